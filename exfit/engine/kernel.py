@@ -1,0 +1,254 @@
+"""Machine code for a system: compiled, kept on disk by content, called from several threads."""
+
+import ctypes
+import hashlib
+import os
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.emit import linearisation, simulation, simulation_with_tangents
+from exfit.engine.system import System, differentiate, trace
+
+Array = NDArray[np.float64]
+
+SIDE_BY_SIDE = 16  # parameter sets: two vectors of 512 bits hide each other's waiting
+DIRECTIONS = 8  # of differentiation in one run
+DIGEST = hashlib.sha256().digest_size
+
+_lock = threading.Lock()
+_alive: list[Any] = []  # code must outlive the functions that point into it
+
+
+class Start(NamedTuple):
+    """A system at rest, for W parameter sets: setpoints r (nr, W) and states x (nx, W)."""
+
+    r: Array
+    x: Array
+
+
+class Span(NamedTuple):
+    """A stretch of a run: inputs u (n + 1, nu) at its grid points, linear between, and the step.
+
+    ``step`` is in seconds; each of the n steps is taken in ``parts`` equal sub-steps.
+    """
+
+    u: Array
+    step: float
+    parts: int
+
+
+def cache_folder() -> Path:
+    """Return where compiled code is kept: EXFIT_CACHE, or the user's cache folder."""
+    chosen = os.environ.get("EXFIT_CACHE")
+    if chosen:
+        return Path(chosen)
+    from platformdirs import user_cache_path
+
+    return user_cache_path("exfit", appauthor=False)
+
+
+@cache
+def _machine() -> tuple[Any, str]:
+    """Return LLVM's idea of this machine, and what distinguishes it from others."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    target = llvm.Target.from_default_triple()
+    machine = target.create_target_machine(
+        cpu=cpu, features=features, opt=3, reloc="pic", codemodel="jitdefault", jit=True
+    )
+    return machine, f"{llvm.llvm_version_info} {target.triple} {cpu} {features}"
+
+
+def _build(ir: str) -> bytes:
+    machine, _ = _machine()
+    parsed = llvm.parse_assembly(ir)
+    options = llvm.PipelineTuningOptions(speed_level=2)
+    llvm.create_pass_builder(machine, options).getModulePassManager().run(
+        parsed, llvm.create_pass_builder(machine, options)
+    )
+    code: bytes = machine.emit_object(parsed)
+    return code
+
+
+def _cached(path: Path) -> bytes | None:
+    """Return the code kept at path; None where there is none, or it is damaged."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    digest, code = content[:DIGEST], content[DIGEST:]
+    return code if hashlib.sha256(code).digest() == digest else None
+
+
+def _keep(path: Path, code: bytes) -> None:
+    """Write code beside its place and rename it; a folder that cannot be written keeps nothing."""
+    beside = path.with_name(f"{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_bytes(hashlib.sha256(code).digest() + code)
+        beside.replace(path)
+    except OSError:
+        return
+
+
+def compiled(ir: str) -> Any:
+    """Return LLVM's engine holding the functions of an IR, built or from the cache."""
+    with _lock:
+        machine, name = _machine()
+        key = hashlib.sha256(f"{name}\n{ir}".encode()).hexdigest()[:32]
+        path = cache_folder() / f"{key}.code"
+        code = _cached(path)
+        if code is None:
+            code = _build(ir)
+            _keep(path, code)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        _alive.append(engine)
+        return engine
+
+
+def _address(array: Array) -> int:
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise TypeError("the kernel takes C-contiguous arrays of float64")
+    return array.ctypes.data
+
+
+def _function(engine: Any, name: str, arrays: int, extra: Sequence[Any] = ()) -> Any:
+    # a call through ctypes releases the interpreter's lock
+    prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arrays, *extra)
+    return prototype(engine.get_function_address(name))
+
+
+RUN_ARGUMENTS = (ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
+
+
+@cache
+def workers() -> ThreadPoolExecutor:
+    """Return the threads that blocks of parameter sets are spread over."""
+    return ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
+
+
+class Kernel:
+    """Simulates ``lanes`` parameter sets side by side."""
+
+    def __init__(self, system: System, outputs: Sequence[str], lanes: int = 1) -> None:
+        self.lanes, self.system, self.outputs = lanes, system, tuple(outputs)
+        engine = compiled(simulation(trace(system, outputs), lanes))
+        self._rest = _function(engine, "rest", 4)
+        self._run = _function(engine, "run", 4, RUN_ARGUMENTS)
+
+    def start(self, p: Array) -> Start:
+        """Return the rest of parameter sets p (np, lanes)."""
+        r = np.empty((len(self.system.setpoints), self.lanes))
+        x = np.empty((len(self.system.states), self.lanes))
+        self._rest(_address(p), _address(r), _address(x), None)
+        return Start(r, x)
+
+    def run(self, p: Array, start: Start, spans: Sequence[Span]) -> list[Array]:
+        """Return the outputs of each span, (n + 1, outputs, lanes); ``start.x`` moves along."""
+        results = []
+        for span in spans:
+            out = np.empty((len(span.u), len(self.outputs), self.lanes))
+            arrays = (p, start.r, start.x, out, span.u)
+            self._run(*map(_address, arrays), span.step / span.parts, len(span.u) - 1, span.parts)
+            results.append(out)
+        return results
+
+
+class TangentKernel:
+    """Simulates one parameter set with its exact derivatives to some of the parameters."""
+
+    def __init__(self, system: System, outputs: Sequence[str], free: Sequence[str]) -> None:
+        self.system, self.outputs, self.free = system, tuple(outputs), tuple(free)
+        traced = trace(system, outputs)
+        derived = differentiate(traced, system, free)
+        engine = compiled(simulation_with_tangents(traced, derived, DIRECTIONS))
+        self._rest = _function(engine, "rest", 8)
+        self._run = _function(engine, "run", 8, RUN_ARGUMENTS)
+
+    @cached_property
+    def seeds(self) -> list[Array]:
+        """The directions, one per free parameter, in blocks (np, DIRECTIONS)."""
+        parameters = self.system.parameters
+        whole = -(-len(self.free) // DIRECTIONS) * DIRECTIONS
+        seeds = np.zeros((len(parameters), whole))
+        for column, name in enumerate(self.free):
+            seeds[parameters.index(name), column] = 1.0
+        return [
+            np.ascontiguousarray(block) for block in np.split(seeds, whole // DIRECTIONS, axis=1)
+        ]
+
+    def run(self, p: Array, spans: Sequence[Span]) -> tuple[list[Array], list[Array]]:
+        """Return, for each span, outputs (n + 1, ny) and their derivatives (n + 1, ny, free).
+
+        ``p`` is (np,); the derivative of the starting state is part of theirs.
+        """
+        blocks = list(workers().map(lambda seed: self._block(p, seed, spans), self.seeds))
+        values = blocks[0][0]
+        slopes = [
+            np.concatenate(parts, axis=2) for parts in zip(*(b[1] for b in blocks), strict=True)
+        ]
+        return values, [slope[:, :, : len(self.free)] for slope in slopes]
+
+    def _block(self, p: Array, dp: Array, spans: Sequence[Span]) -> tuple[list[Array], list[Array]]:
+        shapes = (len(self.system.setpoints), len(self.system.states))
+        r, x = (np.empty(rows) for rows in shapes)
+        dr, dx = (np.empty((rows, DIRECTIONS)) for rows in shapes)
+        starting = (_address(p), _address(r), _address(x), None)
+        self._rest(*starting, _address(dp), _address(dr), _address(dx), None)
+        values, slopes = [], []
+        for span in spans:
+            out = np.empty((len(span.u), len(self.outputs)))
+            dout = np.empty((*out.shape, DIRECTIONS))
+            arrays = (p, r, x, out, dp, dr, dx, dout, span.u)
+            self._run(*map(_address, arrays), span.step / span.parts, len(span.u) - 1, span.parts)
+            values.append(out)
+            slopes.append(dout)
+        return values, slopes
+
+
+class LinearKernel:
+    """Linearises a system: its slopes at given states, and their exact Jacobian."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        traced = trace(system, ())
+        engine = compiled(linearisation(traced, differentiate(traced, system, ()), DIRECTIONS))
+        self._rest = _function(engine, "rest", 8)
+        self._motion = _function(engine, "motion", 9)
+        states = len(system.states)
+        whole = -(-states // DIRECTIONS) * DIRECTIONS
+        self._blocks = np.split(np.eye(states, whole), whole // DIRECTIONS, axis=1)
+
+    def rest(self, p: Array) -> Start:
+        """Return the rest of one parameter set (np,): setpoints (nr,) and states (nx,)."""
+        r, x = np.empty(len(self.system.setpoints)), np.empty(len(self.system.states))
+        still = (np.zeros((rows, DIRECTIONS)) for rows in (len(p), len(r), len(x)))
+        self._rest(_address(p), _address(r), _address(x), None, *map(_address, still), None)
+        return Start(r, x)
+
+    def motion(self, p: Array, r: Array, x: Array, u: Array) -> tuple[Array, Array]:
+        """Return the slopes (nx,) at states x and inputs u, and their Jacobian (nx, nx)."""
+        slopes = np.empty(len(x))
+        columns = []
+        for block in self._blocks:
+            seeds = (
+                np.zeros((len(p), DIRECTIONS)),
+                np.zeros((len(r), DIRECTIONS)),
+                np.ascontiguousarray(block),
+            )
+            column = np.empty((len(x), DIRECTIONS))
+            arrays = (p, r, x, slopes, *seeds, column, u)
+            self._motion(*map(_address, arrays))
+            columns.append(column)
+        return slopes, np.hstack(columns)[:, : len(x)]

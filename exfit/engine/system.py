@@ -1,0 +1,122 @@
+"""What the engine simulates: a closed set of equations, and its trace."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from exfit.engine.trace import Graph, Node, Signal, tangents
+
+Signals = Mapping[str, Signal]
+
+
+class Rest(NamedTuple):
+    """Where a run starts: the states at rest, and the setpoints that keep them there."""
+
+    states: Signals
+    setpoints: Signals
+
+
+class Motion(NamedTuple):
+    """What the equations say at one instant; ``limits`` holds (low, high) of non-windup states."""
+
+    slopes: Signals
+    limits: Mapping[str, tuple[Signal, Signal]]
+    outputs: Signals
+
+
+@dataclass(frozen=True)
+class System:
+    """Equations with the names of all that enters and leaves them.
+
+    ``rest(p)`` starts a run; ``motion(p, r, x, u)`` gives it its course, from parameters,
+    setpoints, states and inputs by name.
+    """
+
+    parameters: tuple[str, ...]
+    setpoints: tuple[str, ...]
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    time_constants: tuple[str, ...]  # the parameters in seconds
+    rest: Callable[[Signals], Rest]
+    motion: Callable[[Signals, Signals, Signals, Signals], Motion]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """The graph of a system: its symbols, and what is computed from them."""
+
+    p: tuple[Node, ...]
+    r: tuple[Node, ...]
+    x: tuple[Node, ...]
+    u: tuple[Node, ...]
+    rest: tuple[Node, ...]  # states, then setpoints
+    slopes: tuple[Node, ...]
+    outputs: tuple[Node, ...]
+    clamped: tuple[Node, ...]  # the states after a step, back within their limits
+
+
+@dataclass(frozen=True)
+class Tangents:
+    """The derivatives of a trace in several directions at once."""
+
+    p: tuple[Node | None, ...]  # the tangent of each parameter; None where it is not free
+    r: tuple[Node, ...]
+    x: tuple[Node, ...]
+    rest: tuple[Node, ...]
+    slopes: tuple[Node, ...]
+    outputs: tuple[Node, ...]
+    clamped: tuple[Node, ...]
+
+
+def trace(system: System, outputs: Sequence[str]) -> Trace:
+    """Run the equations of a system once on symbols; ``outputs`` are those wanted of it."""
+    graph = Graph()
+    p = {name: graph.symbol(f"p.{name}", varies=False) for name in system.parameters}
+    r = {name: graph.symbol(f"r.{name}", varies=False) for name in system.setpoints}
+    x = {name: graph.symbol(f"x.{name}", varies=True) for name in system.states}
+    u = {name: graph.symbol(f"u.{name}", varies=True) for name in system.inputs}
+    start = system.rest(p)
+    motion = system.motion(p, r, x, u)
+    clamped = [
+        graph.apply("clip", x[name], *motion.limits[name]) if name in motion.limits else x[name]
+        for name in system.states
+    ]
+    return Trace(
+        p=tuple(p.values()),
+        r=tuple(r.values()),
+        x=tuple(x.values()),
+        u=tuple(u.values()),
+        rest=(
+            *(graph.lift(start.states[name]) for name in system.states),
+            *(graph.lift(start.setpoints[name]) for name in system.setpoints),
+        ),
+        slopes=tuple(graph.lift(motion.slopes[name]) for name in system.states),
+        outputs=tuple(graph.lift(motion.outputs[name]) for name in outputs),
+        clamped=tuple(clamped),
+    )
+
+
+def differentiate(traced: Trace, system: System, free: Sequence[str]) -> Tangents:
+    """Return the derivatives of a trace with respect to the free parameters."""
+    graph = traced.x[0].graph
+
+    def symbols(nodes: Sequence[Node], varies: bool) -> tuple[Node, ...]:
+        return tuple(graph.symbol(f"d{n.args[0]}", varies=varies, wide=True) for n in nodes)
+
+    p = tuple(
+        graph.symbol(f"dp.{name}", varies=False, wide=True) if name in free else None
+        for name in system.parameters
+    )
+    r, x = symbols(traced.r, False), symbols(traced.x, True)
+    seeds = {node: dp for node, dp in zip(traced.p, p, strict=True) if dp is not None}
+    moving = {**seeds, **dict(zip(traced.r, r, strict=True)), **dict(zip(traced.x, x, strict=True))}
+    return Tangents(
+        p=p,
+        r=r,
+        x=x,
+        rest=tuple(tangents(traced.rest, seeds)),
+        slopes=tuple(tangents(traced.slopes, moving)),
+        outputs=tuple(tangents(traced.outputs, moving)),
+        clamped=tuple(tangents(traced.clamped, moving)),
+    )

@@ -1,0 +1,27 @@
+"""What can be wrong with a user's input; anything else that fails is our own mistake."""
+
+from collections.abc import Iterable
+
+
+class ExfitError(Exception):
+    """Input that cannot be used; the message names the place, the value and the limit."""
+
+
+class CaseError(ExfitError):
+    """Faults of a case file, all of them together."""
+
+    def __init__(self, faults: Iterable[str]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(self.faults))
+
+
+class RecordError(ExfitError):
+    """A record that cannot be read or does not fit its case."""
+
+
+class ModelError(ExfitError):
+    """A model that does not exist or is not one."""
+
+
+class SimulationError(ExfitError):
+    """A simulation that cannot start or cannot be kept stable."""

@@ -1,0 +1,51 @@
+"""The catalogue of exciter models, by the names that IEEE 421.5 and PSS/E give them."""
+
+import difflib
+from pathlib import Path
+
+from exfit.errors import ModelError
+from exfit.models import ac1a, ac8b, first_order
+from exfit.models.sheet import Model, model
+
+MODELS: dict[str, Model] = {
+    name: model(name, vars(module))
+    for name, module in (
+        ("AC1A", ac1a),
+        ("AC8B", ac8b),
+        ("FIRST_ORDER", first_order),
+    )
+}
+
+
+def find(name: str, folder: Path) -> Model:
+    """Return the model of a catalogue name, an alias, or a .py file relative to ``folder``.
+
+    Raises ModelError where there is none.
+    """
+    if name.endswith(".py"):
+        return from_file(folder / name)
+    for found in MODELS.values():
+        if name.upper() in (found.name, *found.aliases):
+            return found
+    names = [known for found in MODELS.values() for known in (found.name, *found.aliases)]
+    near = difflib.get_close_matches(name.upper(), names, n=1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    raise ModelError(f"{name} is not in the catalogue ({', '.join(names)}){hint}")
+
+
+def from_file(path: Path) -> Model:
+    """Return the model of a user's own file, named after it.
+
+    Raises ModelError where the file cannot be read, fails as Python, or defines no model.
+    """
+    from importlib.util import module_from_spec, spec_from_file_location
+
+    spec = spec_from_file_location(f"exfit_user_{path.stem}", path)
+    if not path.is_file() or spec is None or spec.loader is None:
+        raise ModelError(f"{path}: no such file")
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as fault:
+        raise ModelError(f"{path}: {type(fault).__name__}: {fault}") from fault
+    return model(path.stem.upper(), vars(module))

@@ -1,0 +1,74 @@
+"""AC1A: alternator exciter, uncontrolled rectifiers, rate feedback (IEEE Std 421.5-2005, 6.1).
+
+                                       VAMAX      VRMAX             0 ≤ VE
+    vref + vs ─►(Σ)─►[1 + sTC]─►[   KA  ]──►[clip]─►(Σ)─►[  1  ]──┬── VE ──►(×)──► efd
+              -▲ ▲-  [1 + sTB]  [1 + sTA]     │     -▲   [ sTE ]  │          ▲
+    vt ─►[  1  ]│ │               VAMIN     VRMIN    │            │         FEX
+         [1+sTR]┘ └──[  sKF  ]◄──────────────────────┤ VFE        │          ▲
+                     [1 + sTF]                       │            │          │
+                                         VFE = KE VE + VX(VE) + KD IFD    KC IFD / VE
+
+The limits of the lag are non-windup, the clamp behind it is not: VA may stand beyond VRMAX.
+Not modelled: the gates of the under- and overexcitation limiters.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    field_demand,
+    lag,
+    lead_lag,
+    limited_integrator,
+    limited_lag,
+    rectifier,
+    rectifier_supply,
+    washout,
+)
+from exfit.models.sheet import sheet
+
+ALIASES = ("ESAC1A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
+    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant"),
+    ("VAMAX", 14.5, "pu", (0.0, 9999.0), "regulator ceiling"),
+    ("VAMIN", -14.5, "pu", (-9999.0, 0.0), "regulator floor"),
+    ("VRMAX", 6.03, "pu", (0.0, 9999.0), "ceiling of the exciter's field voltage"),
+    ("VRMIN", -5.43, "pu", (-9999.0, 0.0), "floor of the exciter's field voltage"),
+    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("KC", 0.2, "pu", (0.0, 5.0), "rectifier loading factor"),
+    ("KD", 0.38, "pu", (0.0, 10.0), "demagnetising factor"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("E1", 4.18, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.10, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 3.14, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+STATES = "VC VL VA VE VF"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vc, d.VC = lag(u.vt, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    vr = clip(va, p.VRMIN, p.VRMAX)
+    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    vfe = field_demand(ve, u.ifd, p)
+    error = vfe / p.KA
+    x.VC, x.VL, x.VA, x.VE, x.VF = u.vt, error, vfe, ve, vfe
+    return u.vt + error - u.vs

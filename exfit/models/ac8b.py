@@ -1,0 +1,75 @@
+"""AC8B: alternator exciter, uncontrolled rectifiers, PID regulator (IEEE Std 421.5-2005, 6.8).
+
+                                     VPIDMAX     VRMAX           VE ≤ VEMAX: VFE = VFEMAX
+    vref + vs ──►(Σ)──►[KPR + KIR/s + ]─►[   KA  ]─►(Σ)─►[  1  ]──┬── VE ──►(×)──► efd
+                 -▲    [sKDR/(1+sTDR) ]  [1 + sTA]  -▲   [ sTE ]  │          ▲
+    vt ──►[  1  ]─┘                  VPIDMIN     VRMIN   VEMIN    │         FEX
+          [1+sTR]                                    │            │          ▲
+                                         VFE = KE VE + VX(VE) + KD IFD    KC IFD / VE
+
+The limits of the lag and of VE are non-windup; the integral is frozen while the PID is at its
+limit. Not modelled: the gates of the under- and overexcitation limiters. ESAC8B of PSS/E is
+another model.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    field_ceiling,
+    field_demand,
+    lag,
+    limited_integrator,
+    limited_lag,
+    pid,
+    rectifier,
+    rectifier_supply,
+    where,
+)
+from exfit.models.sheet import sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KPR", 80.0, "pu", (0.0, 100000.0), "proportional gain"),
+    ("KIR", 5.0, "pu/s", (0.0, 100000.0), "integral gain"),
+    ("KDR", 10.0, "pu s", (0.0, 100000.0), "derivative gain"),
+    ("TDR", 0.1, "s", (0.001, 10.0), "lag of the derivative"),
+    ("VPIDMAX", 999.0, "pu", (0.0, 9999.0), "ceiling of the PID"),
+    ("VPIDMIN", -999.0, "pu", (-9999.0, 0.0), "floor of the PID"),
+    ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
+    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 35.0, "pu", (0.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", 0.0, "pu", (-9999.0, 0.0), "regulator floor"),
+    ("TE", 1.2, "s", (0.01, 100.0), "exciter time constant"),
+    ("VFEMAX", 6.0, "pu", (0.0, 9999.0), "ceiling of the exciter's field current"),
+    ("VEMIN", 0.0, "pu", (-9999.0, 100.0), "floor of the exciter voltage"),
+    ("KC", 0.55, "pu", (0.0, 5.0), "rectifier loading factor"),
+    ("KD", 1.1, "pu", (0.0, 10.0), "demagnetising factor"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("E1", 9.0, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 3.0, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 6.5, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.3, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+STATES = "VC VI VD VR VE"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vemax = field_ceiling(s.VE, vfe, p)
+    vc, d.VC = lag(u.vt, s.VC, 1.0, p.TR)
+    error = u.vref + u.vs - vc
+    vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
+    vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, p.VEMIN, vemax)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    vfe = field_demand(ve, u.ifd, p)
+    integrates = p.KIR > 0.0
+    error = where(integrates, 0.0, vfe / (p.KA * where(integrates, 1.0, p.KPR)))
+    x.VC, x.VI, x.VD, x.VR, x.VE = u.vt, where(integrates, vfe / p.KA, 0.0), error, vfe, ve
+    return u.vt + error - u.vs

@@ -1,0 +1,198 @@
+"""The blocks of IEEE Std 421.5, and what the families of exciters share.
+
+A block with one state x reads ``y, d.X = block(u, x, ...)``: its output and the slope of its state.
+A time constant below ``SHORTEST`` bypasses a block: it leaves the gain, and a state that stays put.
+A block with a non-windup limit returns its slope as ``Limited``: held at the limit, and the state
+put back on it after every step, so that a response has no jags where a step ends beyond the limit.
+"""
+
+from math import inf
+from math import sqrt as root
+from typing import NamedTuple
+
+from exfit.engine.trace import Signal, clip, exp, larger, log, smaller, sqrt, where
+
+__all__ = [
+    "SHORTEST",
+    "Limited",
+    "Saturation",
+    "clip",
+    "exp",
+    "exponential",
+    "exponential_se",
+    "field_ceiling",
+    "field_demand",
+    "inf",
+    "integrator",
+    "lag",
+    "larger",
+    "lead_lag",
+    "limited",
+    "limited_integrator",
+    "limited_lag",
+    "log",
+    "pid",
+    "quadratic",
+    "rate",
+    "rectifier",
+    "rectifier_supply",
+    "smaller",
+    "sqrt",
+    "washout",
+    "where",
+]
+
+SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
+SQRT3 = root(3.0)
+
+
+class Limited(NamedTuple):
+    """The slope of a state that stops at its limits."""
+
+    slope: Signal
+    low: Signal
+    high: Signal
+
+
+def rate(T: Signal) -> Signal:
+    """Return 1 / T, zero for a bypassed block."""
+    return where(T < SHORTEST, 0.0, 1.0 / where(T < SHORTEST, 1.0, T))
+
+
+def lag(u: Signal, x: Signal, K: Signal, T: Signal) -> tuple[Signal, Signal]:
+    """K / (1 + sT)."""
+    return where(T < SHORTEST, K * u, x), (K * u - x) * rate(T)
+
+
+def lead_lag(u: Signal, x: Signal, TC: Signal, TB: Signal) -> tuple[Signal, Signal]:
+    """(1 + sTC) / (1 + sTB); the state is u seen through the lag TB."""
+    slope = (u - x) * rate(TB)
+    return where(TB < SHORTEST, u, x + TC * slope), slope
+
+
+def washout(u: Signal, x: Signal, K: Signal, T: Signal) -> tuple[Signal, Signal]:
+    """sK / (1 + sT); the state is u seen through the lag T, so at rest x = u."""
+    slope = (u - x) * rate(T)
+    return K * slope, slope
+
+
+def integrator(u: Signal, x: Signal, T: Signal = 1.0) -> tuple[Signal, Signal]:
+    """1 / sT; T is never zero."""
+    return x, u / T
+
+
+def limited(slope: Signal, x: Signal, low: Signal, high: Signal) -> Limited:
+    """Hold a slope while it would push x beyond a limit that it has reached."""
+    outward = ((x >= high) & (slope > 0.0)) | ((x <= low) & (slope < 0.0))
+    return Limited(where(outward, 0.0, slope), low, high)
+
+
+def limited_lag(
+    u: Signal, x: Signal, K: Signal, T: Signal, low: Signal, high: Signal
+) -> tuple[Signal, Limited]:
+    """K / (1 + sT) with a non-windup limit."""
+    y = clip(where(T < SHORTEST, K * u, x), low, high)
+    return y, limited((K * u - x) * rate(T), x, low, high)
+
+
+def limited_integrator(
+    u: Signal, x: Signal, T: Signal, low: Signal = -inf, high: Signal = inf
+) -> tuple[Signal, Limited]:
+    """1 / sT with a non-windup limit; T is never zero."""
+    return clip(x, low, high), limited(u / T, x, low, high)
+
+
+def pid(
+    u: Signal,
+    integral: Signal,
+    derivative: Signal,
+    KP: Signal,
+    KI: Signal,
+    KD: Signal,
+    TD: Signal,
+    low: Signal = -inf,
+    high: Signal = inf,
+) -> tuple[Signal, Signal, Signal]:
+    """KP + KI / s + sKD / (1 + sTD), limited; return the output and the slopes of both states.
+
+    The integral is frozen while it would push the output further beyond its limit.
+    """
+    steep, washed = washout(u, derivative, KD, TD)
+    y = KP * u + integral + steep
+    slope = KI * u
+    outward = ((y >= high) & (slope > 0.0)) | ((y <= low) & (slope < 0.0))
+    return clip(y, low, high), where(outward, 0.0, slope), washed
+
+
+def rectifier(ve: Signal, load: Signal) -> Signal:
+    """Return VE FEX(IN), the voltage behind a rectifier that is loaded with IN = load / VE.
+
+    IEEE Std 421.5-2005, annex D, multiplied out: there is nothing to divide by at VE = 0. The exact
+    constants 1/sqrt(3), sqrt(3)/4 and sqrt(3) make the arcs meet; with the printed 0.577, 0.433 and
+    1.732 they miss each other by 1.6e-4, which a derivative sees.
+    """
+    sloping = where(
+        load < 0.75 * ve, sqrt(0.75 * ve * ve - load * load), larger(SQRT3 * (ve - load), 0.0)
+    )
+    loaded = where(load <= SQRT3 / 4.0 * ve, ve - load / SQRT3, sloping)
+    return where(load <= 0.0, ve, loaded)
+
+
+def rectifier_supply(efd: Signal, load: Signal) -> Signal:
+    """Return the VE that gives ``efd = rectifier(VE, load)``, arc by arc in closed form."""
+    first = efd + load / SQRT3
+    second = sqrt((efd * efd + load * load) / 0.75)
+    loaded = where(
+        load <= SQRT3 / 4.0 * first, first, where(load < 0.75 * second, second, efd / SQRT3 + load)
+    )
+    return where(load <= 0.0, efd, loaded)
+
+
+class Saturation(NamedTuple):
+    """VX = E SE(E) of an exciter or a machine, and its slope dVX/dE."""
+
+    vx: Signal
+    slope: Signal
+
+
+def quadratic(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Saturation:
+    """VX = B (E - A)^2 through two points, zero below the knee A (as in PSS/E).
+
+    The points may come in either order; both SE zero is a machine without saturation.
+    """
+    swapped = E1 > E2
+    low, high = where(swapped, E2, E1), where(swapped, E1, E2)
+    vx_low, vx_high = where(swapped, E2 * SE2, E1 * SE1), where(swapped, E1 * SE1, E2 * SE2)
+    ratio = sqrt(vx_low / where(vx_high > 0.0, vx_high, 1.0))
+    knee = (low - ratio * high) / (1.0 - ratio)
+    gain = vx_high / ((high - knee) * (high - knee))
+    above = larger(e - knee, 0.0)
+    return Saturation(gain * above * above, 2.0 * gain * above)
+
+
+def exponential(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Saturation:
+    """VX = A exp(B E) through two points; note that it is not zero at E = 0."""
+    B = log((E2 * SE2) / (E1 * SE1)) / (E2 - E1)
+    vx = E1 * SE1 * exp(B * (e - E1))
+    return Saturation(vx, B * vx)
+
+
+def exponential_se(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Saturation:
+    """VX = E SE with SE = A exp(B E) through two points."""
+    B = log(SE2 / SE1) / (E2 - E1)
+    se = SE1 * exp(B * (e - E1))
+    return Saturation(e * se, se * (1.0 + B * e))
+
+
+def field_demand(ve: Signal, ifd: Signal, p: Signal) -> Signal:
+    """Return VFE, the field signal that holds an alternator at VE while its rectifier gives IFD."""
+    return p.KE * ve + p.saturation(ve).vx + p.KD * ifd
+
+
+def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
+    """Return the VE at which VFE reaches VFEMAX, seen from a VE that stands near it.
+
+    The standard writes (VFEMAX - KD IFD) / (KE + SE(VE)); both are VE exactly where VFE = VFEMAX.
+    This one is a Newton step, so that a state put back on it does not hunt around the limit.
+    """
+    return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)

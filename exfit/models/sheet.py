@@ -1,0 +1,102 @@
+"""A model as data: its data sheet, its states and its functions."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from exfit.errors import ModelError
+
+
+class Parameter(NamedTuple):
+    """One row of a data sheet; ``low`` and ``high`` bound every value it may take."""
+
+    symbol: str
+    typical: float
+    unit: str
+    low: float
+    high: float
+    meaning: str
+
+
+Sheet = tuple[Parameter, ...]
+Row = tuple[str, float, str, tuple[float, float], str]
+
+
+def sheet(*rows: Row) -> Sheet:
+    """Return the data sheet of rows (symbol, typical value, unit, (low, high), meaning)."""
+    return tuple(
+        Parameter(symbol, typical, unit, *limits, meaning)
+        for symbol, typical, unit, limits, meaning in rows
+    )
+
+
+@dataclass(frozen=True)
+class Model:
+    """An exciter: what stands in its file, under one name.
+
+    ``equations(s, u, p, d)`` takes states, inputs and parameters, writes the slopes into ``d`` and
+    returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
+    ``x`` and returns the reference that does so.
+    """
+
+    name: str
+    title: str
+    drawing: str
+    aliases: tuple[str, ...]
+    sheet: Sheet
+    states: tuple[str, ...]
+    equations: Callable[..., Any]
+    rest: Callable[..., Any]
+
+
+def model(name: str, parts: Mapping[str, Any]) -> Model:
+    """Return the model that a file's names define.
+
+    Raises ModelError where one is missing: a docstring ``NAME: title``, then the drawing, and
+    SHEET, STATES, equations and rest.
+    """
+    missing = [
+        part for part in ("__doc__", "SHEET", "STATES", "equations", "rest") if not parts.get(part)
+    ]
+    if missing:
+        raise ModelError(f"model {name}: its file lacks {', '.join(missing)}")
+    title, _, drawing = str(parts["__doc__"]).partition("\n")
+    return Model(
+        name=name,
+        title=title.partition(": ")[2].rstrip("."),
+        drawing=drawing.strip("\n"),
+        aliases=tuple(parts.get("ALIASES", ())),
+        sheet=tuple(parts["SHEET"]),
+        states=tuple(parts["STATES"].split()),
+        equations=parts["equations"],
+        rest=parts["rest"],
+    )
+
+
+def typical(rows: Sheet) -> dict[str, float]:
+    """Return the typical value of every parameter."""
+    return {row.symbol: row.typical for row in rows}
+
+
+def crossed_limits(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, fault) for each lower limit ``...MIN`` that is not below its ``...MAX``."""
+    for symbol, low in values.items():
+        partner = symbol.removesuffix("MIN") + "MAX"
+        if symbol.endswith("MIN") and partner in values and low >= values[partner]:
+            yield symbol, f"{low:g} is not below {partner} = {values[partner]:g}"
+
+
+def saturation_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, fault) where two saturation points contradict each other.
+
+    Saturation grows with the voltage: SE at the higher of E1, E2 is the larger, or both are zero.
+    """
+    if not {"E1", "SE1", "E2", "SE2"} <= values.keys():
+        return
+    (low, se_low, _), (high, se_high, name) = sorted(
+        [(values["E1"], values["SE1"], "SE1"), (values["E2"], values["SE2"], "SE2")]
+    )
+    if low == high:
+        yield "E1", f"{low:g} equals E2: two points are needed"
+    elif se_high <= se_low and (se_low, se_high) != (0.0, 0.0):
+        yield name, f"{se_high:g} at {high:g} pu is not above {se_low:g} at {low:g} pu"

@@ -1,0 +1,297 @@
+"""From parameter values to a response: the start at rest, the grid, the sub-steps, the samples."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, LinearKernel, Span, Start, TangentKernel
+from exfit.engine.system import System, trace
+from exfit.engine.trace import Node, evaluate, in_order
+from exfit.errors import SimulationError
+from exfit.models.blocks import SHORTEST
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
+REST_TOLERANCE = (
+    1e-6  # pu/s: above the rounding of a gain over a time constant, below any real motion
+)
+ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
+NEIGHBOURS = (
+    4  # grid points of the interpolation, whose error is then of the order of Runge-Kutta's
+)
+
+
+class Change(NamedTuple):
+    """A step of the reference: when (s) and by how much (pu)."""
+
+    at: float
+    step: float
+
+
+@dataclass(frozen=True)
+class Course:
+    """A test from ``start`` to ``end`` (s) with the steps of the reference in it."""
+
+    start: float
+    end: float
+    steps: tuple[Change, ...]
+
+    def without_steps(self) -> "Course":
+        """Return the same stretch of time at rest."""
+        return Course(self.start, self.end, ())
+
+
+@dataclass(frozen=True)
+class Response:
+    """Simulated signals on one clock: ``time`` (M,) in s, each signal (M,) per unit."""
+
+    time: Array
+    signals: Mapping[str, Array]
+    substeps: int
+
+
+class Stretch(NamedTuple):
+    """Equal steps between two changes of the reference; ``vref`` is its sum of steps so far."""
+
+    start: float
+    step: float
+    steps: int
+    vref: float
+
+
+def stretches(course: Course, step: float) -> list[Stretch]:
+    """Divide a course at its changes, so that they fall on the grid, into steps of ``step``."""
+    inside = [change for change in course.steps if course.start < change.at < course.end]
+    edges = [course.start, *(change.at for change in inside), course.end]
+    level = sum(change.step for change in course.steps if change.at <= course.start)
+    levels = np.cumsum([level, *(change.step for change in inside)])
+    result = []
+    for start, end, vref in zip(edges[:-1], edges[1:], levels, strict=True):
+        count = max(1, math.ceil((end - start) / step - ON_GRID))
+        result.append(Stretch(start, (end - start) / count, count, float(vref)))
+    return result
+
+
+class Sampling:
+    """Reads a run, whose stretches lie one behind the other, at given times.
+
+    Between grid points it interpolates with a cubic that never reaches across a step of the
+    reference; at the instant of a step it gives the values before the step.
+    """
+
+    def __init__(self, grid: Sequence[Stretch], times: Array) -> None:
+        rows = np.zeros((len(times), NEIGHBOURS), dtype=np.int64)
+        weights = np.zeros((len(times), NEIGHBOURS))
+        ends = np.array([part.start + part.step * part.steps for part in grid])
+        owner = np.minimum(np.searchsorted(ends, times - ON_GRID * grid[0].step), len(grid) - 1)
+        offset = 0
+        for number, part in enumerate(grid):
+            mine = owner == number
+            near, weight = self._cubic((times[mine] - part.start) / part.step, part.steps)
+            rows[mine, : near.shape[1]] = near + offset
+            weights[mine, : near.shape[1]] = weight
+            offset += part.steps + 1
+        self._rows, self._weights = rows, weights
+        self._exact = bool(np.all(weights[:, 0] == 1.0))
+
+    @staticmethod
+    def _cubic(position: Array, count: int) -> tuple[NDArray[np.int64], Array]:
+        """Return neighbours and Lagrange weights, a row per position on a grid of ``count``
+        steps."""
+        points = min(NEIGHBOURS, count + 1)
+        first = np.clip(np.floor(position).astype(np.int64) - 1, 0, count + 1 - points)
+        near = first[:, None] + np.arange(points)
+        weights = np.ones(near.shape)
+        for one in range(points):
+            for other in range(points):
+                if one != other:
+                    weights[:, one] *= (position - near[:, other]) / (one - other)
+        nearest = np.clip(np.rint(position), 0, count).astype(np.int64)
+        on_grid = np.abs(position - nearest) < ON_GRID
+        near[on_grid], weights[on_grid] = nearest[on_grid, None], np.arange(points) == 0
+        return near, weights
+
+    def __call__(self, run: Sequence[Array]) -> Array:
+        """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
+        rows = np.concatenate(run) if len(run) > 1 else run[0]
+        if self._exact:
+            return np.asarray(rows[self._rows[:, 0]])
+        return np.asarray(np.einsum("mk,mk...->m...", self._weights, rows[self._rows]))
+
+
+@cache
+def kernel(system: System, outputs: tuple[str, ...], lanes: int) -> Kernel:
+    """Return the machine code that simulates a system."""
+    return Kernel(system, outputs, lanes)
+
+
+@cache
+def tangent_kernel(
+    system: System, outputs: tuple[str, ...], free: tuple[str, ...]
+) -> TangentKernel:
+    """Return the machine code that simulates a system with its derivatives."""
+    return TangentKernel(system, outputs, free)
+
+
+@cache
+def linear_kernel(system: System) -> LinearKernel:
+    """Return the machine code that linearises a system."""
+    return LinearKernel(system)
+
+
+@cache
+def parameters_used(system: System) -> frozenset[str]:
+    """Return the parameters that a response of the system can depend on."""
+    traced = trace(system, system.outputs)
+    targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
+    reached = {node.index for node in in_order(targets)}
+    pairs = zip(system.parameters, traced.p, strict=True)
+    return frozenset(name for name, node in pairs if node.index in reached)
+
+
+class Simulator:
+    """Simulates one system through one course, sampled at ``times`` (M,) in s.
+
+    ``step`` (s) is the largest step; where the system is faster, every step is divided.
+    """
+
+    def __init__(self, system: System, course: Course, times: Array, step: float) -> None:
+        self.system, self.course, self.times, self.step = system, course, times, step
+        self._grid = stretches(course, step)
+        self._inputs = [np.full((part.steps + 1, 1), part.vref) for part in self._grid]
+        self._sampling = Sampling(self._grid, times)
+
+    @cached_property
+    def time_constants(self) -> tuple[str, ...]:
+        """The parameters in seconds that matter to the response."""
+        used = parameters_used(self.system)
+        return tuple(name for name in self.system.time_constants if name in used)
+
+    def substeps(self, values: Values) -> int:
+        """Return into how many parts each step is divided for these values.
+
+        The rule is ceil(step * fastest rate), where the rate is the largest of the spectral radius
+        of the slopes' Jacobian at rest and 1/T of every time constant that is not bypassed:
+        Runge-Kutta of order four is unstable beyond 2.785, and a limit would hide it. It depends
+        on the values alone, and a change of one sub-step moves a response by less than the
+        method's own error. Raises SimulationError where the start is beyond a limit, or beyond
+        ``MOST_SUBSTEPS``.
+        """
+        p = self._vector(values)
+        rest = linear_kernel(self.system).rest(p)
+        slopes, rate = self._motion(p, rest, rest.x, np.zeros(len(self.system.inputs)))
+        if not np.max(np.abs(slopes)) <= REST_TOLERANCE * max(1.0, float(np.max(np.abs(rest.x)))):
+            raise SimulationError("no state of rest: " + self._limits_passed(values))
+        return self._parts(values, rate)
+
+    def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
+        """Return the sub-steps that the rule asks for along a response with all its states."""
+        p = self._vector(values)
+        rest = linear_kernel(self.system).rest(p)
+        rate = 0.0
+        for row in np.linspace(0, len(response.time) - 1, points).astype(int):
+            x = np.array([response.signals[name][row] for name in self.system.states])
+            u = np.array([response.signals["vref"][row]]) - rest.r
+            rate = max(rate, self._motion(p, rest, x, u)[1])
+        return self._parts(values, rate)
+
+    def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
+        """Return the outputs (all of the system's by default) at the sample times."""
+        wanted = self.system.outputs if outputs is None else tuple(outputs)
+        samples, parts = self.samples(values, wanted)
+        return Response(self.times, dict(zip(wanted, samples.T, strict=True)), parts)
+
+    def samples(self, values: Values, outputs: tuple[str, ...]) -> tuple[Array, int]:
+        """Return outputs (M, ny) and the number of sub-steps."""
+        parts = self.substeps(values)
+        code = kernel(self.system, outputs, 1)
+        p = self._vector(values)[:, None]
+        run = code.run(p, code.start(p), self._spans(parts))
+        return self._sampling(run)[:, :, 0], parts
+
+    def samples_of_many(self, sets: Sequence[Values], outputs: tuple[str, ...]) -> Array:
+        """Return outputs (M, ny, sets), all simulated side by side with equal sub-steps."""
+        parts = max(self.substeps(values) for values in sets)
+        code = kernel(self.system, outputs, SIDE_BY_SIDE)
+        whole = -(-len(sets) // SIDE_BY_SIDE) * SIDE_BY_SIDE
+        padded = [*sets, *[sets[-1]] * (whole - len(sets))]
+        blocks = []
+        for first in range(0, whole, SIDE_BY_SIDE):
+            block = padded[first : first + SIDE_BY_SIDE]
+            p = np.ascontiguousarray(np.stack([self._vector(values) for values in block], axis=1))
+            blocks.append(self._sampling(code.run(p, code.start(p), self._spans(parts))))
+        return np.concatenate(blocks, axis=2)[:, :, : len(sets)]
+
+    def tangents(
+        self, values: Values, outputs: tuple[str, ...], free: tuple[str, ...]
+    ) -> tuple[Array, Array]:
+        """Return outputs (M, ny) and their exact derivatives (M, ny, free)."""
+        code = tangent_kernel(self.system, outputs, free)
+        run, slopes = code.run(self._vector(values), self._spans(self.substeps(values)))
+        return self._sampling(run), self._sampling(slopes)
+
+    def _vector(self, values: Values) -> Array:
+        return np.array([values[name] for name in self.system.parameters], dtype=np.float64)
+
+    def _spans(self, parts: int) -> list[Span]:
+        return [Span(u, part.step, parts) for u, part in zip(self._inputs, self._grid, strict=True)]
+
+    def _motion(self, p: Array, rest: Start, x: Array, u: Array) -> tuple[Array, float]:
+        """Return the slopes at states x and the spectral radius (1/s) of their Jacobian."""
+        slopes, jacobian = linear_kernel(self.system).motion(p, rest.r, x, u)
+        if not np.all(np.isfinite(jacobian)):
+            return np.full(len(x), np.nan), np.inf
+        return slopes, float(np.max(np.abs(np.linalg.eigvals(jacobian))))
+
+    def _parts(self, values: Values, radius: float) -> int:
+        lags = {name: values[name] for name in self.time_constants if values[name] >= SHORTEST}
+        shortest = min(lags, key=lambda name: lags[name], default=None)
+        rate = max(radius, 1.0 / lags[shortest] if shortest else 0.0)
+        if not math.isfinite(rate):
+            raise SimulationError("the response does not stay finite")
+        parts = max(1, math.ceil(self.step * rate - ON_GRID))
+        if parts > MOST_SUBSTEPS:
+            smallest = (
+                f"; the smallest time constant is {shortest} = {lags[shortest]:g} s"
+                if shortest
+                else ""
+            )
+            raise SimulationError(
+                f"simulation.step: {self.step:g} s would need {parts} sub-steps "
+                f"(limit {MOST_SUBSTEPS}) for a rate of {rate:.4g} 1/s{smallest}"
+            )
+        return parts
+
+    def _limits_passed(self, values: Values) -> str:
+        """Name the limits that the start would have to pass, with both values."""
+        traced = trace(self.system, self.system.outputs)
+        rest = evaluate(traced.rest, {node: values[node.args[0][2:]] for node in traced.p})
+        at_rest = dict(
+            zip((*traced.x, *traced.r), (rest[node] for node in traced.rest), strict=True)
+        )
+        known = {**rest, **at_rest, **dict.fromkeys(traced.u, 0.0)}
+        everything = evaluate([*traced.slopes, *traced.outputs, *traced.clamped], known)
+        found = []
+        for node in [node for node in everything if node.op == "clip"]:
+            x, low, high = (everything[operand] for operand in node.operands)
+            for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
+                name = _limit_name(node.operands[limit])
+                if passed and name:
+                    found.append(
+                        f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
+                    )
+        return "; ".join(dict.fromkeys(found)) or "the values do not define one"
+
+
+def _limit_name(node: Node) -> str:
+    """Return the parameter that gives a limit: of all it is computed from, the one named so."""
+    names = [str(n.args[0])[2:] for n in in_order([node]) if n.op == "symbol" and not n.varies]
+    limits = [name for name in names if "MAX" in name or "MIN" in name]
+    return ", ".join(limits or names)
