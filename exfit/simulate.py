@@ -18,6 +18,7 @@ from exfit.models.blocks import SHORTEST
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
+MOST_STEPS = 1e8  # a day at 1 ms
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
 REST_TOLERANCE = (
     1e-6  # pu/s: above the rounding of a gain over a time constant, below any real motion
@@ -68,6 +69,11 @@ class Stretch(NamedTuple):
 
 def stretches(course: Course, step: float) -> list[Stretch]:
     """Divide a course at its changes, so that they fall on the grid, into steps of ``step``."""
+    if (course.end - course.start) / step > MOST_STEPS:
+        raise SimulationError(
+            f"simulation.step: {step:g} s divides {course.end - course.start:g} s into more than "
+            f"{MOST_STEPS:.0e} steps"
+        )
     inside = [change for change in course.steps if course.start < change.at < course.end]
     edges = [course.start, *(change.at for change in inside), course.end]
     level = sum(change.step for change in course.steps if change.at <= course.start)

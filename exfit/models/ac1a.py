@@ -1,15 +1,14 @@
-"""AC1A: alternator exciter, uncontrolled rectifiers, rate feedback (IEEE Std 421.5-2005, 6.1).
+"""AC1A: alternator exciter with rate feedback (IEEE Std 421.5-2005, 6.1).
 
-                                       VAMAX      VRMAX             0 ≤ VE
-    vref + vs ─►(Σ)─►[1 + sTC]─►[   KA  ]──►[clip]─►(Σ)─►[  1  ]──┬── VE ──►(×)──► efd
-              -▲ ▲-  [1 + sTB]  [1 + sTA]     │     -▲   [ sTE ]  │          ▲
-    vt ─►[  1  ]│ │               VAMIN     VRMIN    │            │         FEX
-         [1+sTR]┘ └──[  sKF  ]◄──────────────────────┤ VFE        │          ▲
-                     [1 + sTF]                       │            │          │
-                                         VFE = KE VE + VX(VE) + KD IFD    KC IFD / VE
+                             VAMAX   VRMAX         VE >= 0
+vref + vs ──►(+)─►[1 + sTC]─►[  KA  ]─►[clip]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
+           -▲   ▲-[1 + sTB]  [1+sTA]          -▲    [ sTE ] │        ▲
+            │   │            VAMIN   VRMIN     │            │       FEX
+vt ─►[  1  ]┘   │  [  sKF  ]                   │            │        ▲
+     [1+sTR]    └──[1 + sTF]◄──────────────────┴─── VFE ◄───┘   KC IFD / VE
 
-The limits of the lag are non-windup, the clamp behind it is not: VA may stand beyond VRMAX.
-Not modelled: the gates of the under- and overexcitation limiters.
+VFE = KE VE + VX(VE) + KD IFD. The limits of the lag are non-windup; the clamp
+behind it is not: VA may stand beyond VRMAX. Not modelled: the UEL and OEL gates.
 """
 
 from exfit.engine.trace import Signal
@@ -41,8 +40,8 @@ SHEET = sheet(
     ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant"),
     ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain"),
     ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
-    ("KC", 0.2, "pu", (0.0, 5.0), "rectifier loading factor"),
-    ("KD", 0.38, "pu", (0.0, 10.0), "demagnetising factor"),
+    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KD", 0.38, "pu", (0.0, 100.0), "demagnetising factor"),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("E1", 4.18, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.10, "pu", (0.0, 100.0), "saturation at E1"),

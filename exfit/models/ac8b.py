@@ -1,15 +1,15 @@
-"""AC8B: alternator exciter, uncontrolled rectifiers, PID regulator (IEEE Std 421.5-2005, 6.8).
+"""AC8B: alternator exciter with PID regulator (IEEE Std 421.5-2005, 6.8).
 
-                                     VPIDMAX     VRMAX           VE ≤ VEMAX: VFE = VFEMAX
-    vref + vs ──►(Σ)──►[KPR + KIR/s + ]─►[   KA  ]─►(Σ)─►[  1  ]──┬── VE ──►(×)──► efd
-                 -▲    [sKDR/(1+sTDR) ]  [1 + sTA]  -▲   [ sTE ]  │          ▲
-    vt ──►[  1  ]─┘                  VPIDMIN     VRMIN   VEMIN    │         FEX
-          [1+sTR]                                    │            │          ▲
-                                         VFE = KE VE + VX(VE) + KD IFD    KC IFD / VE
+                    VPIDMAX            VRMAX         VE <= VEMAX
+vref + vs ─►(+)─►[KPR + KIR/s   ]─►[  KA  ]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
+           -▲    [+ sKDR/(1+sTDR)] [1+sTA]   -▲   [ sTE ] │        ▲
+            │       VPIDMIN            VRMIN  │    VEMIN  │       FEX
+vt ─►[  1  ]┘                                 │           │        ▲
+     [1+sTR]                                  └── VFE ◄───┘   KC IFD / VE
 
-The limits of the lag and of VE are non-windup; the integral is frozen while the PID is at its
-limit. Not modelled: the gates of the under- and overexcitation limiters. ESAC8B of PSS/E is
-another model.
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. The limits of
+the lag and of VE are non-windup; the integral is frozen while the PID is at its
+limit. Not modelled: the UEL and OEL gates. PSS/E's ESAC8B is another model.
 """
 
 from exfit.engine.trace import Signal
@@ -41,8 +41,8 @@ SHEET = sheet(
     ("TE", 1.2, "s", (0.01, 100.0), "exciter time constant"),
     ("VFEMAX", 6.0, "pu", (0.0, 9999.0), "ceiling of the exciter's field current"),
     ("VEMIN", 0.0, "pu", (-9999.0, 100.0), "floor of the exciter voltage"),
-    ("KC", 0.55, "pu", (0.0, 5.0), "rectifier loading factor"),
-    ("KD", 1.1, "pu", (0.0, 10.0), "demagnetising factor"),
+    ("KC", 0.55, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KD", 1.1, "pu", (0.0, 100.0), "demagnetising factor"),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("E1", 9.0, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
     ("SE1", 3.0, "pu", (0.0, 100.0), "saturation at E1"),

@@ -1,8 +1,10 @@
-"""FIRST_ORDER: k/(s + a), a check whose response and derivatives stand in closed form.
+"""FIRST_ORDER: k/(s + a), a check with a known response.
 
-vref ──►(Σ)──►[1/s]──┬──► v        v(t) = k/a (1 - exp(-a t)) after a unit step from rest
-   k     -▲          │
-          └───[a]◄───┘
+vref ─►[k]─►(+)─►[1/s]─┬─► vt
+            -▲         │
+             └──[a]◄───┘
+
+After a unit step from rest, vt = k/a (1 - exp(-a t)).
 """
 
 from exfit.engine.trace import Signal

@@ -106,18 +106,18 @@ def one_axis_rest(vt: Signal, p: Signal, x: Signal) -> None:
 
 GENROU = Machine(
     name="GENROU",
-    title="round rotor, subtransient, quadratic saturation on psi'' (PSS/E GENROU)",
+    title="round rotor, quadratic saturation on psi''",
     sheet=sheet(
-        ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant, open circuit"),
-        ("Tppd0", 0.06, "s", (0.0, 1.0), "d-axis subtransient time constant, open circuit"),
-        ("Tpq0", 0.5, "s", (0.0, 100.0), "q-axis transient time constant (on load only)"),
-        ("Tppq0", 0.077, "s", (0.0, 1.0), "q-axis subtransient time constant (on load only)"),
-        ("H", 3.25, "s", (0.01, 100.0), "inertia constant (on load only)"),
-        ("D", 0.0, "pu", (0.0, 100.0), "damping (on load only)"),
+        ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
+        ("Tppd0", 0.06, "s", (0.0, 1.0), "d-axis subtransient time constant"),
+        ("Tpq0", 0.5, "s", (0.0, 100.0), "q-axis transient time constant, on load"),
+        ("Tppq0", 0.077, "s", (0.0, 1.0), "q-axis subtransient time constant, on load"),
+        ("H", 3.25, "s", (0.01, 100.0), "inertia constant, on load"),
+        ("D", 0.0, "pu", (0.0, 100.0), "damping, on load"),
         ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
-        ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance (on load only)"),
+        ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
         ("Xpd", 0.3, "pu", (0.001, 10.0), "d-axis transient reactance"),
-        ("Xpq", 0.55, "pu", (0.001, 10.0), "q-axis transient reactance (on load only)"),
+        ("Xpq", 0.55, "pu", (0.001, 10.0), "q-axis transient reactance, on load"),
         ("Xppd", 0.25, "pu", (0.001, 10.0), "subtransient reactance"),
         ("Xl", 0.2, "pu", (0.0, 10.0), "leakage reactance"),
         ("S10", 0.0, "pu", (0.0, 10.0), "saturation at 1.0 pu"),
@@ -132,9 +132,9 @@ GENROU = Machine(
 
 ONE_AXIS = Machine(
     name="ONE_AXIS",
-    title="field winding alone, quadratic saturation on E'q",
+    title="field winding alone, quadratic saturation",
     sheet=sheet(
-        ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant, open circuit"),
+        ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
         ("S10", 0.0, "pu", (0.0, 10.0), "saturation at 1.0 pu"),
         ("S12", 0.0, "pu", (0.0, 10.0), "saturation at 1.2 pu"),
     ),

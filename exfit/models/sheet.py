@@ -60,6 +60,14 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
     ]
     if missing:
         raise ModelError(f"model {name}: its file lacks {', '.join(missing)}")
+    if not all(isinstance(row, Parameter) for row in parts["SHEET"]):
+        raise ModelError(f"model {name}: its SHEET is not what sheet(...) returns")
+    if not isinstance(parts["STATES"], str) or not (
+        callable(parts["equations"]) and callable(parts["rest"])
+    ):
+        raise ModelError(
+            f"model {name}: STATES is a text of names, equations and rest are functions"
+        )
     title, _, drawing = str(parts["__doc__"]).partition("\n")
     return Model(
         name=name,

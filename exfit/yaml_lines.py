@@ -1,0 +1,195 @@
+"""YAML with the place of every value: what is wrong with a file can be said with its line.
+
+Plain scalars are read as YAML 1.2 does: 1e-8 is a number; 1:30, yes and on are text; 010 is ten.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from exfit.errors import CaseError
+
+Place = tuple[str | int, ...]
+
+LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+DEEPEST = 20  # levels; a case file has five
+WHOLE = re.compile(r"[-+]?[0-9]+")
+DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+INFINITE = re.compile(r"([-+]?)\.(inf|Inf|INF)")
+WORDS: dict[str, bool | float | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
+}
+
+
+class Fault(NamedTuple):
+    """What is wrong at a place of the file."""
+
+    place: Place
+    text: str
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value, the line on which it starts, and the nodes of its entries by key or index."""
+
+    value: Any
+    line: int
+    entries: Mapping[str | int, "Node"] = field(default_factory=dict)
+
+    def line_of(self, place: Place) -> int:
+        """Return the line of a place, or of what is nearest above it."""
+        node = self
+        for key in place:
+            if key not in node.entries:
+                break
+            node = node.entries[key]
+        return node.line
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file; raises CaseError where it cannot be read or is not UTF-8."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise CaseError([f"{path}: cannot be read: {error.strerror}"]) from None
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        byte = data[error.start]
+        raise CaseError([f"{path}:{line}: not UTF-8 text: byte 0x{byte:02x}"]) from None
+
+
+def read_yaml(text: str, path: Path) -> tuple[Node, list[Fault]]:
+    """Return the mapping a YAML text holds, and the faults of single keys and values.
+
+    Raises CaseError, which names the line, where the text is no YAML or its top is no mapping.
+    """
+    reader = _Reader(text)
+    try:
+        top = reader.document()
+    except _NoYaml as error:
+        raise CaseError([f"{path}:{error.line}: {error}"]) from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = ", ".join(part for part in (error.problem, error.context) if part)
+        raise CaseError([f"{path}:{mark.line + 1 if mark else 1}: not YAML: {what}"]) from None
+    except yaml.YAMLError as error:
+        line = text.count("\n", 0, getattr(error, "position", 0)) + 1
+        what = str(error).partition("\n")[0]
+        raise CaseError([f"{path}:{line}: not YAML: {what}"]) from None
+    if top is None:
+        raise CaseError([f"{path}: the file is empty"])
+    if not isinstance(top.value, dict):
+        what = _kind(top.value)
+        raise CaseError([f"{path}:{top.line}: {what}, not a mapping (key: value) at the top"])
+    return top, reader.faults
+
+
+class _NoYaml(Exception):
+    """A file that cannot be read any further, from a line on."""
+
+    def __init__(self, line: int, text: str) -> None:
+        super().__init__(text)
+        self.line = line
+
+
+class _Reader:
+    """One pass over the parser's events; faults of single keys and values are collected."""
+
+    def __init__(self, text: str) -> None:
+        self.events: Iterator[Any] = yaml.parse(text, Loader=LOADER)
+        self.faults: list[Fault] = []
+        self.anchors: dict[str, Node] = {}
+
+    def document(self) -> Node | None:
+        """Return the node of the only document, None where there is none."""
+        next(self.events)
+        if isinstance(next(self.events), yaml.StreamEndEvent):
+            return None
+        top = self.node(next(self.events), ())
+        next(self.events)
+        after = next(self.events)
+        if not isinstance(after, yaml.StreamEndEvent):
+            raise _NoYaml(_line(after), "a second document begins; one is allowed")
+        return top
+
+    def node(self, event: Any, place: Place) -> Node:
+        """Return the node that begins with an event."""
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor not in self.anchors:
+                raise _NoYaml(_line(event), f"*{event.anchor} stands for nothing before it")
+            return self.anchors[event.anchor]
+        if len(place) > DEEPEST:
+            raise _NoYaml(_line(event), f"nested more than {DEEPEST} levels deep")
+        if event.tag is not None:
+            self.faults.append(Fault(place, f"tag {event.tag} is not used here", _line(event)))
+        found = self._content(event, place)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = found
+        return found
+
+    def _content(self, event: Any, place: Place) -> Node:
+        if isinstance(event, yaml.MappingStartEvent):
+            return self._mapping(event, place)
+        if isinstance(event, yaml.SequenceStartEvent):
+            return self._sequence(event, place)
+        plain = event.implicit[0]
+        return Node(scalar(event.value) if plain else event.value, _line(event))
+
+    def _mapping(self, start: Any, place: Place) -> Node:
+        entries: dict[str | int, Node] = {}
+        while not isinstance(event := next(self.events), yaml.MappingEndEvent):
+            if not isinstance(event, yaml.ScalarEvent):
+                raise _NoYaml(_line(event), "a key must be a plain word")
+            key, line = event.value, _line(event)
+            here = (*place, key)
+            found = self.node(next(self.events), here)
+            if found.value is None:
+                self.faults.append(Fault(here, "has no value", line))
+            if key in entries:
+                first = entries[key].line
+                self.faults.append(Fault(here, f"stands twice, first on line {first}", line))
+            else:
+                entries[key] = Node(found.value, line, found.entries)
+        return Node({key: node.value for key, node in entries.items()}, _line(start), entries)
+
+    def _sequence(self, start: Any, place: Place) -> Node:
+        items: list[Node] = []
+        while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
+            here = (*place, len(items))
+            found = self.node(event, here)
+            if found.value is None:
+                self.faults.append(Fault(here, "has no value", _line(event)))
+            items.append(Node(found.value, _line(event), found.entries))
+        return Node([item.value for item in items], _line(start), dict(enumerate(items)))
+
+
+def scalar(text: str) -> str | bool | int | float | None:
+    """Return the value of a plain scalar; hexadecimal and octal forms stay text."""
+    if text in WORDS:
+        return WORDS[text]
+    if WHOLE.fullmatch(text):
+        return int(text) if len(text) < 16 else float(text)
+    if DECIMAL.fullmatch(text):
+        return float(text)
+    if found := INFINITE.fullmatch(text):
+        return float(found[1] + "inf")
+    return text
+
+
+def _line(event: Any) -> int:
+    return int(event.start_mark.line) + 1
+
+
+def _kind(value: Any) -> str:
+    return "a list" if isinstance(value, list) else repr(value)

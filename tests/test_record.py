@@ -1,0 +1,232 @@
+"""Records: what is read is what stands in the file, and what cannot be used is refused by name."""
+
+import hashlib
+from dataclasses import FrozenInstanceError, dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from exfit.errors import RecordError
+from exfit.record import file_hash, read_columns, read_record
+
+
+@dataclass(frozen=True)
+class Channel:
+    column: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+VT = {"vt": Channel("vt")}
+GOOD = "t,vt,ifd\n0.0,1.0,1.1\n0.1,1.01,1.2\n0.2,1.02,1.3\n0.3,1.03,1.4\n"
+
+
+@pytest.fixture
+def csv(tmp_path):
+    """Return a function that writes a file and returns its path."""
+
+    def write(content: str | bytes, name: str = "bump.csv") -> Path:
+        path = tmp_path / name
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return write
+
+
+def refusal(path, channels=VT, window=None):
+    with pytest.raises(RecordError) as caught:
+        read_record(path, "t", channels, window)
+    return str(caught.value)
+
+
+def test_a_signal_is_column_times_scale_plus_offset(csv):
+    path = csv(GOOD)
+    record = read_record(path, "t", {"vt": Channel("vt", 2.0, -1.0), "ifd": Channel("ifd")})
+    assert record.time.tolist() == [0.0, 0.1, 0.2, 0.3]
+    assert record.signals["vt"].tolist() == [1.0, 2 * 1.01 - 1, 2 * 1.02 - 1, 2 * 1.03 - 1]
+    assert record.signals["ifd"].tolist() == [1.1, 1.2, 1.3, 1.4]
+    assert record.source == path
+
+
+def test_the_window_includes_both_its_ends(csv):
+    record = read_record(csv(GOOD), "t", VT, (0.1, 0.2))
+    assert record.time.tolist() == [0.1, 0.2]
+    assert record.signals["vt"].tolist() == [1.01, 1.02]
+
+
+def test_the_hash_is_of_the_bytes(csv):
+    data = b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode()
+    path = csv(data)
+    assert read_record(path, "t", VT).sha256 == hashlib.sha256(data).hexdigest() == file_hash(path)
+
+
+def test_a_record_cannot_be_changed(csv):
+    record = read_record(csv(GOOD), "t", VT)
+    with pytest.raises(FrozenInstanceError):
+        record.time = record.time
+    for array in (record.time, record.signals["vt"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+    with pytest.raises(TypeError):
+        record.signals["vt"] = record.time
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufeff" + GOOD,
+        GOOD.replace("\n", "\r\n"),
+        GOOD.replace("\n", "\r"),
+        GOOD.rstrip("\n"),
+        GOOD + "\n\n",
+        GOOD.replace("0.1,1.01", "\n0.1,1.01"),
+        GOOD.replace("t,vt,ifd", '"t", vt ,"ifd"'),
+        GOOD.replace("1.01", '"1.01"').replace("1.02", " 1.02 "),
+        GOOD.replace("1.2", '"a, b"').replace("1.3", "text"),
+    ],
+    ids=["BOM", "CRLF", "CR", "no last end", "blank end", "blank row", "header", "cells", "others"],
+)
+def test_the_same_numbers_in_other_dress_read_the_same(csv, text):
+    record = read_record(csv(text), "t", VT)
+    assert record.time.tolist() == [0.0, 0.1, 0.2, 0.3]
+    assert record.signals["vt"].tolist() == [1.0, 1.01, 1.02, 1.03]
+
+
+def test_one_column_may_serve_twice(csv):
+    record = read_record(csv(GOOD), "t", {"vt": Channel("vt"), "efd": Channel("vt", 2.0)})
+    assert np.array_equal(record.signals["efd"], 2 * record.signals["vt"])
+
+
+def test_columns_can_be_read_by_name(csv):
+    columns = read_columns(csv(GOOD), ["ifd", "t"])
+    assert list(columns) == ["ifd", "t"]
+    assert columns["ifd"].tolist() == [1.1, 1.2, 1.3, 1.4]
+
+
+# what is wrong -> content, then all that the message must name
+FAULTS = {
+    "empty file": ("", ["bump.csv", "empty"]),
+    "blank file": (" \n\n", ["bump.csv", "empty"]),
+    "blank first line": ("\nt,vt\n0,1\n", ["bump.csv:1", "column names"]),
+    "header only": ("t,vt\n", ["bump.csv", "no samples"]),
+    "header and blank lines": ("t,vt\n\n\n", ["bump.csv", "no samples"]),
+    "one sample": ("t,vt\n0,1\n", ["bump.csv", "1 of 1 samples", "at least 2"]),
+    "missing column": (GOOD.replace("vt", "Ut"), ["bump.csv", "'vt'", "'t', 'Ut', 'ifd'"]),
+    "missing time": (GOOD.replace("t,vt", "s,vt"), ["bump.csv", "no column 't'", "'s', 'vt'"]),
+    "no header": (GOOD.partition("\n")[2], ["bump.csv", "no column 't'", "'0.0', '1.0', '1.1'"]),
+    "other separator": (GOOD.replace(",", ";"), ["bump.csv", "no column 't'", "'t;vt;ifd'"]),
+    "column twice": (GOOD.replace("ifd", "vt"), ["bump.csv", "'vt'", "2 and 3"]),
+    "text in a number": (GOOD.replace("1.02", "1.0.2"), ["bump.csv:4", "'vt'", "'1.0.2'"]),
+    "decimal comma": (GOOD.replace("1.02", '"1,02"'), ["bump.csv:4", "'vt'", "'1,02'"]),
+    "underscore": (GOOD.replace("1.02", "1_02"), ["bump.csv:4", "'vt'", "'1_02'"]),
+    "other digits": (GOOD.replace("1.02", "١"), ["bump.csv:4", "'vt'", "'١'"]),
+    "empty cell": (GOOD.replace("1.02", ""), ["bump.csv:4", "'vt'", "empty cell"]),
+    "text in time": (GOOD.replace("0.2,", "x,"), ["bump.csv:4", "'t'", "'x'"]),
+    "comment": (GOOD.replace("0.2,", "#0.2,"), ["bump.csv:4", "'t'", "'#0.2'"]),
+    "short row": (GOOD.replace("0.2,1.02,1.3", "0.2,1.02"), ["bump.csv:4", "row: 2", "columns: 3"]),
+    "long row": (GOOD.replace("1.3", "1.3,0"), ["bump.csv:4", "row: 4", "columns: 3"]),
+    "long and short row": (
+        GOOD.replace("1.1", "1.1,0").replace("1.02,", ""),
+        ["bump.csv:2", "row: 4", "columns: 3"],
+    ),
+    "blank of spaces": (GOOD.replace("0.2,1.02,1.3", "  "), ["bump.csv:4", "row: 1", "columns: 3"]),
+    "nan": (GOOD.replace("1.02", "nan"), ["bump.csv:4", "'vt'", "nan is not a finite"]),
+    "inf": (GOOD.replace("1.02", "-inf"), ["bump.csv:4", "'vt'", "-inf is not a finite"]),
+    "overflow": (GOOD.replace("1.02", "1e999"), ["bump.csv:4", "'vt'", "inf is not a finite"]),
+    "nan in time": (GOOD.replace("0.2,", "nan,"), ["bump.csv:4", "'t'", "nan is not a finite"]),
+    "nan behind a blank row": (
+        GOOD.replace("0.1,", "\n0.1,").replace("1.02", "nan"),
+        ["bump.csv:5", "'vt'", "nan"],
+    ),
+    "repeated time": (
+        GOOD.replace("0.2,", "0.1,"),
+        ["bump.csv:4", "'t'", "0.1 s repeats", "0.1 s"],
+    ),
+    "time going back": (GOOD.replace("0.2,", "0.05,"), ["bump.csv:4", "'t'", "0.05 s", "0.1 s"]),
+    "bytes": (b"t,vt\n0,1\n\xff,2\n", ["bump.csv:3", "0xff"]),
+    "UTF-16": (GOOD.encode("utf-16"), ["bump.csv:1", "0xff"]),
+    "null characters": (b"t,vt\n0,1\n0\x00,2\n", ["bump.csv:3", "0x00"]),
+    "endless cell": ("t,vt\n0," + "9" * 200_000 + "x\n1,1\n", ["bump.csv:2", "limit"]),
+    "endless name": ("t," + "v" * 200_000 + "\n0,1\n", ["bump.csv:1", "limit"]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_file_that_cannot_be_used_is_refused_with_place_and_value(csv, fault):
+    content, named = FAULTS[fault]
+    message = refusal(csv(content))
+    assert "\n" not in message
+    for part in named:
+        assert part in message
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    assert refusal(tmp_path / "no.csv").endswith(
+        "no.csv: cannot be read: No such file or directory"
+    )
+    assert "cannot be read: Is a directory" in refusal(tmp_path)
+    assert "null" in refusal(tmp_path / "a\0b")
+    assert "cannot be read" in refusal(tmp_path / ("x" * 5000))
+    with pytest.raises(RecordError, match=r"no\.csv"):
+        file_hash(tmp_path / "no.csv")
+
+
+def test_a_window_with_too_few_samples_is_refused(csv):
+    message = refusal(csv(GOOD), window=(0.15, 0.25))
+    for part in ("bump.csv", "1 of 4", "0.15 ... 0.25 s", "0 ... 0.3 s", "at least 2"):
+        assert part in message
+
+
+def test_a_gap_outside_the_window_is_left_out_with_the_rest(csv):
+    path = csv(GOOD.replace("1.0,", "nan,"))
+    assert "bump.csv:2" in refusal(path)
+    assert read_record(path, "t", VT, (0.1, 0.3)).signals["vt"].tolist() == [1.01, 1.02, 1.03]
+
+
+def test_a_scale_that_overflows_is_refused(csv):
+    message = refusal(csv(GOOD.replace("1.02", "1e300")), {"vt": Channel("vt", 1e10)})
+    for part in ("bump.csv:4", "'vt'", "1e+300 * 1e+10"):
+        assert part in message
+
+
+def test_many_columns_are_not_all_listed(csv):
+    names = [f"c{at}" for at in range(50)]
+    message = refusal(csv(",".join(names) + "\n" + ",".join("1" * 50) + "\n"))
+    assert "'c29' and 20 more" in message
+    assert "c30" not in message
+
+
+def test_a_sound_file_is_not_read_cell_by_cell(csv, monkeypatch):
+    """Millions of samples are read by NumPy in C; Python only looks for the place of a fault."""
+
+    def rows(_):
+        raise AssertionError
+
+    monkeypatch.setattr("exfit.record._Table.rows", rows)
+    path = csv("t,vt\n" + "".join(f"{at}.25,1.5\n" for at in range(1000)))
+    assert read_record(path, "t", VT).time.size == 1000
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    at=st.integers(0, len(GOOD)),
+    cut=st.integers(0, 12),
+    junk=st.one_of(
+        st.text(alphabet=',."\n\r\t 0123456789eE+-naif;#_\x00\ufeffé١\x0b\x1c\u2028', max_size=8),
+        st.text(max_size=6).map(lambda text: text.encode("utf-8", "replace").decode()),
+        st.binary(max_size=4),
+    ),
+)
+def test_no_damage_gives_anything_but_a_record_or_its_refusal(tmp_path_factory, at, cut, junk):
+    path = tmp_path_factory.getbasetemp() / "damaged.csv"
+    data = junk if isinstance(junk, bytes) else junk.encode()
+    path.write_bytes(GOOD.encode()[:at] + data + GOOD.encode()[at + cut :])
+    try:
+        record = read_record(path, "t", {"vt": Channel("vt"), "ifd": Channel("ifd")})
+    except RecordError:
+        return
+    assert np.all(np.diff(record.time) > 0)
+    assert np.all(np.isfinite([record.time, *record.signals.values()]))
