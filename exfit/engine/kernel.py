@@ -6,6 +6,7 @@ import os
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -97,7 +98,8 @@ def _keep(path: Path, code: bytes) -> None:
         beside.write_bytes(hashlib.sha256(code).digest() + code)
         beside.replace(path)
     except OSError:
-        return
+        with suppress(OSError):
+            beside.unlink()
 
 
 def compiled(ir: str) -> Any:
@@ -193,7 +195,10 @@ class TangentKernel:
 
         ``p`` is (np,); the derivative of the starting state is part of theirs.
         """
-        blocks = list(workers().map(lambda seed: self._block(p, seed, spans), self.seeds))
+        if len(self.seeds) == 1:
+            blocks = [self._block(p, self.seeds[0], spans)]
+        else:
+            blocks = list(workers().map(lambda seed: self._block(p, seed, spans), self.seeds))
         values = blocks[0][0]
         slopes = [
             np.concatenate(parts, axis=2) for parts in zip(*(b[1] for b in blocks), strict=True)

@@ -4,7 +4,6 @@ The functions ``where``, ``exp`` ... below also take floats and NumPy arrays, an
 model written with them: that run is what the compiled one is tested against.
 """
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self
 
@@ -21,7 +20,6 @@ ARITHMETIC = {
     "*": lambda a, b: a * b,
     "/": lambda a, b: a / b,
 }
-FUNCTIONS = {"sqrt": math.sqrt, "exp": math.exp, "log": math.log}
 TRUTHS = ("<", "<=", "&", "|")
 
 
@@ -96,6 +94,11 @@ class Node:
 
     def __or__(self, other: Signal) -> "Node":
         return self.graph.apply("|", self, other)
+
+    __hash__ = object.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        raise ModelError("a model may not ask for == or !=: compare values with <, <=, > or >=")
 
     def __bool__(self) -> bool:
         raise ModelError(
@@ -205,7 +208,7 @@ def function(name: str, x: Signal) -> Signal:
         with np.errstate(all="ignore"):
             return getattr(np, name)(x)
     if graph.lift(x).constant is not None:
-        return graph.constant(FUNCTIONS[name](x.constant))
+        return graph.constant(function(name, x.constant))
     return graph.apply(name, x)
 
 
@@ -225,13 +228,13 @@ def sqrt(x: Signal) -> Signal:
 
 
 def larger(a: Signal, b: Signal) -> Signal:
-    """Return the larger of two values."""
-    return where(a > b, a, b)
+    """Return the larger of two values; NaN as the first one stays NaN."""
+    return where(a < b, b, a)
 
 
 def smaller(a: Signal, b: Signal) -> Signal:
-    """Return the smaller of two values."""
-    return where(a < b, a, b)
+    """Return the smaller of two values; NaN as the first one stays NaN."""
+    return where(b < a, b, a)
 
 
 def clip(x: Signal, low: Signal, high: Signal) -> Signal:
@@ -239,7 +242,8 @@ def clip(x: Signal, low: Signal, high: Signal) -> Signal:
     graph = graph_of(x, low, high)
     if graph is not None:
         return graph.apply("clip", x, low, high)
-    return where(x < low, low, where(x > high, high, x))
+    raised = where(x < low, low, x)
+    return where(raised > high, high, raised)
 
 
 def in_order(targets: Iterable[Node]) -> Iterator[Node]:

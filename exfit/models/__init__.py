@@ -2,6 +2,7 @@
 
 import difflib
 from pathlib import Path
+from types import ModuleType
 
 from exfit.errors import ModelError
 from exfit.models import ac1a, ac8b, first_order
@@ -38,14 +39,12 @@ def from_file(path: Path) -> Model:
 
     Raises ModelError where the file cannot be read, fails as Python, or defines no model.
     """
-    from importlib.util import module_from_spec, spec_from_file_location
-
-    spec = spec_from_file_location(f"exfit_user_{path.stem}", path)
-    if not path.is_file() or spec is None or spec.loader is None:
+    if not path.is_file():
         raise ModelError(f"{path}: no such file")
-    module = module_from_spec(spec)
+    module = ModuleType(f"exfit_user_{path.stem}")
     try:
-        spec.loader.exec_module(module)
+        # compiled here, not imported: a module cache beside it would outlive a quick edit
+        exec(compile(path.read_bytes(), path.absolute(), "exec"), vars(module))
     except Exception as fault:
         raise ModelError(f"{path}: {type(fault).__name__}: {fault}") from fault
     return model(path.stem.upper(), vars(module))

@@ -8,7 +8,7 @@ vt ─►[  1  ]┘   │  [  sKF  ]                   │            │       
      [1+sTR]    └──[1 + sTF]◄──────────────────┴─── VFE ◄───┘   KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD. The limits of the lag are non-windup; the clamp
-behind it is not: VA may stand beyond VRMAX. Not modelled: the UEL and OEL gates.
+behind it is not: VA may stand beyond VRMAX. Not modelled: UEL and OEL gates.
 """
 
 from exfit.engine.trace import Signal
@@ -33,10 +33,10 @@ SHEET = sheet(
     ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
     ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain"),
     ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant"),
-    ("VAMAX", 14.5, "pu", (0.0, 9999.0), "regulator ceiling"),
-    ("VAMIN", -14.5, "pu", (-9999.0, 0.0), "regulator floor"),
-    ("VRMAX", 6.03, "pu", (0.0, 9999.0), "ceiling of the exciter's field voltage"),
-    ("VRMIN", -5.43, "pu", (-9999.0, 0.0), "floor of the exciter's field voltage"),
+    ("VAMAX", 14.5, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VAMIN", -14.5, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("VRMAX", 6.03, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
+    ("VRMIN", -5.43, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
     ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant"),
     ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain"),
     ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),

@@ -135,7 +135,7 @@ def rectifier(ve: Signal, load: Signal) -> Signal:
         load < 0.75 * ve, sqrt(0.75 * ve * ve - load * load), larger(SQRT3 * (ve - load), 0.0)
     )
     loaded = where(load <= SQRT3 / 4.0 * ve, ve - load / SQRT3, sloping)
-    return where(load <= 0.0, ve, loaded)
+    return where(load < 0.0, ve, loaded)
 
 
 def rectifier_supply(efd: Signal, load: Signal) -> Signal:
@@ -145,7 +145,7 @@ def rectifier_supply(efd: Signal, load: Signal) -> Signal:
     loaded = where(
         load <= SQRT3 / 4.0 * first, first, where(load < 0.75 * second, second, efd / SQRT3 + load)
     )
-    return where(load <= 0.0, efd, loaded)
+    return where(load < 0.0, efd, loaded)
 
 
 class Saturation(NamedTuple):
@@ -170,16 +170,22 @@ def quadratic(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Sa
     return Saturation(gain * above * above, 2.0 * gain * above)
 
 
+def growth(E1: Signal, y1: Signal, E2: Signal, y2: Signal) -> Signal:
+    """Return B of y = A exp(B E) through two points, zero where both lie at zero."""
+    none = (y1 <= 0.0) & (y2 <= 0.0)
+    return log(where(none, 1.0, y2) / where(none, 1.0, y1)) / (E2 - E1)
+
+
 def exponential(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Saturation:
     """VX = A exp(B E) through two points; note that it is not zero at E = 0."""
-    B = log((E2 * SE2) / (E1 * SE1)) / (E2 - E1)
+    B = growth(E1, E1 * SE1, E2, E2 * SE2)
     vx = E1 * SE1 * exp(B * (e - E1))
     return Saturation(vx, B * vx)
 
 
 def exponential_se(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) -> Saturation:
     """VX = E SE with SE = A exp(B E) through two points."""
-    B = log(SE2 / SE1) / (E2 - E1)
+    B = growth(E1, SE1, E2, SE2)
     se = SE1 * exp(B * (e - E1))
     return Saturation(e * se, se * (1.0 + B * e))
 

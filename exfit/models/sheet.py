@@ -108,3 +108,10 @@ def saturation_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
         yield "E1", f"{low:g} equals E2: two points are needed"
     elif se_high <= se_low and (se_low, se_high) != (0.0, 0.0):
         yield name, f"{se_high:g} at {high:g} pu is not above {se_low:g} at {low:g} pu"
+
+
+def exponential_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, fault) for a saturation of zero at one point: no exponential reaches it."""
+    zero = [symbol for symbol in ("SE1", "SE2") if values.get(symbol) == 0.0]
+    if len(zero) == 1:
+        yield zero[0], "0 lies on no exponential saturation curve; give both SE as 0, or neither"

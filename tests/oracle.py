@@ -1,0 +1,121 @@
+"""What exfit is compared with: the float run of the same equations, and systems to run."""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import numpy as np
+
+from exfit.engine.kernel import Span
+from exfit.engine.system import System
+from exfit.engine.trace import clip
+from exfit.models import MODELS
+from exfit.models.machines import MACHINES
+from exfit.models.sheet import typical
+from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
+
+WITHOUT_PLANT = ("FIRST_ORDER",)
+MACHINE_SATURATION = {"S10": 0.12, "S12": 0.4}
+
+
+@cache
+def system_of(name: str, machine: str = "GENROU", saturation: str = "quadratic") -> System:
+    """Return the closed system of a catalogue model, the same object every time."""
+    model = MODELS[name]
+    if name in WITHOUT_PLANT:
+        return alone(model)
+    return open_circuit(model, MACHINES[machine], SATURATION[saturation])
+
+
+def typical_values(name: str, machine: str = "GENROU", **changes: float) -> dict[str, float]:
+    """Return typical data of a model on a saturated machine; ``machine_S10=0`` changes its own."""
+    values = typical(MODELS[name].sheet)
+    if name in WITHOUT_PLANT:
+        values[VT0] = 0.0
+    else:
+        of_machine = {**typical(MACHINES[machine].sheet), **MACHINE_SATURATION}
+        values |= {MACHINE + symbol: value for symbol, value in of_machine.items()} | {VT0: 1.0}
+    return values | {symbol.replace("machine_", MACHINE): v for symbol, v in changes.items()}
+
+
+def lively_values(name: str, machine: str = "GENROU", **changes: float) -> dict[str, float]:
+    """Return typical data with no block bypassed: every lag takes part."""
+    system, values = system_of(name, machine), typical_values(name, machine)
+    for symbol in system.time_constants:
+        values[symbol] = values[symbol] or 0.03
+    return values | {symbol.replace("machine_", MACHINE): v for symbol, v in changes.items()}
+
+
+def drawn_values(
+    name: str, seed: int, machine: str = "GENROU", spread: float = 1.3
+) -> dict[str, float]:
+    """Return lively data, each value moved by a factor of at most ``spread`` that a seed decides.
+
+    The reactances and the points of the saturation curves move together, so that none overtakes
+    another.
+    """
+    rng = np.random.default_rng(seed)
+    values = lively_values(name, machine)
+    together = spread ** rng.uniform(-1.0, 1.0)
+    for symbol in values:
+        factor = spread ** rng.uniform(-1.0, 1.0)
+        bare = symbol.removeprefix(MACHINE)
+        if symbol != VT0:
+            moves_together = bare[0] in "XS" or bare in ("E1", "E2")
+            values[symbol] *= together if moves_together else factor
+    return values
+
+
+def levels(steps: int, *changes: tuple[int, float]) -> np.ndarray:
+    """Return an input (steps + 1, 1) with changes, each a ramp up to its grid point."""
+    u = np.zeros((steps + 1, 1))
+    for at, change in changes:
+        u[at:] += change
+    return u
+
+
+def vector(system: System, values: Mapping[str, float]) -> np.ndarray:
+    """Return the values in the system's order."""
+    return np.array([values[name] for name in system.parameters])
+
+
+def float_run(
+    system: System, values: Mapping[str, object], outputs: Sequence[str], spans: Sequence[Span]
+) -> list[np.ndarray]:
+    """Simulate with the plain equations: classical Runge-Kutta, states clamped after each step.
+
+    Values may be floats or arrays (W,) of sets side by side; the outputs of each span come as
+    (n + 1, outputs) or (n + 1, outputs, W).
+    """
+    begin = system.rest(values)
+    x, r = dict(begin.states), begin.setpoints
+
+    def motion(x, u):
+        return system.motion(values, r, x, dict(zip(system.inputs, u, strict=True)))
+
+    def advanced(x, h, slopes):
+        return {name: x[name] + h * slopes[name] for name in x}
+
+    def step(x, u, change, h):
+        k1 = motion(x, u).slopes
+        k2 = motion(advanced(x, h / 2, k1), u + change / 2).slopes
+        k3 = motion(advanced(x, h / 2, k2), u + change / 2).slopes
+        k4 = motion(advanced(x, h, k3), u + change).slopes
+        mean = {n: (k1[n] + 2.0 * k2[n] + 2.0 * k3[n] + k4[n]) / 6.0 for n in x}
+        free = advanced(x, h, mean)
+        limits = motion(free, u + change).limits
+        return {n: clip(v, *limits[n]) if n in limits else v for n, v in free.items()}
+
+    def row(x, u):
+        told = motion(x, u).outputs
+        return np.array(np.broadcast_arrays(*[told[name] for name in outputs]))
+
+    results = []
+    for span in spans:
+        rows, h = [], span.step / span.parts
+        for now, then in zip(span.u[:-1], span.u[1:], strict=True):
+            rows.append(row(x, now))
+            change = (then - now) / span.parts
+            for part in range(span.parts):
+                x = step(x, now + part * change, change, h)
+        results.append(np.array([*rows, row(x, span.u[-1])]))
+    return results

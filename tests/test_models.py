@@ -1,0 +1,379 @@
+"""What every model of the catalogue keeps to; a new model is tested unasked."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from oracle import (
+    MACHINE_SATURATION,
+    WITHOUT_PLANT,
+    drawn_values,
+    levels,
+    lively_values,
+    system_of,
+    typical_values,
+    vector,
+)
+
+from exfit.engine.kernel import Kernel, LinearKernel, Span
+from exfit.engine.system import trace
+from exfit.engine.trace import in_order
+from exfit.errors import ModelError, SimulationError
+from exfit.models import MODELS, find, from_file
+from exfit.models.blocks import SHORTEST
+from exfit.models.machines import MACHINES
+from exfit.models.sheet import crossed_limits, saturation_faults, typical
+from exfit.models.sheet import model as build
+from exfit.plant import MACHINE, SATURATION, VT0, Names, exciter_parameters
+from exfit.simulate import Change, Course, Simulator, parameters_used
+
+SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}
+ON_LOAD = "on load"
+VOLTAGES = (0.8, 0.95, 1.0, 1.05, 1.2)
+
+
+@pytest.fixture(params=list(SHEETS))
+def sheet(request):
+    return SHEETS[request.param]
+
+
+# --- data sheets ----------------------------------------------------------------------------------
+
+
+def test_a_sheet_names_each_parameter_once_with_unit_and_meaning(sheet):
+    for column in ("symbol", "meaning"):
+        entries = [getattr(row, column) for row in sheet]
+        assert len(set(entries)) == len(entries)
+        assert all(entry.strip() == entry != "" for entry in entries)
+    assert all(row.unit for row in sheet)
+
+
+def test_a_typical_value_lies_within_its_range(sheet):
+    for row in sheet:
+        assert row.low <= row.typical <= row.high, row.symbol
+        assert row.low < row.high, row.symbol
+        assert np.isfinite([row.low, row.high]).all()
+
+
+def test_typical_data_do_not_contradict_themselves(sheet):
+    assert list(crossed_limits(typical(sheet))) == []
+    assert list(saturation_faults(typical(sheet))) == []
+
+
+def test_typical_machines_do_not_contradict_themselves():
+    for machine in MACHINES.values():
+        assert list(machine.faults(typical(machine.sheet))) == []
+        assert list(machine.faults(typical(machine.sheet) | MACHINE_SATURATION)) == []
+
+
+def test_every_ceiling_has_its_floor(model):
+    symbols = [row.symbol for row in MODELS[model].sheet]
+    for symbol in symbols:
+        if symbol.endswith("MIN"):
+            # the ceiling of VE may be given by another signal, VFEMAX
+            assert {symbol.replace("MIN", "MAX"), "VFEMAX"} & set(symbols), symbol
+
+
+def test_a_title_and_a_drawing_are_present_and_narrow(model):
+    found = MODELS[model]
+    assert found.title
+    assert len(found.drawing.splitlines()) >= 3
+    assert max(map(len, found.drawing.splitlines())) <= 100
+
+
+def test_the_drawing_shows_every_gain_and_time_constant(model):
+    text = MODELS[model].title + MODELS[model].drawing
+    points = ("E1", "SE1", "E2", "SE2")
+    for row in MODELS[model].sheet:
+        assert row.symbol in text or row.symbol in points, row.symbol
+
+
+# --- rest -----------------------------------------------------------------------------------------
+
+
+def set_to(values, vt0):
+    return values | {VT0: vt0}
+
+
+@pytest.mark.parametrize("saturation", list(SATURATION))
+@pytest.mark.parametrize("machine", list(MACHINES))
+def test_rest_is_rest(exciter, machine, saturation):
+    system = system_of(exciter, machine, saturation)
+    for values in (typical_values(exciter, machine), drawn_values(exciter, 5, machine)):
+        for vt0 in VOLTAGES:
+            told = set_to(values, vt0)
+            rest = LinearKernel(system).rest(vector(system, told))
+            states = dict(zip(system.states, rest.x, strict=True))
+            at = system.motion(told, {"vref": rest.r[0]}, states, {"vref": 0.0})
+            assert at.outputs["vt"] == pytest.approx(vt0, rel=1e-12)
+            assert at.outputs["efd"] == pytest.approx(at.outputs["ifd"], rel=1e-12)
+            fastest = 1.0 / min(told[T] for T in system.time_constants if told[T] >= SHORTEST)
+            for name, slope in at.slopes.items():
+                # rounding of a state times its gain, over the shortest time constant
+                assert abs(slope) < 1e-9 * fastest * max(1.0, abs(states[name])), name
+
+
+def test_an_exciter_alone_rests_at_any_output_and_voltage(exciter):
+    found = MODELS[exciter]
+    p = exciter_parameters(lively_values(exciter), found, SATURATION["quadratic"])
+    for efd in (0.5, 1.0, 2.0):
+        for vt in VOLTAGES:
+            u = Names(vt=vt, ifd=0.9 * efd, vs=0.01)
+            x, d = Names(), Names()
+            u.vref = found.rest(efd, u, p, x)
+            assert found.equations(x, u, p, d) == pytest.approx(efd, rel=1e-12)
+            for slope in vars(d).values():
+                assert abs(getattr(slope, "slope", slope)) < 1e-9 * 100.0
+
+
+def test_a_model_without_a_plant_rests_at_any_output():
+    for name in WITHOUT_PLANT:
+        system, values = system_of(name), typical_values(name)
+        for v in (-3.0, 0.0, 0.7, 20.0):
+            rest = LinearKernel(system).rest(vector(system, set_to(values, v)))
+            slopes, _ = LinearKernel(system).motion(
+                vector(system, values), rest.r, rest.x, np.zeros(1)
+            )
+            assert slopes == pytest.approx(0.0, abs=1e-12 * (1.0 + abs(v)))
+
+
+@pytest.mark.parametrize("saturation", list(SATURATION))
+def test_a_flat_run_stays_flat_for_a_minute(model, saturation):
+    system = system_of(model, saturation=saturation)
+    for values in (typical_values(model), drawn_values(model, 6)):
+        code = Kernel(system, ("vt",))
+        p = vector(system, values)[:, None]
+        (out,) = code.run(p, code.start(p), [Span(levels(60_000), 1e-3, 1)])
+        assert np.abs(out - values[VT0]).max() < 1e-9
+
+
+# --- the method -----------------------------------------------------------------------------------
+
+
+def test_halving_the_step_cuts_the_error_sixteenfold(model):
+    """Small enough to stay off the limits and the knees; the step lies on the grid."""
+    system, values = system_of(model), lively_values(model)
+
+    def ends(steps):
+        code = Kernel(system, ("vt",))
+        p = vector(system, values)[:, None]
+        span = Span(np.full((steps + 1, 1), 1e-3), 0.5 / steps, 1)
+        (out,) = code.run(p, code.start(p), [span])
+        return out[:: steps // 50, 0, 0]
+
+    finest = ends(6400)
+    errors = [np.abs(ends(steps) - finest).max() for steps in (50, 100, 200)]
+    for coarse, fine in pairwise(errors):
+        # the next term of the error is smaller by step * rate, a fifth to a third here
+        assert 15.0 < coarse / fine < 19.0
+
+
+def responses(model, sets, saturation="quadratic", size=0.3):
+    """Return vt and the last state after a large bump up and down, for each set."""
+    system = system_of(model, saturation=saturation)
+    course = Course(0.0, 4.0, (Change(0.1, size), Change(2.0, -2 * size)))
+    simulator = Simulator(system, course, np.linspace(0.0, 4.0, 81), 1e-3)
+    return [simulator.samples(values, ("vt",))[0] for values in sets]
+
+
+def tried(row, value):
+    """Return values of a parameter, near and far from its own."""
+    factors = [value * factor for factor in (0.005, 0.01, 0.05, 0.2, 0.5, 2.0, 5.0)]
+    shifts = [value + shift for shift in (-5.0, -0.5, 0.5, 1.0)]
+    return [v for v in (*factors, *shifts) if row.low <= v <= row.high and v != value]
+
+
+def moves(model, symbol, row):
+    values = lively_values(model)
+    (before,) = responses(model, [values])
+    for value in tried(row, values[symbol]):
+        try:
+            (after,) = responses(model, [values | {symbol: value}])
+        except SimulationError:
+            continue
+        if np.abs(after - before).max() > 1e-6:
+            return True
+    return False
+
+
+def test_no_parameter_is_inert(model):
+    rows = {row.symbol: row for row in MODELS[model].sheet}
+    if model not in WITHOUT_PLANT:
+        of_machine = {MACHINE + row.symbol: row for row in MACHINES["GENROU"].sheet}
+        rows |= {name: row for name, row in of_machine.items() if ON_LOAD not in row.meaning}
+    inert = [symbol for symbol, row in rows.items() if not moves(model, symbol, row)]
+    assert inert == []
+
+
+def test_what_acts_on_load_only_is_said_to_and_nothing_else_is(exciter):
+    for machine in MACHINES.values():
+        used = parameters_used(system_of(exciter, machine.name))
+        for row in machine.sheet:
+            assert (MACHINE + row.symbol in used) == (ON_LOAD not in row.meaning), row.symbol
+
+
+def test_all_parameters_of_an_exciter_reach_its_equations(model):
+    used = parameters_used(system_of(model))
+    assert {row.symbol for row in MODELS[model].sheet} <= used
+
+
+def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(model):
+    system, values = system_of(model), typical_values(model)
+    sheets = {row.symbol: row for row in MODELS[model].sheet}
+    if model not in WITHOUT_PLANT:
+        sheets |= {MACHINE + row.symbol: row for row in MACHINES["GENROU"].sheet}
+    for symbol in system.time_constants:
+        if sheets[symbol].low > 0.0 or symbol not in parameters_used(system):
+            continue
+        none, small, twice = responses(
+            model, [values | {symbol: T} for T in (0.0, 2.0 * SHORTEST, 4.0 * SHORTEST)], size=0.02
+        )
+        # the difference is a T + b T^2 + ...: the two small ones tell a; b T^2 remains
+        assert np.abs(2.0 * small - twice - none).max() < 1e-5, symbol
+        assert np.abs(small - none).max() < 2e-3, symbol
+
+
+def test_a_time_constant_beyond_notice_equals_zero(model):
+    system, values = system_of(model), typical_values(model)
+    for symbol in system.time_constants:
+        if values[symbol] == 0.0:
+            one, other = responses(model, [values, values | {symbol: 0.99 * SHORTEST}])
+            np.testing.assert_array_equal(one, other)
+
+
+def limited_states(model):
+    system = system_of(model)
+    traced = trace(system, system.outputs)
+    pairs = zip(system.states, traced.clamped, strict=True)
+    return [name for name, node in pairs if node.op == "clip"]
+
+
+def test_a_state_stays_at_a_limit_only_while_pushed_against_it(exciter):
+    """Over a bump up and down: none is ever beyond, none stays that is drawn back."""
+    system, values = system_of(exciter), lively_values(exciter)
+    code = Kernel(system, system.outputs)
+    p = vector(system, values)[:, None]
+    start = code.start(p)
+    r = {"vref": start.r[0, 0]}
+    met = set()
+    for size in (0.0, 1.0, -1.0, 0.0):
+        (out,) = code.run(p, start, [Span(np.full((1201, 1), size), 1e-3, 1)])
+        x = {name: out[:, system.outputs.index(name), 0] for name in system.states}
+        at = system.motion(values, r, x, {"vref": np.full(1201, size)})
+        for name in limited_states(exciter):
+            low, high = at.limits[name]
+            # the ceiling of VE is a Newton step away: its own rounding
+            margin = 1e-9 * (1.0 + np.abs(x[name]))
+            assert (x[name] <= high + margin).all(), name
+            assert (x[name] >= low - margin).all(), name
+            held = (x[name] == high) | (x[name] == low)
+            drawn_back = held[:-1] & (at.slopes[name][:-1] != 0.0)
+            assert (np.diff(x[name])[drawn_back] != 0.0).all(), name
+            met |= {name} if held.any() and drawn_back.any() else set()
+    assert met
+
+
+# --- the catalogue --------------------------------------------------------------------------------
+
+
+def test_a_model_is_found_by_its_name_and_aliases_in_any_case(model, tmp_path):
+    for name in (model, model.lower(), *MODELS[model].aliases):
+        assert find(name, tmp_path) is MODELS[model]
+
+
+def test_an_unknown_name_is_answered_with_the_nearest(tmp_path):
+    with pytest.raises(ModelError, match="did you mean AC8B"):
+        find("AC88", tmp_path)
+    with pytest.raises(ModelError, match=r"XYZ is not in the catalogue \(AC1A, "):
+        find("XYZ", tmp_path)
+
+
+USER = '''"""MINE: a lag.
+
+vref -> [K / (1 + sT)] -> v
+"""
+from exfit.models.blocks import lag
+from exfit.models.sheet import sheet
+
+SHEET = sheet(("K", 2.0, "pu", (0.1, 10.0), "gain"), ("T", 0.5, "s", (0.01, 10.0), "lag"))
+STATES = "V"
+
+def equations(s, u, p, d):
+    v, d.V = lag(u.vref, s.V, p.K, p.T)
+    return v
+
+def rest(v, u, p, x):
+    x.V = v
+    return v / p.K
+'''
+
+
+def test_a_user_s_file_is_a_model_like_any_other(tmp_path):
+    from exfit.plant import alone
+
+    (tmp_path / "mine.py").write_text(USER)
+    mine = find("mine.py", tmp_path)
+    assert (mine.name, mine.title, mine.states) == ("MINE", "a lag", ("V",))
+    simulator = Simulator(
+        alone(mine), Course(0.0, 2.0, (Change(0.0, 1.0),)), np.linspace(0.0, 2.0, 41), 1e-3
+    )
+    samples, _ = simulator.samples({"K": 2.0, "T": 0.5, VT0: 0.0}, ("vt",))
+    expected = 2.0 * (1.0 - np.exp(-simulator.times / 0.5))
+    assert samples[:, 0] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("def rest", "def restt"), "lacks rest"),
+        (('STATES = "V"', ""), "lacks STATES"),
+        (("import sheet", "import sheets"), "ImportError"),
+        (("return v /", "return v //)"), "SyntaxError"),
+    ],
+)
+def test_a_file_that_is_no_model_is_refused_by_name(tmp_path, change, says):
+    (tmp_path / "mine.py").write_text(USER.replace(*change))
+    with pytest.raises(ModelError, match=says):
+        from_file(tmp_path / "mine.py")
+
+
+def test_a_missing_file_is_refused_by_name(tmp_path):
+    with pytest.raises(ModelError, match=r"none\.py: no such file"):
+        find("none.py", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("v, d.V =", "v, d.W ="), "states and slopes .*V, W"),
+        (("p.K, p.T)\n", "p.K, p.TX)\n"), "TX"),
+        (("x.V = v", "x.W = v"), "states and rest .*V, W"),
+        (("    v, d.V", "    if s.V > 0: pass\n    v, d.V"), "where"),
+    ],
+)
+def test_equations_that_do_not_fit_their_declarations_are_refused(tmp_path, change, says):
+    from exfit.plant import alone
+
+    assert change[0] in USER
+    (tmp_path / "mine.py").write_text(USER.replace(*change))
+    mine = find("mine.py", tmp_path)
+    with pytest.raises(ModelError, match=says):
+        trace(alone(mine), ("vt",))
+
+
+def test_a_model_is_made_of_the_names_of_its_file():
+    parts = {
+        "__doc__": "X: a title.\n\n a -> b\n",
+        "SHEET": SHEETS["FIRST_ORDER"],
+        "STATES": "A B",
+        "equations": print,
+        "rest": print,
+    }
+    made = build("X", parts)
+    assert (made.title, made.drawing, made.states) == ("a title", " a -> b", ("A", "B"))
+
+
+def test_the_graph_of_a_model_is_small(model):
+    """A model that unrolls something by mistake makes thousands of nodes."""
+    traced = trace(system_of(model), system_of(model).outputs)
+    assert len(list(in_order([*traced.slopes, *traced.outputs, *traced.clamped]))) < 1000
