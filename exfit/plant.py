@@ -1,7 +1,7 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -78,6 +78,7 @@ def rest_of(model: Model, output: Signal, u: Names, p: Names) -> tuple[Names, Si
     return x, vref
 
 
+@cache
 def open_circuit(model: Model, machine: Machine, saturation: SaturationForm) -> System:
     """Return an exciter on a machine whose breaker is open, at rated speed.
 
@@ -128,6 +129,7 @@ def open_circuit(model: Model, machine: Machine, saturation: SaturationForm) -> 
     )
 
 
+@cache
 def alone(model: Model) -> System:
     """Return a model without a plant: its output is ``vt``."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,12 @@ class Free:
             if scaled == self.scaled(bound):
                 return bound
         return float(np.exp(scaled)) if self.logarithmic else scaled * (self.high - self.low)
+
+    def bound(self, value: float) -> Literal["min", "max"] | None:
+        """Return which bound a value lies on."""
+        if value == self.low:
+            return "min"
+        return "max" if value == self.high else None
 
     def slope(self, scaled: float) -> float:
         """Return d value / d scaled."""

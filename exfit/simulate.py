@@ -20,9 +20,8 @@ Values = Mapping[str, float]
 
 MOST_STEPS = 1e8  # a day at 1 ms
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
-REST_TOLERANCE = (
-    1e-6  # pu/s: above the rounding of a gain over a time constant, below any real motion
-)
+REST_TOLERANCE = 1e-6  # pu/s: below any real motion
+ROUNDING = 1e-13  # of a state
 ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
 NEIGHBOURS = (
     4  # grid points of the interpolation, whose error is then of the order of Runge-Kutta's
@@ -173,6 +172,7 @@ class Simulator:
         self._grid = stretches(course, step)
         self._inputs = [np.full((part.steps + 1, 1), part.vref) for part in self._grid]
         self._sampling = Sampling(self._grid, times)
+        self._last = b"", 0  # the sub-steps of the last values asked for
 
     @cached_property
     def time_constants(self) -> tuple[str, ...]:
@@ -191,11 +191,11 @@ class Simulator:
         ``MOST_SUBSTEPS``.
         """
         p = self._vector(values)
-        rest = linear_kernel(self.system).rest(p)
-        slopes, rate = self._motion(p, rest, rest.x, np.zeros(len(self.system.inputs)))
-        if not np.max(np.abs(slopes)) <= REST_TOLERANCE * max(1.0, float(np.max(np.abs(rest.x)))):
-            raise SimulationError("no state of rest: " + self._limits_passed(values))
-        return self._parts(values, rate)
+        known, parts = self._last
+        if known != p.tobytes():
+            parts = self._parts(values, self._rate_at_rest(values, p))
+            self._last = p.tobytes(), parts
+        return parts
 
     def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
         """Return the sub-steps that the rule asks for along a response with all its states."""
@@ -249,6 +249,17 @@ class Simulator:
     def _spans(self, parts: int) -> list[Span]:
         return [Span(u, part.step, parts) for u, part in zip(self._inputs, self._grid, strict=True)]
 
+    def _rate_at_rest(self, values: Values, p: Array) -> float:
+        """Return the fastest rate (1/s) at the start; raises SimulationError if that is no rest."""
+        rest = linear_kernel(self.system).rest(p)
+        slopes, rate = self._motion(p, rest, rest.x, np.zeros(len(self.system.inputs)))
+        # what the rounding of a state leaves of its slope, at the fastest rate
+        rounding = ROUNDING * float(np.max(np.abs(rest.x))) * rate
+        moving = ~(np.abs(slopes) <= REST_TOLERANCE + rounding)
+        if np.any(moving) or not math.isfinite(rounding):
+            raise SimulationError("no state of rest: " + self._why_moving(values, slopes, moving))
+        return rate
+
     def _motion(self, p: Array, rest: Start, x: Array, u: Array) -> tuple[Array, float]:
         """Return the slopes at states x and the spectral radius (1/s) of their Jacobian."""
         slopes, jacobian = linear_kernel(self.system).motion(p, rest.r, x, u)
@@ -275,6 +286,11 @@ class Simulator:
             )
         return parts
 
+    def _why_moving(self, values: Values, slopes: Array, moving: NDArray[np.bool_]) -> str:
+        states = zip(self.system.states, slopes, moving, strict=True)
+        moved = [f"{name} moves by {slope:.3g} pu/s" for name, slope, moves in states if moves]
+        return self._limits_passed(values) or ", ".join(moved) or "the values do not define one"
+
     def _limits_passed(self, values: Values) -> str:
         """Name the limits that the start would have to pass, with both values."""
         traced = trace(self.system, self.system.outputs)
@@ -293,7 +309,7 @@ class Simulator:
                     found.append(
                         f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
                     )
-        return "; ".join(dict.fromkeys(found)) or "the values do not define one"
+        return "; ".join(dict.fromkeys(found))
 
 
 def _limit_name(node: Node) -> str:

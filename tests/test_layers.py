@@ -1,0 +1,138 @@
+"""Who may import whom: each module only what stands above it."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import exfit
+
+ROOT = Path(exfit.__file__).parent
+ORDER = (
+    "exfit",
+    "exfit.errors",
+    "exfit.engine",
+    "exfit.engine.trace",
+    "exfit.engine.system",
+    "exfit.engine.emit",
+    "exfit.engine.kernel",
+    "exfit.models.sheet",
+    "exfit.models.blocks",
+    "exfit.models.machines",
+    "exfit.models.*",
+    "exfit.models",
+    "exfit.plant",
+    "exfit.record",
+    "exfit.yaml_lines",
+    "exfit.case_form",
+    "exfit.case_faults",
+    "exfit.case",
+    "exfit.simulate",
+    "exfit.residuals",
+    "exfit.estimate",
+    "exfit.inference",
+    "exfit.features",
+    "exfit.result",
+    "exfit.plots",
+    "exfit.report",
+    "exfit.trial",
+    "exfit.changes",
+    "exfit.notes",
+    "exfit.study",
+    "exfit.check",
+    "exfit.files",
+    "exfit.show",
+    "exfit.cli",
+    "exfit.__main__",
+)
+FORBIDDEN_ABOVE_CASE = {"yaml", "click", "rich", "matplotlib", "pydantic"}
+MAY_READ_YAML = {"exfit.yaml_lines"}
+AT_ONCE = {"numpy", "matplotlib", "scipy", "pydantic", "rich", "llvmlite", "yaml"}
+
+
+def module_name(path):
+    parts = path.relative_to(ROOT.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py"))}
+
+
+def place(name):
+    """Return where a module stands; a model's file stands where all of them do."""
+    if name in ORDER:
+        return ORDER.index(name)
+    if name.startswith("exfit.models."):
+        return ORDER.index("exfit.models.*")
+    return len(ORDER)
+
+
+def imports(path, everywhere):
+    """Yield the modules a file imports; only those at its top unless ``everywhere``."""
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree) if everywhere else at_the_top(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            members = [f"{node.module}.{alias.name}" for alias in node.names]
+            found = [member for member in members if member in MODULES]
+            yield from found or [node.module]
+
+
+def at_the_top(tree):
+    """Yield the statements that run when a module is imported."""
+    for node in tree.body:
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        if not isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield from ast.walk(node)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_every_module_has_its_place_in_the_order(name):
+    assert place(name) < len(ORDER), f"say in ORDER where {name} stands"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_module_imports_only_what_stands_above_it(name):
+    for imported in imports(MODULES[name], everywhere=True):
+        if imported.split(".")[0] == "exfit":
+            assert place(imported) < place(name), f"{name} imports {imported}"
+
+
+@pytest.mark.parametrize("name", [m for m in MODULES if place(m) < ORDER.index("exfit.case_form")])
+def test_nothing_above_the_case_knows_files_or_screens(name):
+    roots = {imported.split(".")[0] for imported in imports(MODULES[name], everywhere=True)}
+    allowed = {"yaml"} if name in MAY_READ_YAML else set()
+    assert not roots & (FORBIDDEN_ABOVE_CASE - allowed)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_nothing_waits_for_scipy(name):
+    roots = {imported.split(".")[0] for imported in imports(MODULES[name], everywhere=False)}
+    assert "scipy" not in roots
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_only_the_engine_knows_machine_code(name):
+    roots = {imported.split(".")[0] for imported in imports(MODULES[name], everywhere=True)}
+    assert "llvmlite" not in roots or name.startswith("exfit.engine.")
+
+
+@pytest.mark.skipif("exfit.cli" not in MODULES, reason="there is no command yet")
+def test_the_command_starts_without_the_heavy_packages():
+    code = "import exfit.cli, sys; print(*{name.partition('.')[0] for name in sys.modules})"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT.parent)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
+    assert not AT_ONCE & set(done.stdout.split())
+
+
+def test_an_estimator_can_be_used_without_the_rest():
+    if "exfit.estimate" in MODULES:
+        own = [m for m in imports(MODULES["exfit.estimate"], True) if m.startswith("exfit.")]
+        assert own == []

@@ -1,0 +1,162 @@
+"""Residuals and their Jacobians over the scaled free parameters."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracle import lively_values, system_of
+
+from exfit.residuals import (
+    CENTRAL_STEP,
+    JACOBIANS,
+    ONE_SIDED_STEP,
+    Channel,
+    Free,
+    Residuals,
+)
+from exfit.simulate import Change, Course, Simulator
+
+TIMES = np.linspace(0.0, 2.0, 101)
+COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
+FREE = {"AC1A": ("KA", "TE", "KF", "KC", "KD"), "AC8B": ("KPR", "TE", "TDR", "KC", "KD")}
+WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
+
+
+def problem(exciter, logarithmic=True, signals=("vt",), offset=0.01, **bounds):
+    """Return residuals against a record that is everywhere ``offset`` above the truth."""
+    values = lively_values(exciter)
+    simulator = Simulator(system_of(exciter), COURSE, TIMES, 1e-3)
+    truth = simulator.samples(values, signals)[0]
+    channels = [
+        Channel(name, truth[:, k] + offset, WEIGHTS[name]) for k, name in enumerate(signals)
+    ]
+    free = [
+        Free(
+            name,
+            values[name],
+            *bounds.get(name, (values[name] / 10, values[name] * 10)),
+            logarithmic,
+        )
+        for name in FREE[exciter]
+    ]
+    return Residuals(simulator, channels, free, values)
+
+
+@pytest.mark.parametrize("logarithmic", [True, False])
+def test_residuals_are_simulated_minus_measured_times_weight(exciter, logarithmic):
+    signals = ("vt", "efd", "ifd")
+    residuals = problem(exciter, logarithmic, signals)
+    expected = np.concatenate([np.full(101, -0.01 * WEIGHTS[name]) for name in signals])
+    assert residuals(residuals.start) == pytest.approx(expected, abs=1e-12)
+
+
+# what differences err by: curvature times the step or its square, and rounding over the step
+KINDS = (
+    ("central", 1e-6, CENTRAL_STEP),
+    ("forward", 1e-5, ONE_SIDED_STEP),
+    ("backward", 1e-5, ONE_SIDED_STEP),
+)
+ROUNDING = 5e-14  # of a run of thousands of steps, pu
+
+
+@pytest.mark.parametrize("logarithmic", [True, False])
+@pytest.mark.parametrize("signals", [("vt",), ("efd", "vt"), ("vt", "efd", "ifd")])
+def test_exact_and_difference_jacobians_agree(exciter, signals, logarithmic):
+    residuals = problem(exciter, logarithmic, signals)
+    theta = residuals.start
+    exact = residuals.exact(theta)
+    assert exact.shape == (101 * len(signals), len(theta))
+    size = np.abs(exact).max(axis=0)
+    for kind, tolerance, step in KINDS:
+        got = JACOBIANS[kind](residuals)(theta)
+        error = np.abs(got - exact).max(axis=0)
+        assert (error <= tolerance * size + ROUNDING / step).all(), kind
+
+
+def test_a_jacobian_at_a_bound_stays_within(exciter):
+    values = lively_values(exciter)
+    name = FREE[exciter][0]
+    for bounds in ((values[name], values[name] * 5), (values[name] / 5, values[name])):
+        residuals = problem(exciter, **{name: bounds})
+        seen = []
+        run = residuals.simulator.samples_of_many
+        residuals.simulator.samples_of_many = lambda sets, out, run=run, seen=seen: (
+            seen.extend(one[name] for one in sets) or run(sets, out)
+        )
+        exact = residuals.exact(residuals.start)
+        for kind, _, step in KINDS:
+            got = JACOBIANS[kind](residuals)(residuals.start)
+            # at the bound even the central ones are one-sided
+            error = np.abs(got - exact).max()
+            assert error < 1e-4 * np.abs(exact).max() + ROUNDING / step, kind
+        assert bounds[0] <= min(seen)
+        assert max(seen) <= bounds[1]
+
+
+positive = st.floats(1e-6, 1e6)
+
+
+@settings(deadline=None, derandomize=True)
+@given(positive, st.floats(1.01, 1e4), st.floats(0.0, 1.0), st.booleans())
+def test_scaling_and_back_is_the_identity_and_bounds_are_exact(low, ratio, share, logarithmic):
+    high = low * ratio
+    value = low + share * (high - low)
+    free = Free("X", value, low, high, logarithmic)
+    assert free.value(free.scaled(value)) == pytest.approx(value, rel=1e-9)
+    assert free.value(free.scaled(low)) == low
+    assert free.value(free.scaled(high)) == high
+    if not logarithmic:
+        assert free.scaled(high) - free.scaled(low) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("logarithmic", [True, False])
+def test_the_slope_of_the_scale_is_its_derivative(logarithmic):
+    free = Free("X", 3.0, 0.5, 20.0, logarithmic)
+    theta = free.scaled(3.0)
+    expected = (free.value(theta + 1e-6) - free.value(theta - 1e-6)) / 2e-6
+    assert free.slope(theta) == pytest.approx(expected, rel=1e-6)
+
+
+def test_on_its_bounds_a_parameter_is_exactly_the_bound(exciter):
+    residuals = problem(exciter)
+    for side, theta in enumerate(residuals.bounds):
+        values = residuals.values(theta)
+        for one in residuals.free:
+            assert values[one.name] == (one.low, one.high)[side]
+
+
+def test_zero_may_be_a_bound_of_a_linear_parameter(exciter):
+    free = Free("TA", 0.01, 0.0, 0.1, False)
+    assert free.value(free.scaled(0.0)) == 0.0
+
+
+def test_what_is_fixed_stays(exciter):
+    residuals = problem(exciter)
+    moved = residuals.values(residuals.start + 0.1)
+    free = set(FREE[exciter])
+    fixed = {name: value for name, value in lively_values(exciter).items() if name not in free}
+    assert fixed.items() <= moved.items()
+    assert all(moved[name] != lively_values(exciter)[name] for name in free)
+
+
+def test_a_set_that_cannot_be_simulated_costs_infinity(exciter):
+    residuals = problem(exciter)
+    residuals.fixed = {**residuals.fixed, "VRMAX": 0.1}
+    got = residuals(residuals.start)
+    assert got.shape == (101,)
+    assert (got == np.inf).all()
+
+
+def test_every_run_is_counted(exciter):
+    residuals = problem(exciter)
+    count = len(residuals.free)
+    for call, cost in (
+        (residuals, 1),
+        (residuals.exact, 1),
+        (residuals.central, 2 * count),
+        (residuals.forward, 2 * count),
+    ):
+        before = residuals.simulations
+        call(residuals.start)
+        assert residuals.simulations == before + cost
+    assert residuals.substeps >= 1

@@ -1,0 +1,320 @@
+"""The grid, the samples, the sub-steps and what cannot be simulated."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracle import drawn_values, lively_values, system_of, typical_values
+from scipy.integrate import solve_ivp
+
+from exfit.errors import SimulationError
+from exfit.models.blocks import SHORTEST
+from exfit.plant import VT0
+from exfit.simulate import (
+    MOST_SUBSTEPS,
+    Change,
+    Course,
+    Simulator,
+    parameters_used,
+    stretches,
+)
+
+UP = Course(0.0, 2.0, (Change(0.5, 0.005),))  # off the limits
+CLOCK = np.linspace(0.0, 2.0, 201)
+laws = settings(deadline=None, derandomize=True, max_examples=25)
+
+
+def samples(name, values, course=UP, times=CLOCK, step=1e-3, outputs=("vt",)):
+    return Simulator(system_of(name), course, times, step).samples(values, outputs)[0]
+
+
+# --- grid and samples -----------------------------------------------------------------------------
+
+
+@laws
+@given(st.lists(st.floats(0.0, 3.0), max_size=4, unique=True), st.floats(1e-3, 0.5))
+def test_the_grid_is_gapless_and_every_change_lies_on_it(instants, step):
+    changes = tuple(Change(at, 0.1) for at in sorted(instants))
+    grid = stretches(Course(0.0, 3.0, changes), step)
+    ends = [part.start + part.step * part.steps for part in grid]
+    assert grid[0].start == 0.0
+    assert ends == pytest.approx([part.start for part in grid[1:]] + [3.0], abs=1e-12)
+    inside = [at for at in sorted(instants) if 0.0 < at < 3.0]
+    assert [part.start for part in grid[1:]] == inside
+    assert all(part.step <= step * (1.0 + 1e-5) for part in grid)
+    assert grid[-1].vref == pytest.approx(0.1 * sum(at < 3.0 for at in instants))
+
+
+def test_at_the_instant_of_a_step_the_value_is_that_before_it(model):
+    for at in (0.5, 0.50037):
+        course = Course(0.0, 1.0, (Change(at, 0.02),))
+        times = np.array([at - 1e-3, at, at + 1e-3])
+        vref = samples(model, lively_values(model), course, times, outputs=("vref",))[:, 0]
+        assert vref[1] == vref[0]
+        assert vref[2] - vref[1] == pytest.approx(0.02)
+
+
+def test_a_step_between_grid_points_is_the_same_step_later(model):
+    """Two grids of one response: they differ by the method's error alone."""
+    values, delay = lively_values(model), 0.00037
+    later = Course(0.0, 2.0, (Change(0.5 + delay, 0.005),))
+    got = samples(model, values, later, CLOCK[:-1] + delay)
+    assert np.abs(got - samples(model, values)[:-1]).max() < 1e-9
+
+
+def test_steps_add_up(model):
+    values = lively_values(model)
+    several = Course(0.0, 2.0, (Change(0.5, 0.03), Change(1.0, -0.02), Change(1.2, 0.01)))
+    vref = samples(model, values, several, outputs=("vref",))[:, 0]
+    levels = vref - vref[0]
+    assert levels[[49, 51, 99, 101, 119, 121, 200]] == pytest.approx(
+        [0.0, 0.03, 0.03, 0.01, 0.01, 0.02, 0.02]
+    )
+
+
+def test_a_step_up_and_back_returns_to_rest():
+    values = typical_values("AC1A")
+    course = Course(0.0, 60.0, (Change(1.0, 0.05), Change(20.0, -0.05)))
+    vt = samples("AC1A", values, course, np.array([0.0, 20.0, 60.0]))[:, 0]
+    assert vt[2] == pytest.approx(vt[0], abs=1e-6)
+    assert vt[1] - vt[0] > 0.04
+
+
+def test_the_response_to_a_small_bump_scales_and_mirrors(model):
+    values = lively_values(model)
+
+    def moved(size):
+        vt = samples(model, values, Course(0.0, 2.0, (Change(0.5, size),)))
+        return (vt - vt[0]) / size
+
+    assert moved(1e-5) == pytest.approx(moved(-1e-5), abs=1e-3)
+    assert moved(1e-5) == pytest.approx(moved(2e-5), abs=1e-3)
+
+
+def test_samples_at_uneven_times_err_as_little_as_the_method(model):
+    """Halving the step divides the error of samples between grid points by sixteen."""
+    values, rng = lively_values(model), np.random.default_rng(4)
+    times = np.sort(rng.uniform(0.01, 2.0, 200))
+    course = Course(0.0, 2.0, (Change(0.0, 0.002),))
+    finest = samples(model, values, course, times, 1.25e-4)
+    errors = [np.abs(samples(model, values, course, times, h) - finest).max() for h in (4e-3, 2e-3)]
+    assert errors[0] / errors[1] > 11.0
+    assert errors[1] < 1e-8
+
+
+def test_a_sample_on_the_grid_is_the_computed_value(model):
+    values = lively_values(model)
+    fine = samples(model, values, times=np.linspace(0.0, 2.0, 2001))
+    rng = np.random.default_rng(5)
+    some = np.sort(rng.choice(2001, 50, replace=False))
+    got = samples(model, values, times=np.append(some * 1e-3, 1.99951))
+    np.testing.assert_allclose(got[:-1], fine[some], rtol=0.0, atol=1e-15)
+
+
+def test_a_response_has_every_signal_and_state_on_its_clock(model):
+    system = system_of(model)
+    response = Simulator(system, UP, CLOCK, 1e-3).response(lively_values(model))
+    assert tuple(response.signals) == system.outputs
+    assert response.time is CLOCK
+    assert all(signal.shape == CLOCK.shape for signal in response.signals.values())
+
+
+def test_many_sets_give_what_each_gives(model):
+    simulator = Simulator(system_of(model), UP, CLOCK, 1e-3)
+    sets = [drawn_values(model, seed) for seed in range(19)]
+    together = simulator.samples_of_many(sets, ("vt",))
+    assert together.shape == (201, 1, 19)
+    for lane, values in enumerate(sets):
+        # all take the most sub-steps that any of them needs
+        expected, _ = simulator.samples(values, ("vt",))
+        assert np.abs(together[:, :, lane] - expected).max() < 1e-7
+
+
+def test_tangents_are_the_slopes_of_the_samples(model):
+    """By differences at the times of the samples, off the grid and past a step."""
+    system, values = system_of(model), lively_values(model)
+    times = np.linspace(0.0, 2.0, 77)
+    simulator = Simulator(system, Course(0.0, 2.0, (Change(0.20037, 0.002),)), times, 1e-3)
+    free = (system.parameters[-1], *sorted(parameters_used(system))[:4])
+    got, slopes = simulator.tangents(values, ("vt",), free)
+    assert got == pytest.approx(simulator.samples(values, ("vt",))[0], abs=1e-12)
+    for column, name in enumerate(free):
+        h = 1e-4 * max(values[name], 0.1)
+        sets = [values | {name: values[name] + side * h} for side in (1, -1)]
+        ends = simulator.samples_of_many(sets, ("vt",))
+        expected = (ends[:, :, 0] - ends[:, :, 1]) / (2 * h)
+        size = np.abs(slopes[:, :, column]).max()
+        assert np.abs(slopes[:, :, column] - expected).max() < 1e-6 * size + 1e-8, name
+
+
+# --- limits ---------------------------------------------------------------------------------------
+
+
+def test_a_lag_meets_and_leaves_its_limits_when_a_run_of_tiny_steps_does():
+    """The lag of AC1A, driven by what it saw, against Euler's method with tiny steps.
+
+    The loop is cut by KF = 0 and an exciter that is too slow to answer.
+    """
+    changes = {"KA": 40.0, "TA": 0.1, "VAMAX": 5.0, "VAMIN": -1.0, "KF": 0.0, "TE": 99.0}
+    values = typical_values("AC1A", **changes, VRMAX=99.0, VRMIN=-99.0)
+    course = Course(0.0, 2.0, (Change(0.2, 0.5), Change(0.9, -1.0), Change(1.4, 0.52)))
+    got = samples("AC1A", values, course, outputs=("VA", "vref", "vt"))
+    start, vt = got[0, 0], got[:, 2]
+    vref = got[0, 1]
+
+    def free(t, x, level):
+        return (40.0 * (vref + level - np.interp(t, CLOCK, vt)) - x) / 0.1
+
+    x, expected = start, [start]
+    fine = np.arange(0.0, 2.0, 1e-5)
+    for k, t in enumerate(fine):
+        level = sum(change.step for change in course.steps if t >= change.at - 1e-9)
+        x = min(max(x + 1e-5 * free(t, x, level), -1.0), 5.0)
+        if (k + 1) % 1000 == 0:
+            expected.append(x)
+    assert max(expected) == 5.0
+    assert min(expected) == -1.0
+    # Euler's error at 10 us, 40 / 0.1 * 1e-5 / 2 of a pu
+    assert np.abs(got[:, 0] - expected).max() < 4e-3
+
+
+def test_halving_the_step_hardly_moves_a_response_that_meets_limits(exciter):
+    values = lively_values(exciter)
+    course = Course(0.0, 2.0, (Change(0.3, 0.3), Change(1.1, -0.4)))
+    fine = samples(exciter, values, course, step=3.125e-5)
+    errors = [np.abs(samples(exciter, values, course, step=h) - fine).max() for h in (1e-3, 2.5e-4)]
+    # a state may be held a part of a step too early: what follows it errs by the step squared
+    assert errors[0] < 2e-5
+    assert errors[1] < 2e-5 / 8
+
+
+BEYOND = {
+    "AC1A": {"VAMAX": 0.5, "VAMIN": 9.0, "VRMAX": 0.5, "VRMIN": 9.0},
+    "AC8B": {
+        "VPIDMAX": 0.5,
+        "VPIDMIN": 9.0,
+        "VRMAX": 0.5,
+        "VRMIN": 9.0,
+        "VFEMAX": 0.5,
+        "VEMIN": 9.0,
+    },
+}
+CASES = [(name, symbol) for name in BEYOND for symbol in BEYOND[name]]
+
+
+def test_every_limit_is_tried(exciter):
+    limits = [s for s in system_of(exciter).parameters if s.endswith(("MAX", "MIN"))]
+    assert sorted(BEYOND[exciter]) == sorted(limits)
+
+
+@pytest.mark.parametrize("bypassed", [True, False])
+@pytest.mark.parametrize(("name", "symbol"), CASES)
+def test_a_start_beyond_a_limit_names_it_with_both_values(name, symbol, bypassed):
+    values = (typical_values if bypassed else lively_values)(name)
+    limit = BEYOND[name][symbol]
+    side = "above" if symbol.endswith("MAX") else "below"
+    with pytest.raises(SimulationError, match=f"{side} {symbol}") as caught:
+        samples(name, values | {symbol: limit})
+    told = str(caught.value)
+    assert told.startswith("no state of rest: the start needs ")
+    if symbol != "VFEMAX":  # the limit of VE that follows from it is told
+        assert f"{symbol} = {limit:g}" in told
+    simulator = Simulator(system_of(name), UP, CLOCK, 1e-3)
+    needed = simulator.response(values, ("VE", "vt")).signals["VE"][0]
+    number = float(told.split("needs ")[1].split(",")[0])
+    if symbol in ("VFEMAX", "VEMIN"):
+        assert number == pytest.approx(needed, rel=1e-5)
+    else:
+        assert 0.5 < number < 9.0
+
+
+def test_a_start_exactly_on_a_limit_is_a_start(exciter):
+    """What holds the start is allowed; a hair less is not."""
+    values = lively_values(exciter)
+    state = {"AC1A": "VA", "AC8B": "VR"}[exciter]
+    simulator = Simulator(system_of(exciter), UP.without_steps(), CLOCK, 1e-3)
+    needed = simulator.response(values, (state,)).signals[state][0]
+    vt = simulator.response(values | {"VRMAX": needed * (1 + 1e-12)}, ("vt",)).signals["vt"]
+    assert vt == pytest.approx(1.0, abs=1e-9)
+    with pytest.raises(SimulationError, match="VRMAX"):
+        simulator.response(values | {"VRMAX": needed * (1 - 1e-3)})
+
+
+def test_values_that_define_no_start_are_refused(exciter):
+    for wrong in ({"KA": 0.0}, {"TE": float("nan")}, {"KC": float("inf")}, {VT0: float("nan")}):
+        with pytest.raises(SimulationError):
+            samples(exciter, lively_values(exciter) | wrong)
+
+
+# --- sub-steps ------------------------------------------------------------------------------------
+
+
+def stiff_values(name, seed):
+    """Return values whose gains and times lie anywhere within a factor of ten."""
+    return drawn_values(name, seed, spread=10.0)
+
+
+@pytest.mark.parametrize("step", [1e-3, 2e-2])
+def test_no_response_is_unstable_without_a_word(model, step):
+    """Either a set cannot be simulated, or a four times smaller step gives the same response."""
+    course = Course(0.0, 4.0, (Change(0.5, 0.05), Change(2.0, -0.05)))
+    times = np.linspace(0.0, 4.0, 201)
+    simulated = 0
+    for seed in range(40):
+        values = stiff_values(model, seed)
+        try:
+            coarse = samples(model, values, course, times, step)
+        except SimulationError:
+            continue
+        fine = samples(model, values, course, times, step / 4)
+        # where a limit holds a step of a fast loop, its end is known to a sub-step
+        assert np.abs(coarse - fine).max() < 2e-2 * np.ptp(fine) + 1e-4, seed
+        simulated += 1
+    assert simulated > 10
+
+
+def test_sub_steps_follow_the_shortest_time_constant(exciter):
+    for T in (1e-2, 2e-4):
+        simulator = Simulator(system_of(exciter), UP, CLOCK, 1e-2)
+        values = lively_values(exciter) | {"TR": T}
+        parts = simulator.substeps(values)
+        assert parts >= np.ceil(1e-2 / T)
+        assert simulator.samples(values, ("vt",))[1] == parts
+
+
+def test_sub_steps_along_a_response_are_at_least_those_of_its_start(exciter):
+    simulator = Simulator(system_of(exciter), UP, CLOCK, 1e-2)
+    values = lively_values(exciter)
+    response = simulator.response(values)
+    assert response.substeps == simulator.substeps(values)
+    assert simulator.substeps_along(values, response) >= 0.5 * response.substeps
+
+
+def test_too_many_sub_steps_are_an_error_that_names_the_time_constant(exciter):
+    times = [T for T in system_of(exciter).time_constants if T in ("TA", "TR")]
+    for symbol in times:
+        values = lively_values(exciter) | {symbol: 1.5 * SHORTEST}
+        with pytest.raises(SimulationError, match=f"{symbol} = 0.00015 s") as caught:
+            samples(exciter, values, step=0.5)
+        assert str(MOST_SUBSTEPS) in str(caught.value)
+        assert "simulation.step: 0.5 s" in str(caught.value)
+        samples(exciter, values, step=0.01)
+
+
+def test_a_parameter_that_matters_nowhere_costs_no_sub_steps():
+    simulator = Simulator(system_of("AC1A"), UP, CLOCK, 1e-3)
+    values = typical_values("AC1A")
+    without = simulator.substeps(values)
+    assert simulator.substeps(values | {"machine.Tppq0": 2e-4}) == without
+
+
+def test_a_fast_pole_without_a_time_constant_is_seen_too():
+    """FIRST_ORDER has its rate as a parameter: the spectral radius finds it."""
+    values = {"k": 900.0, "a": 900.0, VT0: 0.0}
+    course = Course(0.0, 0.1, (Change(0.0, 1.0),))
+    times = np.linspace(0.0, 0.1, 11)
+    simulator = Simulator(system_of("FIRST_ORDER"), course, times, 1e-2)
+    got, parts = simulator.samples(values, ("vt",))
+    assert parts == 9
+    exact = solve_ivp(lambda t, x: 900.0 * (1.0 - x), (0.0, 0.1), [0.0], "LSODA", times, rtol=1e-9)
+    assert got[:, 0] == pytest.approx(exact.y[0], abs=1e-3)
