@@ -99,6 +99,11 @@ class BumpTest(Section):
         default=None,
         description="Voltage before the first step, pu; default: mean of the record there.",
     )
+    begin: Number | None = Field(
+        default=None,
+        description="Where the simulation starts at rest, s; default: with the record. Earlier "
+        "than the record, for steps that were made before it; then vt0 holds from here on.",
+    )
     vref: tuple[Step, ...] = Field(
         min_length=1, description="Steps of the reference, in the order of time."
     )
@@ -176,7 +181,9 @@ class Estimate(Section):
     jacobian: Literal["exact", "central", "forward", "backward"] = Field(
         default="exact", description="Derivatives: exact, or by differences."
     )
-    iterations: Count = Field(default=100, description="Most iterations of a fit.")
+    iterations: Count = Field(
+        default=100, description="Most iterations of each phase of the strategy."
+    )
     tolerance: Tolerance = Field(default_factory=Tolerance, description="When to stop.")
     good_enough: Limit = Field(
         default_factory=lambda: Limit(rmse=2e-4),
@@ -291,6 +298,13 @@ class Case(Section):
         path = self.folder / record.file
         read = read_record(path, record.time, channels, record.window)
         start, end = read.time[0], read.time[-1]
+        if test.begin is not None:
+            if test.begin > start:
+                raise RecordError(
+                    f"{path}: begins at {show(start)} s, before {self.path} begins to simulate it "
+                    f"at {show(test.begin)} s"
+                )
+            start = test.begin
         for step in test.vref:
             if not start <= step.at < end:
                 raise RecordError(

@@ -12,7 +12,15 @@ from typing import Any
 from exfit.case_form import near, show
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import Machine
-from exfit.models.sheet import Model, Parameter, Sheet, crossed_limits, saturation_faults, typical
+from exfit.models.sheet import (
+    Model,
+    Parameter,
+    Sheet,
+    crossed_limits,
+    exponential_faults,
+    saturation_faults,
+    typical,
+)
 from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
@@ -21,6 +29,7 @@ Contradictions = Iterable[tuple[str, str]]
 FIXED: Place = ("parameters", "fixed")
 FREE: Place = ("parameters", "free")
 MACHINE: Place = ("plant", "parameters")
+TAKEN = ("fit", "response", "history", "overlay", "convergence", "trajectories")
 
 
 def contradictions(data: Data, exciter: Model | None, machine: Machine | None) -> Iterator[Fault]:
@@ -60,7 +69,7 @@ def _exciter_faults(data: Data, exciter: Model) -> Iterator[Fault]:
     yield from _placed(FIXED[:1], given, crossed_limits(values))
     yield from _placed(FIXED[:1], given, saturation_faults(values))
     if str(data.get("saturation")).startswith("exponential"):
-        yield from _placed(("saturation",), given, _without_logarithm(values))
+        yield from _placed(("saturation",), given, exponential_faults(values))
 
 
 def _machine_faults(data: Data, machine: Machine) -> Iterator[Fault]:
@@ -122,14 +131,6 @@ def _outside(start: float | None, low: float | None, high: float | None) -> bool
     return (low is not None and start < low) or (high is not None and start > high)
 
 
-def _without_logarithm(values: Mapping[str, float]) -> Contradictions:
-    """Yield the saturation points through which no exponential runs."""
-    for symbol in ("SE1", "SE2"):
-        if symbol in values and values[symbol] <= 0:
-            value = show(values[symbol])
-            yield symbol, f"{value} is not above 0, as an exponential saturation needs"
-
-
 def _placed(section: Place, given: Mapping[str, Place], found: Contradictions) -> Iterator[Fault]:
     """Yield each contradiction where the file gives its parameter, else the other one it names."""
     for symbol, text in found:
@@ -184,8 +185,11 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
         yield Fault(
             (*place, "test", "duration"), "only without a record; record.window cuts a record"
         )
+    begin = _numbers(test).get("begin")
+    if begin is not None and "vt0" not in test:
+        yield Fault((*place, "test", "vt0"), "is missing: with begin it says where to start")
     channels = _section(record, "channels")
-    if channels and "vt" not in channels and "vt0" not in test:
+    if channels and "begin" not in test and "vt" not in channels and "vt0" not in test:
         yield Fault((*place, "test", "vt0"), "is missing, and the record has no vt to take it from")
     window = record.get("window")
     if not (isinstance(window, list) and len(window) == 2 and all(map(_is_number, window))):
@@ -196,6 +200,12 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
             (*place, "record", "window"), f"start {show(start)} is not below end {show(end)}"
         )
         return
+    if begin is not None and begin > start:
+        here = (*place, "test", "begin")
+        yield Fault(
+            here, f"{show(begin)} s is after {show(start)} s, where the record's window starts"
+        )
+    start = start if begin is None else begin
     for index, step in enumerate(_list(test, "vref")):
         at = _numbers(step).get("at")
         if at is not None and not start <= at < end:
@@ -205,6 +215,8 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
 
 
 def _missing_without_record(place: Place, test: Data) -> Iterator[Fault]:
+    if "begin" in test:
+        yield Fault((*place, "begin"), "only with a record; without one the time begins at 0")
     if test and "duration" not in test:
         yield Fault(
             (*place, "duration"), "is missing: without a record it says how long to simulate"
@@ -214,15 +226,15 @@ def _missing_without_record(place: Place, test: Data) -> Iterator[Fault]:
 
 
 def _repeated_names(trials: list[Any]) -> Iterator[Fault]:
-    seen: dict[str, str] = {}
+    seen = dict.fromkeys(TAKEN, "a file of every run")
     for at, trial in enumerate(trials):
         name = trial.get("name") if isinstance(trial, dict) else None
         if not isinstance(name, str):
             continue
         if name.casefold() in seen:
-            text = f"{name!r} is taken by {seen[name.casefold()]!r}: files are named after it"
+            text = f"{name!r} is taken by {seen[name.casefold()]}: files are named after it"
             yield Fault(("validate", at, "name"), text)
-        seen.setdefault(name.casefold(), name)
+        seen.setdefault(name.casefold(), repr(name))
 
 
 def _readable(rows: Sheet, *given: Data) -> dict[str, float]:

@@ -324,7 +324,7 @@ MEANING = {
         "{KE",
         "{SE2: 0.0, KE",
         "parameters.fixed.SE2",
-        ["0 is not above 0", "exponential"],
+        ["0 lies on no exponential"],
     ),
     "machine data out of order": (
         "Xd: 1.8",
