@@ -1,0 +1,92 @@
+"""Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case import Case
+from exfit.models.blocks import SHORTEST
+from exfit.notes import typical_notes
+from exfit.plant import VT0
+from exfit.residuals import Channel, Residuals
+from exfit.simulate import Course, Simulator
+from exfit.trial import fitted_trial, free_of, plain_simulator, system_of, values_of
+
+Array = NDArray[np.float64]
+
+STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
+AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
+FLAT_SECONDS = 60.0
+FLAT_DRIFT = 1e-9  # pu
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a check found.
+
+    ``deviations`` holds, for each free parameter, the largest difference between the exact column
+    of the Jacobian and the central difference at each of STEPS, relative to the column's largest
+    element.
+    """
+
+    deviations: Mapping[str, tuple[float, ...]]
+    bypassed: tuple[str, ...]
+    substeps: int
+    step: float
+    drift: float
+    notes: tuple[str, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every column agrees with its best central difference."""
+        return all(min(found) <= AGREEMENT for found in self.deviations.values())
+
+    @property
+    def flat(self) -> bool:
+        """Whether a run without a step stays where it starts."""
+        return self.drift <= FLAT_DRIFT
+
+
+def check(case: Case) -> Check:
+    """Check a case at its start values; raises ExfitError for input that cannot be used."""
+    system = system_of(case)
+    if case.record is None:
+        simulator, vt0 = plain_simulator(case)
+        channels: tuple[Channel, ...] = (Channel("vt", np.zeros(len(simulator.times))),)
+    else:
+        trial = fitted_trial(case)
+        simulator, vt0, channels = trial.simulator, trial.vt0, trial.channels
+    values = {**values_of(case, {}), VT0: vt0}
+    free = free_of(case)
+    names = [one.name for one in free]
+    fixed = {name: value for name, value in values.items() if name not in names}
+    substeps = simulator.substeps(values)
+    lags = [name for name in simulator.time_constants if values[name] < SHORTEST]
+    still = Simulator(
+        system, Course(0.0, FLAT_SECONDS, ()), np.linspace(0.0, FLAT_SECONDS, 601), simulator.step
+    )
+    flat = still.response(values, ("vt",)).signals["vt"]
+    return Check(
+        deviations=deviations(Residuals(simulator, channels, free, fixed)),
+        bypassed=tuple(lags),
+        substeps=substeps,
+        step=simulator.step,
+        drift=float(np.max(np.abs(flat - vt0))),
+        notes=tuple(typical_notes(case)),
+    )
+
+
+def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:
+    """Compare the exact Jacobian with central differences at the start, column by column."""
+    if not residuals.free:
+        return {}
+    start = residuals.start
+    exact = residuals.exact(start)
+    sizes = np.max(np.abs(exact), axis=0)
+    sizes[sizes == 0.0] = 1.0
+    rows = [
+        np.max(np.abs(residuals.differences(start, -h, h) - exact), axis=0) / sizes for h in STEPS
+    ]
+    return {one.name: tuple(float(row[k]) for row in rows) for k, one in enumerate(residuals.free)}

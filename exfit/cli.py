@@ -1,0 +1,260 @@
+"""The command line: reads arguments, calls study, shows what comes back; it computes nothing.
+
+Everything but click is imported in the command that needs it, so that help appears at once.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from exfit.errors import ExfitError
+
+if TYPE_CHECKING:
+    from exfit.case import Case
+    from exfit.estimate import Method
+
+NOT_CONVERGED = 3
+STRATEGIES = ("gn", "dgn", "lm", "lm-then-dgn", "auto", "robust")
+
+
+class Refusal(click.ClickException):
+    """Input that cannot be used: its faults on standard error, exit code 1."""
+
+    def show(self, file: Any = None) -> None:
+        """Print the message, all faults of a case under each other."""
+        lines = self.message.splitlines()
+        click.echo("Error: " + "\n       ".join(lines), err=True, file=file)
+
+
+class Commands(click.Group):
+    """The commands; what they refuse is told without a traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command, and turn what is wrong with its input into a message."""
+        try:
+            return super().invoke(ctx)
+        except ExfitError as fault:
+            raise Refusal(str(fault)) from fault
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="exfit")
+def main() -> None:
+    """Find the parameters of a generator's excitation system from a recorded bump test."""
+
+
+case_argument = click.argument("case", type=click.Path(path_type=Path))
+output_option = click.option(
+    "-o", "--output", type=click.Path(path_type=Path), metavar="DIR", help="Folder for the files."
+)
+plots_option = click.option("--plots/--no-plots", default=True, help="Draw figures (default: yes).")
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else."
+)
+parameters_option = click.option(
+    "--parameters",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Values from the parameters.yaml of a fit.",
+)
+
+
+@main.command()
+@case_argument
+@output_option
+@click.option("--strategy", type=click.Choice(STRATEGIES), help="In place of the case's own.")
+@plots_option
+@quiet_option
+@json_option
+def fit(
+    case: Path,
+    output: Path | None,
+    strategy: "Method | None",
+    plots: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Fit the free parameters of CASE to its record.
+
+    Writes result.json, parameters.yaml, history.csv, response.csv and figures to runs/CASE-fit, or
+    to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad input; 3: not
+    converged, or a validation beyond the limit that the case accepts.
+    """
+    from exfit import files, study
+    from exfit.result import to_json
+
+    loaded = _load(case)
+    folder = output or _folder(case, "fit")
+    files.refuse_unwritable(folder)
+    if quiet or as_json:
+        result = study.fit(loaded, strategy)
+        files.write_fit(result, folder, plots)
+        if as_json:
+            click.echo(to_json(result.as_json()), nl=False)
+    else:
+        from exfit import show
+
+        console = show.console()
+        with show.Watch(console, show.task(loaded, strategy)).running() as watch:
+            result = study.fit(loaded, strategy, watch)
+        files.write_fit(result, folder, plots)
+        show.fit(console, result, folder)
+    if not (result.success and result.accepted):
+        raise SystemExit(NOT_CONVERGED)
+
+
+@main.command()
+@case_argument
+@click.option("--set", "changes", multiple=True, metavar="KA=400", help="Value of a parameter.")
+@parameters_option
+@output_option
+@plots_option
+@quiet_option
+def simulate(
+    case: Path,
+    changes: tuple[str, ...],
+    parameters: Path | None,
+    output: Path | None,
+    plots: bool,
+    quiet: bool,
+) -> None:
+    """Simulate CASE at its start values.
+
+    Writes response.csv (t, vref, vt, efd, ifd and the states) and figures to runs/CASE-simulate, or
+    to DIR. --set goes over --parameters, and both over the case; a parameter of the machine is
+    named as in --set machine.Tpd0=6.
+    """
+    from exfit import files, study
+    from exfit.changes import changed_values, read_parameters
+
+    loaded = _load(case)
+    folder = output or _folder(case, "simulate")
+    files.refuse_unwritable(folder)
+    values = read_parameters(loaded, parameters) if parameters else {}
+    values |= changed_values(loaded, _assignments(changes), "--set")
+    simulation = study.simulate(loaded, values)
+    files.write_simulation(simulation, case.stem, folder, plots)
+    if not quiet:
+        from exfit import show
+
+        console = show.console()
+        if simulation.comparison is not None:
+            show.comparisons(console, [simulation.comparison])
+        console.print(f"sub-steps {simulation.response.substeps}")
+        show.written(console, folder)
+
+
+@main.command(short_help="Compare fitted values with records that no fit saw.")
+@case_argument
+@parameters_option
+@click.option(
+    "--record",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Record in place of the first that the case validates on.",
+)
+@output_option
+@plots_option
+@quiet_option
+@json_option
+def validate(
+    case: Path,
+    parameters: Path | None,
+    record: Path | None,
+    output: Path | None,
+    plots: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Compare fitted values with the records of CASE that the fit never saw.
+
+    The values are those of the last fit of the case, or of --parameters. Writes validation.json,
+    samples and overlays to runs/CASE-validate, or to DIR.
+    """
+    from exfit import files, study
+    from exfit.changes import read_parameters
+    from exfit.result import to_json
+
+    loaded = _load(case)
+    folder = output or _folder(case, "validate")
+    files.refuse_unwritable(folder)
+    source = parameters or files.last_fit(case)
+    found = study.validate(loaded, read_parameters(loaded, source), record)
+    files.write_validation(found, folder, plots)
+    if as_json:
+        click.echo(to_json({"validation": [one.as_json() for one in found]}), nl=False)
+    elif not quiet:
+        from exfit import show
+
+        console = show.console()
+        console.print(f"values of {source}", soft_wrap=True, markup=False)
+        show.comparisons(console, found)
+        console.print()
+        show.written(console, folder)
+    if not all(one.accepted for one in found):
+        raise SystemExit(NOT_CONVERGED)
+
+
+@main.command(short_help="Check a case before its fit.")
+@case_argument
+def check(case: Path) -> None:
+    """Check CASE before a fit: derivatives, bypasses, sub-steps, a flat run."""
+    from exfit import show
+    from exfit.check import check as checked
+
+    found = checked(_load(case))
+    show.check(show.console(), found)
+    if not (found.agrees and found.flat):
+        raise SystemExit(NOT_CONVERGED)
+
+
+@main.command(short_help="List the models, or describe one.")
+@click.argument("name", required=False)
+def models(name: str | None) -> None:
+    """List the models, or print the drawing, data sheet and states of one."""
+    from exfit import show
+    from exfit.models import MODELS, find
+    from exfit.models.machines import MACHINES
+
+    if name is None:
+        show.catalogue(show.console(), MODELS.values(), MACHINES.values())
+    elif name.upper() in MACHINES:
+        show.machine(show.console(), MACHINES[name.upper()])
+    else:
+        show.model(show.console(), find(name, Path()))
+
+
+@main.command(short_help="Print the JSON Schema of a case file.")
+def schema() -> None:
+    """Print the JSON Schema of a case file, for editors that complete and check."""
+    from exfit.case import json_schema
+    from exfit.result import to_json
+
+    click.echo(to_json(json_schema()), nl=False)
+
+
+def _load(case: Path) -> "Case":
+    from exfit.case import load_case
+
+    return load_case(case)
+
+
+def _folder(case: Path, command: str) -> Path:
+    return Path("runs") / f"{case.stem}-{command}"
+
+
+def _assignments(texts: tuple[str, ...]) -> dict[str, float]:
+    values = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            values[name.strip()] = float(value)
+        except ValueError:
+            _bad_assignment(text)
+    return values
+
+
+def _bad_assignment(text: str) -> NoReturn:
+    raise ExfitError(f"--set {text}: not of the form KA=400")

@@ -1,0 +1,104 @@
+"""The files that a run leaves behind, each written whole or not at all."""
+
+import hashlib
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+
+from exfit.engine.kernel import cache_folder
+from exfit.errors import CaseError, ExfitError
+from exfit.result import (
+    Comparison,
+    FitResult,
+    comparison_table,
+    history_table,
+    parameter_file,
+    table,
+    to_json,
+    write,
+)
+from exfit.study import Simulation
+
+PARAMETERS = "parameters.yaml"
+
+
+def refuse_unwritable(folder: Path) -> None:
+    """Raise ExfitError where a folder cannot be written, before a run is spent on it."""
+    place = next(one for one in (folder, *folder.parents) if one.exists())
+    if not place.is_dir():
+        raise ExfitError(f"{folder}: cannot be written: {place} is not a folder")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise ExfitError(f"{folder}: cannot be written: no permission in {place}")
+
+
+def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
+    """Write a fit's numbers, tables and figures, and remember where they are.
+
+    Raises ExfitError where the folder cannot be written.
+    """
+    history = [asdict(line) for line in result.history]
+    write(folder / PARAMETERS, parameter_file(result))
+    write(folder / "history.csv", history_table(result))
+    write(folder / "response.csv", comparison_table(result.comparison))
+    write_comparisons(result.validation, folder, figures)
+    if figures:
+        from exfit import plots
+
+        title = f"{result.name}: {result.model} fitted to {result.comparison.record.name}"
+        write(folder / "overlay.png", plots.png(plots.overlay(result.comparison, title)))
+        write(folder / "convergence.png", plots.png(plots.convergence(result)))
+        write(folder / "trajectories.png", plots.png(plots.trajectories(result)))
+    # last: where it stands, everything else does
+    write(folder / "result.json", to_json({**result.as_json(), "history": history}))
+    with suppress(ExfitError):  # a cache that cannot be written keeps nothing
+        write(_pointer(result.case), str((folder / PARAMETERS).absolute()))
+
+
+def write_comparisons(comparisons: Sequence[Comparison], folder: Path, figures: bool) -> None:
+    """Write the samples and the overlay of each comparison under its name."""
+    for one in comparisons:
+        write(folder / f"{one.name}.csv", comparison_table(one))
+        if figures:
+            from exfit import plots
+
+            title = f"{one.name}: simulated and {one.record.name}"
+            write(folder / f"{one.name}.png", plots.png(plots.overlay(one, title)))
+
+
+def write_validation(comparisons: Sequence[Comparison], folder: Path, figures: bool) -> None:
+    """Write a validation's figures as JSON, its samples and its overlays."""
+    write_comparisons(comparisons, folder, figures)
+    content = {"validation": [one.as_json() for one in comparisons]}
+    write(folder / "validation.json", to_json(content))
+
+
+def write_simulation(simulation: Simulation, name: str, folder: Path, figures: bool) -> None:
+    """Write a response, and its figures."""
+    response = simulation.response
+    header = ["t", *response.signals]
+    write(folder / "response.csv", table(header, [response.time, *response.signals.values()]))
+    if figures:
+        from exfit import plots
+
+        write(folder / "response.png", plots.png(plots.response(response, name)))
+        if simulation.comparison is not None:
+            title = f"{name}: simulated and {simulation.comparison.record.name}"
+            write(folder / "overlay.png", plots.png(plots.overlay(simulation.comparison, title)))
+
+
+def last_fit(case: Path) -> Path:
+    """Return the parameters of the last fit of a case; raises CaseError where none is known."""
+    try:
+        found = Path(_pointer(case).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise CaseError([f"{case}: no fit of this case is known; give --parameters FILE"]) from None
+    if not found.is_file():
+        raise CaseError([f"{case}: its last fit, {found}, is gone; give --parameters FILE"])
+    return found
+
+
+def _pointer(case: Path) -> Path:
+    name = hashlib.sha256(str(case.resolve()).encode()).hexdigest()[:32]
+    return cache_folder() / "last-fit" / name

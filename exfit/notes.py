@@ -1,0 +1,80 @@
+"""What a reader of a fit must know beside its numbers."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case import Case
+from exfit.plant import MACHINE
+from exfit.residuals import Residuals
+from exfit.result import Comparison
+from exfit.simulate import parameters_used
+from exfit.trial import system_of
+
+Array = NDArray[np.float64]
+
+EXACTLY_REDUNDANT = 1e-9  # of the largest singular value: rounding, not a weak influence
+MUCH_WORSE = 3.0  # than the fit
+TAKES_PART = 0.01  # of a direction of length one
+
+
+def notes(case: Case, residuals: Residuals, theta: Array, jacobian: Array) -> Iterator[str]:
+    """Yield the notes on a fit that ended at theta (N,) with this Jacobian (M, N)."""
+    values = residuals.values(theta)
+    yield from typical_notes(case)
+    for one in residuals.free:
+        side = one.bound(values[one.name])
+        if side:
+            value = f"{values[one.name]:.6g}"
+            yield f"{one.name} lies on its {side} {value}: it is the bound's, not the record's"
+    for group in redundant(jacobian, [one.name for one in residuals.free]):
+        if len(group) == 1:
+            yield f"{group[0]} has no effect on the record: its value says nothing"
+        else:
+            names = ", ".join(group)
+            yield f"{names} can move together without any effect on the record: fix one of them"
+    response = residuals.simulator.response(values)
+    wanted = residuals.simulator.substeps_along(values, response)
+    if wanted > 2 * response.substeps:
+        step = case.simulation.step * response.substeps / wanted
+        yield (
+            f"the response asks for {wanted} sub-steps on its way, {response.substeps} were taken: "
+            f"give simulation.step = {step:.2g}"
+        )
+
+
+def validation_notes(fitted: Comparison, tried: Sequence[Comparison]) -> Iterator[str]:
+    """Yield which records the fit does not hold on."""
+    for one in tried:
+        if one.rmse > MUCH_WORSE * fitted.rmse:
+            yield (
+                f"on {one.name} the error is {one.rmse / fitted.rmse:.1f} times that of the fit: "
+                "the fitted record leaves open what matters there"
+            )
+
+
+def typical_notes(case: Case) -> Iterator[str]:
+    """Yield which values were taken from the data sheet, because the case does not give them."""
+    used = parameters_used(system_of(case))
+    exciter = [name for name in case.typical_symbols if name in used]
+    machine = [name for name in case.typical_machine_symbols if MACHINE + name in used]
+    for owner, names, values in (
+        (case.exciter.name, exciter, case.values()),
+        ("machine", machine, case.machine_values()),
+    ):
+        if names:
+            listed = ", ".join(f"{name} {values[name]:g}" for name in names)
+            yield f"typical values taken for {owner}: {listed}"
+
+
+def redundant(jacobian: Array, names: Sequence[str]) -> Iterator[list[str]]:
+    """Yield groups of parameters that the residuals cannot tell apart at all."""
+    sizes = np.linalg.norm(jacobian, axis=0)
+    seen = sizes > 0.0
+    yield from ([name] for name, visible in zip(names, seen, strict=True) if not visible)
+    _, singular, directions = np.linalg.svd(jacobian[:, seen] / sizes[seen], full_matrices=False)
+    kept = np.array(names)[seen]
+    for value, direction in zip(singular, directions, strict=True):
+        if value < EXACTLY_REDUNDANT * singular[0]:
+            yield [str(name) for name in kept[np.abs(direction) > TAKES_PART]]

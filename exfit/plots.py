@@ -1,0 +1,191 @@
+"""Figures of results: functions that return one, and touch nothing else."""
+
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from exfit.result import Comparison, FitResult, Overlay
+from exfit.simulate import Response
+
+MEASURED, SIMULATED, START, LIMIT = "#8a8f98", "#c1272d", "#2b6cb0", "#b7791f"
+PHASES: Mapping[str, str] = {"lm": "#2b6cb0", "dgn": "#c1272d", "gn": "#2f855a"}
+PHASE_NAMES: Mapping[str, str] = {
+    "lm": "Levenberg-Marquardt",
+    "dgn": "damped Gauss-Newton",
+    "gn": "Gauss-Newton",
+}
+WIDTH = 9.0  # inches
+DPI = 120
+MILLI = 1e3
+WANTED_STATES = 12  # panels of states that are still readable
+
+LABELS: Mapping[str, str] = {
+    "vt": "terminal voltage vt (pu)",
+    "vref": "reference vref (pu)",
+    "efd": "field voltage efd (pu)",
+    "ifd": "field current ifd (pu)",
+}
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as the bytes of a PNG file."""
+    out = io.BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(out, format="png", dpi=DPI)
+    return out.getvalue()
+
+
+def overlay(comparison: Comparison, title: str) -> Figure:
+    """Return measured and simulated signals on one axis each, with their difference below."""
+    count = len(comparison.overlays)
+    figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * count), layout="constrained")
+    axes = figure.subplots(
+        2 * count, 1, sharex=True, height_ratios=[3.0, 1.0] * count, squeeze=False
+    )
+    for k, (signal, one) in enumerate(comparison.overlays.items()):
+        _signal(axes[2 * k, 0], comparison, signal, one)
+        _error(axes[2 * k + 1, 0], comparison, one)
+    axes[-1, 0].set_xlabel("time (s)")
+    figure.suptitle(title, fontsize=11)
+    return figure
+
+
+def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> None:
+    time = comparison.time
+    axes.plot(time, one.measured, ".", color=MEASURED, markersize=3, label="measured")
+    if one.start is not None:
+        axes.plot(time, one.start, "--", color=START, linewidth=1.2, label="start values")
+    label = "fitted" if one.start is not None else "simulated"
+    axes.plot(time, one.simulated, "-", color=SIMULATED, linewidth=1.4, label=label)
+    axes.set_ylabel(LABELS[signal])
+    axes.legend(loc="best", frameon=False)
+    text = f"rmse {one.rmse:.3g} pu, fit {one.fit_percent:.2f} %"
+    axes.set_title(text, fontsize=9, loc="right")
+    _tidy(axes)
+
+
+def _error(axes: Axes, comparison: Comparison, one: Overlay) -> None:
+    axes.axhline(0.0, color="black", linewidth=0.6)
+    axes.plot(comparison.time, MILLI * one.error, color=SIMULATED, linewidth=0.7)
+    axes.set_ylabel("simulated\n- measured\n(1e-3 pu)")
+    _tidy(axes)
+
+
+def convergence(result: FitResult) -> Figure:
+    """Return cost, gradient and damping over the iterations."""
+    figure = Figure(figsize=(WIDTH, 7.0), layout="constrained")
+    axes = figure.subplots(3, 1, sharex=True)
+    rows = (
+        ("cost", "cost f (pu²)", "o"),
+        ("gradient_norm", "norm of the gradient", "o"),
+        ("damping", "damping ν, or\nstep length λ", "s"),
+    )
+    for ax, (name, label, marker) in zip(axes, rows, strict=True):
+        values = [float(getattr(line, name)) for line in result.history]
+        # an undamped step and a vanished gradient have no place on a logarithmic axis
+        _by_phase(ax, result, [v if v > 0.0 else float("nan") for v in values], marker)
+        if any(value > 0.0 for value in values):
+            ax.set_yscale("log")
+        ax.set_ylabel(label)
+        _tidy(ax)
+    axes[0].legend(loc="upper right", frameon=False)
+    axes[-1].set_xlabel("iteration")
+    axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.suptitle(f"{result.name}: {result.strategy}; {result.message}", fontsize=11)
+    return figure
+
+
+def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: str) -> None:
+    numbers = [line.number for line in result.history]
+    axes.plot(numbers, values, "-", color=MEASURED, linewidth=0.8)
+    for phase in dict.fromkeys(line.phase for line in result.history):
+        chosen = [k for k, line in enumerate(result.history) if line.phase == phase]
+        axes.plot(
+            [numbers[k] for k in chosen],
+            [values[k] for k in chosen],
+            marker,
+            color=PHASES[phase],
+            markersize=4,
+            clip_on=False,
+            label=PHASE_NAMES[phase],
+        )
+
+
+def trajectories(result: FitResult) -> Figure:
+    """Return every free parameter over the iterations, between its bounds."""
+    names = list(result.parameters)
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    figure = Figure(figsize=(WIDTH, 1.0 + 2.0 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for ax, name in zip(grid.flat, names, strict=False):
+        one = result.parameters[name]
+        values = [line.values[name] for line in result.history]
+        _by_phase(ax, result, values, "o")
+        for limit in (one.min, one.max):
+            if min(values) <= limit <= max(values):
+                ax.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
+        bound = f" (on its {one.at_bound})" if one.at_bound else ""
+        ax.set_title(f"{name} = {one.value:.5g} {one.unit}{bound}", fontsize=9)
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        _tidy(ax)
+    for k, ax in enumerate(grid.flat):
+        lowest = k + columns >= len(names)
+        ax.tick_params(labelbottom=lowest)
+        ax.set_xlabel("iteration" if lowest else "")
+        ax.set_visible(k < len(names))
+    phases = dict.fromkeys(line.phase for line in result.history)
+    if len(phases) > 1:
+        handles = grid[0, 0].get_legend_handles_labels()
+        figure.legend(*handles, loc="outside lower right", ncols=len(phases), frameon=False)
+    figure.suptitle(f"{result.name}: the parameters on their way", fontsize=11)
+    return figure
+
+
+def response(simulated: Response, title: str) -> Figure:
+    """Return every signal of a simulation over time; vref and vt share an axis."""
+    others = [name for name in simulated.signals if name not in ("vref", "vt")]
+    names = [name for name in others if np.ptp(simulated.signals[name]) > 0.0][:WANTED_STATES]
+    still = [name for name in others if np.ptp(simulated.signals[name]) == 0.0]
+    columns = 2 if len(names) > 2 else 1
+    rows = 1 + -(-len(names) // columns)
+    figure = Figure(figsize=(WIDTH, 2.6 + 1.6 * (rows - 1)), layout="constrained")
+    grid = figure.add_gridspec(rows, columns, height_ratios=[1.6, *[1.0] * (rows - 1)])
+    first = figure.add_subplot(grid[0, :])
+    time = simulated.time
+    first.plot(time, simulated.signals["vref"], color=MEASURED, linewidth=1.0, label="vref")
+    first.plot(time, simulated.signals["vt"], color=SIMULATED, linewidth=1.4, label="vt")
+    first.set_ylabel("vref, vt (pu)")
+    first.legend(loc="best", frameon=False)
+    _tidy(first)
+    for k, name in enumerate(names):
+        ax = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
+        ax.plot(time, simulated.signals[name], color=START, linewidth=1.1)
+        ax.set_ylabel(f"{name} (pu)")
+        ax.tick_params(labelbottom=k + columns >= len(names))
+        _tidy(ax)
+    # one column lies on the same axis as the panels below it, two do not
+    first.tick_params(labelbottom=columns > 1 or not names)
+    figure.align_ylabels()
+    rest = f"   (unused or at rest: {', '.join(still)})" if still else ""
+    figure.supxlabel(f"time (s){rest}", fontsize=10)
+    figure.suptitle(title, fontsize=11)
+    return figure
+
+
+def _tidy(axes: Axes) -> None:
+    axes.grid(visible=True, color="#e2e5e9", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.01)
+    low, high = axes.get_ylim()
+    if axes.get_yscale() == "linear" and high - low < 1e-6 * max(1.0, abs(high)):
+        # a flat signal fills its axis with rounding errors unless it is given some room
+        axes.set_ylim(low - 0.05 * max(abs(low), 0.1), high + 0.05 * max(abs(high), 0.1))
+    if not np.isfinite((low, high)).all():
+        axes.set_ylim(0.0, 1.0)

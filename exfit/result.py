@@ -1,0 +1,346 @@
+"""What a fit, a simulation or a validation leaves behind: data, written and read back."""
+
+import csv
+import io
+import json
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import ExfitError
+from exfit.features import Features
+
+Array = NDArray[np.float64]
+
+DIGITS = 9  # significant digits of a number in a table of samples
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One line of a fit's history; line 0 is the start.
+
+    f = 1/2 sum of squared residuals; ``gradient_norm`` of its gradient over the scaled parameters;
+    ``damping`` is nu of Levenberg-Marquardt or the step length of Gauss-Newton; ``inner`` counts
+    the trials that were rejected before; ``nfev`` and ``njev`` count residuals and Jacobians until
+    now.
+    """
+
+    number: int
+    phase: str
+    cost: float
+    gradient_norm: float
+    step_norm: float
+    damping: float
+    inner: int
+    nfev: int
+    njev: int
+    quality: float
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """A free parameter after a fit."""
+
+    value: float
+    start: float
+    min: float
+    max: float
+    at_bound: Literal["min", "max"] | None
+    unit: str = field(default="", metadata={"kind": "display"})
+    meaning: str = field(default="", metadata={"kind": "display"})
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Measured and simulated samples (M,) of one signal, per unit; ``start`` after a fit."""
+
+    measured: Array
+    simulated: Array
+    start: Array | None = None
+
+    @property
+    def error(self) -> Array:
+        """Simulated minus measured."""
+        return self.simulated - self.measured
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the error, per unit."""
+        return float(np.sqrt(np.mean(self.error**2)))
+
+    @property
+    def max_error(self) -> float:
+        """Largest magnitude of the error, per unit."""
+        return float(np.max(np.abs(self.error)))
+
+    @property
+    def fit_percent(self) -> float:
+        """100 (1 - |error| / |measured - its mean|), norms of the whole signal: 100 is perfect."""
+        spread = float(np.linalg.norm(self.measured - np.mean(self.measured)))
+        return (
+            100.0 * (1.0 - float(np.linalg.norm(self.error)) / spread) if spread else float("nan")
+        )
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A simulated response beside a record: ``time`` (M,) in s, one overlay per signal.
+
+    ``cost`` and ``rmse`` are of the weighted residuals of all signals; features are those of vt
+    after the first step, None where the record does not have it.
+    """
+
+    name: str
+    time: Array
+    overlays: Mapping[str, Overlay]
+    cost: float
+    rmse: float
+    measured: Features | None
+    simulated: Features | None
+    record: Path
+    sha256: str
+    steps: tuple[tuple[float, float], ...]
+    substeps: int
+    rmse_limit: float | None = None
+
+    @property
+    def max_error(self) -> float:
+        """Largest error of any signal, per unit."""
+        return max(overlay.max_error for overlay in self.overlays.values())
+
+    @property
+    def fit_percent(self) -> float:
+        """The fit percentage of the first signal."""
+        return next(iter(self.overlays.values())).fit_percent
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the error is within the limit that the case sets, if it sets one."""
+        return self.rmse_limit is None or self.rmse <= self.rmse_limit
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures, without the samples."""
+        return {
+            "name": self.name,
+            "rmse": self.rmse,
+            "max_error": self.max_error,
+            "fit_percent": self.fit_percent,
+            "cost": self.cost,
+            "accepted": self.accepted,
+            "channels": {
+                signal: {"rmse": o.rmse, "max_error": o.max_error, "fit_percent": o.fit_percent}
+                for signal, o in self.overlays.items()
+            },
+            "features": {
+                "measured": None if self.measured is None else asdict(self.measured),
+                "simulated": None if self.simulated is None else asdict(self.simulated),
+            },
+        }
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A fit: what was found, how, and how well it matches."""
+
+    case: Path
+    name: str
+    model: str
+    strategy: str
+    parameters: Mapping[str, FittedParameter]
+    fixed: Mapping[str, float]
+    typical: tuple[str, ...]
+    machine: Mapping[str, float]
+    comparison: Comparison
+    start_cost: float
+    gradient_norm: float
+    status: int
+    message: str
+    success: bool
+    interrupted: bool
+    history: tuple[Iteration, ...]
+    nfev: int
+    njev: int
+    simulations: int
+    substeps: int
+    seconds: float
+    notes: tuple[str, ...]
+    validation: tuple[Comparison, ...]
+    versions: Mapping[str, str]
+    inputs: Mapping[str, str]
+
+    @property
+    def nit(self) -> int:
+        """Number of iterations."""
+        return len(self.history) - 1
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter of the exciter."""
+        return {**self.fixed, **{name: one.value for name, one in self.parameters.items()}}
+
+    @property
+    def accepted(self) -> bool:
+        """Whether every validation is within the limit of the case."""
+        return all(one.accepted for one in self.validation)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what ``--json`` prints: everything but history and samples."""
+        return {
+            "case": str(self.case),
+            "model": self.model,
+            "strategy": self.strategy,
+            "parameters": {
+                name: {
+                    "value": one.value,
+                    "start": one.start,
+                    "min": one.min,
+                    "max": one.max,
+                    "at_bound": one.at_bound,
+                }
+                for name, one in self.parameters.items()
+            },
+            "fixed": dict(self.fixed),
+            "typical": list(self.typical),
+            "machine": dict(self.machine),
+            "cost": self.comparison.cost,
+            "start_cost": self.start_cost,
+            "rmse": self.comparison.rmse,
+            "status": self.status,
+            "message": self.message,
+            "success": self.success,
+            "interrupted": self.interrupted,
+            "nit": self.nit,
+            "nfev": self.nfev,
+            "njev": self.njev,
+            "simulations": self.simulations,
+            "substeps": self.substeps,
+            "seconds": self.seconds,
+            "notes": list(self.notes),
+            "fit": self.comparison.as_json(),
+            "validation": [one.as_json() for one in self.validation],
+            "versions": dict(self.versions),
+            "inputs": dict(self.inputs),
+        }
+
+
+def to_json(content: Mapping[str, Any]) -> str:
+    """Return JSON that every reader takes: numbers that are not finite become null."""
+    return json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n"
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, Mapping):
+        return {key: _finite(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(value) for value in content]
+    if isinstance(content, float) and not np.isfinite(content):
+        return None
+    return content
+
+
+def write(path: Path, content: str | bytes) -> None:
+    """Write a file beside its place and rename it: whole or not at all.
+
+    Raises ExfitError where the place cannot be written.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    data = content.encode() if isinstance(content, str) else content
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_bytes(data)
+        beside.replace(path)
+    except OSError as fault:
+        with suppress(OSError):
+            beside.unlink()
+        raise ExfitError(f"{path}: cannot be written: {fault.strerror}") from fault
+
+
+def table(header: Sequence[str], columns: Sequence[Array]) -> str:
+    """Return samples as CSV, one column after the other."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerow(header)
+    np.savetxt(out, np.column_stack(columns), fmt=f"%.{DIGITS}g", delimiter=",")
+    return out.getvalue()
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """Return measured, start, fitted and residual of every signal on the record's clock, as CSV."""
+    header, columns = ["t"], [comparison.time]
+    for signal, overlay in comparison.overlays.items():
+        named = {
+            "measured": overlay.measured,
+            "start": overlay.start,
+            "simulated": overlay.simulated,
+            "residual": overlay.error,
+        }
+        for label, samples in named.items():
+            if samples is not None:
+                header.append(f"{signal}_{label}")
+                columns.append(samples)
+    return table(header, columns)
+
+
+def history_table(result: FitResult) -> str:
+    """Return the history as CSV, a line per iteration."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    first = (
+        "iteration",
+        "phase",
+        "f",
+        "gradient_norm",
+        "step_norm",
+        "damping",
+        "inner",
+        "nfev",
+        "njev",
+        "quality",
+    )
+    writer.writerow([*first, *result.parameters])
+    for line in result.history:
+        numbers = (line.cost, line.gradient_norm, line.step_norm, line.damping)
+        counts = (line.inner, line.nfev, line.njev)
+        writer.writerow(
+            [
+                line.number,
+                line.phase,
+                *(f"{number:.{DIGITS}g}" for number in numbers),
+                *counts,
+                f"{line.quality:.4g}",
+                *(f"{line.values[name]:.{DIGITS}g}" for name in result.parameters),
+            ]
+        )
+    return out.getvalue()
+
+
+def parameter_file(result: FitResult) -> str:
+    """Return the values as YAML, to be read back by simulate and validate."""
+    state = "interrupted" if result.interrupted else result.message
+    lines = [
+        f"# {result.model} fitted to {result.comparison.record.name}: "
+        f"rmse {result.comparison.rmse:.4g} pu; {state}",
+        f"model: {result.model}",
+        "parameters:",
+    ]
+    for name, value in result.values.items():
+        one = result.parameters.get(name)
+        if one is None:
+            origin = "typical" if name in result.typical else "fixed"
+        else:
+            origin = f"fitted, on its {one.at_bound}" if one.at_bound else "fitted"
+        lines.append(f"  {name}: {_yaml_number(value)}  # {origin}")
+    return "\n".join(lines) + "\n"
+
+
+def _yaml_number(value: float) -> str:
+    text = repr(float(value))
+    mantissa, e, exponent = text.partition("e")
+    # YAML 1.1 takes 1e-05 for text, 1.0e-05 for a number
+    return f"{mantissa}{'' if '.' in mantissa else '.0'}{e}{exponent}"

@@ -1,0 +1,293 @@
+"""What the terminal shows: tables and lines, with rich."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from exfit.case import Case
+from exfit.check import STEPS, Check
+from exfit.features import Features
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model, Sheet
+from exfit.result import Comparison, FitResult, Iteration
+
+LINES = 12  # of the history that stay in sight
+NARROW = 80  # columns where the width is unknown
+GAP = 2  # between columns
+LABELLED = 25  # columns that the names and units of the features take
+
+HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "inner", "nfev")
+
+
+def console() -> Console:
+    """Return the terminal; a file or pipe is taken for a narrow one."""
+    found = Console(highlight=False)
+    return found if found.is_terminal else Console(highlight=False, width=NARROW)
+
+
+def plain_table(*columns: str, numbers: Sequence[str] = ()) -> Table:
+    """Return a table without frames; the named columns are numbers, aligned to the right."""
+    table = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
+    for column in columns[:-1]:
+        table.add_column(column, justify="right" if column in numbers else "left", no_wrap=True)
+    # the last column gives way where the terminal is narrow
+    table.add_column(columns[-1], justify="right" if columns[-1] in numbers else "left")
+    return table
+
+
+def number(value: float | None, digits: int = 5) -> str:
+    """Return a number in a few digits, a dash for None."""
+    return "-" if value is None else f"{value:.{digits}g}"
+
+
+class Watch:
+    """Shows the iterations of a fit as they come: a live table, or lines in a file or pipe."""
+
+    def __init__(self, console: Console, title: str) -> None:
+        self.console, self.title = console, title
+        self.lines: list[Iteration] = []
+        self._live: Live | None = None
+
+    @contextmanager
+    def running(self) -> Iterator["Watch"]:
+        """Show the table for as long as the fit runs."""
+        if not self.console.is_terminal:
+            yield self
+            return
+        with Live(console=self.console, auto_refresh=False) as self._live:
+            yield self
+
+    def __call__(self, line: Iteration) -> None:
+        """Show one more iteration."""
+        self.lines.append(line)
+        if len(self.lines) == 1:
+            self.console.print(self.title, markup=False)
+        if self._live is None:
+            heading = "{:>4} {:5} {:>10} {:>9} {:>9} {:>9} {:>5} {:>5}"
+            if len(self.lines) == 1:
+                self.console.print(heading.format(*HISTORY), soft_wrap=True)
+            self.console.print(heading.format(*_cells(line)), soft_wrap=True)
+        else:
+            self._live.update(self._table(), refresh=True)
+
+    def _table(self) -> RenderableType:
+        table = plain_table(*HISTORY, numbers=[name for name in HISTORY if name != "phase"])
+        for line in self.lines[-LINES:]:
+            table.add_row(*_cells(line))
+        hidden = len(self.lines) - LINES
+        above = Text(f"({hidden} earlier iterations)", style="dim") if hidden > 0 else Text("")
+        return Group(above, table)
+
+
+def _cells(line: Iteration) -> tuple[str, ...]:
+    return (
+        str(line.number),
+        line.phase,
+        f"{line.cost:.4e}",
+        f"{line.gradient_norm:.2e}",
+        f"{line.step_norm:.2e}",
+        f"{line.damping:.2e}" if line.damping == line.damping else "-",
+        str(line.inner),
+        str(line.nfev),
+    )
+
+
+def task(case: Case, strategy: str | None) -> str:
+    """Return what a fit is about to do."""
+    free = ", ".join(case.parameters.free)
+    return (
+        f"{case.path.stem}: {case.exciter.name}, {strategy or case.estimate.strategy}; free {free}"
+    )
+
+
+def written(console: Console, folder: Path) -> None:
+    """Say where the files are."""
+    console.print(f"written to {folder}", soft_wrap=True, markup=False)
+
+
+def fit(console: Console, result: FitResult, folder: Path) -> None:
+    """Show what a fit found and where its files are."""
+    table = plain_table(
+        "parameter",
+        "start",
+        "fitted",
+        "min",
+        "max",
+        "unit",
+        "",
+        numbers=("start", "fitted", "min", "max"),
+    )
+    for name, one in result.parameters.items():
+        style = "yellow" if one.at_bound else ""
+        mark = f"on its {one.at_bound}" if one.at_bound else ""
+        cells = (number(v) for v in (one.start, one.value, one.min, one.max))
+        table.add_row(name, *cells, one.unit, mark, style=style)
+    console.print()
+    console.print(table)
+    console.print()
+    match = result.comparison
+    outcome = "converged" if result.success else "NOT CONVERGED"
+    style = "green" if result.success else "bold red"
+    console.print(Text.assemble((outcome, style), f": {result.message}"))
+    console.print(
+        f"cost {result.start_cost:.4e} -> {match.cost:.4e}   rmse {match.rmse:.3e} pu   "
+        f"fit {match.fit_percent:.2f} %"
+    )
+    console.print(
+        f"{result.nit} iterations, {result.nfev} residuals, {result.njev} Jacobians, "
+        f"{result.simulations} simulations, {result.seconds:.2f} s"
+    )
+    console.print(f"sub-steps: {result.substeps}")
+    for note in result.notes:
+        console.print(f"[yellow]note[/] {note}")
+    if result.validation:
+        comparisons(console, [match, *result.validation])
+    console.print()
+    written(console, folder)
+
+
+FEATURES = (
+    ("initial value", "initial_value", "pu"),
+    ("final value", "final_value", "pu"),
+    ("rise time 10-90 %", "rise_time", "s"),
+    ("overshoot", "overshoot_percent", "%"),
+    ("peak time", "peak_time", "s"),
+    ("settling time 2 %", "settling_time", "s"),
+)
+
+
+def comparisons(console: Console, found: Sequence[Comparison]) -> None:
+    """Show records side by side: how well each is met, and its step measured beside simulated."""
+    for some in _beside_each_other(console, found):
+        console.print()
+        console.print(_match_table(some))
+        if any(one.measured or one.simulated for one in some):
+            console.print()
+            console.print(_feature_table(some))
+    for one in found:
+        if not one.accepted:
+            console.print(
+                f"[bold red]not accepted[/] {one.name}: rmse {one.rmse:.3e} exceeds "
+                f"{one.rmse_limit:.3e}"
+            )
+
+
+def _beside_each_other(
+    console: Console, found: Sequence[Comparison]
+) -> Iterator[Sequence[Comparison]]:
+    """Yield as many comparisons at a time as the terminal has room for."""
+    widest = max(len(heading) for one in found for heading in (one.name, "simulated"))
+    count = max(1, (console.width - LABELLED) // (2 * (widest + GAP)))
+    for first in range(0, len(found), count):
+        yield found[first : first + count]
+
+
+def _folding(table: Table) -> Table:
+    """Let the columns behind the unit fold: names of records may be long."""
+    for column in table.columns[2:]:
+        column.no_wrap, column.overflow = False, "fold"
+    return table
+
+
+def _match_table(found: Sequence[Comparison]) -> Table:
+    names = [one.name for one in found]
+    table = _folding(plain_table("", "unit", *names, numbers=names))
+    table.add_row("f", "pu²", *(f"{one.cost:.4e}" for one in found))
+    table.add_row("rmse", "pu", *(f"{one.rmse:.3e}" for one in found))
+    signals = list(dict.fromkeys(signal for one in found for signal in one.overlays))
+    for signal in signals if len(signals) > 1 else ():
+        errors = (one.overlays[signal].rmse if signal in one.overlays else None for one in found)
+        table.add_row(f"rmse {signal}", "pu", *("-" if e is None else f"{e:.3e}" for e in errors))
+    table.add_row("maximum error", "pu", *(f"{one.max_error:.3e}" for one in found))
+    table.add_row("fit", "%", *(f"{one.fit_percent:.2f}" for one in found))
+    return table
+
+
+def _feature_table(found: Sequence[Comparison]) -> Table:
+    headings = [f"{one.name}\n{kind}" for one in found for kind in ("measured", "simulated")]
+    table = _folding(plain_table("step of vt", "unit", *headings, numbers=headings))
+    for label, name, unit in FEATURES:
+        cells = [_feature(one, name) for pair in found for one in (pair.measured, pair.simulated)]
+        table.add_row(label, unit, *cells)
+    return table
+
+
+def _feature(found: Features | None, name: str) -> str:
+    return "-" if found is None else number(getattr(found, name))
+
+
+def check(console: Console, found: Check) -> None:
+    """Show what a check found."""
+    if found.deviations:
+        console.print("exact Jacobian against central differences, relative, by their step")
+        heads = [f"{step:.0e}" for step in STEPS]
+        table = plain_table("parameter", *heads, "best", numbers=[*heads, "best"])
+        for name, row in found.deviations.items():
+            table.add_row(name, *(f"{value:.0e}" for value in row), f"{min(row):.1e}")
+        console.print(table)
+        _verdict(console, found.agrees, "derivatives agree", "derivatives DISAGREE")
+    else:
+        console.print("no free parameter: no derivative to check")
+    _verdict(
+        console,
+        found.flat,
+        f"a run without a step stays flat: vt drifts {found.drift:.1e} pu in 60 s",
+        f"a run without a step is NOT flat: vt drifts {found.drift:.1e} pu in 60 s",
+    )
+    step = f"{found.step:g} s"
+    console.print(f"sub-steps: {found.substeps} to each step of {step}")
+    console.print(f"bypassed: {', '.join(found.bypassed) or 'nothing'}")
+    for note in found.notes:
+        console.print(note)
+
+
+def _verdict(console: Console, good: bool, yes: str, no: str) -> None:
+    console.print(f"[green]{yes}[/]" if good else f"[bold red]{no}[/]")
+
+
+def catalogue(console: Console, models: Iterable[Model], machines: Iterable[Machine]) -> None:
+    """Show the names of all models."""
+    table = plain_table("exciter", "also", "")
+    for one in models:
+        table.add_row(one.name, ", ".join(one.aliases), one.title.partition(" (")[0])
+    console.print(table)
+    console.print()
+    table = plain_table("machine", "")
+    for machine in machines:
+        table.add_row(machine.name, machine.title)
+    console.print(table)
+
+
+def model(console: Console, one: Model) -> None:
+    """Show a model's drawing, data sheet and states."""
+    console.print(f"[bold]{one.name}[/]: {one.title}")
+    console.print()
+    console.print(one.drawing, markup=False, soft_wrap=True)
+    console.print()
+    console.print(data_sheet(one.sheet))
+    console.print()
+    console.print(f"states: {', '.join(one.states)}")
+
+
+def machine(console: Console, one: Machine) -> None:
+    """Show a machine's data sheet and states."""
+    console.print(f"[bold]{one.name}[/]: {one.title}")
+    console.print()
+    console.print(data_sheet(one.sheet))
+    console.print()
+    console.print(f"states: {', '.join(one.states)}")
+
+
+def data_sheet(rows: Sheet) -> Table:
+    """Return a data sheet as a table."""
+    table = plain_table("symbol", "typical", "unit", "range", "meaning", numbers=("typical",))
+    for row in rows:
+        limits = f"{row.low:g} ... {row.high:g}"
+        cells = (row.symbol, f"{row.typical:g}", row.unit, limits, row.meaning)
+        table.add_row(*(Text(cell) for cell in cells))
+    return table

@@ -1,0 +1,201 @@
+"""The whole path of a study: from a case to a fit, a simulation, a validation."""
+
+import sys
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from exfit import __version__, estimate
+from exfit.case import Case
+from exfit.errors import CaseError, SimulationError
+from exfit.notes import notes, validation_notes
+from exfit.plant import VT0
+from exfit.record import file_hash
+from exfit.residuals import JACOBIANS, Residuals
+from exfit.result import Comparison, FitResult, FittedParameter, Iteration
+from exfit.simulate import Response
+from exfit.trial import Trial, fitted_trial, plain_simulator, residuals_of, trial_of, values_of
+
+Values = Mapping[str, float]
+
+LIBRARIES = ("numpy", "llvmlite", "pydantic")
+
+
+def fit(
+    case: Case,
+    strategy: estimate.Method | None = None,
+    watch: Callable[[Iteration], None] = lambda _: None,
+) -> FitResult:
+    """Fit the free parameters of a case to its record, and try the result on its other records.
+
+    ``watch`` is told every iteration. An interruption (KeyboardInterrupt) ends the search with the
+    best point so far. Raises ExfitError for input that cannot be used.
+    """
+    began = clock.perf_counter()
+    trial = fitted_trial(case)
+    validations = [trial_of(case, one.test, one.record) for one in case.validations]
+    residuals = residuals_of(case, trial)
+    start = residuals.start
+    trial.simulator.substeps(residuals.values(start))  # a start beyond a limit ends here
+    method = strategy or case.estimate.strategy
+    history: list[Iteration] = []
+
+    def announce(line: estimate.Iteration) -> None:
+        history.append(_iteration(line, residuals))
+        watch(history[-1])
+
+    found = estimate.least_squares(
+        residuals,
+        start,
+        jac=JACOBIANS[case.estimate.jacobian](residuals),
+        bounds=residuals.bounds,
+        method=method,
+        max_iterations=case.estimate.iterations,
+        gtol=case.estimate.tolerance.gradient,
+        xtol=case.estimate.tolerance.step,
+        x_scale=1.0,
+        good_enough=case.estimate.good_enough.rmse,
+        callback=announce,
+    )
+    values, begin = residuals.values(found.x), residuals.values(start)
+    limit = None if case.accept is None else case.accept.rmse
+    compared = trial.compare("fit", values, begin)
+    tried = tuple(
+        other.compare(one.name, values, None, limit)
+        for one, other in zip(case.validations, validations, strict=True)
+    )
+    units = {row.symbol: row for row in case.exciter.sheet}
+    return FitResult(
+        case=case.path,
+        name=case.path.stem,
+        model=case.exciter.name,
+        strategy=method,
+        parameters={
+            one.name: FittedParameter(
+                value=values[one.name],
+                start=one.start,
+                min=one.low,
+                max=one.high,
+                at_bound=one.bound(values[one.name]),
+                unit=units[one.name].unit,
+                meaning=units[one.name].meaning,
+            )
+            for one in residuals.free
+        },
+        fixed={name: v for name, v in case.values().items() if name not in case.parameters.free},
+        typical=case.typical_symbols,
+        machine=case.machine_values(),
+        comparison=compared,
+        start_cost=history[0].cost if history else float("nan"),
+        gradient_norm=history[-1].gradient_norm if history else float("nan"),
+        status=found.status,
+        message=found.message,
+        success=found.success,
+        interrupted=found.status == estimate.STATUS[estimate.Stop.INTERRUPTED],
+        history=tuple(history),
+        nfev=found.nfev,
+        njev=found.njev,
+        simulations=residuals.simulations,
+        substeps=residuals.substeps,
+        seconds=clock.perf_counter() - began,
+        notes=(
+            *notes(case, residuals, found.x, found.jac),
+            *validation_notes(compared, tried),
+        ),
+        validation=tried,
+        versions=versions(),
+        inputs=inputs(case, trial, *validations),
+    )
+
+
+def _iteration(line: estimate.Iteration, residuals: Residuals) -> Iteration:
+    values = residuals.values(line.x)
+    return Iteration(
+        number=line.number,
+        phase=line.phase,
+        cost=line.cost,
+        gradient_norm=line.gradient_norm,
+        step_norm=line.step_norm,
+        damping=line.damping,
+        inner=line.inner,
+        nfev=line.nfev,
+        njev=line.njev,
+        quality=line.quality,
+        values={one.name: values[one.name] for one in residuals.free},
+    )
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    from importlib.metadata import version
+
+    return {
+        "exfit": __version__,
+        "python": ".".join(map(str, sys.version_info[:3])),
+        **{name: version(name) for name in LIBRARIES},
+    }
+
+
+def inputs(case: Case, *trials: Trial) -> dict[str, str]:
+    """Return the SHA-256 of every file that went into a result."""
+    files = {"case": file_hash(case.path)}
+    if case.model.endswith(".py"):
+        files["model"] = file_hash(case.folder / case.model)
+    labels = ["record", *(f"validate.{one.name}" for one in case.validations)]
+    return files | {
+        label: trial.record.sha256 for label, trial in zip(labels, trials, strict=False)
+    }
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A response of a case, with the record beside it where there is one."""
+
+    response: Response
+    comparison: Comparison | None
+    values: Values
+
+
+def simulate(case: Case, changes: Values) -> Simulation:
+    """Simulate a case at its start values, with changes upon them.
+
+    Raises ExfitError for input that cannot be used.
+    """
+    values = values_of(case, changes)
+    if case.record is not None:
+        trial = trial_of(case, case.test, case.record)
+        response = trial.simulator.response({**values, VT0: trial.vt0})
+        return Simulation(response, trial.compare("record", values), values)
+    simulator, vt0 = plain_simulator(case)
+    response = simulator.response({**values, VT0: vt0})
+    if not all(np.all(np.isfinite(signal)) for signal in response.signals.values()):
+        raise SimulationError("the response does not stay finite")
+    return Simulation(response, None, values)
+
+
+def validate(case: Case, changes: Values, record: Path | None = None) -> list[Comparison]:
+    """Compare a case with its records: the fitted one first, then those that no fit saw.
+
+    ``record`` takes the place of the first of the latter (or of the fitted one if there is no
+    other), under the same test and columns. Raises ExfitError for input that cannot be used.
+    """
+    limit = None if case.accept is None else case.accept.rmse
+    named = [(one.name, one.test, one.record, limit) for one in case.validations]
+    fitted = [] if case.record is None else [("fit", case.test, case.record, None)]
+    if record is not None:
+        if not named + fitted:
+            raise CaseError([f"{case.path}: record: missing; nothing says how to read {record}"])
+        _, test, file, _ = (named + fitted)[0]
+        other = file.model_copy(update={"file": str(record.absolute())})
+        name = record.name if record.stem == "fit" else record.stem
+        named = [(name, test, other, limit)]
+    if not named + fitted:
+        raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
+    values = values_of(case, changes)
+    return [
+        trial_of(case, test, file).compare(name, values, None, most)
+        for name, test, file, most in fitted + named
+    ]
