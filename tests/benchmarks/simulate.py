@@ -1,0 +1,145 @@
+"""Time simulations and Jacobians against the same loop in C and against SciPy's LSODA.
+
+Run it as ``python tests/benchmarks/simulate.py``; it needs gcc. All ways run in one process, taking
+turns, so that a busy machine slows them alike.
+"""
+
+import ctypes
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.integrate import solve_ivp
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from fit import ByHand
+from oracle import system_of, typical_values, vector
+
+from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
+from exfit.simulate import Change, Course, Simulator
+
+HERE = Path(__file__).parent
+STEP, STEPS, AT, RISE = 1e-3, 10_000, 1_000, 0.05
+FREE = ("KA", "KF", "TE", "TF", "TA", "KC", "KD")
+THESIS = {"KA": 364.1523, "KF": 0.0413, "TE": 1.6724, "TF": 1.458, "TA": 0.0542}
+VALUES = typical_values("AC1A", **THESIS, KC=0.486, KD=0.4039, VRMAX=14.5, VRMIN=-14.5)
+SYSTEM = system_of("AC1A")
+ROUNDS = 200
+
+
+def loop_in_c():
+    """Compile the hand-written loop and return it as a function that gives vt (n + 1,)."""
+    folder = Path(tempfile.mkdtemp())
+    library = folder / "ac1a.so"
+    flags = ["-O3", "-march=native", "-std=gnu11", "-shared", "-fPIC"]
+    subprocess.run(["gcc", *flags, str(HERE / "ac1a.c"), "-o", str(library), "-lm"], check=True)
+    simulate = ctypes.CDLL(str(library)).simulate
+    number, whole, pointer = ctypes.c_double, ctypes.c_long, ctypes.c_void_p
+    simulate.argtypes = [pointer, number, whole, whole, number, pointer]
+    simulate.restype = None
+    p, vt = vector(SYSTEM, VALUES), np.empty(STEPS + 1)
+
+    def run():
+        simulate(p.ctypes.data, STEP, STEPS, AT, RISE, vt.ctypes.data)
+        return vt
+
+    return run
+
+
+def kernel(lanes):
+    """Return the bare machine code of exfit, for sets side by side."""
+    code, p = Kernel(SYSTEM, ("vt",), lanes), np.tile(vector(SYSTEM, VALUES)[:, None], lanes)
+    spans = bump()
+
+    def run():
+        before, after = code.run(p, code.start(p), spans)
+        return np.concatenate([before[:-1, 0, 0], after[:, 0, 0]])
+
+    return run
+
+
+def bump():
+    """Return the inputs of the bump test, with the step on the grid."""
+    flat, raised = np.zeros((AT + 1, 1)), np.full((STEPS - AT + 1, 1), RISE)
+    return [Span(flat, STEP, 1), Span(raised, STEP, 1)]
+
+
+def tangents():
+    """Return the bare machine code of exfit with its exact derivatives."""
+    code, p, spans = TangentKernel(SYSTEM, ("vt",), FREE), vector(SYSTEM, VALUES), bump()
+    return lambda: code.run(p, spans)
+
+
+def simulator():
+    """Return exfit's own way of a fit: sub-steps found, samples at the times of a recorder."""
+    times = np.arange(1001) / 100.0
+    return Simulator(SYSTEM, Course(0.0, STEPS * STEP, (Change(AT * STEP, RISE),)), times, STEP)
+
+
+def lsoda():
+    """Return an adaptive integration of equations in Python, at the times of a recorder."""
+    unit, times = ByHand(VALUES), np.arange(1001) / 100.0
+
+    def run():
+        (x, vref), parts = unit.rest(), []
+        for first, last, rise in ((0, 100, 0.0), (100, 1000, RISE)):
+            inside = times[first : last + 1]
+            ends, level = (inside[0], inside[-1]), (vref + rise,)
+            solved = solve_ivp(
+                unit.slopes, ends, x, "LSODA", inside, args=level, rtol=1e-6, atol=1e-9
+            )
+            x = solved.y[:, -1]
+            parts.append(solved.y)
+        return parts
+
+    return run
+
+
+def timed(ways, rounds):
+    """Return the times (rounds, ways) in ms of functions that take turns."""
+    found = np.empty((rounds, len(ways)))
+    for row in found:
+        for column, way in enumerate(ways):
+            begin = time.perf_counter()
+            way()
+            row[column] = 1e3 * (time.perf_counter() - begin)
+    return found
+
+
+def main():
+    in_c, one, slow = loop_in_c(), kernel(1), lsoda()
+    study = simulator()
+    error = np.abs(in_c() - one()).max()
+    assert error < 1e-9, f"C and exfit differ by {error:g}"
+    ways = {
+        "C, gcc -O3 -march=native": in_c,
+        "exfit, bare machine code": one,
+        "exfit, sub-steps and samples": lambda: study.samples(VALUES, ("vt",)),
+        "exfit, bare Jacobian of 7": tangents(),
+        "exfit, Jacobian of 7 and samples": lambda: study.tangents(VALUES, ("vt",), FREE),
+        f"exfit, {SIDE_BY_SIDE} sets side by side": kernel(SIDE_BY_SIDE),
+    }
+    timed(list(ways.values()), 5)
+    times = timed(list(ways.values()), ROUNDS)
+    several = timed([slow], 5)
+    table = Table(title=f"AC1A, 10 s at 1 ms, ms ({ROUNDS} rounds; vt of C and exfit: {error:.0e})")
+    table.add_column("way")
+    for heading in ("median", "best", "median : C", "best : C"):
+        table.add_column(heading, justify="right")
+    rows = [*zip(ways, times.T, strict=True), ("SciPy, LSODA 1e-6, equations in Python", several)]
+    middle, least = np.median(times[:, 0]), times[:, 0].min()
+    for name, found in rows:
+        here, best = np.median(found), found.min()
+        ratios = (f"{here / middle:.2f}", f"{best / least:.2f}")
+        table.add_row(name, f"{here:.3f}", f"{best:.3f}", *ratios)
+    Console(width=100).print(table)
+
+
+if __name__ == "__main__":
+    main()
