@@ -3,6 +3,7 @@
 Everything but click is imported in the command that needs it, so that help appears at once.
 """
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -13,6 +14,9 @@ from exfit.errors import ExfitError
 if TYPE_CHECKING:
     from exfit.case import Case
     from exfit.estimate import Method
+
+# before NumPy is imported: starting its threads costs more than they gain on matrices this small
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 NOT_CONVERGED = 3
 STRATEGIES = ("gn", "dgn", "lm", "lm-then-dgn", "auto", "robust")

@@ -9,7 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, LinearKernel, Span, Start, TangentKernel
+from exfit.engine.kernel import (
+    SIDE_BY_SIDE,
+    Kernel,
+    LinearKernel,
+    Span,
+    Start,
+    TangentKernel,
+    in_threads,
+)
 from exfit.engine.system import System, trace
 from exfit.engine.trace import Node, evaluate, in_order
 from exfit.errors import SimulationError
@@ -223,17 +231,19 @@ class Simulator:
         return self._sampling(run)[:, :, 0], parts
 
     def samples_of_many(self, sets: Sequence[Values], outputs: tuple[str, ...]) -> Array:
-        """Return outputs (M, ny, sets), all simulated side by side with equal sub-steps."""
-        parts = max(self.substeps(values) for values in sets)
+        """Return outputs (M, ny, sets): side by side, in threads, and with equal sub-steps."""
+        spans = self._spans(max(self.substeps(values) for values in sets))
         code = kernel(self.system, outputs, SIDE_BY_SIDE)
-        whole = -(-len(sets) // SIDE_BY_SIDE) * SIDE_BY_SIDE
-        padded = [*sets, *[sets[-1]] * (whole - len(sets))]
-        blocks = []
-        for first in range(0, whole, SIDE_BY_SIDE):
-            block = padded[first : first + SIDE_BY_SIDE]
-            p = np.ascontiguousarray(np.stack([self._vector(values) for values in block], axis=1))
-            blocks.append(self._sampling(code.run(p, code.start(p), self._spans(parts))))
-        return np.concatenate(blocks, axis=2)[:, :, : len(sets)]
+        vectors = np.stack([self._vector(values) for values in sets], axis=1)
+        missing = -len(sets) % SIDE_BY_SIDE
+        padded = np.pad(vectors, ((0, 0), (0, missing)), mode="edge")
+
+        def block(first: int) -> Array:
+            p = np.ascontiguousarray(padded[:, first : first + SIDE_BY_SIDE])
+            return self._sampling(code.run(p, code.start(p), spans))
+
+        firsts = range(0, padded.shape[1], SIDE_BY_SIDE)
+        return np.concatenate(list(in_threads(block, firsts)), axis=2)[:, :, : len(sets)]
 
     def tangents(
         self, values: Values, outputs: tuple[str, ...], free: tuple[str, ...]

@@ -22,6 +22,7 @@ from exfit.trial import Trial, fitted_trial, plain_simulator, residuals_of, tria
 Values = Mapping[str, float]
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
+UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
 def fit(
@@ -56,7 +57,7 @@ def fit(
         max_iterations=case.estimate.iterations,
         gtol=case.estimate.tolerance.gradient,
         xtol=case.estimate.tolerance.step,
-        x_scale=1.0,
+        x_scale=UNIT,
         good_enough=case.estimate.good_enough.rmse,
         callback=announce,
     )

@@ -87,11 +87,9 @@ def test_the_fit_holds_on_the_step_down_that_it_never_saw_or_says_that_it_does_n
     found = fits(name, None)
     (down,) = found.validation
     told = [text for text in found.notes if text.startswith("on down-step the error is")]
-    if name == "ac8b_unit2":
-        assert told
-    else:
-        assert down.rmse <= 1.5 * NOISE
-        assert not told
+    holds = down.rmse <= 1.5 * NOISE
+    assert holds or (name.startswith("ac8b_unit2") and told)
+    assert not (holds and told)
 
 
 @pytest.mark.parametrize("name", ["ac8b_unit1_ka_free", "ac8b_unit2_ka_free"])

@@ -4,12 +4,11 @@ import ctypes
 import hashlib
 import os
 import threading
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -18,7 +17,12 @@ from numpy.typing import NDArray
 from exfit.engine.emit import linearisation, simulation, simulation_with_tangents
 from exfit.engine.system import System, differentiate, trace
 
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
+
 Array = NDArray[np.float64]
+Item = TypeVar("Item")
+Done = TypeVar("Done")
 
 SIDE_BY_SIDE = 16  # parameter sets: two vectors of 512 bits hide each other's waiting
 DIRECTIONS = 8  # of differentiation in one run
@@ -135,9 +139,15 @@ RUN_ARGUMENTS = (ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int6
 
 
 @cache
-def workers() -> ThreadPoolExecutor:
-    """Return the threads that blocks of parameter sets are spread over."""
+def _workers() -> "ThreadPoolExecutor":
+    from concurrent.futures import ThreadPoolExecutor
+
     return ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
+
+
+def in_threads(run: Callable[[Item], Done], items: Sequence[Item]) -> Iterable[Done]:
+    """Return run(item) of each, spread over the processors; a single one needs no thread."""
+    return map(run, items) if len(items) == 1 else _workers().map(run, items)
 
 
 class Kernel:
@@ -195,10 +205,7 @@ class TangentKernel:
 
         ``p`` is (np,); the derivative of the starting state is part of theirs.
         """
-        if len(self.seeds) == 1:
-            blocks = [self._block(p, self.seeds[0], spans)]
-        else:
-            blocks = list(workers().map(lambda seed: self._block(p, seed, spans), self.seeds))
+        blocks = list(in_threads(lambda seed: self._block(p, seed, spans), self.seeds))
         values = blocks[0][0]
         slopes = [
             np.concatenate(parts, axis=2) for parts in zip(*(b[1] for b in blocks), strict=True)

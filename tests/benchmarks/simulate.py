@@ -5,6 +5,7 @@ turns, so that a busy machine slows them alike.
 """
 
 import ctypes
+import itertools
 import subprocess
 import sys
 import tempfile
@@ -115,14 +116,16 @@ def timed(ways, rounds):
 def main():
     in_c, one, slow = loop_in_c(), kernel(1), lsoda()
     study = simulator()
+    # values asked for a second time in a row cost less: a fit never does
+    ever_new = (VALUES | {"KA": VALUES["KA"] + 1e-9 * n} for n in itertools.count())
     error = np.abs(in_c() - one()).max()
     assert error < 1e-9, f"C and exfit differ by {error:g}"
     ways = {
         "C, gcc -O3 -march=native": in_c,
         "exfit, bare machine code": one,
-        "exfit, sub-steps and samples": lambda: study.samples(VALUES, ("vt",)),
+        "exfit, sub-steps and samples": lambda: study.samples(next(ever_new), ("vt",)),
         "exfit, bare Jacobian of 7": tangents(),
-        "exfit, Jacobian of 7 and samples": lambda: study.tangents(VALUES, ("vt",), FREE),
+        "exfit, Jacobian of 7 and samples": lambda: study.tangents(next(ever_new), ("vt",), FREE),
         f"exfit, {SIDE_BY_SIDE} sets side by side": kernel(SIDE_BY_SIDE),
     }
     timed(list(ways.values()), 5)
