@@ -238,29 +238,28 @@ class LinearKernel:
         engine = compiled(linearisation(traced, differentiate(traced, system, ()), DIRECTIONS))
         self._rest = _function(engine, "rest", 8)
         self._motion = _function(engine, "motion", 9)
-        states = len(system.states)
+        sizes = (len(system.parameters), len(system.setpoints), len(system.states))
+        states = sizes[-1]
+        self._still = [np.zeros((rows, DIRECTIONS)) for rows in sizes]
+        self._fixed = [_address(zeros) for zeros in self._still[:2]]
         whole = -(-states // DIRECTIONS) * DIRECTIONS
-        self._blocks = np.split(np.eye(states, whole), whole // DIRECTIONS, axis=1)
+        columns = np.split(np.eye(states, whole), whole // DIRECTIONS, axis=1)
+        self._blocks = [np.ascontiguousarray(block) for block in columns]
 
     def rest(self, p: Array) -> Start:
         """Return the rest of one parameter set (np,): setpoints (nr,) and states (nx,)."""
         r, x = np.empty(len(self.system.setpoints)), np.empty(len(self.system.states))
-        still = (np.zeros((rows, DIRECTIONS)) for rows in (len(p), len(r), len(x)))
-        self._rest(_address(p), _address(r), _address(x), None, *map(_address, still), None)
+        # its tangents are zero, written over with zero
+        still = (*self._fixed, _address(self._still[2]), None)
+        self._rest(_address(p), _address(r), _address(x), None, *still)
         return Start(r, x)
 
     def motion(self, p: Array, r: Array, x: Array, u: Array) -> tuple[Array, Array]:
         """Return the slopes (nx,) at states x and inputs u, and their Jacobian (nx, nx)."""
-        slopes = np.empty(len(x))
-        columns = []
+        slopes, columns = np.empty(len(x)), []
         for block in self._blocks:
-            seeds = (
-                np.zeros((len(p), DIRECTIONS)),
-                np.zeros((len(r), DIRECTIONS)),
-                np.ascontiguousarray(block),
-            )
             column = np.empty((len(x), DIRECTIONS))
-            arrays = (p, r, x, slopes, *seeds, column, u)
-            self._motion(*map(_address, arrays))
+            given = (*map(_address, (p, r, x, slopes)), *self._fixed)
+            self._motion(*given, _address(block), _address(column), _address(u))
             columns.append(column)
         return slopes, np.hstack(columns)[:, : len(x)]

@@ -1,15 +1,18 @@
 """Count and time whole fits of AC1A from four starts: exfit's estimator against SciPy's.
 
-Run it as ``python tests/benchmarks/fit.py``. All use the same residuals and exact Jacobians. With
-``--lsoda`` it adds, from one start, what one would write with SciPy alone; that takes a while.
+Run it as ``python tests/benchmarks/fit.py``. All use the same residuals and exact Jacobians. Last
+comes, from one start, what one would write with SciPy alone.
 """
 
 import csv
+import os
 import sys
 import time
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 import numpy as np
 from rich.console import Console

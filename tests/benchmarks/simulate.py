@@ -6,11 +6,14 @@ turns, so that a busy machine slows them alike.
 
 import ctypes
 import itertools
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 import numpy as np
 from rich.console import Console
