@@ -62,6 +62,7 @@ def check(case: Case) -> Check:
     free = free_of(case)
     names = [one.name for one in free]
     fixed = {name: value for name, value in values.items() if name not in names}
+    simulator = simulator.secured(values)
     substeps = simulator.substeps(values)
     lags = [name for name in simulator.time_constants if values[name] < SHORTEST]
     still = Simulator(

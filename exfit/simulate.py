@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 MOST_STEPS = 1e8  # a day at 1 ms
+MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
 REST_TOLERANCE = 1e-6  # pu/s: below any real motion
 ROUNDING = 1e-13  # of a state
@@ -172,11 +173,15 @@ def parameters_used(system: System) -> frozenset[str]:
 class Simulator:
     """Simulates one system through one course, sampled at ``times`` (M,) in s.
 
-    ``step`` (s) is the largest step; where the system is faster, every step is divided.
+    ``step`` (s) is the largest step; where the system is faster, every step is divided, into no
+    fewer than ``least`` parts.
     """
 
-    def __init__(self, system: System, course: Course, times: Array, step: float) -> None:
-        self.system, self.course, self.times, self.step = system, course, times, step
+    def __init__(
+        self, system: System, course: Course, times: Array, step: float, least: int = 1
+    ) -> None:
+        self.system, self.course, self.times = system, course, times
+        self.step, self.least = step, least
         self._grid = stretches(course, step)
         self._inputs = [np.full((part.steps + 1, 1), part.vref) for part in self._grid]
         self._sampling = Sampling(self._grid, times)
@@ -195,13 +200,14 @@ class Simulator:
         of the slopes' Jacobian at rest and 1/T of every time constant that is not bypassed:
         Runge-Kutta of order four is unstable beyond 2.785, and a limit would hide it. It depends
         on the values alone, and a change of one sub-step moves a response by less than the
-        method's own error. Raises SimulationError where the start is beyond a limit, or beyond
-        ``MOST_SUBSTEPS``.
+        method's own error. What is faster away from rest is for ``secured``.
+
+        Raises SimulationError where the start is no rest, or beyond ``MOST_SUBSTEPS``.
         """
         p = self._vector(values)
         known, parts = self._last
         if known != p.tobytes():
-            parts = self._parts(values, self._rate_at_rest(values, p))
+            parts = max(self.least, self._parts(values, self._rate_at_rest(values, p)))
             self._last = p.tobytes(), parts
         return parts
 
@@ -215,6 +221,20 @@ class Simulator:
             u = np.array([response.signals["vref"][row]]) - rest.r
             rate = max(rate, self._motion(p, rest, x, u)[1])
         return self._parts(values, rate)
+
+    def secured(self, values: Values) -> "Simulator":
+        """Return a simulator whose sub-steps are enough all along the response to these values.
+
+        Raises SimulationError where that response does not stay finite.
+        """
+        simulator = self
+        for _ in range(MOST_REPEATS):
+            response = simulator.response(values)
+            wanted = simulator.substeps_along(values, response)
+            if wanted <= response.substeps:
+                break
+            simulator = Simulator(self.system, self.course, self.times, self.step, wanted)
+        return simulator
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
         """Return the outputs (all of the system's by default) at the sample times."""

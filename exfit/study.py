@@ -6,11 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from exfit import __version__, estimate
 from exfit.case import Case
-from exfit.errors import CaseError, SimulationError
+from exfit.errors import CaseError
 from exfit.notes import notes, validation_notes
 from exfit.plant import VT0
 from exfit.record import file_hash
@@ -36,11 +34,10 @@ def fit(
     best point so far. Raises ExfitError for input that cannot be used.
     """
     began = clock.perf_counter()
-    trial = fitted_trial(case)
+    trial = fitted_trial(case).secured(values_of(case, {}))
     validations = [trial_of(case, one.test, one.record) for one in case.validations]
     residuals = residuals_of(case, trial)
     start = residuals.start
-    trial.simulator.substeps(residuals.values(start))  # a start beyond a limit ends here
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
@@ -168,12 +165,11 @@ def simulate(case: Case, changes: Values) -> Simulation:
     values = values_of(case, changes)
     if case.record is not None:
         trial = trial_of(case, case.test, case.record)
-        response = trial.simulator.response({**values, VT0: trial.vt0})
+        response = trial.secured(values).simulator.response({**values, VT0: trial.vt0})
         return Simulation(response, trial.compare("record", values), values)
     simulator, vt0 = plain_simulator(case)
-    response = simulator.response({**values, VT0: vt0})
-    if not all(np.all(np.isfinite(signal)) for signal in response.signals.values()):
-        raise SimulationError("the response does not stay finite")
+    at = {**values, VT0: vt0}
+    response = simulator.secured(at).response(at)
     return Simulation(response, None, values)
 
 

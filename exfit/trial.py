@@ -1,7 +1,7 @@
 """A test of a case, ready to be simulated: its system, its course, its record."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from traceback import extract_tb
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.case import BumpTest, Case, NoPlant, RecordFile, initial_voltage
 from exfit.engine.system import System, trace
-from exfit.errors import CaseError, ModelError, SimulationError
+from exfit.errors import CaseError, ModelError
 from exfit.features import Features, features
 from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.record import Record
@@ -62,6 +62,10 @@ class Trial:
     vt0: float
     channels: tuple[Channel, ...]
 
+    def secured(self, values: Values) -> "Trial":
+        """Return the trial with sub-steps enough all along the response to the values."""
+        return replace(self, simulator=self.simulator.secured({**values, VT0: self.vt0}))
+
     def compare(
         self, name: str, values: Values, start: Values | None = None, limit: float | None = None
     ) -> Comparison:
@@ -69,9 +73,7 @@ class Trial:
 
         Raises SimulationError where it does not stay finite.
         """
-        samples, substeps = self._samples(values)
-        if not np.all(np.isfinite(samples)):
-            raise SimulationError(f"{name}: the response does not stay finite")
+        samples, substeps = self.secured(values)._samples(values)
         first = np.full_like(samples, np.nan) if start is None else self._samples(start)[0]
         weights = np.array([channel.weight for channel in self.channels])
         measured = np.stack([channel.measured for channel in self.channels], axis=1)
