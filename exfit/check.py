@@ -28,13 +28,14 @@ class Check:
 
     ``deviations`` holds, for each free parameter, the largest difference between the exact column
     of the Jacobian and the central difference at each of STEPS, relative to the column's largest
-    element.
+    element; ``step_error`` is by how much halving every step moves the response (pu).
     """
 
     deviations: Mapping[str, tuple[float, ...]]
     bypassed: tuple[str, ...]
     substeps: int
     step: float
+    step_error: float
     drift: float
     notes: tuple[str, ...]
 
@@ -74,6 +75,7 @@ def check(case: Case) -> Check:
         bypassed=tuple(lags),
         substeps=substeps,
         step=simulator.step,
+        step_error=simulator.step_error(values, tuple(channel.signal for channel in channels)),
         drift=float(np.max(np.abs(flat - vt0))),
         notes=tuple(typical_notes(case)),
     )

@@ -15,6 +15,7 @@ from exfit.trial import system_of
 Array = NDArray[np.float64]
 
 EXACTLY_REDUNDANT = 1e-9  # of the largest singular value: rounding, not a weak influence
+COARSE = 0.2  # of the error of the fit: what halving the step may move
 MUCH_WORSE = 3.0  # than the fit
 TAKES_PART = 0.01  # of a direction of length one
 
@@ -34,6 +35,13 @@ def notes(case: Case, residuals: Residuals, theta: Array, jacobian: Array) -> It
         else:
             names = ", ".join(group)
             yield f"{names} can move together without any effect on the record: fix one of them"
+    moved = residuals.simulator.step_error(values, residuals.signals)
+    rmse = float(np.sqrt(np.mean(residuals(theta) ** 2)))
+    if moved > COARSE * rmse:
+        yield (
+            f"halving the step of {case.simulation.step:g} s moves the response by {moved:.1e} pu, "
+            f"the error of the fit is {rmse:.1e} pu: give a smaller simulation.step"
+        )
     response = residuals.simulator.response(values)
     wanted = residuals.simulator.substeps_along(values, response)
     if wanted > 2 * response.substeps:
@@ -70,6 +78,8 @@ def typical_notes(case: Case) -> Iterator[str]:
 
 def redundant(jacobian: Array, names: Sequence[str]) -> Iterator[list[str]]:
     """Yield groups of parameters that the residuals cannot tell apart at all."""
+    if not np.all(np.isfinite(jacobian)):
+        return  # interrupted before it was known
     sizes = np.linalg.norm(jacobian, axis=0)
     seen = sizes > 0.0
     yield from ([name] for name, visible in zip(names, seen, strict=True) if not visible)

@@ -241,6 +241,7 @@ def check(console: Console, found: Check) -> None:
     )
     step = f"{found.step:g} s"
     console.print(f"sub-steps: {found.substeps} to each step of {step}")
+    console.print(f"halving every step moves the response by {found.step_error:.1e} pu")
     console.print(f"bypassed: {', '.join(found.bypassed) or 'nothing'}")
     for note in found.notes:
         console.print(note)

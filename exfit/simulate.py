@@ -236,6 +236,12 @@ class Simulator:
             simulator = Simulator(self.system, self.course, self.times, self.step, wanted)
         return simulator
 
+    def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
+        """Return by how much, at most and per unit, halving every step moves the outputs."""
+        samples, parts = self.samples(values, outputs)
+        finer = Simulator(self.system, self.course, self.times, self.step, 2 * parts)
+        return float(np.max(np.abs(samples - finer.samples(values, outputs)[0])))
+
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
         """Return the outputs (all of the system's by default) at the sample times."""
         wanted = self.system.outputs if outputs is None else tuple(outputs)

@@ -101,3 +101,12 @@ def test_it_tells_the_sub_steps_of_a_fast_case(tmp_path):
     assert found.step == 0.1
     # the shortest time constant is TA = 0.02 s or shorter: five parts of a step at least
     assert found.substeps >= 5
+
+
+def test_the_error_of_the_step_is_told_and_falls_sixteenfold_with_it():
+    text = WITHOUT_RECORD.replace("step: 0.02}]", "step: 0.001}]")  # off the limits
+    errors = [
+        check(parse_case(f"{text}simulation: {{step: {step}}}\n", Path("case.yaml"))).step_error
+        for step in (0.008, 0.004)
+    ]
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.2)

@@ -181,3 +181,25 @@ def test_the_initial_voltage_is_the_mean_before_the_step_where_the_case_gives_no
     before = trial.record.time < 1.0
     assert trial.vt0 == pytest.approx(np.mean(trial.record.signals["vt"][before]), rel=1e-12)
     assert residuals_of(loaded, fitted_trial(loaded)).fixed[VT0] == 1.0
+
+
+def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):
+    """At 0.1 s the check system is off by more than its record is rounded."""
+    text = (ROOT / "configs" / "first_order.yaml").read_text()
+    text = text.replace("../sample_data", (ROOT / "sample_data").as_posix())
+    path = tmp_path / "case.yaml"
+    told = []
+    for step in (0.1, 0.001):
+        path.write_text(f"{text}simulation: {{step: {step}}}\n")
+        told.append(any("halving the step" in note for note in fit(load_case(path)).notes))
+    assert told == [True, False]
+
+
+def test_an_interruption_before_the_second_jacobian_is_told_without_a_note_on_redundance():
+    def interrupt(line):
+        if line.number == 1:
+            raise KeyboardInterrupt
+
+    found = fit(case("first_order"), None, interrupt)
+    assert found.interrupted
+    assert [note for note in found.notes if "effect" in note] == []
