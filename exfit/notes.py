@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 EXACTLY_REDUNDANT = 1e-9  # of the largest singular value: rounding, not a weak influence
 COARSE = 0.2  # of the error of the fit: what halving the step may move
+INVISIBLE = 1e-7  # pu: no recorder shows it
 MUCH_WORSE = 3.0  # than the fit
 TAKES_PART = 0.01  # of a direction of length one
 
@@ -37,7 +38,7 @@ def notes(case: Case, residuals: Residuals, theta: Array, jacobian: Array) -> It
             yield f"{names} can move together without any effect on the record: fix one of them"
     moved = residuals.simulator.step_error(values, residuals.signals)
     rmse = float(np.sqrt(np.mean(residuals(theta) ** 2)))
-    if moved > COARSE * rmse:
+    if moved > max(COARSE * rmse, INVISIBLE):
         yield (
             f"halving the step of {case.simulation.step:g} s moves the response by {moved:.1e} pu, "
             f"the error of the fit is {rmse:.1e} pu: give a smaller simulation.step"
