@@ -389,7 +389,9 @@ def cache(tmp_path, monkeypatch):
 def builds(monkeypatch):
     """Count what is compiled."""
     counted, build = [], engine._build
-    monkeypatch.setattr(engine, "_build", lambda ir: counted.append(ir) or build(ir))
+    monkeypatch.setattr(
+        engine, "_build", lambda ir, machine: counted.append(ir) or build(ir, machine)
+    )
     return counted
 
 

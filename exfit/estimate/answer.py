@@ -1,0 +1,94 @@
+"""What the estimator tells: why it stopped, each iteration, the result."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from exfit.estimate.arrays import Array
+
+
+class Stop(Enum):
+    """Why an estimation ended."""
+
+    GRADIENT = "the gradient vanished"
+    FLOOR = "the cost is at its floor: neither the linear model nor a trial finds a lower one"
+    STEP = "the Gauss-Newton step fell below the tolerance"
+    KINK = (
+        "no trial lowers the cost, which has a kink here: the linear model sees nothing beyond it"
+    )
+    ITERATIONS = "the iteration limit was reached"
+    INTERRUPTED = "interrupted: this is the best point seen until then"
+    JACOBIAN = "the Jacobian is not finite here"
+    STALLED = "no trial lowers the cost visibly, although the linear model promises a lower one"
+    FULL_STEP = "the full Gauss-Newton step did not lower the cost"
+    ILL_CONDITIONED = "the Jacobian is too ill-conditioned for full Gauss-Newton steps"
+    TRUSTED = "a full Gauss-Newton step fits the trust region and proved good"  # only inside
+
+
+STATUS = {
+    Stop.GRADIENT: 1,
+    Stop.FLOOR: 2,
+    Stop.STEP: 3,
+    Stop.KINK: 4,
+    Stop.ITERATIONS: 0,
+    Stop.INTERRUPTED: -1,
+    Stop.JACOBIAN: -2,
+    Stop.STALLED: -3,
+    Stop.FULL_STEP: -4,
+    Stop.ILL_CONDITIONED: -5,
+    Stop.TRUSTED: -6,
+}
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One line of the log, announced when the iteration is over.
+
+    number         0 is the start; counts on through the phases, and once where one restarts
+    phase          "gn", "dgn" or "lm"
+    x              where the iteration ended, shape (N,)
+    cost           1/2 sum(fun(x)^2)
+    gradient_norm  Euclidean norm of the projected gradient at x
+    step_norm      Euclidean norm of the step that led there, 0 if none was accepted
+    damping        gn: 1; dgn: the step length lambda; lm: nu; nan at a start
+    inner          trials rejected before: reductions of lambda, shrinkings of the trust region
+    nfev, njev     calls of fun (those for differences included) and Jacobians, until now
+    quality        gain ratio: decrease of the cost over the decrease that the model promised
+    """
+
+    number: int
+    phase: str
+    x: Array
+    cost: float
+    gradient_norm: float
+    step_norm: float
+    damping: float
+    inner: int
+    nfev: int
+    njev: int
+    quality: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """The best point seen and how it was reached; fun (M,), jac (M, N), grad (N,) belong to x.
+
+    status: 1 gradient, 2 floor, 3 step, 4 kink (converged); 0 iteration limit; -1 interrupted,
+    -2 Jacobian not finite, -3 stalled, -4 full step failed, -5 ill-conditioned (not converged).
+    message is the sentence, stop the member of Stop. optimality is the largest component of the
+    projected gradient. After an interruption jac and grad may be nan.
+    """
+
+    x: Array
+    cost: float
+    fun: Array
+    jac: Array
+    grad: Array
+    optimality: float
+    nfev: int
+    njev: int
+    nit: int
+    status: int
+    message: str
+    success: bool
+    history: tuple[Iteration, ...]
+    stop: Stop

@@ -1,0 +1,157 @@
+"""The linear model fun(x + d) = fun(x) + J d at a point, and the steps it proposes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, nan, sqrt
+
+import numpy as np
+
+from exfit.estimate.arrays import TINY, Array
+from exfit.estimate.bounded import bounded_minimum
+from exfit.estimate.box import Box
+from exfit.estimate.problem import Point, Problem
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where the full step leads, its slope g^T d, and the decrease the model promises for it."""
+
+    origin: Array
+    target: Array
+    slope: float
+    promise: float
+
+    def at(self, length: float) -> Array:
+        """Return the point a fraction of the way along."""
+        return self.target if length == 1.0 else self.origin + length * (self.target - self.origin)
+
+    def promised(self, length: float) -> float:
+        """Return the decrease the model promises for a fraction of the way."""
+        return -self.slope * length + (self.promise + self.slope) * length**2
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The linear model at a point, in scaled variables y = scale * d within low <= y <= high.
+
+    J / scale = U diag(singular) directions; amounts = U^T residuals; unseen: the share of the
+    largest singular value below which a direction does not exist.
+    """
+
+    point: Point
+    jacobian: Array
+    gradient: Array
+    projected: Array
+    scale: Array
+    singular: Array
+    directions: Array
+    amounts: Array
+    low: Array
+    high: Array
+    unseen: float
+    box: Box
+
+    @property
+    def finite(self) -> bool:
+        """Whether the model can be used."""
+        return bool(np.isfinite(self.jacobian).all())
+
+    @cached_property
+    def rank(self) -> int:
+        """How many directions exist."""
+        return int(np.count_nonzero(self.singular > self.unseen * max(self.singular[0], TINY)))
+
+    @cached_property
+    def full(self) -> Step:
+        """The Gauss-Newton step: least squares within the bounds, of minimum norm."""
+        return solve(self)
+
+    @cached_property
+    def gradient_norm(self) -> float:
+        """The Euclidean norm of the projected gradient."""
+        return float(np.linalg.norm(self.projected))
+
+    def scaled_length(self, x: Array) -> float:
+        """Return how far x is from here in scaled variables."""
+        return float(np.linalg.norm(self.scale * (x - self.point.x)))
+
+
+def linearise(problem: Problem, point: Point, before: Linear | None = None) -> Linear:
+    """Return the linear model at a point, scaled no less than the one before."""
+    J = problem.jacobian(point)
+    return factored(problem, point, J, before) if np.isfinite(J).all() else blind(problem, point, J)
+
+
+def blind(problem: Problem, point: Point, J: Array) -> Linear:
+    """Return the model at a point where J is not finite: there are no directions."""
+    unknown, none = np.full(len(point.x), nan), np.zeros(0)
+    return Linear(
+        point=point,
+        jacobian=J,
+        gradient=unknown,
+        projected=unknown,
+        scale=unknown,
+        singular=none,
+        directions=np.zeros((0, len(point.x))),
+        amounts=none,
+        low=unknown,
+        high=unknown,
+        unseen=problem.unseen,
+        box=problem.box,
+    )
+
+
+def factored(problem: Problem, point: Point, J: Array, before: Linear | None) -> Linear:
+    """Factor J: QR first, for the many residuals, then the singular values of the corner."""
+    box, n = problem.box, len(point.x)
+    gradient = J.T @ point.residuals
+    scale = 1.0 / box.unit if problem.scaled else column_scale(J, before)
+    both = np.column_stack([J / scale, point.residuals])
+    corner = np.asarray(np.linalg.qr(both, mode="r"), dtype=np.float64)
+    left, singular, directions = np.linalg.svd(corner[:, :n], full_matrices=False)
+    return Linear(
+        point=point,
+        jacobian=J,
+        gradient=gradient,
+        projected=box.projected(point.x, gradient),
+        scale=scale,
+        singular=singular,
+        directions=directions,
+        amounts=left.T @ corner[:, n],
+        low=scale * (box.low - point.x),
+        high=scale * (box.high - point.x),
+        unseen=problem.unseen,
+        box=box,
+    )
+
+
+def column_scale(J: Array, before: Linear | None) -> Array:
+    """Return the largest norm each column has had (Moré 1978, section 6)."""
+    norms: Array = np.linalg.norm(J, axis=0)
+    if before is not None and before.finite:
+        return np.maximum(norms, before.scale)
+    return np.where(norms > 0.0, norms, 1.0)
+
+
+def solve(linear: Linear, nu: float = 0.0, reach: float = inf) -> Step:
+    """Minimise |J d + R|^2 + nu |scale d|^2 within the bounds and |d| <= reach, unit by unit."""
+    k = linear.rank
+    s, V, b = linear.singular[:k], linear.directions[:k], linear.amounts[:k]
+    limit = reach * linear.scale * linear.box.unit
+    low, high = np.maximum(linear.low, -limit), np.minimum(linear.high, limit)
+    y = -V.T @ (s * b / (s**2 + nu))
+    if np.any(y < low) or np.any(y > high):
+        rows = np.vstack([s[:, None] * V, sqrt(nu) * np.eye(len(y))])
+        y = bounded_minimum(rows, np.append(b, np.zeros(len(y))), low, high)
+    return step_to(linear, y)
+
+
+def step_to(linear: Linear, y: Array) -> Step:
+    """Return the step d = y / scale; where it reaches a bound it ends on it exactly."""
+    x, box = linear.point.x, linear.box
+    target = box.inside(x + y / linear.scale)
+    target = np.where(y <= linear.low, box.low, np.where(y >= linear.high, box.high, target))
+    d = target - x
+    change = linear.singular * (linear.directions @ (linear.scale * d))
+    promise = -float(change @ (linear.amounts + 0.5 * change))
+    return Step(x, target, float(linear.gradient @ d), promise)

@@ -1,0 +1,137 @@
+"""The one loop of all methods, its log, and what comes out of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, nan
+
+import numpy as np
+
+from exfit.estimate.answer import STATUS, Iteration, Result, Stop
+from exfit.estimate.arrays import Array
+from exfit.estimate.linear import Linear, blind, linearise
+from exfit.estimate.problem import Point, Problem
+from exfit.estimate.search import Move, Search
+from exfit.estimate.stopping import Rules
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where a phase ended and why."""
+
+    linear: Linear
+    stop: Stop
+
+    @property
+    def converged(self) -> bool:
+        """Whether it ended at a minimum."""
+        return STATUS[self.stop] > 0
+
+
+class Run:
+    """A search from its start to its end, perhaps in several phases."""
+
+    def __init__(
+        self, problem: Problem, rules: Rules, callback: Callable[[Iteration], object] | None
+    ) -> None:
+        self.problem, self.rules, self.callback = problem, rules, callback
+        self.history: list[Iteration] = []
+        self.iterations = 0
+        self.best: Linear | None = None
+
+    def begin(self, x0: Array) -> Linear:
+        """Return the linear model at the start, or raise ValueError."""
+        point = self.problem.evaluate(x0)
+        if point.cost == inf:
+            raise ValueError("the residuals at x0 are not finite")
+        start = self.linearise(point)
+        self.rules = self.rules.starting_at(start)
+        return start
+
+    def linearise(self, point: Point, before: Linear | None = None) -> Linear:
+        """Return the linear model at a point; remember the best one."""
+        linear = linearise(self.problem, point, before)
+        if self.best is None or point.cost <= self.best.point.cost:
+            self.best = linear
+        return linear
+
+    def descend(self, search: Search, linear: Linear) -> Outcome:
+        """Go down from a point until there is a reason to stop."""
+        if not self.history or not np.array_equal(self.history[-1].x, linear.point.x):
+            self.announce(search.phase, linear)
+        for _ in range(self.rules.max_iterations):
+            stop = self.rules.at_rest(linear)
+            if stop is not None:
+                return Outcome(linear, stop)
+            before = linear
+            move, search = search.advance(self.problem, before)
+            if move.point is not None:
+                linear = self.linearise(move.point, before)
+            self.iterations += 1
+            self.announce(search.phase, linear, move, before)
+            stop = self.rules.after(before, linear, move)
+            if stop is not None:
+                return Outcome(linear, stop)
+        return Outcome(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)
+
+    def announce(
+        self, phase: str, linear: Linear, move: Move | None = None, before: Linear | None = None
+    ) -> None:
+        """Write a line of the log and tell the callback."""
+        x = linear.point.x
+        move = move or Move(None, nan, 0)
+        line = Iteration(
+            number=len(self.history),
+            phase=phase,
+            x=x.copy(),
+            cost=linear.point.cost,
+            gradient_norm=linear.gradient_norm,
+            step_norm=float(np.linalg.norm(x - before.point.x)) if before else 0.0,
+            damping=move.damping,
+            inner=move.inner,
+            nfev=self.problem.nfev,
+            njev=self.problem.njev,
+            quality=move.quality,
+        )
+        self.history.append(line)
+        if self.callback is not None:
+            self.callback(line)
+
+    def best_of(self, outcome: Outcome) -> Outcome:
+        """Return the outcome, moved to a trial that was rejected and yet is the best."""
+        best = self.problem.best
+        if best is not None and best.cost < outcome.linear.point.cost:
+            return Outcome(linearise(self.problem, best), outcome.stop)
+        return outcome
+
+    def interrupted(self) -> Outcome:
+        """Return the best point seen, with its Jacobian if that was there in time.
+
+        Raises KeyboardInterrupt where there is none.
+        """
+        point = self.problem.best
+        if point is None or point.cost == inf:
+            raise KeyboardInterrupt
+        if self.best is not None and self.best.point.cost <= point.cost:
+            return Outcome(self.best, Stop.INTERRUPTED)
+        unknown = np.full((len(point.residuals), len(point.x)), nan)
+        return Outcome(blind(self.problem, point, unknown), Stop.INTERRUPTED)
+
+    def result(self, outcome: Outcome) -> Result:
+        """Return what the user gets."""
+        linear, stop = outcome.linear, outcome.stop
+        return Result(
+            x=linear.point.x,
+            cost=linear.point.cost,
+            fun=linear.point.residuals,
+            jac=linear.jacobian,
+            grad=linear.gradient,
+            optimality=float(np.max(abs(linear.projected))),
+            nfev=self.problem.nfev,
+            njev=self.problem.njev,
+            nit=self.iterations,
+            status=STATUS[stop],
+            message=stop.value,
+            success=outcome.converged,
+            history=tuple(self.history),
+            stop=stop,
+        )

@@ -1,0 +1,67 @@
+"""What a search is, and the shortening of a step that searches share."""
+
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Protocol, Self
+
+from exfit.estimate.answer import Stop
+from exfit.estimate.arrays import EPS
+from exfit.estimate.linear import Linear, Step
+from exfit.estimate.problem import Point, Problem
+
+ARMIJO = 1e-4  # share of the promised decrease that makes a trial good enough
+MOST_TRIALS = 60
+
+
+@dataclass(frozen=True)
+class Move:
+    """What one iteration came to: a better point, or a reason to stop, or both."""
+
+    point: Point | None
+    damping: float
+    inner: int
+    quality: float = nan
+    stop: Stop | None = None
+
+
+class Search(Protocol):
+    """Finds the next point with the help of a linear model."""
+
+    @property
+    def phase(self) -> str:
+        """The name in the log."""
+
+    def advance(self, problem: Problem, linear: Linear) -> tuple[Move, Self]:
+        """Return the move made, and the search to go on with."""
+
+
+def gain_ratio(decrease: float, promise: float) -> float:
+    """Return the decrease in units of what was promised, nan if that was nothing."""
+    return decrease / promise if promise > 0.0 else nan
+
+
+def shorten(problem: Problem, linear: Linear, step: Step, trials: int) -> Move:
+    """Shorten the step until Armijo's rule holds or its promise can no longer be seen.
+
+    Source: Armijo 1966.
+    """
+    cost, length, reductions = linear.point.cost, 1.0, 0
+    while reductions < trials and -length * step.slope > EPS * cost:
+        trial = problem.evaluate(step.at(length))
+        if trial.cost < cost and trial.cost <= cost + ARMIJO * length * step.slope:
+            quality = gain_ratio(cost - trial.cost, step.promised(length))
+            return Move(trial, length, reductions, quality)
+        length *= shortened(trial.cost - cost, length * step.slope)
+        reductions += 1
+    return Move(None, length, reductions, stop=Stop.STALLED)
+
+
+def shortened(rise: float, slope: float) -> float:
+    """Return by how much to shorten a trial: to the minimum of the parabola, 0.2 ... 0.5.
+
+    Source: Dennis & Schnabel 1983, section 6.3.2. slope: of the whole trial step.
+    """
+    curvature = rise - slope
+    if not (isfinite(curvature) and curvature > 0.0):
+        return 0.2
+    return min(0.5, max(0.2, -0.5 * slope / curvature))

@@ -1,0 +1,69 @@
+"""When to stop, and why."""
+
+from dataclasses import dataclass, replace
+from math import nan, sqrt
+from typing import Self
+
+import numpy as np
+
+from exfit.estimate.answer import Stop
+from exfit.estimate.arrays import EPS, TINY, Array
+from exfit.estimate.box import Box
+from exfit.estimate.linear import Linear
+from exfit.estimate.search import Move
+
+KINK = 1e-3  # of the cost: what a derivative from one side may promise at a minimum
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The tolerances, of which `least_squares` says what they mean, and what they refer to."""
+
+    max_iterations: int
+    gtol: float
+    ftol: float
+    xtol: float
+    first_cost: float = nan
+    first_gradient: float = nan
+
+    def starting_at(self, start: Linear) -> Self:
+        """Return the rules that measure by the start."""
+        return replace(self, first_cost=start.point.cost, first_gradient=start.gradient_norm)
+
+    def at_rest(self, linear: Linear) -> Stop | None:
+        """Return why there is nothing to gain from a point, if so."""
+        if not linear.finite:
+            return Stop.JACOBIAN
+        full, cost = linear.full, linear.point.cost
+        flat = linear.gradient_norm <= self.gtol * self.first_gradient + TINY
+        if flat and (full.promise <= self.ftol * cost or cost <= self.gtol**2 * self.first_cost):
+            return Stop.GRADIENT
+        return Stop.STEP if self.tiny(full.target, full.origin, linear.box) else None
+
+    def after(self, before: Linear, linear: Linear, move: Move) -> Stop | None:
+        """Return why to stop after an iteration, if so."""
+        cost = before.point.cost
+        if not linear.finite:
+            return Stop.JACOBIAN
+        if move.point is None:
+            return stuck(before, move.stop)
+        if max(before.full.promise, cost - linear.point.cost) <= self.ftol * cost:
+            return Stop.FLOOR
+        if move.stop is None and self.tiny(linear.point.x, before.point.x, linear.box):
+            return self.at_rest(linear) or stuck(linear, Stop.STALLED)
+        return move.stop
+
+    def tiny(self, there: Array, here: Array, box: Box) -> bool:
+        """Tell whether a step is below the tolerance in every variable."""
+        size = np.maximum(abs(here), box.unit)
+        return bool(np.all(abs(there - here) <= self.xtol * size))
+
+
+def stuck(linear: Linear, stop: Stop | None) -> Stop | None:
+    """Return why to stop at a point from where no step led lower."""
+    promise = linear.full.promise / linear.point.cost
+    if stop is Stop.ILL_CONDITIONED:
+        return stop
+    if promise <= sqrt(EPS):
+        return Stop.FLOOR
+    return Stop.KINK if stop is Stop.STALLED and promise <= KINK else stop

@@ -1,0 +1,65 @@
+"""The methods by name: one search alone, or several one after the other."""
+
+from collections.abc import Callable
+from math import sqrt
+from typing import Literal
+
+from exfit.estimate.answer import Stop
+from exfit.estimate.gauss_newton import FullStep, LineSearch
+from exfit.estimate.linear import Linear
+from exfit.estimate.run import Outcome, Run
+from exfit.estimate.search import Search
+from exfit.estimate.trust_region import TrustRegion
+
+Method = Literal["gn", "dgn", "lm", "lm-then-dgn", "auto", "robust"]
+Strategy = Callable[[Run, Linear, float | None], Outcome]
+
+
+def alone(search: Search) -> Strategy:
+    """Return the strategy that is one method from start to end."""
+    return lambda run, start, _: run.descend(search, start)
+
+
+def lm_then_dgn(run: Run, start: Linear, _: float | None) -> Outcome:
+    """Let lm find the valley and dgn follow it."""
+    return relay(run, start, TrustRegion(hand_over=True), LineSearch())
+
+
+def robust(run: Run, start: Linear, _: float | None) -> Outcome:
+    """Go on with lm where gn quits."""
+    return relay(run, start, FullStep(), TrustRegion())
+
+
+def relay(run: Run, start: Linear, first: Search, second: Search) -> Outcome:
+    """Go on with the second search where the first ends short of a minimum."""
+    outcome = run.descend(first, start)
+    if outcome.converged or outcome.stop is Stop.JACOBIAN:
+        return outcome
+    return run.descend(second, outcome.linear)
+
+
+def auto(run: Run, start: Linear, good_enough: float | None) -> Outcome:
+    """Try dgn; where that is not good enough, lm and dgn from the same start."""
+    first = run.descend(LineSearch(), start)
+    if matches(first, good_enough):
+        return first
+    second = lm_then_dgn(run, start, good_enough)
+    return second if second.linear.point.cost <= first.linear.point.cost else first
+
+
+def matches(outcome: Outcome, good_enough: float | None) -> bool:
+    """Tell whether the residuals are as small as asked; unasked, whether the search converged."""
+    if good_enough is None:
+        return outcome.converged
+    point = outcome.linear.point
+    return sqrt(2.0 * point.cost / len(point.residuals)) <= good_enough
+
+
+STRATEGIES: dict[str, Strategy] = {
+    "gn": alone(FullStep()),
+    "dgn": alone(LineSearch()),
+    "lm": alone(TrustRegion()),
+    "lm-then-dgn": lm_then_dgn,
+    "auto": auto,
+    "robust": robust,
+}

@@ -1,0 +1,119 @@
+"""Levenberg-Marquardt within a trust region (lm)."""
+
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+from typing import Self
+
+import numpy as np
+
+from exfit.estimate.answer import Stop
+from exfit.estimate.arrays import EPS, TINY, Array
+from exfit.estimate.linear import Linear, Step, solve
+from exfit.estimate.problem import Problem
+from exfit.estimate.search import ARMIJO, MOST_TRIALS, Move, gain_ratio, shorten, shortened
+
+FIRST_RADIUS = 100.0  # as MINPACK; in units of x_scale the first radius is 1
+BAD, PROVED, GOOD = 0.25, 0.5, 0.75  # gain ratios that shrink, hand over, enlarge
+TIMID = 0.1  # share of what the full step promises: an iteration that gains less gained little
+PATIENCE = 2  # iterations that may gain little
+BOLD_TRIALS = 2
+SLACK = 0.1  # of the radius: how far the step may be from it
+NEWTON_STEPS = 30
+
+
+@dataclass(frozen=True)
+class TrustRegion:
+    """Levenberg-Marquardt: nu keeps the scaled step within a radius (Moré 1978).
+
+    A cost with kinks (limits that are met a step earlier or later) makes a small radius smaller
+    still. So after two steps in a row that gained less than a tenth of what the full step
+    promises, the next one is the full step, shortened a few times at most; if that
+    fails, it is tried half as often.
+    """
+
+    radius: float = inf
+    hand_over: bool = False
+    timid: int = 0
+    patience: int = PATIENCE
+    phase: str = "lm"
+
+    def advance(self, problem: Problem, linear: Linear) -> tuple[Move, Self]:
+        """Shrink the radius until a trial lowers the cost, and enlarge it after a good one."""
+        if self.timid < self.patience:
+            return self.within(problem, linear, 0)
+        move = shorten(problem, linear, solve(linear, reach=1.0), BOLD_TRIALS)
+        if move.point is None:
+            wary = replace(self, timid=0, patience=2 * self.patience)
+            return wary.within(problem, linear, move.inner)
+        radius = max(self.radius, linear.scaled_length(move.point.x))
+        return replace(move, damping=0.0), replace(self, timid=0, patience=PATIENCE, radius=radius)
+
+    def within(self, problem: Problem, linear: Linear, spent: int) -> tuple[Move, Self]:
+        """Return the best move that the trust region allows."""
+        cost, search = linear.point.cost, self
+        if self.radius == inf:
+            search = replace(self, radius=first_radius(problem, linear))
+        for rejections in range(spent, spent + MOST_TRIALS):
+            nu = damping(linear, search.radius)
+            step = solve(linear, nu)
+            if not step.promise > EPS * cost:
+                break
+            trial = problem.evaluate(step.target)
+            decrease = cost - trial.cost
+            search = search.resized(linear, step, nu, decrease)
+            quality = gain_ratio(decrease, step.promise)
+            if quality > ARMIJO:
+                trusted = self.hand_over and nu == 0.0 and quality > PROVED
+                timid = self.timid + 1 if decrease < TIMID * linear.full.promise else 0
+                move = Move(trial, nu, rejections, quality, Stop.TRUSTED if trusted else None)
+                return move, replace(search, timid=timid)
+        return Move(None, nu, rejections, stop=Stop.STALLED), search
+
+    def resized(self, linear: Linear, step: Step, nu: float, decrease: float) -> Self:
+        """Return the search with the radius that the trial suggests."""
+        quality = gain_ratio(decrease, step.promise)
+        length = linear.scaled_length(step.target)
+        if quality >= GOOD or (quality > BAD and nu == 0.0):
+            return replace(self, radius=max(self.radius, 2.0 * length))
+        if quality > BAD:
+            return self
+        share = shortened(-decrease, step.slope) if decrease < 0.0 else 0.5
+        return replace(self, radius=share * min(self.radius, 10.0 * length))
+
+
+def first_radius(problem: Problem, linear: Linear) -> float:
+    """Return the radius to begin with, no longer than the full step."""
+    full = linear.scaled_length(linear.full.target)
+    size = float(np.linalg.norm(linear.scale * linear.box.unit))
+    return min(1.0 if problem.scaled else FIRST_RADIUS * size, max(full, TINY))
+
+
+def damping(linear: Linear, radius: float) -> float:
+    """Return nu for which the free part of the step is as long as the radius, to a tenth.
+
+    Source: Moré 1978, section 5 (Newton's iteration on 1/|y|, safeguarded).
+    """
+    s, b = free_part(linear)
+    if float(np.linalg.norm(b / s)) <= (1.0 + SLACK) * radius:
+        return 0.0
+    low, high = 0.0, float(np.linalg.norm(s * b)) / radius
+    nu = 1e-3 * high
+    for _ in range(NEWTON_STEPS):
+        length = float(np.linalg.norm(s * b / (s**2 + nu)))
+        if abs(length - radius) <= SLACK * radius:
+            break
+        low, high = (nu, high) if length > radius else (low, nu)
+        fall = float(np.sum((s * b) ** 2 / (s**2 + nu) ** 3))
+        nu += (length / radius - 1.0) * length**2 / fall
+        if not low < nu < high:
+            nu = max(1e-3 * high, sqrt(low * high))
+    return nu
+
+
+def free_part(linear: Linear) -> tuple[Array, Array]:
+    """Return singular values and amounts of the variables that no bound holds; both (K,)."""
+    free, k = linear.projected != 0.0, linear.rank
+    A = linear.singular[:k, None] * linear.directions[:k, free]
+    left, s, _ = np.linalg.svd(A, full_matrices=False)
+    seen = s > linear.unseen * max(np.max(s, initial=0.0), TINY)
+    return s[seen], (left.T @ linear.amounts[:k])[seen]
