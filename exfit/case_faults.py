@@ -42,6 +42,8 @@ def contradictions(data: Data, exciter: Model | None, machine: Machine | None) -
     for at, trial in enumerate(_list(data, "validate")):
         yield from _trial_faults(("validate", at), trial, data)
     yield from _repeated_names(_list(data, "validate"))
+    if "accept" in data and not _list(data, "validate"):
+        yield Fault(("accept",), "there is no validation that it could judge")
 
 
 def resolved(rows: Sheet, *given: Mapping[str, float]) -> dict[str, float]:

@@ -84,7 +84,7 @@ def fit(
 
     Writes result.json, parameters.yaml, history.csv, response.csv and figures to runs/CASE-fit, or
     to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad input; 3: not
-    converged, or a validation beyond the limit that the case accepts.
+    converged, no match at all, or a validation beyond the limit that the case accepts.
     """
     from exfit import files, study
     from exfit.result import to_json
@@ -105,7 +105,7 @@ def fit(
             result = study.fit(loaded, strategy, watch)
         files.write_fit(result, folder, plots)
         show.fit(console, result, folder)
-    if not (result.success and result.accepted):
+    if not (result.success and result.accepted and result.describes):
         raise SystemExit(NOT_CONVERGED)
 
 
@@ -193,7 +193,7 @@ def validate(
         from exfit import show
 
         console = show.console()
-        console.print(f"values of {source}", soft_wrap=True, markup=False)
+        console.print(f"values of {parameters or 'the last fit'}", soft_wrap=True, markup=False)
         show.comparisons(console, found)
         console.print()
         show.written(console, folder)

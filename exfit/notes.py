@@ -15,8 +15,10 @@ from exfit.trial import system_of
 Array = NDArray[np.float64]
 
 EXACTLY_REDUNDANT = 1e-9  # of the largest singular value: rounding, not a weak influence
+NO_EFFECT = 1e-12  # of the largest column: rounding
 COARSE = 0.2  # of the error of the fit: what halving the step may move
 INVISIBLE = 1e-7  # pu: no recorder shows it
+FAR = 0.01  # of vt0: beyond the noise of a record
 MUCH_WORSE = 3.0  # than the fit
 TAKES_PART = 0.01  # of a direction of length one
 
@@ -53,8 +55,20 @@ def notes(case: Case, residuals: Residuals, theta: Array, jacobian: Array) -> It
         )
 
 
-def validation_notes(fitted: Comparison, tried: Sequence[Comparison]) -> Iterator[str]:
-    """Yield which records the fit does not hold on."""
+def match_notes(fitted: Comparison, tried: Sequence[Comparison], vt0: float) -> Iterator[str]:
+    """Yield where the response does not describe the record, or does not hold on another one."""
+    if not fitted.fit_percent > 0.0:
+        yield (
+            "the response matches the record no better than a constant would: "
+            "check the step's sign, size and instant, and the units of the record"
+        )
+    measured, simulated = fitted.measured, fitted.simulated
+    if measured is not None and simulated is not None:
+        way = measured.final_value - measured.initial_value
+        if way * (simulated.final_value - simulated.initial_value) < 0.0:
+            yield f"the record moves by {way:+.3g} pu, the response the other way"
+        if abs(measured.initial_value - vt0) > FAR * abs(vt0):
+            yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
     for one in tried:
         if one.rmse > MUCH_WORSE * fitted.rmse:
             yield (
@@ -82,7 +96,7 @@ def redundant(jacobian: Array, names: Sequence[str]) -> Iterator[list[str]]:
     if not np.all(np.isfinite(jacobian)):
         return  # interrupted before it was known
     sizes = np.linalg.norm(jacobian, axis=0)
-    seen = sizes > 0.0
+    seen = sizes > NO_EFFECT * np.max(sizes, initial=0.0)
     yield from ([name] for name, visible in zip(names, seen, strict=True) if not visible)
     _, singular, directions = np.linalg.svd(jacobian[:, seen] / sizes[seen], full_matrices=False)
     kept = np.array(names)[seen]

@@ -184,7 +184,8 @@ def _place(table: _Table, name: str) -> int:
         known = ", ".join(repr(name) for name in table.names[:COLUMNS_SHOWN])
         more = f" and {len(table.names) - COLUMNS_SHOWN} more"
         shown = known + (more if len(table.names) > COLUMNS_SHOWN else "")
-        raise RecordError(f"{table.path}: no column {name!r}; the columns are {shown}")
+        single = "; columns are separated by commas" if len(table.names) == 1 else ""
+        raise RecordError(f"{table.path}: no column {name!r}; the columns are {shown}{single}")
     if len(found) > 1:
         places = " and ".join(str(at + 1) for at in found)
         raise RecordError(f"{table.path}: {name!r} names more than one column: {places}")

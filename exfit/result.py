@@ -93,15 +93,15 @@ class Overlay:
 class Comparison:
     """A simulated response beside a record: ``time`` (M,) in s, one overlay per signal.
 
-    ``cost`` and ``rmse`` are of the weighted residuals of all signals; features are those of vt
-    after the first step, None where the record does not have it.
+    ``cost`` is of the weighted residuals of all signals; ``rmse``, ``max_error`` and
+    ``fit_percent`` are those of vt, or of the first signal where there is no vt. Features are those
+    of vt after the first step, None where the record does not have it.
     """
 
     name: str
     time: Array
     overlays: Mapping[str, Overlay]
     cost: float
-    rmse: float
     measured: Features | None
     simulated: Features | None
     record: Path
@@ -111,14 +111,24 @@ class Comparison:
     rmse_limit: float | None = None
 
     @property
+    def judged(self) -> Overlay:
+        """The signal that the match is judged by."""
+        return self.overlays.get("vt", next(iter(self.overlays.values())))
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of its error, per unit."""
+        return self.judged.rmse
+
+    @property
     def max_error(self) -> float:
-        """Largest error of any signal, per unit."""
-        return max(overlay.max_error for overlay in self.overlays.values())
+        """Largest magnitude of its error, per unit."""
+        return self.judged.max_error
 
     @property
     def fit_percent(self) -> float:
-        """The fit percentage of the first signal."""
-        return next(iter(self.overlays.values())).fit_percent
+        """Its fit percentage; not above zero where a constant would match as well."""
+        return self.judged.fit_percent
 
     @property
     def accepted(self) -> bool:
@@ -189,6 +199,11 @@ class FitResult:
     def accepted(self) -> bool:
         """Whether every validation is within the limit of the case."""
         return all(one.accepted for one in self.validation)
+
+    @property
+    def describes(self) -> bool:
+        """Whether the response matches its record better than a constant would."""
+        return self.comparison.fit_percent > 0.0
 
     def as_json(self) -> dict[str, Any]:
         """Return what ``--json`` prints: everything but history and samples."""

@@ -198,11 +198,11 @@ def _match_table(found: Sequence[Comparison]) -> Table:
     names = [one.name for one in found]
     table = _folding(plain_table("", "unit", *names, numbers=names))
     table.add_row("f", "pu²", *(f"{one.cost:.4e}" for one in found))
-    table.add_row("rmse", "pu", *(f"{one.rmse:.3e}" for one in found))
     signals = list(dict.fromkeys(signal for one in found for signal in one.overlays))
-    for signal in signals if len(signals) > 1 else ():
+    for signal in signals:
+        label = "rmse" if len(signals) == 1 else f"rmse {signal}"
         errors = (one.overlays[signal].rmse if signal in one.overlays else None for one in found)
-        table.add_row(f"rmse {signal}", "pu", *("-" if e is None else f"{e:.3e}" for e in errors))
+        table.add_row(label, "pu", *("-" if e is None else f"{e:.3e}" for e in errors))
     table.add_row("maximum error", "pu", *(f"{one.max_error:.3e}" for one in found))
     table.add_row("fit", "%", *(f"{one.fit_percent:.2f}" for one in found))
     return table

@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from exfit import __version__, estimate
 from exfit.case import Case
-from exfit.errors import CaseError
-from exfit.notes import notes, validation_notes
+from exfit.errors import CaseError, SimulationError
+from exfit.notes import match_notes, notes
 from exfit.plant import VT0
 from exfit.record import file_hash
 from exfit.residuals import JACOBIANS, Residuals
@@ -38,6 +40,7 @@ def fit(
     validations = [trial_of(case, one.test, one.record) for one in case.validations]
     residuals = residuals_of(case, trial)
     start = residuals.start
+    refuse_unfit(case, residuals_of(case, trial))
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
@@ -101,12 +104,32 @@ def fit(
         seconds=clock.perf_counter() - began,
         notes=(
             *notes(case, residuals, found.x, found.jac),
-            *validation_notes(compared, tried),
+            *match_notes(compared, tried, trial.vt0),
         ),
         validation=tried,
         versions=versions(),
         inputs=inputs(case, trial, *validations),
     )
+
+
+def refuse_unfit(case: Case, residuals: Residuals) -> None:
+    """Raise ExfitError where a record cannot be fitted: it is too short, flat, or out of scale."""
+    samples, unknown = residuals.measured.size, len(residuals.free)
+    if samples < unknown:
+        raise CaseError([f"{case.path}: record: {samples} samples for {unknown} free parameters"])
+    for channel in residuals.channels:
+        if np.all(channel.measured == channel.measured[0]):
+            level = f"{channel.signal} is {channel.measured[0]:g} pu throughout"
+            raise CaseError([f"{case.path}: record: {level}: it shows no test"])
+    with np.errstate(over="ignore"):
+        start = residuals(residuals.start)
+        square = float(start @ start)
+    if not np.isfinite(square):
+        largest = float(np.max(np.abs(start)))
+        raise SimulationError(
+            f"{case.path}: the residuals at the start values are too large to be squared: "
+            f"up to {largest:.3g}; check scale, weight and start"
+        )
 
 
 def _iteration(line: estimate.Iteration, residuals: Residuals) -> Iteration:

@@ -16,7 +16,7 @@ from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.record import Record
 from exfit.residuals import Channel, Free, Residuals
 from exfit.result import Comparison, Overlay
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import MOST_STEPS, Change, Course, Simulator
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -90,7 +90,6 @@ class Trial:
             time=self.record.time,
             overlays=overlays,
             cost=0.5 * float(np.sum(residuals**2)),
-            rmse=float(np.sqrt(np.mean(residuals**2))),
             measured=None if vt is None else self._features(vt.measured),
             simulated=None if vt is None else self._features(vt.simulated),
             record=self.record.source,
@@ -161,8 +160,15 @@ def plain_simulator(case: Case) -> tuple[Simulator, float]:
             f"{case.path}: test.{name}: missing; there is no record to take it from"
             for name in missing
         )
-    count = max(1, round(test.duration / case.simulation.output_step))
-    times = np.linspace(0.0, test.duration, count + 1)
+    count = max(1.0, test.duration / case.simulation.output_step)
+    if count > MOST_STEPS:
+        raise CaseError(
+            [
+                f"{case.path}: simulation.output_step: {case.simulation.output_step:g} s divides "
+                f"the duration of {test.duration:g} s into more than {MOST_STEPS:.0e} samples"
+            ]
+        )
+    times = np.linspace(0.0, test.duration, round(count) + 1)
     course = course_of(test, 0.0, test.duration)
     return Simulator(system_of(case), course, times, case.simulation.step), test.vt0
 

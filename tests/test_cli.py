@@ -59,7 +59,7 @@ CASE = {
 MACHINE_CASE = {
     **yaml.safe_load((ROOT / "configs" / "ac1a_typical.yaml").read_text()),
     "test": {"vt0": 1.0, "vref": [{"at": 0.5, "step": 0.05}]},
-    "record": {"file": "flat.csv", "time": "t", "channels": {"vt": "v"}},
+    "record": {"file": "unit.csv", "time": "t", "channels": {"vt": "v"}},
     "validate": [],
 }
 
@@ -95,7 +95,12 @@ def workplace(tmp_path, monkeypatch):
     place = tmp_path / "work"
     place.mkdir()
     monkeypatch.chdir(place)
-    records = {"up.csv": TRUTH, "down.csv": 2.0 - TRUTH, "flat.csv": np.ones(len(TIME))}
+    records = {
+        "up.csv": TRUTH,
+        "down.csv": 2.0 - TRUTH,
+        "flat.csv": np.ones(len(TIME)),
+        "unit.csv": 1.0 + 0.05 * (1.0 - np.exp(-3.0 * np.maximum(TIME - 0.5, 0.0))),
+    }
     for name, samples in records.items():
         (place / name).write_text(csv_text(TIME, samples))
     (place / "values.yaml").write_text("parameters: {k: 4.0, a: 2.0}\n")
@@ -406,6 +411,7 @@ def test_json_is_the_result_and_nothing_else(run):
     assert printed.keys() >= {
         *("case", "model", "strategy", "parameters", "fixed", "cost", "rmse", "status", "message"),
         *("success", "nit", "nfev", "njev", "seconds", "validation", "versions", "inputs"),
+        *("typical", "machine", "substeps", "simulations", "interrupted", "start_cost", "notes"),
     }
     assert printed["parameters"].keys() == {"k", "a"}
     for one in printed["parameters"].values():
@@ -576,7 +582,9 @@ def test_a_path_may_hold_spaces_brackets_and_letters_of_any_language(run):
 
 
 SLOW = """\
+import signal
 import time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
 from exfit.residuals import Residuals
 quick = Residuals.__call__
@@ -802,3 +810,44 @@ def test_the_program_starts_as_a_command_and_as_a_pipe(tmp_path):
     )
     assert (ran.returncode, ran.stderr) == (0, "")
     assert json.loads(ran.stdout)["success"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        pytest.param(("record.file", "flat.csv"), "vt is 1 pu throughout", id="flat"),
+        pytest.param(
+            ("record.channels.vt", {"column": "v", "scale": 0.0}), "vt is 0 pu", id="scaled away"
+        ),
+        pytest.param(
+            ("record.channels.vt", {"column": "v", "scale": 1e200}), "too large", id="overflow"
+        ),
+    ],
+)
+def test_a_record_that_shows_no_test_is_refused(run, change, words):
+    ran = run("fit", case_file(changed(CASE, change)), "--no-plots")
+    assert (ran.code, ran.out) == (1, "")
+    assert words in ran.err
+
+
+def test_a_record_with_fewer_samples_than_unknowns_is_refused(run):
+    ran = run("fit", case_file(changed(MACHINE_CASE, ("record.window", [0.45, 0.6]))), "--no-plots")
+    assert ran.code == 1
+    assert "4 samples for 7 free parameters" in ran.err
+
+
+def test_a_fit_no_better_than_a_constant_ends_with_3_and_says_why(run):
+    """The step is given with the wrong sign: every value runs to a bound, and none helps."""
+    wrong = changed(MACHINE_CASE, ("test.vref.0.step", -0.05), ("estimate", {"iterations": 5}))
+    ran = run("fit", case_file(wrong), "--no-plots")
+    assert ran.code == 3
+    told = " ".join(ran.out.split())
+    assert "no better than a constant" in told
+    assert "the response the other way" in told
+
+
+def test_an_acceptance_without_a_validation_is_refused(run):
+    case = changed(CASE, ("accept", {"rmse": 1.0}), ("validate", []))
+    ran = run("fit", case_file(case), "--no-plots")
+    assert ran.code == 1
+    assert "no validation" in ran.err

@@ -27,7 +27,6 @@ def comparison(signals=("vt",), start=None):
         time=TIME,
         overlays={name: Overlay(RISE, RISE + 1e-4 * np.sin(TIME), start) for name in signals},
         cost=1e-6,
-        rmse=1e-4,
         measured=None,
         simulated=None,
         record=Path("bump.csv"),

@@ -8,7 +8,8 @@ import pytest
 
 from exfit.case import load_case
 from exfit.plant import VT0
-from exfit.study import fit, fitted_trial, residuals_of, simulate, validate, values_of
+from exfit.study import fit, simulate, validate
+from exfit.trial import fitted_trial, residuals_of, trial_of, values_of
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "tests" / "reference"
@@ -70,7 +71,7 @@ def test_all_starts_end_at_the_same_values(fits, strategy):
 @pytest.mark.parametrize("name", AC1A)
 def test_a_fit_needs_no_more_evaluations_than_minpack(fits, name, strategy):
     found = fits(name, strategy)
-    assert (found.nfev, found.njev) <= MINPACK_MOST
+    assert found.nfev <= MINPACK_MOST[0]
     assert found.njev <= MINPACK_MOST[1]
 
 
@@ -175,8 +176,6 @@ def test_an_interrupted_fit_keeps_the_best_point_so_far():
 def test_the_initial_voltage_is_the_mean_before_the_step_where_the_case_gives_none():
     loaded = case("ac1a_typical")
     down = loaded.validations[0]
-    from exfit.study import trial_of
-
     trial = trial_of(loaded, down.test, down.record)
     before = trial.record.time < 1.0
     assert trial.vt0 == pytest.approx(np.mean(trial.record.signals["vt"][before]), rel=1e-12)
