@@ -56,7 +56,7 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
     texts = [f"{path}: {fault.text}" for fault in faults]
     if not isinstance(parameters, dict) or not parameters:
         raise CaseError([*texts, f"{path}: parameters: missing"])
-    if content.get("model") not in (None, case.exciter.name):
+    if str(content.get("model", case.exciter.name)).upper() != case.exciter.name:
         texts.append(f"{path}: model: {content['model']}, but {case.path} has {case.exciter.name}")
     texts += [
         f"{path}: parameters.{name}: {value!r} is not a number"

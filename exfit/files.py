@@ -38,6 +38,8 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
 
     Raises ExfitError where the folder cannot be written.
     """
+    for old in ("result.json", "overlay.png", "convergence.png", "trajectories.png"):
+        (folder / old).unlink(missing_ok=True)  # of a former fit: it would stand beside new numbers
     history = [asdict(line) for line in result.history]
     write(folder / PARAMETERS, parameter_file(result))
     write(folder / "history.csv", history_table(result))
@@ -53,7 +55,7 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
     # last: where it stands, everything else does
     write(folder / "result.json", to_json({**result.as_json(), "history": history}))
     with suppress(ExfitError):  # a cache that cannot be written keeps nothing
-        write(_pointer(result.case), str((folder / PARAMETERS).absolute()))
+        write(_kept(result.case), parameter_file(result))
 
 
 def write_comparisons(comparisons: Sequence[Comparison], folder: Path, figures: bool) -> None:
@@ -90,15 +92,16 @@ def write_simulation(simulation: Simulation, name: str, folder: Path, figures: b
 
 def last_fit(case: Path) -> Path:
     """Return the parameters of the last fit of a case; raises CaseError where none is known."""
-    try:
-        found = Path(_pointer(case).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise CaseError([f"{case}: no fit of this case is known; give --parameters FILE"]) from None
-    if not found.is_file():
-        raise CaseError([f"{case}: its last fit, {found}, is gone; give --parameters FILE"])
-    return found
+    kept = _kept(case)
+    if not kept.is_file():
+        raise CaseError([f"{case}: no fit of this case is known; give --parameters FILE"])
+    return kept
 
 
-def _pointer(case: Path) -> Path:
+def _kept(case: Path) -> Path:
+    """Return where the parameters of a case's last fit are kept.
+
+    A copy beside the compiled code: a folder of results may be written over by another case.
+    """
     name = hashlib.sha256(str(case.resolve()).encode()).hexdigest()[:32]
-    return cache_folder() / "last-fit" / name
+    return cache_folder() / "last-fit" / f"{name}.yaml"

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -171,25 +172,38 @@ def test_a_folder_that_does_not_exist_yet_is_fine(tmp_path):
     assert names(tmp_path) == set()
 
 
-def test_the_last_fit_of_a_case_is_found_by_any_of_its_paths(folder, monkeypatch):
+def test_the_last_fit_of_a_case_is_found_by_any_of_its_paths(fitted, folder, monkeypatch):
     monkeypatch.chdir(ROOT)
     found = files.last_fit(Path("configs/../configs/first_order.yaml"))
-    assert found == folder / "parameters.yaml"
     assert files.last_fit(CASE) == found
+    assert read_parameters(load_case(CASE), found) == fitted.values
 
 
-def test_a_last_fit_that_is_gone_is_told(folder):
-    (folder / "parameters.yaml").unlink()
-    with pytest.raises(CaseError, match="is gone"):
-        files.last_fit(CASE)
+def test_a_last_fit_outlives_its_folder_and_another_case_that_takes_it(fitted, folder, tmp_path):
+    """Two cases of one name write to one folder: each keeps its own values."""
+    other = tmp_path / "first_order.yaml"
+    values = {name: replace(one, value=7.0) for name, one in fitted.parameters.items()}
+    files.write_fit(replace(fitted, case=other, parameters=values), folder, figures=False)
+    assert read_parameters(load_case(CASE), files.last_fit(CASE)) == fitted.values
+    assert set(read_parameters(load_case(CASE), files.last_fit(other)).values()) == {7.0}
+    shutil.rmtree(folder)
+    assert read_parameters(load_case(CASE), files.last_fit(CASE)) == fitted.values
+
+
+def test_a_fit_leaves_no_figure_or_result_of_a_former_one(fitted, folder):
+    for name in ("overlay.png", "convergence.png", "trajectories.png"):
+        (folder / name).write_text("of a former fit")
+    files.write_fit(fitted, folder, figures=False)
+    assert not [name for name in names(folder) if name.endswith("s.png") or "overlay" in name]
+    assert not (folder / "convergence.png").exists()
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"a\0b", b"elsewhere"])
-def test_a_damaged_memory_of_the_last_fit_is_none(folder, tmp_path, content):
-    (pointer,) = (tmp_path / "cache" / "last-fit").iterdir()
-    pointer.write_bytes(content)
-    with pytest.raises(CaseError, match="give --parameters"):
-        files.last_fit(CASE)
+def test_a_damaged_memory_of_the_last_fit_is_refused(folder, tmp_path, content):
+    (kept,) = (tmp_path / "cache" / "last-fit").iterdir()
+    kept.write_bytes(content)
+    with pytest.raises(CaseError):
+        read_parameters(load_case(CASE), files.last_fit(CASE))
 
 
 def test_a_fit_is_written_even_where_it_cannot_be_remembered(fitted, tmp_path, monkeypatch):
