@@ -1,6 +1,6 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
@@ -55,6 +55,13 @@ def states_of(x: Signals, names: tuple[str, ...]) -> Names:
     return Names(**{name: x[name] for name in names})
 
 
+def refuse_taken(model: Model, taken: Iterable[str]) -> None:
+    """Raise ModelError where a state of the model has the name of something else."""
+    clash = sorted(set(model.states) & set(taken))
+    if clash:
+        raise ModelError(f"model {model.name}: STATES: {', '.join(clash)} is taken by the plant")
+
+
 def motion(written: Names, states: tuple[str, ...], outputs: Signals) -> Motion:
     """Return slopes, limits and outputs from what a model wrote into its slopes."""
     slopes = vars(written)
@@ -86,6 +93,8 @@ def open_circuit(model: Model, machine: Machine, saturation: SaturationForm) -> 
     the input ``vref`` is the change of the reference from the one that holds ``vt0``. All per
     unit.
     """
+    signals = ("vref", "vt", "efd", "ifd")
+    refuse_taken(model, (*signals, *machine.states))
     states = (*machine.states, *model.states)
 
     def rest(p: Signals) -> Rest:
@@ -119,7 +128,7 @@ def open_circuit(model: Model, machine: Machine, saturation: SaturationForm) -> 
         setpoints=("vref",),
         states=states,
         inputs=("vref",),
-        outputs=("vref", "vt", "efd", "ifd", *states),
+        outputs=(*signals, *states),
         time_constants=(
             *seconds(model.sheet),
             *(MACHINE + name for name in seconds(machine.sheet)),
@@ -132,6 +141,7 @@ def open_circuit(model: Model, machine: Machine, saturation: SaturationForm) -> 
 @cache
 def alone(model: Model) -> System:
     """Return a model without a plant: its output is ``vt``."""
+    refuse_taken(model, ("vref", "vt"))
 
     def rest(p: Signals) -> Rest:
         values = exciter_parameters(p, model, quadratic)

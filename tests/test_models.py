@@ -24,7 +24,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, saturation_faults, typical
 from exfit.models.sheet import model as build
-from exfit.plant import MACHINE, SATURATION, VT0, Names, exciter_parameters
+from exfit.plant import MACHINE, SATURATION, VT0, Names, exciter_parameters, open_circuit
 from exfit.simulate import Change, Course, Simulator, parameters_used
 
 SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}
@@ -329,6 +329,8 @@ def test_a_user_s_file_is_a_model_like_any_other(tmp_path):
         (('STATES = "V"', ""), "lacks STATES"),
         (("import sheet", "import sheets"), "ImportError"),
         (("return v /", "return v //)"), "SyntaxError"),
+        (('STATES = "V"', 'STATES = "V V"'), "STATES: V stands there twice"),
+        (('STATES = "V"', "raise SystemExit(0)"), "SystemExit"),
     ],
 )
 def test_a_file_that_is_no_model_is_refused_by_name(tmp_path, change, says):
@@ -377,3 +379,12 @@ def test_the_graph_of_a_model_is_small(model):
     """A model that unrolls something by mistake makes thousands of nodes."""
     traced = trace(system_of(model), system_of(model).outputs)
     assert len(list(in_order([*traced.slopes, *traced.outputs, *traced.clamped]))) < 1000
+
+
+@pytest.mark.parametrize("state", ["EQP", "PSID", "vt", "vref", "efd", "ifd"])
+def test_a_state_with_the_name_of_something_else_is_refused(tmp_path, state):
+    """Two rows of one name would be written beyond the arrays that hold them."""
+    (tmp_path / "mine.py").write_text(USER.replace('"V"', f'"{state}"').replace(".V", f".{state}"))
+    mine = find("mine.py", tmp_path)
+    with pytest.raises(ModelError, match=f"{state} is taken"):
+        open_circuit(mine, MACHINES["GENROU"], SATURATION["quadratic"])

@@ -45,6 +45,6 @@ def from_file(path: Path) -> Model:
     try:
         # compiled here, not imported: a module cache beside it would outlive a quick edit
         exec(compile(path.read_bytes(), path.absolute(), "exec"), vars(module))
-    except Exception as fault:
+    except (Exception, SystemExit) as fault:
         raise ModelError(f"{path}: {type(fault).__name__}: {fault}") from fault
     return model(path.stem.upper(), vars(module))

@@ -68,6 +68,13 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         raise ModelError(
             f"model {name}: STATES is a text of names, equations and rest are functions"
         )
+    for part, names in (
+        ("STATES", parts["STATES"].split()),
+        ("SHEET", [row.symbol for row in parts["SHEET"]]),
+    ):
+        twice = sorted({one for one in names if names.count(one) > 1})
+        if twice:
+            raise ModelError(f"model {name}: {part}: {', '.join(twice)} stands there twice")
     title, _, drawing = str(parts["__doc__"]).partition("\n")
     return Model(
         name=name,
