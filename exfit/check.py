@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
 AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
+ROUNDING = 1e-12  # of the largest column
+TINY = float(np.finfo(float).tiny)
 FLAT_SECONDS = 60.0
 FLAT_DRIFT = 1e-9  # pu
 
@@ -88,7 +90,8 @@ def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:
     start = residuals.start
     exact = residuals.exact(start)
     sizes = np.max(np.abs(exact), axis=0)
-    sizes[sizes == 0.0] = 1.0
+    # a column of rounding errors belongs to a parameter without effect
+    sizes = np.maximum(sizes, ROUNDING * max(float(np.max(sizes)), TINY))
     rows = [
         np.max(np.abs(residuals.differences(start, -h, h) - exact), axis=0) / sizes for h in STEPS
     ]

@@ -26,7 +26,7 @@ from exfit.models.blocks import SHORTEST
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-MOST_STEPS = 1e8  # a day at 1 ms
+MOST_STEPS = 1e7  # three hours at 1 ms
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
 REST_TOLERANCE = 1e-6  # pu/s: below any real motion
@@ -239,7 +239,7 @@ class Simulator:
     def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
         """Return by how much, at most and per unit, halving every step moves the outputs."""
         samples, parts = self.samples(values, outputs)
-        finer = Simulator(self.system, self.course, self.times, self.step, 2 * parts)
+        finer = Simulator(self.system, self.course, self.times, self.step / 2.0, parts)
         return float(np.max(np.abs(samples - finer.samples(values, outputs)[0])))
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
@@ -293,7 +293,9 @@ class Simulator:
         rounding = ROUNDING * float(np.max(np.abs(rest.x))) * rate
         moving = ~(np.abs(slopes) <= REST_TOLERANCE + rounding)
         if np.any(moving) or not math.isfinite(rounding):
-            raise SimulationError("no state of rest: " + self._why_moving(values, slopes, moving))
+            why = self._why_moving(values, slopes, moving)
+            at = f" at vt0 = {values['vt0']:g} pu" if "vt0" in values else ""
+            raise SimulationError(f"no state of rest{at}: {why}")
         return rate
 
     def _motion(self, p: Array, rest: Start, x: Array, u: Array) -> tuple[Array, float]:

@@ -297,8 +297,9 @@ def test_a_curve_through_zeros_is_no_saturation_at_all(curve, E, factor, e):
 @laws
 @given(volts, factors, small)
 def test_quadratic_saturation_may_begin_at_its_lower_point(E, factor, SE):
-    assert quadratic(E, E, 0.0, E * factor, SE).vx == 0.0
-    assert quadratic(E * factor, E, 0.0, E * factor, SE).vx == pytest.approx(E * factor * SE)
+    for points in ((E, 0.0, E * factor, SE), (E * factor, SE, E, 0.0)):  # in either order
+        assert quadratic(E, *points).vx == 0.0
+        assert quadratic(E * factor, *points).vx == pytest.approx(E * factor * SE)
 
 
 @laws

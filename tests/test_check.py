@@ -8,7 +8,7 @@ import pytest
 from exfit.case import load_case, parse_case
 from exfit.check import AGREEMENT, STEPS, check, deviations
 from exfit.residuals import Residuals
-from exfit.study import fitted_trial, residuals_of
+from exfit.trial import fitted_trial, residuals_of
 
 ROOT = Path(__file__).parent.parent
 
@@ -106,7 +106,11 @@ def test_it_tells_the_sub_steps_of_a_fast_case(tmp_path):
 def test_the_error_of_the_step_is_told_and_falls_sixteenfold_with_it():
     text = WITHOUT_RECORD.replace("step: 0.02}]", "step: 0.001}]")  # off the limits
     errors = [
-        check(parse_case(f"{text}simulation: {{step: {step}}}\n", Path("case.yaml"))).step_error
+        check(
+            parse_case(
+                f"{text}simulation: {{step: {step}, output_step: 0.016}}\n", Path("case.yaml")
+            )
+        ).step_error
         for step in (0.008, 0.004)
     ]
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.2)

@@ -51,6 +51,23 @@ def for_every_run(law):
     return settings(max_examples=60, deadline=None, derandomize=True)(given_runs(law))
 
 
+@pytest.mark.parametrize("method", [method for method in SAFE_METHODS if method != "robust"])
+def test_a_trial_that_was_rejected_and_yet_is_the_best_is_the_result(method):
+    """The full step to 1 gains a little, far less than promised; whatever is shorter loses.
+
+    gn, with which robust begins, accepts it.
+    """
+
+    def fun(x):
+        return np.where(x <= 0.0, 1.0, np.where(x < 0.9, 2.0, 1.0 - 1e-7))
+
+    found = least_squares(fun, [0.0], lambda x: [[-1.0]], method=method, x_scale=1.0)
+    assert found.history[-1].cost == found.history[0].cost == 0.5  # nothing was accepted
+    assert found.x == pytest.approx([1.0])
+    assert found.cost == pytest.approx(0.5 * (1.0 - 1e-7) ** 2, rel=1e-12)
+    assert found.fun == pytest.approx(fun(found.x), rel=1e-12)
+
+
 @for_every_run
 def test_fun_is_never_called_outside_the_bounds_and_every_call_counts(seed, method, jac):
     low, high = random_problem(seed)[3]

@@ -271,12 +271,20 @@ def integrated(unit, vt0, changes, times, method):
 
 
 @pytest.mark.parametrize("method", ["DOP853", "LSODA"])
-@pytest.mark.parametrize("machine", list(MACHINES))
+@pytest.mark.parametrize(
+    ("machine", "changes_of_machine"),
+    [("ONE_AXIS", {}), ("GENROU", {}), ("GENROU", {"machine.Xppd": 0.22})],
+)
 @pytest.mark.parametrize("unit", [AC1A, AC8B])
-def test_another_integrator_of_other_words_agrees(unit, machine, method):
-    """Steps on and off the grid, samples at uneven times; the limits stand far away."""
+def test_another_integrator_of_other_words_agrees(unit, machine, changes_of_machine, method):
+    """Steps on and off the grid, samples at uneven times; the limits stand far away.
+
+    The typical Xppd lies halfway between Xl and Xpd, where both fluxes have equal shares.
+    """
     name = unit.__name__
     values = drawn_values(name, 2, machine)
+    for symbol, value in changes_of_machine.items():
+        values[symbol] *= value / typical_values(name, machine)[symbol]
     limits = {"MAX": 9999.0, "MIN": -9999.0}
     values |= {symbol: limits[symbol[-3:]] for symbol in values if symbol[-3:] in limits}
     changes = (Change(0.2, 0.02), Change(1.00037, -0.03), Change(1.5, 0.005))

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from oracle import drawn_values, lively_values, system_of, typical_values
 from scipy.integrate import solve_ivp
 
+from exfit.engine.system import Motion, Rest, System
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.plant import VT0
@@ -216,7 +217,7 @@ def test_a_start_beyond_a_limit_names_it_with_both_values(name, symbol, bypassed
     with pytest.raises(SimulationError, match=f"{side} {symbol}") as caught:
         samples(name, values | {symbol: limit})
     told = str(caught.value)
-    assert told.startswith("no state of rest: the start needs ")
+    assert told.startswith("no state of rest at vt0 = 1 pu: the start needs ")
     if symbol != "VFEMAX":  # the limit of VE that follows from it is told
         assert f"{symbol} = {limit:g}" in told
     simulator = Simulator(system_of(name), UP, CLOCK, 1e-3)
@@ -318,3 +319,42 @@ def test_a_fast_pole_without_a_time_constant_is_seen_too():
     assert parts == 9
     exact = solve_ivp(lambda t, x: 900.0 * (1.0 - x), (0.0, 0.1), [0.0], "LSODA", times, rtol=1e-9)
     assert got[:, 0] == pytest.approx(exact.y[0], abs=1e-3)
+
+
+# --- sub-steps where a response gets faster than it was at rest -----------------------------------
+
+STIFFENING = System(
+    parameters=(VT0,),
+    setpoints=("vref",),
+    states=("x",),
+    inputs=("vref",),
+    outputs=("vref", "x"),
+    time_constants=(),
+    rest=lambda p: Rest({"x": p[VT0]}, {"vref": p[VT0] + p[VT0] * p[VT0] * p[VT0]}),
+    motion=lambda p, r, x, u: Motion(
+        {"x": r["vref"] + u["vref"] - x["x"] - x["x"] * x["x"] * x["x"]},
+        {},
+        {"vref": r["vref"] + u["vref"], "x": x["x"]},
+    ),
+)
+
+
+def test_a_response_that_gets_faster_on_its_way_is_secured_by_more_sub_steps():
+    """dx/dt = vref - x - x^3 has the rate 1 at rest, and 1 + 3 x^2 = 100 where the step ends."""
+    end = 33.0**0.5
+    course = Course(0.0, 1.0, (Change(0.1, end + end**3),))
+    times, values = np.linspace(0.0, 1.0, 51), {VT0: 0.0}
+    plain = Simulator(STIFFENING, course, times, 0.02)
+    secured = plain.secured(values)
+    assert plain.substeps(values) == 1
+    assert secured.substeps(values) >= 2  # 0.02 s at 100 1/s
+    fine = Simulator(STIFFENING, course, times, 0.02 / 16.0).samples(values, ("x",))[0]
+    assert fine[-1] == pytest.approx([end])
+    errors = [np.abs(s.samples(values, ("x",))[0] - fine).max() for s in (plain, secured)]
+    assert errors[1] < 1e-2 * end
+    assert errors[1] < errors[0] / 4.0  # two sub-steps of an order of four: 16, less at the edge
+
+
+def test_a_response_that_stays_as_fast_as_at_rest_is_secured_as_it_is(model):
+    simulator = Simulator(system_of(model), UP.without_steps(), CLOCK, 1e-2)
+    assert simulator.secured(lively_values(model)) is simulator

@@ -1,0 +1,85 @@
+"""The README says what is so: its commands, its cases, its model, its tables."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exfit import files, study
+from exfit.case import load_case
+from exfit.cli import main
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+OWN_CASE = """\
+model: my_exciter.py
+plant: {type: open-circuit, machine: GENROU}
+test: {vt0: 1.0, duration: 5.0, vref: [{at: 1.0, step: 0.02}]}
+"""
+
+
+def block(language):
+    """Return the first block of the README in a language."""
+    return re.search(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)[1]
+
+
+def first_column(after):
+    """Return the first cells of the first table behind some words, without its head."""
+    lines = iter(README.partition(after)[2].splitlines())
+    table = []
+    for line in lines:
+        if line.startswith("|"):
+            table.append(line.split("|")[1].strip())
+        elif table:
+            break
+    return table[2:]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return a folder for cases, beside a copy of the records."""
+    shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
+    (tmp_path / "configs").mkdir()
+    return tmp_path / "configs"
+
+
+def test_two_commands_install_and_run_and_test():
+    lines = [line for line in README.splitlines() if line.startswith("$ pip install")]
+    assert len(lines) == 2
+
+
+def test_the_case_of_the_readme_is_valid_and_its_records_can_be_read(folder):
+    path = folder / "case.yaml"
+    path.write_text(block("yaml"), encoding="utf-8")
+    case = load_case(path)
+    assert case.measure(case.test, case.record).time.size > 1
+    for one in case.validations:
+        assert case.measure(one.test, one.record).time.size > 1
+
+
+def test_the_model_of_the_readme_starts_at_rest_and_follows_a_step(folder):
+    (folder / "my_exciter.py").write_text(block("python"), encoding="utf-8")
+    (folder / "case.yaml").write_text(OWN_CASE, encoding="utf-8")
+    response = study.simulate(load_case(folder / "case.yaml"), {}).response
+    vt = response.signals["vt"]
+    assert vt[response.time <= 1.0] == pytest.approx(1.0, abs=1e-9)
+    assert np.all(np.isfinite(vt))
+    # a static exciter, without an integral: the loop leaves 1 / (1 + KA) and saturation
+    assert vt[-1] == pytest.approx(1.02, abs=2e-3)
+
+
+def test_the_table_of_commands_names_every_command_and_no_other():
+    told = [re.match(r"`exfit (\w+)", cell)[1] for cell in first_column("## Commands")]
+    assert sorted(told) == sorted(main.commands)
+
+
+def test_a_fit_leaves_the_files_of_the_table_and_no_others(tmp_path, monkeypatch):
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    result = study.fit(load_case(ROOT / "configs" / "first_order.yaml"))
+    files.write_fit(result, tmp_path / "run", figures=True)
+    told = re.findall(r"`([^`]+)`", " ".join(first_column("A fit leaves")))
+    (validation,) = result.validation
+    named = {name.replace("NAME", validation.name) for name in told}
+    assert {path.name for path in (tmp_path / "run").iterdir()} == named
