@@ -196,6 +196,11 @@ def steeper(x):
     return np.array([[0.01 if x[0] >= 0.0 else -0.01], [1.0]])
 
 
+def walled(x):
+    """Large whatever x is, and not to be had below 0.5, where the lowest point would be."""
+    return np.array([1e3, x[0] if x[0] > 0.5 else np.nan])
+
+
 def ended(stop):
     """A run that ends for the reason given."""
     jac = TEXTBOOK["rosenbrock"].jac
@@ -217,6 +222,8 @@ def ended(stop):
             return least_squares(rosenbrock, start, lambda x: np.full((2, 2), np.nan))
         case Stop.KINK:
             return least_squares(kinked, [1.0], steeper, method="dgn")
+        case Stop.CREEPING:
+            return least_squares(walled, [1.0], lambda x: np.array([[0.0], [1.0]]), method="dgn")
         case Stop.STALLED:
             return least_squares(rosenbrock, start, lambda x: -jac(x), method="dgn")
         case Stop.FULL_STEP:
@@ -237,7 +244,9 @@ def test_every_reason_to_stop_is_reachable_and_says_so(stop):
     found = ended(stop)
     assert found.stop is stop
     assert found.message == stop.value
-    assert found.success == (stop in (Stop.GRADIENT, Stop.FLOOR, Stop.STEP, Stop.KINK))
+    assert found.success == (
+        stop in (Stop.GRADIENT, Stop.FLOOR, Stop.STEP, Stop.KINK, Stop.CREEPING)
+    )
 
 
 @pytest.mark.parametrize("method", SAFE_METHODS)

@@ -66,7 +66,8 @@ def least_squares(
     the full step promises less than ftol f(x) (the gradient alone hardly sees badly determined
     directions) or f(x) is below gtol^2 f(x0); (FLOOR) an iteration neither promised nor brought
     ftol f(x); (STEP) the full step is below xtol; (KINK) no trial is better and the full step
-    promises less than a thousandth of f(x), as at a minimum where the derivative jumps; or after
+    promises less than a thousandth of f(x), as at a minimum where the derivative jumps; (CREEPING)
+    ten iterations, each with rejected trials, gained less than a millionth of f(x); or after
     max_iterations, in each phase anew.
 
     Raises ValueError for bounds that cross, x0 outside them or residuals not finite there.

@@ -15,6 +15,7 @@ class Stop(Enum):
     KINK = (
         "no trial lowers the cost, which has a kink here: the linear model sees nothing beyond it"
     )
+    CREEPING = "ten iterations, all with rejected trials, gained less than a millionth of the cost"
     ITERATIONS = "the iteration limit was reached"
     INTERRUPTED = "interrupted: this is the best point seen until then"
     JACOBIAN = "the Jacobian is not finite here"
@@ -29,6 +30,7 @@ STATUS = {
     Stop.FLOOR: 2,
     Stop.STEP: 3,
     Stop.KINK: 4,
+    Stop.CREEPING: 5,
     Stop.ITERATIONS: 0,
     Stop.INTERRUPTED: -1,
     Stop.JACOBIAN: -2,
@@ -72,8 +74,9 @@ class Iteration:
 class Result:
     """The best point seen and how it was reached; fun (M,), jac (M, N), grad (N,) belong to x.
 
-    status: 1 gradient, 2 floor, 3 step, 4 kink (converged); 0 iteration limit; -1 interrupted,
-    -2 Jacobian not finite, -3 stalled, -4 full step failed, -5 ill-conditioned (not converged).
+    status: 1 gradient, 2 floor, 3 step, 4 kink, 5 creeping (converged); 0 iteration limit;
+    -1 interrupted, -2 Jacobian not finite, -3 stalled, -4 full step failed, -5 ill-conditioned
+    (not converged).
     message is the sentence, stop the member of Stop. optimality is the largest component of the
     projected gradient. After an interruption jac and grad may be nan.
     """

@@ -58,6 +58,7 @@ class Run:
         """Go down from a point until there is a reason to stop."""
         if not self.history or not np.array_equal(self.history[-1].x, linear.point.x):
             self.announce(search.phase, linear)
+        first = len(self.history) - 1
         for _ in range(self.rules.max_iterations):
             stop = self.rules.at_rest(linear)
             if stop is not None:
@@ -69,6 +70,7 @@ class Run:
             self.iterations += 1
             self.announce(search.phase, linear, move, before)
             stop = self.rules.after(before, linear, move)
+            stop = stop or self.rules.creeping(self.history[first:])
             if stop is not None:
                 return Outcome(linear, stop)
         return Outcome(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)

@@ -1,17 +1,20 @@
 """When to stop, and why."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan, sqrt
 from typing import Self
 
 import numpy as np
 
-from exfit.estimate.answer import Stop
+from exfit.estimate.answer import Iteration, Stop
 from exfit.estimate.arrays import EPS, TINY, Array
 from exfit.estimate.box import Box
 from exfit.estimate.linear import Linear
 from exfit.estimate.search import Move
 
+LULL = 10  # iterations
+CREEP = 1e-6  # of the cost: less than the noise of any record leaves open
 KINK = 1e-3  # of the cost: what a derivative from one side may promise at a minimum
 
 
@@ -52,6 +55,14 @@ class Rules:
         if move.stop is None and self.tiny(linear.point.x, before.point.x, linear.box):
             return self.at_rest(linear) or stuck(linear, Stop.STALLED)
         return move.stop
+
+    def creeping(self, log: Sequence[Iteration]) -> Stop | None:
+        """Return why to stop after these iterations of a phase: a valley of kinks has no end."""
+        last = log[-LULL:]
+        if len(log) <= LULL or min(line.inner for line in last) == 0:
+            return None
+        gain = log[-1 - LULL].cost - log[-1].cost
+        return Stop.CREEPING if gain <= CREEP * log[-1].cost else None
 
     def tiny(self, there: Array, here: Array, box: Box) -> bool:
         """Tell whether a step is below the tolerance in every variable."""
