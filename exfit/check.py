@@ -12,7 +12,14 @@ from exfit.notes import typical_notes
 from exfit.plant import VT0
 from exfit.residuals import Channel, Residuals
 from exfit.simulate import Course, Simulator
-from exfit.trial import fitted_trial, free_of, plain_simulator, system_of, values_of
+from exfit.trial import (
+    fitted_trial,
+    free_of,
+    plain_simulator,
+    secured,
+    system_of,
+    values_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -65,7 +72,7 @@ def check(case: Case) -> Check:
     free = free_of(case)
     names = [one.name for one in free]
     fixed = {name: value for name, value in values.items() if name not in names}
-    simulator = simulator.secured(values)
+    simulator = secured(simulator, values, case.path)
     substeps = simulator.substeps(values)
     lags = [name for name in simulator.time_constants if values[name] < SHORTEST]
     still = Simulator(

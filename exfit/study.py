@@ -17,7 +17,15 @@ from exfit.record import file_hash
 from exfit.residuals import JACOBIANS, Residuals
 from exfit.result import Comparison, FitResult, FittedParameter, Iteration
 from exfit.simulate import Response
-from exfit.trial import Trial, fitted_trial, plain_simulator, residuals_of, trial_of, values_of
+from exfit.trial import (
+    Trial,
+    fitted_trial,
+    plain_simulator,
+    residuals_of,
+    secured,
+    trial_of,
+    values_of,
+)
 
 Values = Mapping[str, float]
 
@@ -192,7 +200,7 @@ def simulate(case: Case, changes: Values) -> Simulation:
         return Simulation(response, trial.compare("record", values), values)
     simulator, vt0 = plain_simulator(case)
     at = {**values, VT0: vt0}
-    response = simulator.secured(at).response(at)
+    response = secured(simulator, at, case.path).response(at)
     return Simulation(response, None, values)
 
 

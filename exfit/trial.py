@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.case import BumpTest, Case, NoPlant, RecordFile, initial_voltage
 from exfit.engine.system import System, trace
-from exfit.errors import CaseError, ModelError
+from exfit.errors import CaseError, ModelError, SimulationError
 from exfit.features import Features, features
 from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.record import Record
@@ -53,10 +53,22 @@ def values_of(case: Case, changes: Values) -> dict[str, float]:
     return {**case.values(), **machine, **changes}
 
 
+def secured(simulator: Simulator, values: Values, case: Path) -> Simulator:
+    """Return a simulator with sub-steps enough all along the response to the values.
+
+    Raises SimulationError, naming the case, where they have no start or no finite response.
+    """
+    try:
+        return simulator.secured(values)
+    except SimulationError as fault:
+        raise SimulationError(f"{case}: {fault}") from fault
+
+
 @dataclass(frozen=True)
 class Trial:
-    """A test and its record, ready to be simulated."""
+    """A test of a case and its record, ready to be simulated."""
 
+    case: Path
     simulator: Simulator
     record: Record
     vt0: float
@@ -64,7 +76,8 @@ class Trial:
 
     def secured(self, values: Values) -> "Trial":
         """Return the trial with sub-steps enough all along the response to the values."""
-        return replace(self, simulator=self.simulator.secured({**values, VT0: self.vt0}))
+        at = {**values, VT0: self.vt0}
+        return replace(self, simulator=secured(self.simulator, at, self.case))
 
     def compare(
         self, name: str, values: Values, start: Values | None = None, limit: float | None = None
@@ -131,6 +144,7 @@ def trial_of(case: Case, test: BumpTest, file: RecordFile) -> Trial:
     begin = float(record.time[0]) if test.begin is None else test.begin
     course = course_of(test, begin, float(record.time[-1]))
     return Trial(
+        case.path,
         Simulator(system, course, record.time, case.simulation.step),
         record,
         initial_voltage(test, record),
