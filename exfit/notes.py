@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit import estimate
 from exfit.case import Case
 from exfit.plant import MACHINE
 from exfit.residuals import Residuals
@@ -23,34 +24,35 @@ MUCH_WORSE = 3.0  # than the fit
 TAKES_PART = 0.01  # of a direction of length one
 
 
-def notes(case: Case, residuals: Residuals, theta: Array, jacobian: Array) -> Iterator[str]:
-    """Yield the notes on a fit that ended at theta (N,) with this Jacobian (M, N)."""
-    values = residuals.values(theta)
+def notes(
+    case: Case, residuals: Residuals, found: estimate.Result, compared: Comparison
+) -> Iterator[str]:
+    """Yield the notes on what a fit found; ``compared`` has sub-steps enough for its response."""
+    values = residuals.values(found.x)
     yield from typical_notes(case)
     for one in residuals.free:
         side = one.bound(values[one.name])
         if side:
             value = f"{values[one.name]:.6g}"
             yield f"{one.name} lies on its {side} {value}: it is the bound's, not the record's"
-    for group in redundant(jacobian, [one.name for one in residuals.free]):
+    for group in redundant(found.jac, [one.name for one in residuals.free]):
         if len(group) == 1:
             yield f"{group[0]} has no effect on the record: its value says nothing"
         else:
             names = ", ".join(group)
             yield f"{names} can move together without any effect on the record: fix one of them"
     moved = residuals.simulator.step_error(values, residuals.signals)
-    rmse = float(np.sqrt(np.mean(residuals(theta) ** 2)))
+    rmse = float(np.sqrt(np.mean(found.fun**2)))
     if moved > max(COARSE * rmse, INVISIBLE):
         yield (
             f"halving the step of {case.simulation.step:g} s moves the response by {moved:.1e} pu, "
             f"the error of the fit is {rmse:.1e} pu: give a smaller simulation.step"
         )
-    response = residuals.simulator.response(values)
-    wanted = residuals.simulator.substeps_along(values, response)
-    if wanted > 2 * response.substeps:
-        step = case.simulation.step * response.substeps / wanted
+    taken = residuals.simulator.substeps(values)
+    if compared.substeps > 2 * taken:
+        step = case.simulation.step * taken / compared.substeps
         yield (
-            f"the response asks for {wanted} sub-steps on its way, {response.substeps} were taken: "
+            f"the response asks for {compared.substeps} sub-steps on its way, {taken} were taken: "
             f"give simulation.step = {step:.2g}"
         )
 

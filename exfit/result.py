@@ -3,16 +3,15 @@
 import csv
 import io
 import json
-import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.atomic import write_whole
 from exfit.errors import ExfitError
 from exfit.features import Features
 
@@ -53,8 +52,7 @@ class FittedParameter:
     min: float
     max: float
     at_bound: Literal["min", "max"] | None
-    unit: str = field(default="", metadata={"kind": "display"})
-    meaning: str = field(default="", metadata={"kind": "display"})
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,6 @@ class Comparison:
     simulated: Features | None
     record: Path
     sha256: str
-    steps: tuple[tuple[float, float], ...]
     substeps: int
     rmse_limit: float | None = None
 
@@ -168,8 +165,6 @@ class FitResult:
     typical: tuple[str, ...]
     machine: Mapping[str, float]
     comparison: Comparison
-    start_cost: float
-    gradient_norm: float
     status: int
     message: str
     success: bool
@@ -189,6 +184,11 @@ class FitResult:
     def nit(self) -> int:
         """Number of iterations."""
         return len(self.history) - 1
+
+    @property
+    def start_cost(self) -> float:
+        """The cost of the start values."""
+        return self.history[0].cost if self.history else float("nan")
 
     @property
     def values(self) -> dict[str, float]:
@@ -261,19 +261,10 @@ def _finite(content: Any) -> Any:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file beside its place and rename it: whole or not at all.
-
-    Raises ExfitError where the place cannot be written.
-    """
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    data = content.encode() if isinstance(content, str) else content
+    """Write a file, whole or not at all; raises ExfitError where the place cannot be written."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(data)
-        beside.replace(path)
+        write_whole(path, content.encode() if isinstance(content, str) else content)
     except OSError as fault:
-        with suppress(OSError):
-            beside.unlink()
         raise ExfitError(f"{path}: cannot be written: {fault.strerror}") from fault
 
 

@@ -266,18 +266,19 @@ def catalogue(console: Console, models: Iterable[Model], machines: Iterable[Mach
 
 def model(console: Console, one: Model) -> None:
     """Show a model's drawing, data sheet and states."""
-    console.print(f"[bold]{one.name}[/]: {one.title}")
-    console.print()
-    console.print(one.drawing, markup=False, soft_wrap=True)
-    console.print()
-    console.print(data_sheet(one.sheet))
-    console.print()
-    console.print(f"states: {', '.join(one.states)}")
+    _described(console, one, one.drawing)
 
 
 def machine(console: Console, one: Machine) -> None:
     """Show a machine's data sheet and states."""
+    _described(console, one)
+
+
+def _described(console: Console, one: Model | Machine, *drawing: str) -> None:
     console.print(f"[bold]{one.name}[/]: {one.title}")
+    for text in drawing:
+        console.print()
+        console.print(text, markup=False, soft_wrap=True)
     console.print()
     console.print(data_sheet(one.sheet))
     console.print()

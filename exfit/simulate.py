@@ -32,9 +32,7 @@ MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mis
 REST_TOLERANCE = 1e-6  # pu/s: below any real motion
 ROUNDING = 1e-13  # of a state
 ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
-NEIGHBOURS = (
-    4  # grid points of the interpolation, whose error is then of the order of Runge-Kutta's
-)
+NEIGHBOURS = 4  # grid points of the interpolation: its error is then of Runge-Kutta's order
 
 
 class Change(NamedTuple):
@@ -117,8 +115,7 @@ class Sampling:
 
     @staticmethod
     def _cubic(position: Array, count: int) -> tuple[NDArray[np.int64], Array]:
-        """Return neighbours and Lagrange weights, a row per position on a grid of ``count``
-        steps."""
+        """Return neighbours and Lagrange weights, a row per position on ``count`` steps."""
         points = min(NEIGHBOURS, count + 1)
         first = np.clip(np.floor(position).astype(np.int64) - 1, 0, count + 1 - points)
         near = first[:, None] + np.arange(points)

@@ -46,9 +46,9 @@ def fit(
     began = clock.perf_counter()
     trial = fitted_trial(case).secured(values_of(case, {}))
     validations = [trial_of(case, one.test, one.record) for one in case.validations]
+    refuse_unfit(case, residuals_of(case, trial))
     residuals = residuals_of(case, trial)
     start = residuals.start
-    refuse_unfit(case, residuals_of(case, trial))
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
@@ -71,35 +71,21 @@ def fit(
     )
     values, begin = residuals.values(found.x), residuals.values(start)
     limit = None if case.accept is None else case.accept.rmse
-    compared = trial.compare("fit", values, begin)
+    compared = trial.secured(values).compare("fit", values, begin)
     tried = tuple(
-        other.compare(one.name, values, None, limit)
+        other.secured(values).compare(one.name, values, None, limit)
         for one, other in zip(case.validations, validations, strict=True)
     )
-    units = {row.symbol: row for row in case.exciter.sheet}
     return FitResult(
         case=case.path,
         name=case.path.stem,
         model=case.exciter.name,
         strategy=method,
-        parameters={
-            one.name: FittedParameter(
-                value=values[one.name],
-                start=one.start,
-                min=one.low,
-                max=one.high,
-                at_bound=one.bound(values[one.name]),
-                unit=units[one.name].unit,
-                meaning=units[one.name].meaning,
-            )
-            for one in residuals.free
-        },
+        parameters=_parameters(case, residuals, values),
         fixed={name: v for name, v in case.values().items() if name not in case.parameters.free},
         typical=case.typical_symbols,
         machine=case.machine_values(),
         comparison=compared,
-        start_cost=history[0].cost if history else float("nan"),
-        gradient_norm=history[-1].gradient_norm if history else float("nan"),
         status=found.status,
         message=found.message,
         success=found.success,
@@ -111,7 +97,7 @@ def fit(
         substeps=residuals.substeps,
         seconds=clock.perf_counter() - began,
         notes=(
-            *notes(case, residuals, found.x, found.jac),
+            *notes(case, residuals, found, compared),
             *match_notes(compared, tried, trial.vt0),
         ),
         validation=tried,
@@ -140,21 +126,26 @@ def refuse_unfit(case: Case, residuals: Residuals) -> None:
         )
 
 
+def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, FittedParameter]:
+    units = {row.symbol: row.unit for row in case.exciter.sheet}
+    return {
+        one.name: FittedParameter(
+            value=values[one.name],
+            start=one.start,
+            min=one.low,
+            max=one.high,
+            at_bound=one.bound(values[one.name]),
+            unit=units[one.name],
+        )
+        for one in residuals.free
+    }
+
+
 def _iteration(line: estimate.Iteration, residuals: Residuals) -> Iteration:
+    """Return a line of the log with the parameters' own values for the scaled ones."""
     values = residuals.values(line.x)
-    return Iteration(
-        number=line.number,
-        phase=line.phase,
-        cost=line.cost,
-        gradient_norm=line.gradient_norm,
-        step_norm=line.step_norm,
-        damping=line.damping,
-        inner=line.inner,
-        nfev=line.nfev,
-        njev=line.njev,
-        quality=line.quality,
-        values={one.name: values[one.name] for one in residuals.free},
-    )
+    kept = {name: value for name, value in vars(line).items() if name != "x"}
+    return Iteration(**kept, values={one.name: values[one.name] for one in residuals.free})
 
 
 def versions() -> dict[str, str]:
@@ -185,7 +176,6 @@ class Simulation:
 
     response: Response
     comparison: Comparison | None
-    values: Values
 
 
 def simulate(case: Case, changes: Values) -> Simulation:
@@ -195,13 +185,13 @@ def simulate(case: Case, changes: Values) -> Simulation:
     """
     values = values_of(case, changes)
     if case.record is not None:
-        trial = trial_of(case, case.test, case.record)
-        response = trial.secured(values).simulator.response({**values, VT0: trial.vt0})
-        return Simulation(response, trial.compare("record", values), values)
+        trial = trial_of(case, case.test, case.record).secured(values)
+        response = trial.simulator.response({**values, VT0: trial.vt0})
+        return Simulation(response, trial.compare("record", values))
     simulator, vt0 = plain_simulator(case)
     at = {**values, VT0: vt0}
     response = secured(simulator, at, case.path).response(at)
-    return Simulation(response, None, values)
+    return Simulation(response, None)
 
 
 def validate(case: Case, changes: Values, record: Path | None = None) -> list[Comparison]:
@@ -224,6 +214,6 @@ def validate(case: Case, changes: Values, record: Path | None = None) -> list[Co
         raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
     values = values_of(case, changes)
     return [
-        trial_of(case, test, file).compare(name, values, None, most)
+        trial_of(case, test, file).secured(values).compare(name, values, None, most)
         for name, test, file, most in fitted + named
     ]

@@ -82,32 +82,26 @@ class Trial:
     def compare(
         self, name: str, values: Values, start: Values | None = None, limit: float | None = None
     ) -> Comparison:
-        """Return the response to the values (all but vt0) beside the record.
-
-        Raises SimulationError where it does not stay finite.
-        """
-        samples, substeps = self.secured(values)._samples(values)
-        first = np.full_like(samples, np.nan) if start is None else self._samples(start)[0]
-        weights = np.array([channel.weight for channel in self.channels])
-        measured = np.stack([channel.measured for channel in self.channels], axis=1)
-        residuals = (samples - measured) * weights
+        """Return the response to the values (all but vt0) beside the record; secure it first."""
+        samples, substeps = self._samples(values)
+        first = None if start is None else self._samples(start)[0]
         overlays = {
             channel.signal: Overlay(
-                channel.measured, samples[:, k], None if start is None else first[:, k]
+                channel.measured, samples[:, k], None if first is None else first[:, k]
             )
             for k, channel in enumerate(self.channels)
         }
+        errors = [channel.weight * overlays[channel.signal].error for channel in self.channels]
         vt = overlays.get("vt")
         return Comparison(
             name=name,
             time=self.record.time,
             overlays=overlays,
-            cost=0.5 * float(np.sum(residuals**2)),
+            cost=0.5 * sum(float(error @ error) for error in errors),
             measured=None if vt is None else self._features(vt.measured),
             simulated=None if vt is None else self._features(vt.simulated),
             record=self.record.source,
             sha256=self.record.sha256,
-            steps=tuple((change.at, change.step) for change in self.simulator.course.steps),
             substeps=substeps,
             rmse_limit=limit,
         )

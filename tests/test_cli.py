@@ -18,6 +18,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
+from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH
 from rich.console import Console
 
 from exfit import cli, show
@@ -32,22 +33,10 @@ COMMANDS = ("fit", "simulate", "validate", "check")
 WIDTH = 80
 
 # k/(s + a) with k = 4 and a = 2, a unit step at 0.5 s from rest
-TIME = np.linspace(0.0, 3.0, 61)
-TRUTH = np.where(TIME < 0.5, 0.0, 2.0 - 2.0 * np.exp(-2.0 * (TIME - 0.5)))
-UP = {"vt0": 0.0, "vref": [{"at": 0.5, "step": 1.0}]}
 DOWN = {"vt0": 2.0, "vref": [{"at": 0.5, "step": -1.0}]}
 CASE = {
-    "model": "FIRST_ORDER",
-    "plant": {"type": "none"},
-    "test": UP,
+    **FIRST_ORDER,
     "record": {"file": "up.csv", "time": "t", "channels": {"vt": "v"}},
-    "parameters": {
-        "free": {
-            "k": {"start": 1.0, "min": 0.1, "max": 100.0},
-            "a": {"start": 1.0, "min": 0.1, "max": 100.0},
-        }
-    },
-    "simulation": {"step": 0.01},
     "validate": [
         {
             "name": "down-step",
@@ -274,7 +263,9 @@ def test_a_fit_needs_a_free_parameter_but_a_simulation_does_not(run, workplace):
 
 def test_a_fit_needs_a_record_but_a_simulation_does_not(run, workplace):
     case = case_file(
-        changed(CASE, ("record", None), ("validate", None), ("test", {**UP, "duration": 2.0}))
+        changed(
+            CASE, ("record", None), ("validate", None), ("test", {**CASE["test"], "duration": 2.0})
+        )
     )
     before = listing(workplace)
     is_refused(run("fit", case), ["case.yaml", "record", "missing"], before, workplace)
@@ -361,17 +352,7 @@ def test_a_cache_that_cannot_be_written_costs_only_time(run, tmp_path, monkeypat
 def test_a_fit_that_converges_ends_with_0_and_writes_its_files(run):
     ran = run("fit", case_file())
     assert (ran.code, ran.err) == (0, "")
-    assert {path.name for path in Path("runs/case-fit").iterdir()} == {
-        "result.json",
-        "parameters.yaml",
-        "history.csv",
-        "response.csv",
-        "overlay.png",
-        "convergence.png",
-        "trajectories.png",
-        "down-step.csv",
-        "down-step.png",
-    }
+    assert {path.name for path in Path("runs/case-fit").iterdir()} == FILES_OF_A_FIT
 
 
 def test_a_fit_without_a_terminal_prints_plain_lines_of_80_columns(run):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from cases import FILES_OF_A_FIT
 
 from exfit import files, study
 from exfit.case import load_case
@@ -18,17 +19,6 @@ from exfit.result import DIGITS, parameter_file, table, to_json, write
 
 ROOT = Path(__file__).parent.parent
 CASE = ROOT / "configs" / "first_order.yaml"
-FILES = {
-    "result.json",
-    "parameters.yaml",
-    "history.csv",
-    "response.csv",
-    "overlay.png",
-    "convergence.png",
-    "trajectories.png",
-    "down-step.csv",
-    "down-step.png",
-}
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +45,11 @@ def names(folder):
 def test_a_fit_leaves_these_files_and_no_others(fitted, tmp_path, monkeypatch):
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
     files.write_fit(fitted, tmp_path / "run", figures=True)
-    assert names(tmp_path / "run") == FILES
+    assert names(tmp_path / "run") == FILES_OF_A_FIT
 
 
 def test_without_figures_there_are_only_tables(folder):
-    assert names(folder) == {name for name in FILES if not name.endswith(".png")}
+    assert names(folder) == {name for name in FILES_OF_A_FIT if not name.endswith(".png")}
 
 
 def test_the_result_holds_what_json_prints_and_the_history(fitted, folder):

@@ -14,6 +14,7 @@ ROOT = Path(exfit.__file__).parent
 ORDER = (
     "exfit",
     "exfit.errors",
+    "exfit.atomic",
     "exfit.engine",
     "exfit.engine.trace",
     "exfit.engine.system",

@@ -31,7 +31,6 @@ def comparison(signals=("vt",), start=None):
         simulated=None,
         record=Path("bump.csv"),
         sha256="",
-        steps=((1.0, 0.05),),
         substeps=1,
     )
 
@@ -65,15 +64,12 @@ def result(free=2, iterations=4, phases=("lm", "dgn"), at_bound=None):
         model="AC1A",
         strategy="lm-then-dgn",
         parameters={
-            name: FittedParameter(end[name], 1.0, 0.1, 10.0, at_bound, "pu", "gain")
-            for name in names
+            name: FittedParameter(end[name], 1.0, 0.1, 10.0, at_bound, "pu") for name in names
         },
         fixed={},
         typical=(),
         machine={},
         comparison=comparison(start=RISE),
-        start_cost=1.0,
-        gradient_norm=history[-1].gradient_norm,
         status=1,
         message="the gradient vanished",
         success=True,

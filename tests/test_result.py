@@ -14,7 +14,7 @@ from exfit.result import FitResult, Overlay
 
 ROOT = Path(__file__).parent.parent
 INSIDE = {"comparison": "fit"}  # under another name
-ELSEWHERE = {"name", "gradient_norm", "history"}  # in the name of the folder and in the history
+ELSEWHERE = {"name", "history"}  # in the name of the folder and in the history
 
 laws = settings(deadline=None, derandomize=True, max_examples=25)
 

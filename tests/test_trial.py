@@ -7,6 +7,7 @@ import numpy as np
 import oracle
 import pytest
 import yaml
+from cases import FIRST_ORDER, TIME, TRUTH
 
 from exfit.case import load_case
 from exfit.plant import SATURATION, VT0
@@ -16,21 +17,9 @@ from exfit.trial import fitted_trial, values_of
 
 ROOT = Path(__file__).parent.parent
 
-# k/(s + a) with k = 4 and a = 2, a unit step at 0.5 s from rest
-TIME = np.linspace(0.0, 3.0, 61)
-TRUTH = np.where(TIME < 0.5, 0.0, 2.0 - 2.0 * np.exp(-2.0 * (TIME - 0.5)))
 CASE = {
-    "model": "FIRST_ORDER",
-    "plant": {"type": "none"},
-    "test": {"vt0": 0.0, "vref": [{"at": 0.5, "step": 1.0}]},
+    **FIRST_ORDER,
     "record": {"file": "record.csv", "time": "t", "channels": {"vt": "vt"}},
-    "parameters": {
-        "free": {
-            "k": {"start": 1.0, "min": 0.1, "max": 100.0},
-            "a": {"start": 1.0, "min": 0.1, "max": 100.0},
-        }
-    },
-    "simulation": {"step": 0.01},
 }
 MACHINE_CASE = {
     **yaml.safe_load((ROOT / "configs" / "ac1a_typical.yaml").read_text()),

@@ -14,6 +14,7 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.atomic import write_whole
 from exfit.engine.emit import linearisation, simulation, simulation_with_tangents
 from exfit.engine.system import System, differentiate, trace
 
@@ -100,15 +101,9 @@ def _cached(path: Path) -> bytes | None:
 
 
 def _keep(path: Path, code: bytes) -> None:
-    """Write code beside its place and rename it; a folder that cannot be written keeps nothing."""
-    beside = path.with_name(f"{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(hashlib.sha256(code).digest() + code)
-        beside.replace(path)
-    except OSError:
-        with suppress(OSError):
-            beside.unlink()
+    """Keep code on disk; a folder that cannot be written keeps nothing."""
+    with suppress(OSError):
+        write_whole(path, hashlib.sha256(code).digest() + code)
 
 
 def compiled(ir: str, *, long_vectors: bool) -> Any:

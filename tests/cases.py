@@ -1,0 +1,30 @@
+"""A small case that several tests start from, and what a fit of it leaves behind."""
+
+import numpy as np
+
+# k/(s + a) with k = 4 and a = 2, a unit step at 0.5 s from rest
+TIME = np.linspace(0.0, 3.0, 61)
+TRUTH = np.where(TIME < 0.5, 0.0, 2.0 - 2.0 * np.exp(-2.0 * (TIME - 0.5)))
+FIRST_ORDER = {
+    "model": "FIRST_ORDER",
+    "plant": {"type": "none"},
+    "test": {"vt0": 0.0, "vref": [{"at": 0.5, "step": 1.0}]},
+    "parameters": {
+        "free": {
+            "k": {"start": 1.0, "min": 0.1, "max": 100.0},
+            "a": {"start": 1.0, "min": 0.1, "max": 100.0},
+        }
+    },
+    "simulation": {"step": 0.01},
+}
+FILES_OF_A_FIT = {
+    "result.json",
+    "parameters.yaml",
+    "history.csv",
+    "response.csv",
+    "overlay.png",
+    "convergence.png",
+    "trajectories.png",
+    "down-step.csv",
+    "down-step.png",
+}
