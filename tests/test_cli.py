@@ -659,7 +659,7 @@ def test_a_model_of_the_user_s_own_gives_the_same_fit(run):
         pytest.param(
             "(s: Signal, u: Signal, p", "(s: Signal, p", ["own.py", "arg"], id="arguments"
         ),
-        pytest.param("return u.vt + error", "return None  #", ["own.py"], id="returns nothing"),
+        pytest.param("return u.vc1 + error", "return None  #", ["own.py"], id="returns nothing"),
         pytest.param("error = vfe / p.KA", "error = vfe", ["rest"], id="rest that moves"),
     ],
 )

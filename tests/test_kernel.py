@@ -11,7 +11,7 @@ from oracle import WITHOUT_PLANT, drawn_values, float_run, levels, system_of, ve
 from exfit.engine import kernel as engine
 from exfit.engine.kernel import Kernel, LinearKernel, Span, TangentKernel
 from exfit.engine.system import Motion, Rest, System
-from exfit.engine.trace import clip, exp, larger, log, smaller, sqrt, where
+from exfit.engine.trace import clip, cos, exp, larger, log, sin, smaller, sqrt, where
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plant import SATURATION
@@ -144,6 +144,17 @@ def test_the_exponential_stays_finite_and_positive_beyond_what_it_can_hold():
     assert (far[3:] == far[5]).all()
     assert 0.0 < far[0] < 1e-300
     assert 1e300 < far[5] < np.inf
+
+
+@pytest.mark.parametrize("lanes", [1, LANES])
+@pytest.mark.parametrize(("ours", "numpys"), [(sin, np.sin), (cos, np.cos)])
+def test_sine_and_cosine_are_right_over_many_turns(ours, numpys, lanes):
+    rng = np.random.default_rng(2)
+    x = np.concatenate([rng.uniform(-10.0, 10.0, 5000), rng.uniform(-3000.0, 3000.0, 5000)])
+    x = np.concatenate([x, [0.0, -0.0, 1e-300], np.pi / 4.0 * np.arange(-9.0, 10.0)])
+    # next to a zero the rounding of the angle remains
+    assert np.abs(apply(ours, x, lanes=lanes) - numpys(x)).max() < 5e-16
+    assert np.isnan(apply(ours, np.array([np.nan]), lanes=lanes)).all()
 
 
 @pytest.mark.parametrize("lanes", [1, LANES])

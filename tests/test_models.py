@@ -24,7 +24,15 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, saturation_faults, typical
 from exfit.models.sheet import model as build
-from exfit.plant import MACHINE, SATURATION, VT0, Names, exciter_parameters, open_circuit
+from exfit.plant import (
+    MACHINE,
+    SATURATION,
+    VT0,
+    Names,
+    exciter_inputs,
+    exciter_parameters,
+    open_circuit,
+)
 from exfit.simulate import Change, Course, Simulator, parameters_used
 
 SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}
@@ -104,7 +112,8 @@ def test_rest_is_rest(exciter, machine, saturation):
             told = set_to(values, vt0)
             rest = LinearKernel(system).rest(vector(system, told))
             states = dict(zip(system.states, rest.x, strict=True))
-            at = system.motion(told, {"vref": rest.r[0]}, states, {"vref": 0.0})
+            setpoints = dict(zip(system.setpoints, rest.r, strict=True))
+            at = system.motion(told, setpoints, states, {"vref": 0.0})
             assert at.outputs["vt"] == pytest.approx(vt0, rel=1e-12)
             assert at.outputs["efd"] == pytest.approx(at.outputs["ifd"], rel=1e-12)
             fastest = 1.0 / min(told[T] for T in system.time_constants if told[T] >= SHORTEST)
@@ -118,7 +127,7 @@ def test_an_exciter_alone_rests_at_any_output_and_voltage(exciter):
     p = exciter_parameters(lively_values(exciter), found, SATURATION["quadratic"])
     for efd in (0.5, 1.0, 2.0):
         for vt in VOLTAGES:
-            u = Names(vt=vt, ifd=0.9 * efd, vs=0.01)
+            u = exciter_inputs(vt=vt, vc1=1.01 * vt, ifd=0.9 * efd, vs=0.01, p=0.7, q=0.2)
             x, d = Names(), Names()
             u.vref = found.rest(efd, u, p, x)
             assert found.equations(x, u, p, d) == pytest.approx(efd, rel=1e-12)
@@ -254,7 +263,7 @@ def test_a_state_stays_at_a_limit_only_while_pushed_against_it(exciter):
     code = Kernel(system, system.outputs)
     p = vector(system, values)[:, None]
     start = code.start(p)
-    r = {"vref": start.r[0, 0]}
+    r = dict(zip(system.setpoints, start.r[:, 0], strict=True))
     met = set()
     for size in (0.0, 1.0, -1.0, 0.0):
         (out,) = code.run(p, start, [Span(np.full((1201, 1), size), 1e-3, 1)])

@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 from exfit.engine.trace import (
     Graph,
     clip,
+    cos,
     evaluate,
     exp,
     in_order,
     larger,
     log,
+    sin,
     smaller,
     sqrt,
     tangents,
@@ -51,6 +53,20 @@ def test_a_graph_evaluates_to_what_its_function_gives(x, y):
     assert traced(formula, x, y)[0] == pytest.approx(formula(x, y), rel=1e-14, abs=1e-14)
 
 
+@pytest.mark.parametrize(
+    "unlimited",
+    [
+        lambda x: clip(x, -math.inf, math.inf),
+        lambda x: larger(x, -math.inf),
+        lambda x: smaller(x, math.inf),
+        lambda x: where((x >= math.inf) & (x > 0.0) | (x <= -math.inf), 0.0, x),
+    ],
+)
+def test_a_limit_at_infinity_leaves_nothing_behind(unlimited):
+    _, node, symbols = traced(unlimited, 2.0)
+    assert node is symbols[0]
+
+
 @settings(deadline=None)
 @given(st.lists(st.tuples(numbers, numbers), min_size=1, max_size=5))
 def test_arrays_give_what_their_elements_give(points):
@@ -65,7 +81,8 @@ def test_arrays_give_what_their_elements_give(points):
 def test_derivatives_equal_central_differences(x, y, direction):
     def smooth(x, y):
         a = 1.0 + x * x
-        return sqrt(a) * exp(0.3 * y) / (2.0 + y * y) - log(a + y * y) + (1.0 - x) / a
+        wave = sin(1.3 * x) * cos(x - 0.7 * y)
+        return sqrt(a) * exp(0.3 * y) / (2.0 + y * y) - log(a + y * y) + (1.0 - x) / a + wave
 
     _, node, symbols = traced(smooth, x, y)
     seed = node.graph.constant(1.0)

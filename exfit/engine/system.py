@@ -79,7 +79,7 @@ def trace(system: System, outputs: Sequence[str]) -> Trace:
     start = system.rest(p)
     motion = system.motion(p, r, x, u)
     clamped = [
-        graph.apply("clip", x[name], *motion.limits[name]) if name in motion.limits else x[name]
+        graph.clip(x[name], *motion.limits[name]) if name in motion.limits else x[name]
         for name in system.states
     ]
     return Trace(

@@ -4,6 +4,7 @@ The functions ``where``, ``exp`` ... below also take floats and NumPy arrays, an
 model written with them: that run is what the compiled one is tested against.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self
 
@@ -77,23 +78,29 @@ class Node:
     def __pos__(self) -> Self:
         return self
 
-    def __lt__(self, other: Signal) -> "Node":
-        return self.graph.apply("<", self, other)
+    def __lt__(self, other: Signal) -> Signal:
+        return self.graph.compare("<", self, other)
 
-    def __gt__(self, other: Signal) -> "Node":
-        return self.graph.apply("<", other, self)
+    def __gt__(self, other: Signal) -> Signal:
+        return self.graph.compare("<", other, self)
 
-    def __le__(self, other: Signal) -> "Node":
-        return self.graph.apply("<=", self, other)
+    def __le__(self, other: Signal) -> Signal:
+        return self.graph.compare("<=", self, other)
 
-    def __ge__(self, other: Signal) -> "Node":
-        return self.graph.apply("<=", other, self)
+    def __ge__(self, other: Signal) -> Signal:
+        return self.graph.compare("<=", other, self)
 
-    def __and__(self, other: Signal) -> "Node":
+    def __and__(self, other: Signal) -> Signal:
+        if isinstance(other, bool):
+            return self if other else False
         return self.graph.apply("&", self, other)
 
-    def __or__(self, other: Signal) -> "Node":
+    def __or__(self, other: Signal) -> Signal:
+        if isinstance(other, bool):
+            return True if other else self
         return self.graph.apply("|", self, other)
+
+    __rand__, __ror__ = __and__, __or__
 
     __hash__ = object.__hash__
 
@@ -165,6 +172,21 @@ class Graph:
             return self.multiply(x, self.divide(1.0, y))
         return self._fold("/", x, y)
 
+    def compare(self, op: str, a: Signal, b: Signal) -> Signal:
+        """Return a < b or a <= b; nothing finite lies beyond infinity: such a limit costs nothing.
+
+        A value that is not finite passes such a limit; it ends a run anyway.
+        """
+        x, y = self.lift(a), self.lift(b)
+        never = x.constant == math.inf or y.constant == -math.inf
+        return False if never else self.apply(op, x, y)
+
+    def clip(self, x: Signal, low: Signal, high: Signal) -> Node:
+        """Return x held between two limits."""
+        bounds = self.lift(low), self.lift(high)
+        free = bounds[0].constant == -math.inf and bounds[1].constant == math.inf
+        return self.lift(x) if free else self.apply("clip", x, *bounds)
+
     def select(self, condition: Signal, a: Signal, b: Signal) -> Node:
         """Return a where the condition holds, else b."""
         if isinstance(condition, bool | np.bool_):
@@ -227,6 +249,16 @@ def sqrt(x: Signal) -> Signal:
     return function("sqrt", x)
 
 
+def sin(x: Signal) -> Signal:
+    """Return the sine of x in radians."""
+    return function("sin", x)
+
+
+def cos(x: Signal) -> Signal:
+    """Return the cosine of x in radians."""
+    return function("cos", x)
+
+
 def larger(a: Signal, b: Signal) -> Signal:
     """Return the larger of two values; NaN as the first one stays NaN."""
     return where(a < b, b, a)
@@ -241,7 +273,7 @@ def clip(x: Signal, low: Signal, high: Signal) -> Signal:
     """Return x held between low and high; NaN stays NaN."""
     graph = graph_of(x, low, high)
     if graph is not None:
-        return graph.apply("clip", x, low, high)
+        return graph.clip(x, low, high)
     raised = where(x < low, low, x)
     return where(raised > high, high, raised)
 
@@ -296,6 +328,10 @@ def _tangent(node: Node, t: list[Node]) -> Node:
             return graph.divide(1.0, args[0]) * t[0]
         case "sqrt":
             return graph.divide(0.5, node) * t[0]
+        case "sin":
+            return graph.apply("cos", args[0]) * t[0]
+        case "cos":
+            return graph.subtract(0.0, graph.apply("sin", args[0])) * t[0]
         case op:
             raise KeyError(op)
 

@@ -4,7 +4,7 @@
 vref + vs ──►(+)─►[1 + sTC]─►[  KA  ]─►[clip]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
            -▲   ▲-[1 + sTB]  [1+sTA]          -▲    [ sTE ] │        ▲
             │   │            VAMIN   VRMIN     │            │       FEX
-vt ─►[  1  ]┘   │  [  sKF  ]                   │            │        ▲
+vc1 ►[  1  ]┘   │  [  sKF  ]                   │            │        ▲
      [1+sTR]    └──[1 + sTF]◄──────────────────┴─── VFE ◄───┘   KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD. The limits of the lag are non-windup; the clamp
@@ -23,7 +23,7 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.sheet import sheet
+from exfit.models.sheet import record, sheet
 
 ALIASES = ("ESAC1A",)
 
@@ -49,13 +49,20 @@ SHEET = sheet(
     ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
 )
 
+RECORDS = (
+    record(
+        "ESAC1A",
+        "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN",
+    ),
+)
+
 STATES = "VC VL VA VE VF"
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vfe = field_demand(s.VE, u.ifd, p)
-    vc, d.VC = lag(u.vt, s.VC, 1.0, p.TR)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
     vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
     va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
@@ -69,5 +76,5 @@ def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     ve = rectifier_supply(efd, p.KC * u.ifd)
     vfe = field_demand(ve, u.ifd, p)
     error = vfe / p.KA
-    x.VC, x.VL, x.VA, x.VE, x.VF = u.vt, error, vfe, ve, vfe
-    return u.vt + error - u.vs
+    x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, vfe, ve, vfe
+    return u.vc1 + error - u.vs

@@ -4,7 +4,7 @@
 vref + vs ─►(+)─►[KPR + KIR/s   ]─►[  KA  ]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
            -▲    [+ sKDR/(1+sTDR)] [1+sTA]   -▲   [ sTE ] │        ▲
             │       VPIDMIN            VRMIN  │    VEMIN  │       FEX
-vt ─►[  1  ]┘                                 │           │        ▲
+vc1 ►[  1  ]┘                                 │           │        ▲
      [1+sTR]                                  └── VFE ◄───┘   KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. The limits of
@@ -24,7 +24,7 @@ from exfit.models.blocks import (
     rectifier_supply,
     where,
 )
-from exfit.models.sheet import sheet
+from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -50,6 +50,16 @@ SHEET = sheet(
     ("SE2", 0.3, "pu", (0.0, 100.0), "saturation at E2"),
 )
 
+RECORDS = (
+    record(
+        "AC8B",
+        "TR KPR KIR KDR TDR VPIDMAX VPIDMIN KA TA VRMAX VRMIN KC KD KE TE VFEMAX VEMIN "
+        "E1 SE1 E2 SE2",
+        doubt="the order of AC8B is likely, not confirmed",
+    ),
+    record("ESAC8B", "TR KPR KIR KDR TDR KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),
+)
+
 STATES = "VC VI VD VR VE"
 
 
@@ -57,7 +67,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vfe = field_demand(s.VE, u.ifd, p)
     vemax = field_ceiling(s.VE, vfe, p)
-    vc, d.VC = lag(u.vt, s.VC, 1.0, p.TR)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = u.vref + u.vs - vc
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
     vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
@@ -71,5 +81,5 @@ def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     vfe = field_demand(ve, u.ifd, p)
     integrates = p.KIR > 0.0
     error = where(integrates, 0.0, vfe / (p.KA * where(integrates, 1.0, p.KPR)))
-    x.VC, x.VI, x.VD, x.VR, x.VE = u.vt, where(integrates, vfe / p.KA, 0.0), error, vfe, ve
-    return u.vt + error - u.vs
+    x.VC, x.VI, x.VD, x.VR, x.VE = u.vc1, where(integrates, vfe / p.KA, 0.0), error, vfe, ve
+    return u.vc1 + error - u.vs

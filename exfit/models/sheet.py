@@ -31,12 +31,48 @@ def sheet(*rows: Row) -> Sheet:
 
 
 @dataclass(frozen=True)
+class Record:
+    """How a PSS/E file lists a model: the symbols of its constants (CONs) in their order.
+
+    ``icons`` are the integers before them, each a symbol and the only value that the model stands
+    for; ``absent`` are symbols that the model does not have, with the only value that it stands
+    for; ``doubt`` says what is not settled about the order.
+    """
+
+    name: str
+    cons: tuple[str, ...]
+    icons: tuple[tuple[str, int], ...]
+    absent: tuple[tuple[str, float], ...]
+    doubt: str
+
+
+def record(
+    name: str,
+    cons: str,
+    *,
+    icons: Mapping[str, int] | None = None,
+    absent: Mapping[str, float] | None = None,
+    doubt: str = "",
+) -> Record:
+    """Return a PSS/E record from its symbols in one text, ``"TR KA TA"``."""
+    return Record(
+        name,
+        tuple(cons.split()),
+        tuple((icons or {}).items()),
+        tuple((absent or {}).items()),
+        doubt,
+    )
+
+
+@dataclass(frozen=True)
 class Model:
-    """An exciter: what stands in its file, under one name.
+    """An exciter or a stabiliser: what stands in its file, under one name.
 
     ``equations(s, u, p, d)`` takes states, inputs and parameters, writes the slopes into ``d`` and
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
-    ``x`` and returns the reference that does so.
+    ``x`` and returns the reference that does so. Setpoints are what it finds at the start and then
+    keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
+    its PSS/E records, its own one first.
     """
 
     name: str
@@ -45,6 +81,8 @@ class Model:
     aliases: tuple[str, ...]
     sheet: Sheet
     states: tuple[str, ...]
+    setpoints: tuple[str, ...]
+    records: tuple[Record, ...]
     equations: Callable[..., Any]
     rest: Callable[..., Any]
 
@@ -62,14 +100,17 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         raise ModelError(f"model {name}: its file lacks {', '.join(missing)}")
     if not all(isinstance(row, Parameter) for row in parts["SHEET"]):
         raise ModelError(f"model {name}: its SHEET is not what sheet(...) returns")
-    if not isinstance(parts["STATES"], str) or not (
-        callable(parts["equations"]) and callable(parts["rest"])
+    states, setpoints = parts["STATES"], parts.get("SETPOINTS", "")
+    functions = parts["equations"], parts["rest"]
+    if not (
+        isinstance(states, str) and isinstance(setpoints, str) and all(map(callable, functions))
     ):
         raise ModelError(
-            f"model {name}: STATES is a text of names, equations and rest are functions"
+            f"model {name}: STATES (and SETPOINTS) is a text of names, equations and rest are "
+            "functions"
         )
     for part, names in (
-        ("STATES", parts["STATES"].split()),
+        ("STATES", [*states.split(), *setpoints.split()]),
         ("SHEET", [row.symbol for row in parts["SHEET"]]),
     ):
         twice = sorted({one for one in names if names.count(one) > 1})
@@ -82,7 +123,9 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         drawing=drawing.strip("\n"),
         aliases=tuple(parts.get("ALIASES", ())),
         sheet=tuple(parts["SHEET"]),
-        states=tuple(parts["STATES"].split()),
+        states=tuple(states.split()),
+        setpoints=tuple(setpoints.split()),
+        records=tuple(parts.get("RECORDS", ())),
         equations=parts["equations"],
         rest=parts["rest"],
     )

@@ -1,0 +1,111 @@
+"""What the plants share: names of values, and an exciter as a part of a system."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from math import inf
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from exfit.engine.system import Motion, Signals
+from exfit.engine.trace import Signal
+from exfit.errors import ModelError
+from exfit.models.blocks import Limited, Saturation, exponential, exponential_se, quadratic
+from exfit.models.sheet import Model, Sheet
+
+SaturationForm = Callable[..., Saturation]
+
+SATURATION: Mapping[str, SaturationForm] = {
+    "quadratic": quadratic,
+    "exponential": exponential,
+    "exponential-se": exponential_se,
+}
+
+MACHINE = "machine."  # how the name of a machine's parameter begins
+VT0 = "vt0"
+
+
+class Names(SimpleNamespace):
+    """Values by name, as a model reads and writes them."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise ModelError(f"the model uses {name}, which its file does not declare")
+
+
+def exciter_inputs(**given: Signal) -> Names:
+    """Return what an exciter sees, per unit: what is not given does not act.
+
+    ``vt`` terminal voltage, ``vc1`` the same with load compensation, ``ifd`` field current, ``p``
+    and ``q`` active and reactive power of the machine, ``vref`` reference, ``vs`` stabiliser,
+    ``vuel`` and ``voel`` under- and overexcitation limiter, at their gates.
+    """
+    still = {"vs": 0.0, "p": 0.0, "q": 0.0, "vuel": -inf, "voel": inf}
+    compensated = {"vc1": given["vt"]} if "vt" in given else {}
+    return Names(**{**still, **compensated, **given})
+
+
+def exciter_parameters(p: Signals, model: Model, saturation: SaturationForm) -> Names:
+    """Return the parameters of an exciter, with its saturation curve where it has one."""
+    values = Names(**{row.symbol: p[row.symbol] for row in model.sheet})
+    if {"E1", "SE1", "E2", "SE2"} <= vars(values).keys():
+        points = {name: p[name] for name in ("E1", "SE1", "E2", "SE2")}
+        values.saturation = partial(saturation, **points)
+    return values
+
+
+def machine_parameters(p: Signals, rows: Sheet) -> Names:
+    """Return the parameters of a machine under the names of its data sheet."""
+    return Names(**{row.symbol: p[MACHINE + row.symbol] for row in rows})
+
+
+def seconds(rows: Sheet) -> list[str]:
+    """Return the parameters that are times."""
+    return [row.symbol for row in rows if row.unit == "s"]
+
+
+def values_named(source: Signals, names: Iterable[str]) -> Names:
+    """Return some values by name."""
+    return Names(**{name: source[name] for name in names})
+
+
+def state_of(model: Model, x: Signals, r: Signals) -> Names:
+    """Return an exciter's states, and the setpoints that it found at the start."""
+    return Names(**vars(values_named(x, model.states)), **vars(values_named(r, model.setpoints)))
+
+
+def refuse_taken(model: Model, taken: Iterable[str]) -> None:
+    """Raise ModelError where a state of the model has the name of something else."""
+    clash = sorted({*model.states, *model.setpoints} & set(taken))
+    if clash:
+        raise ModelError(f"model {model.name}: STATES: {', '.join(clash)} is taken by the plant")
+
+
+def motion(written: Names, states: tuple[str, ...], outputs: Signals) -> Motion:
+    """Return slopes, limits and outputs from what a model wrote into its slopes."""
+    slopes = vars(written)
+    if slopes.keys() != set(states):
+        wrong = ", ".join(sorted(slopes.keys() ^ set(states)))
+        raise ModelError(f"states and slopes of the model do not match: {wrong}")
+    return Motion(
+        {name: s.slope if isinstance(s, Limited) else s for name, s in slopes.items()},
+        {name: (s.low, s.high) for name, s in slopes.items() if isinstance(s, Limited)},
+        outputs,
+    )
+
+
+class ExciterRest(NamedTuple):
+    """How an exciter holds its output: its states, and its setpoints with the reference."""
+
+    states: Signals
+    setpoints: Signals
+
+
+def rest_of(model: Model, output: Signal, u: Names, p: Names) -> ExciterRest:
+    """Return an exciter's states at rest, and the setpoints that hold them."""
+    x = Names()
+    vref = model.rest(output, u, p, x)
+    found = vars(x)
+    if found.keys() != {*model.states, *model.setpoints}:
+        wrong = ", ".join(sorted(found.keys() ^ {*model.states, *model.setpoints}))
+        raise ModelError(f"states and rest of the model do not match: {wrong}")
+    setpoints = {name: found[name] for name in model.setpoints}
+    return ExciterRest({name: found[name] for name in model.states}, {"vref": vref, **setpoints})
