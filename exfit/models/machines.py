@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import lag, quadratic
-from exfit.models.sheet import Sheet, sheet
+from exfit.models.sheet import Record, Sheet, record, sheet
 
 Faults = Iterable[tuple[str, str]]
 
@@ -40,6 +40,7 @@ class Machine:
     slopes: Callable[..., None]
     rest: Callable[..., None]
     faults: Callable[[Mapping[str, float]], Faults]
+    records: tuple[Record, ...] = ()
 
 
 def descending(values: Mapping[str, float], *symbols: str) -> Faults:
@@ -128,6 +129,7 @@ GENROU = Machine(
     slopes=genrou_slopes,
     rest=genrou_rest,
     faults=genrou_faults,
+    records=(record("GENROU", "Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xl S10 S12"),),
 )
 
 ONE_AXIS = Machine(
