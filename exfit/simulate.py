@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -36,23 +37,39 @@ NEIGHBOURS = 4  # grid points of the interpolation: its error is then of Runge-K
 
 
 class Change(NamedTuple):
-    """A step of the reference: when (s) and by how much (pu)."""
+    """A step of an input, by default of the reference: when (s) and by how much (pu)."""
 
     at: float
     step: float
+    signal: str = "vref"
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """Recorded inputs: ``time`` (M,) in s, and what each signal (M,) deviates from the start."""
+
+    time: Array
+    signals: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
 class Course:
-    """A test from ``start`` to ``end`` (s) with the steps of the reference in it."""
+    """A test from ``start`` to ``end`` (s): steps of the inputs, and recorded ones played back."""
 
     start: float
     end: float
     steps: tuple[Change, ...]
+    played: Played | None = None
 
-    def without_steps(self) -> "Course":
-        """Return the same stretch of time at rest."""
-        return Course(self.start, self.end, ())
+    def level(self, signal: str, at: float) -> float:
+        """Return the sum of an input's steps at an instant; a step counts from its own on."""
+        return sum((c.step for c in self.steps if c.signal == signal and c.at <= at), start=0.0)
+
+    def input(self, signal: str, times: Array, level: float) -> Array:
+        """Return an input at times between which it makes no step; ``level`` is that of steps."""
+        if self.played is None or signal not in self.played.signals:
+            return np.full(len(times), level)
+        return level + np.interp(times, self.played.time, self.played.signals[signal])
 
 
 @dataclass(frozen=True)
@@ -65,12 +82,16 @@ class Response:
 
 
 class Stretch(NamedTuple):
-    """Equal steps between two changes of the reference; ``vref`` is its sum of steps so far."""
+    """Equal steps of the grid between two changes of the inputs."""
 
     start: float
     step: float
     steps: int
-    vref: float
+
+    @property
+    def end(self) -> float:
+        """Where it ends, s."""
+        return self.start + self.step * self.steps
 
 
 def stretches(course: Course, step: float) -> list[Stretch]:
@@ -80,14 +101,11 @@ def stretches(course: Course, step: float) -> list[Stretch]:
             f"simulation.step: {step:g} s divides {course.end - course.start:g} s into more than "
             f"{MOST_STEPS:.0e} steps"
         )
-    inside = [change for change in course.steps if course.start < change.at < course.end]
-    edges = [course.start, *(change.at for change in inside), course.end]
-    level = sum(change.step for change in course.steps if change.at <= course.start)
-    levels = np.cumsum([level, *(change.step for change in inside)])
+    instants = {change.at for change in course.steps if course.start < change.at < course.end}
     result = []
-    for start, end, vref in zip(edges[:-1], edges[1:], levels, strict=True):
+    for start, end in pairwise([course.start, *sorted(instants), course.end]):
         count = max(1, math.ceil((end - start) / step - ON_GRID))
-        result.append(Stretch(start, (end - start) / count, count, float(vref)))
+        result.append(Stretch(start, (end - start) / count, count))
     return result
 
 
@@ -95,13 +113,13 @@ class Sampling:
     """Reads a run, whose stretches lie one behind the other, at given times.
 
     Between grid points it interpolates with a cubic that never reaches across a step of the
-    reference; at the instant of a step it gives the values before the step.
+    inputs; at the instant of a step it gives the values before the step.
     """
 
     def __init__(self, grid: Sequence[Stretch], times: Array) -> None:
         rows = np.zeros((len(times), NEIGHBOURS), dtype=np.int64)
         weights = np.zeros((len(times), NEIGHBOURS))
-        ends = np.array([part.start + part.step * part.steps for part in grid])
+        ends = np.array([part.end for part in grid])
         owner = np.minimum(np.searchsorted(ends, times - ON_GRID * grid[0].step), len(grid) - 1)
         offset = 0
         for number, part in enumerate(grid):
@@ -180,7 +198,7 @@ class Simulator:
         self.system, self.course, self.times = system, course, times
         self.step, self.least = step, least
         self._grid = stretches(course, step)
-        self._inputs = [np.full((part.steps + 1, 1), part.vref) for part in self._grid]
+        self._inputs = [self._inputs_of(part) for part in self._grid]
         self._sampling = Sampling(self._grid, times)
         self._last = b"", 0  # the sub-steps of the last values asked for
 
@@ -212,11 +230,11 @@ class Simulator:
         """Return the sub-steps that the rule asks for along a response with all its states."""
         p = self._vector(values)
         rest = linear_kernel(self.system).rest(p)
+        inputs = self._sampling(self._inputs)
         rate = 0.0
         for row in np.linspace(0, len(response.time) - 1, points).astype(int):
             x = np.array([response.signals[name][row] for name in self.system.states])
-            u = np.array([response.signals["vref"][row]]) - rest.r
-            rate = max(rate, self._motion(p, rest, x, u)[1])
+            rate = max(rate, self._motion(p, rest, x, np.ascontiguousarray(inputs[row]))[1])
         return self._parts(values, rate)
 
     def secured(self, values: Values) -> "Simulator":
@@ -275,6 +293,13 @@ class Simulator:
         code = tangent_kernel(self.system, outputs, free)
         run, slopes = code.run(self._vector(values), self._spans(self.substeps(values)))
         return self._sampling(run), self._sampling(slopes)
+
+    def _inputs_of(self, part: Stretch) -> Array:
+        """Return the inputs at the grid points of a stretch, (n + 1, nu)."""
+        times = np.linspace(part.start, part.end, part.steps + 1)
+        names, course = self.system.inputs, self.course
+        inputs = [course.input(name, times, course.level(name, part.start)) for name in names]
+        return np.ascontiguousarray(np.stack(inputs, axis=1))
 
     def _vector(self, values: Values) -> Array:
         return np.array([values[name] for name in self.system.parameters], dtype=np.float64)

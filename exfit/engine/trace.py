@@ -213,6 +213,13 @@ def graph_of(*values: Signal) -> Graph | None:
     return next((value.graph for value in values if isinstance(value, Node)), None)
 
 
+def is_zero(value: Signal) -> bool:
+    """Tell whether a value is the number zero as it stands, whatever the run brings."""
+    if isinstance(value, Node):
+        return value.constant == 0.0
+    return isinstance(value, float) and value == 0.0
+
+
 def where(condition: Signal, a: Signal, b: Signal) -> Signal:
     """Return a where the condition holds, else b."""
     graph = graph_of(condition, a, b)

@@ -6,17 +6,31 @@ A block with a non-windup limit returns its slope as ``Limited``: held at the li
 put back on it after every step, so that a response has no jags where a step ends beyond the limit.
 """
 
-from math import inf
+from math import inf, pi
 from math import sqrt as root
 from typing import NamedTuple
 
-from exfit.engine.trace import Signal, clip, exp, larger, log, smaller, sqrt, where
+from exfit.engine.trace import (
+    Signal,
+    clip,
+    cos,
+    exp,
+    is_zero,
+    larger,
+    log,
+    sin,
+    smaller,
+    sqrt,
+    where,
+)
 
 __all__ = [
     "SHORTEST",
     "Limited",
     "Saturation",
+    "angle",
     "clip",
+    "cos",
     "exp",
     "exponential",
     "exponential_se",
@@ -31,11 +45,13 @@ __all__ = [
     "limited_integrator",
     "limited_lag",
     "log",
+    "modulus",
     "pid",
     "quadratic",
     "rate",
     "rectifier",
     "rectifier_supply",
+    "sin",
     "smaller",
     "sqrt",
     "washout",
@@ -44,6 +60,21 @@ __all__ = [
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
 SQRT3 = root(3.0)
+NEWTON_STEPS = 4  # to an angle: each cubes the error, which is 0.33 at first
+
+
+def modulus(a: Signal, b: Signal) -> Signal:
+    """Return sqrt(a^2 + b^2); where b is not there at all, a, which is then positive."""
+    return a if is_zero(b) else sqrt(a * a + b * b)
+
+
+def angle(x: Signal, y: Signal) -> Signal:
+    """Return the angle of the point (x, y), in radians between -pi and pi; not for x = y = 0."""
+    size = sqrt(x * x + y * y)
+    found = where(y < 0.0, -pi / 2.0, pi / 2.0) * (1.0 - x / size)
+    for _ in range(NEWTON_STEPS):
+        found = found + (y * cos(found) - x * sin(found)) / size
+    return found
 
 
 class Limited(NamedTuple):

@@ -15,6 +15,7 @@ from exfit.plant.parts import (
     rest_of,
     seconds,
     state_of,
+    symbols,
 )
 
 
@@ -35,12 +36,12 @@ def alone(model: Model) -> System:
         return motion(d, model.states, {"vref": vref, "vt": output, **x})
 
     return System(
-        parameters=(*(row.symbol for row in model.sheet), VT0),
+        parameters=(*symbols("", model.sheet), VT0),
         setpoints=("vref", *model.setpoints),
         states=model.states,
         inputs=("vref",),
         outputs=("vref", "vt", *model.states),
-        time_constants=tuple(seconds(model.sheet)),
+        time_constants=tuple(seconds("", model.sheet)),
         rest=rest,
         motion=course,
     )

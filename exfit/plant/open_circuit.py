@@ -3,7 +3,7 @@
 from functools import cache
 
 from exfit.engine.system import Motion, Rest, Signals, System
-from exfit.models.machines import Machine
+from exfit.models.machines import Axes, Machine
 from exfit.models.sheet import Model
 from exfit.plant.parts import (
     MACHINE,
@@ -12,64 +12,66 @@ from exfit.plant.parts import (
     SaturationForm,
     exciter_inputs,
     exciter_parameters,
-    machine_parameters,
     motion,
+    named_parameters,
     refuse_taken,
     rest_of,
     seconds,
     state_of,
+    symbols,
     values_named,
+    values_of,
 )
+
+SIGNALS = ("vref", "vt", "efd", "ifd")
+NO_CURRENT = Axes(0.0, 0.0)
 
 
 @cache
-def open_circuit(model: Model, machine: Machine, saturation: SaturationForm) -> System:
+def open_circuit(
+    model: Model,
+    machine: Machine,
+    saturation: SaturationForm,
+    inputs: tuple[str, ...] = ("vref",),
+) -> System:
     """Return an exciter on a machine whose breaker is open, at rated speed.
 
     Parameters are the exciter's, the machine's (``machine.Tpd0``) and the initial voltage ``vt0``;
-    the input ``vref`` is the change of the reference from the one that holds ``vt0``. All per
-    unit.
+    of the inputs, ``vref`` is the change of the reference from the one that holds ``vt0``, and
+    ``vs`` a signal in place of a stabiliser. All per unit.
     """
-    signals = ("vref", "vt", "efd", "ifd")
-    refuse_taken(model, (*signals, *machine.states))
-    states = (*machine.states, *model.states)
+    refuse_taken(model, (*SIGNALS, *machine.d_axis))
+    states = (*machine.d_axis, *model.states)
 
     def rest(p: Signals) -> Rest:
-        of_machine = machine_parameters(p, machine.sheet)
-        fluxes = Names()
-        machine.rest(p[VT0], of_machine, fluxes)
-        at = machine.terminals(fluxes, of_machine)
-        u = exciter_inputs(vt=at.vt, ifd=at.ifd)
-        found = rest_of(model, at.ifd, u, exciter_parameters(p, model, saturation))
-        return Rest({**vars(fluxes), **found.states}, found.setpoints)
+        of_machine, fluxes = named_parameters(p, MACHINE, machine.sheet), Names()
+        machine.rest(Axes(0.0, p[VT0]), NO_CURRENT, of_machine, fluxes)
+        ifd = machine.field(fluxes, NO_CURRENT, of_machine)
+        u = exciter_inputs(vt=p[VT0], ifd=ifd)
+        found = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
+        return Rest({**values_of(fluxes, machine.d_axis), **found.states}, found.setpoints)
 
     def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
-        of_machine, fluxes = machine_parameters(p, machine.sheet), values_named(x, machine.states)
-        at = machine.terminals(fluxes, of_machine)
+        of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
+        fluxes = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
+        vt = machine.source(fluxes, of_machine).voltage.q
+        ifd = machine.field(fluxes, NO_CURRENT, of_machine)
         vref = r["vref"] + u["vref"]
-        seen = exciter_inputs(vref=vref, vt=at.vt, ifd=at.ifd)
-        d = Names()
+        seen = exciter_inputs(vref=vref, vt=vt, ifd=ifd, vs=u.get("vs", 0.0))
         efd = model.equations(
             state_of(model, x, r), seen, exciter_parameters(p, model, saturation), d
         )
-        machine.slopes(fluxes, efd, at.ifd, of_machine, d)
-        outputs = {"vref": vref, "vt": at.vt, "efd": efd, "ifd": at.ifd, **x}
+        machine.slopes(fluxes, efd, ifd, NO_CURRENT, of_machine, d)
+        outputs = {"vref": vref, "vt": vt, "efd": efd, "ifd": ifd, **x}
         return motion(d, states, outputs)
 
     return System(
-        parameters=(
-            *(row.symbol for row in model.sheet),
-            *(MACHINE + row.symbol for row in machine.sheet),
-            VT0,
-        ),
+        parameters=(*symbols("", model.sheet), *symbols(MACHINE, machine.sheet), VT0),
         setpoints=("vref", *model.setpoints),
         states=states,
-        inputs=("vref",),
-        outputs=(*signals, *states),
-        time_constants=(
-            *seconds(model.sheet),
-            *(MACHINE + name for name in seconds(machine.sheet)),
-        ),
+        inputs=inputs,
+        outputs=(*SIGNALS, *states),
+        time_constants=(*seconds("", model.sheet), *seconds(MACHINE, machine.sheet)),
         rest=rest,
         motion=course,
     )

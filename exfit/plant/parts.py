@@ -20,7 +20,10 @@ SATURATION: Mapping[str, SaturationForm] = {
     "exponential-se": exponential_se,
 }
 
-MACHINE = "machine."  # how the name of a machine's parameter begins
+# how the names of parameters begin, and the states of a stabiliser
+MACHINE = "machine."
+NETWORK = "network."
+STABILISER = "stabiliser."
 VT0 = "vt0"
 
 
@@ -52,19 +55,29 @@ def exciter_parameters(p: Signals, model: Model, saturation: SaturationForm) -> 
     return values
 
 
-def machine_parameters(p: Signals, rows: Sheet) -> Names:
-    """Return the parameters of a machine under the names of its data sheet."""
-    return Names(**{row.symbol: p[MACHINE + row.symbol] for row in rows})
+def named_parameters(p: Signals, prefix: str, rows: Sheet) -> Names:
+    """Return the parameters of a part under the names of its data sheet."""
+    return Names(**{row.symbol: p[prefix + row.symbol] for row in rows})
 
 
-def seconds(rows: Sheet) -> list[str]:
-    """Return the parameters that are times."""
-    return [row.symbol for row in rows if row.unit == "s"]
+def symbols(prefix: str, rows: Sheet) -> list[str]:
+    """Return the parameters of a part."""
+    return [prefix + row.symbol for row in rows]
+
+
+def seconds(prefix: str, rows: Sheet) -> list[str]:
+    """Return those of them that are times."""
+    return [prefix + row.symbol for row in rows if row.unit == "s"]
 
 
 def values_named(source: Signals, names: Iterable[str]) -> Names:
     """Return some values by name."""
     return Names(**{name: source[name] for name in names})
+
+
+def values_of(written: Names, names: Iterable[str]) -> dict[str, Signal]:
+    """Return some of the values that were written."""
+    return {name: getattr(written, name) for name in names}
 
 
 def state_of(model: Model, x: Signals, r: Signals) -> Names:

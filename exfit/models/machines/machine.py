@@ -1,0 +1,96 @@
+"""A synchronous machine as data, and what the kinds of machine share.
+
+Per unit as excitation studies have it: 1 pu of efd and of ifd gives 1 pu of terminal voltage on the
+air-gap line; power, current and reactances are on the machine's own base. The rotor's q axis leads
+its d axis. Neglected, as in PSS/E: armature resistance, the stator's own transients, and speed in
+the stator's voltages.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+from exfit.engine.trace import Signal
+from exfit.models.sheet import Record, Row, Sheet
+
+Faults = Iterable[tuple[str, str]]
+
+
+class Axes(NamedTuple):
+    """A voltage or a current, by its components along d and q, per unit."""
+
+    d: Signal
+    q: Signal
+
+
+class Source(NamedTuple):
+    """What the stator sees of a machine: a voltage behind a reactance on each axis."""
+
+    voltage: Axes
+    xd: Signal
+    xq: Signal
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine: its data sheet, its states and its functions.
+
+    Of the states ``d_axis`` move on open circuit too, ``q_axis`` on load only. ``source(s, p)`` is
+    what the states alone determine; ``field(s, i, p)`` is ifd at the stator current i; the
+    functions ``slopes(s, efd, ifd, i, p, d)`` and ``q_slopes(s, i, p, d)`` write slopes into ``d``;
+    ``rest(v, i, p, x)`` writes the states that hold v and i; ``quadrature(vt, i_p, i_q, p)`` is the
+    reactance behind which, at rest, the voltage lies on the q axis, where the current seen from vt
+    is i_p - j i_q; ``faults(values)`` yields (symbol, text) for data that contradict each other.
+    """
+
+    name: str
+    title: str
+    sheet: Sheet
+    d_axis: tuple[str, ...]
+    q_axis: tuple[str, ...]
+    source: Callable[..., Source]
+    field: Callable[..., Signal]
+    slopes: Callable[..., None]
+    q_slopes: Callable[..., None]
+    rest: Callable[..., None]
+    quadrature: Callable[..., Signal]
+    faults: Callable[[Mapping[str, float]], Faults]
+    records: tuple[Record, ...] = ()
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """All states, those that move on open circuit first."""
+        return (*self.d_axis, *self.q_axis)
+
+
+SWING: tuple[Row, ...] = (
+    ("H", 3.25, "s", (0.01, 100.0), "inertia constant, on load"),
+    ("D", 0.0, "pu", (0.0, 100.0), "damping, on load"),
+)
+
+SATURATION: tuple[Row, ...] = (
+    ("S10", 0.0, "pu", (0.0, 10.0), "saturation at 1.0 pu"),
+    ("S12", 0.0, "pu", (0.0, 10.0), "saturation at 1.2 pu"),
+)
+
+
+def descending(values: Mapping[str, float], *symbols: str) -> Faults:
+    """Yield a fault for each reactance that does not exceed the next one of the row."""
+    for larger, smaller in pairwise(symbols):
+        if values[larger] <= values[smaller]:
+            yield larger, f"{values[larger]:g} is not above {smaller} = {values[smaller]:g}"
+
+
+def saturation_order(values: Mapping[str, float]) -> Faults:
+    """Yield a fault where the saturation at 1.2 pu is not above that at 1.0 pu."""
+    s10, s12 = values["S10"], values["S12"]
+    if s12 <= s10 and (s10, s12) != (0.0, 0.0):
+        yield "S12", f"{s12:g} at 1.2 pu is not above S10 = {s10:g} at 1.0 pu"
+
+
+def power_order(values: Mapping[str, float]) -> Faults:
+    """Yield a fault where no power of the flux has the saturation at both points."""
+    yield from saturation_order(values)
+    if values["S10"] == 0.0 < values["S12"]:
+        yield "S10", "0 lies on no exponential saturation curve; give both as 0, or neither"

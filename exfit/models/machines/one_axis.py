@@ -1,0 +1,72 @@
+"""ONE_AXIS: the field winding alone, saturation by E'q."""
+
+from collections.abc import Mapping
+
+from exfit.engine.trace import Signal
+from exfit.models.machines.d_axis import curve, unsaturated_quadrature
+from exfit.models.machines.machine import (
+    SATURATION,
+    SWING,
+    Axes,
+    Faults,
+    Machine,
+    Source,
+    descending,
+    saturation_order,
+)
+from exfit.models.sheet import sheet
+
+SHEET = sheet(
+    ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
+    *SWING,
+    ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance, on load"),
+    ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
+    ("Xpd", 0.3, "pu", (0.001, 10.0), "d-axis transient reactance, on load"),
+    *SATURATION,
+)
+
+
+def source(s: Signal, p: Signal) -> Source:
+    """E'q behind X'd, nothing behind Xq."""
+    return Source(Axes(0.0, s.EQP), p.Xpd, p.Xq)
+
+
+def field(s: Signal, i: Axes, p: Signal) -> Signal:
+    """Return the field current."""
+    return s.EQP + (p.Xd - p.Xpd) * i.d + curve(s.EQP, p)
+
+
+def slopes(s: Signal, efd: Signal, ifd: Signal, i: Axes, p: Signal, d: Signal) -> None:
+    """T'd0 dE'q/dt = efd - ifd."""
+    d.EQP = (efd - ifd) / p.Tpd0
+
+
+def q_slopes(s: Signal, i: Axes, p: Signal, d: Signal) -> None:
+    """Nothing moves on this axis."""
+
+
+def rest(v: Axes, i: Axes, p: Signal, x: Signal) -> None:
+    """Write the flux that holds a voltage at a current."""
+    x.EQP = v.q + p.Xpd * i.d
+
+
+def faults(values: Mapping[str, float]) -> Faults:
+    """Yield what contradicts itself in the data sheet."""
+    yield from descending(values, "Xd", "Xpd")
+    yield from saturation_order(values)
+
+
+ONE_AXIS = Machine(
+    name="ONE_AXIS",
+    title="field winding alone, quadratic saturation by E'q",
+    sheet=SHEET,
+    d_axis=("EQP",),
+    q_axis=(),
+    source=source,
+    field=field,
+    slopes=slopes,
+    q_slopes=q_slopes,
+    rest=rest,
+    quadrature=unsaturated_quadrature,
+    faults=faults,
+)

@@ -1,0 +1,110 @@
+"""GENROU and GENROE: two windings on each axis, saturation by the air-gap flux on both."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import lag
+from exfit.models.machines.d_axis import (
+    D_AXIS,
+    along_axes,
+    curve,
+    d_rest,
+    d_slopes,
+    power_curve,
+    quadrature,
+    subtransient_flux,
+    unsaturated_field,
+)
+from exfit.models.machines.machine import (
+    SATURATION,
+    SWING,
+    Axes,
+    Faults,
+    Machine,
+    Source,
+    descending,
+    power_order,
+    saturation_order,
+)
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
+    ("Tppd0", 0.06, "s", (0.0, 1.0), "d-axis subtransient time constant"),
+    ("Tpq0", 0.5, "s", (0.01, 100.0), "q-axis transient time constant, on load"),
+    ("Tppq0", 0.077, "s", (0.001, 1.0), "q-axis subtransient time constant, on load"),
+    *SWING,
+    ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
+    ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
+    ("Xpd", 0.3, "pu", (0.001, 10.0), "d-axis transient reactance"),
+    ("Xpq", 0.55, "pu", (0.001, 10.0), "q-axis transient reactance, on load"),
+    ("Xppd", 0.25, "pu", (0.001, 10.0), "subtransient reactance"),
+    ("Xl", 0.2, "pu", (0.0, 10.0), "leakage reactance"),
+    *SATURATION,
+)
+
+CONS = "Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xl S10 S12"
+
+
+def source(s: Signal, p: Signal) -> Source:
+    """Both axes behind X''."""
+    share = (p.Xppd - p.Xl) / (p.Xpq - p.Xl)
+    along_d = share * s.EDP + (1.0 - share) * s.PSIQ
+    return Source(Axes(along_d, subtransient_flux(s, p)), p.Xppd, p.Xppd)
+
+
+def field(form: Callable[..., Signal], s: Signal, i: Axes, p: Signal) -> Signal:
+    """Return the field current."""
+    return unsaturated_field(s, i, p) + along_axes(form, source(s, p).voltage, p).q
+
+
+def q_slopes(form: Callable[..., Signal], s: Signal, i: Axes, p: Signal, d: Signal) -> None:
+    """T'q0 dE'd/dt and T''q0 dpsiq/dt: the d axis mirrored, with nothing that excites it."""
+    inner = p.Xpq - p.Xl
+    coupling = (p.Xpq - p.Xppd) / (inner * inner)
+    damped = s.EDP + inner * i.q
+    current = (p.Xq - p.Xpq) * (coupling * (damped - s.PSIQ) - i.q)
+    d.EDP = -(s.EDP + current + along_axes(form, source(s, p).voltage, p).d) / p.Tpq0
+    _, d.PSIQ = lag(damped, s.PSIQ, 1.0, p.Tppq0)
+
+
+def rest(form: Callable[..., Signal], v: Axes, i: Axes, p: Signal, x: Signal) -> None:
+    """Write the fluxes that hold a voltage at a current."""
+    d_rest(v, i, p, x)
+    flux = Axes(v.d - p.Xppd * i.q, v.q + p.Xppd * i.d)
+    x.EDP = (p.Xq - p.Xpq) * i.q - along_axes(form, flux, p).d
+    x.PSIQ = x.EDP + (p.Xpq - p.Xl) * i.q
+
+
+def faults(order: Callable[..., Faults], values: Mapping[str, float]) -> Faults:
+    """Yield what contradicts itself in a data sheet of a round-rotor machine."""
+    yield from descending(values, "Xd", "Xpd", "Xppd", "Xl")
+    yield from descending(values, "Xq", "Xpq", "Xppd")
+    yield from descending(values, "Tpd0", "Tppd0")
+    yield from order(values)
+
+
+def machine(
+    name: str, shape: str, form: Callable[..., Signal], order: Callable[..., Faults]
+) -> Machine:
+    """Return a round-rotor machine with one form of saturation."""
+    return Machine(
+        name=name,
+        title=f"round rotor, {shape} saturation by the air-gap flux",
+        sheet=SHEET,
+        d_axis=D_AXIS,
+        q_axis=("EDP", "PSIQ"),
+        source=source,
+        field=partial(field, form),
+        slopes=d_slopes,
+        q_slopes=partial(q_slopes, form),
+        rest=partial(rest, form),
+        quadrature=partial(quadrature, form),
+        faults=partial(faults, order),
+        records=(record(name, CONS),),
+    )
+
+
+GENROU = machine("GENROU", "quadratic", curve, saturation_order)
+GENROE = machine("GENROE", "exponential", power_curve, power_order)

@@ -1,0 +1,133 @@
+"""GENSAL and GENSAE: no field-like winding on the q axis.
+
+GENSAL saturates by E'q, on the d axis alone; GENSAE by the air-gap flux on both axes.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import lag
+from exfit.models.machines.d_axis import (
+    D_AXIS,
+    along_axes,
+    curve,
+    d_rest,
+    d_slopes,
+    power_curve,
+    quadrature,
+    subtransient_flux,
+    unsaturated_field,
+    unsaturated_quadrature,
+)
+from exfit.models.machines.machine import (
+    SATURATION,
+    SWING,
+    Axes,
+    Faults,
+    Machine,
+    Source,
+    descending,
+    power_order,
+    saturation_order,
+)
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
+    ("Tppd0", 0.06, "s", (0.0, 1.0), "d-axis subtransient time constant"),
+    ("Tppq0", 0.077, "s", (0.001, 1.0), "q-axis subtransient time constant, on load"),
+    *SWING,
+    ("Xd", 1.071, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
+    ("Xq", 0.704, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
+    ("Xpd", 0.351, "pu", (0.001, 10.0), "d-axis transient reactance"),
+    ("Xppd", 0.296, "pu", (0.001, 10.0), "subtransient reactance"),
+    ("Xl", 0.154, "pu", (0.0, 10.0), "leakage reactance"),
+    *SATURATION,
+)
+
+CONS = "Tpd0 Tppd0 Tppq0 H D Xd Xq Xpd Xppd Xl S10 S12"
+
+
+def source(s: Signal, p: Signal) -> Source:
+    """Both axes behind X''."""
+    return Source(Axes(s.PSIQ, subtransient_flux(s, p)), p.Xppd, p.Xppd)
+
+
+def gensal_field(s: Signal, i: Axes, p: Signal) -> Signal:
+    """Return the field current: E'q saturates."""
+    return unsaturated_field(s, i, p) + curve(s.EQP, p)
+
+
+def gensae_field(s: Signal, i: Axes, p: Signal) -> Signal:
+    """Return the field current: the air-gap flux saturates."""
+    return unsaturated_field(s, i, p) + along_axes(power_curve, source(s, p).voltage, p).q
+
+
+def gensal_q_slopes(s: Signal, i: Axes, p: Signal, d: Signal) -> None:
+    """T''q0 dpsiq/dt = (Xq - X'') iq - psiq."""
+    _, d.PSIQ = lag((p.Xq - p.Xppd) * i.q, s.PSIQ, 1.0, p.Tppq0)
+
+
+def gensae_q_slopes(s: Signal, i: Axes, p: Signal, d: Signal) -> None:
+    """T''q0 dpsiq/dt = (Xq - X'') iq - psiq, less what saturation takes."""
+    taken = along_axes(power_curve, source(s, p).voltage, p).d
+    _, d.PSIQ = lag((p.Xq - p.Xppd) * i.q - taken, s.PSIQ, 1.0, p.Tppq0)
+
+
+def rest(v: Axes, i: Axes, p: Signal, x: Signal) -> None:
+    """Write the fluxes that hold a voltage at a current."""
+    d_rest(v, i, p, x)
+    x.PSIQ = v.d - p.Xppd * i.q
+
+
+def faults(values: Mapping[str, float]) -> Faults:
+    """Yield what contradicts itself in a data sheet of a salient-pole machine."""
+    yield from descending(values, "Xd", "Xpd", "Xppd", "Xl")
+    yield from descending(values, "Xq", "Xppd")
+    yield from descending(values, "Tpd0", "Tppd0")
+
+
+def gensal_faults(values: Mapping[str, float]) -> Faults:
+    """Yield them, and what contradicts itself in a quadratic saturation."""
+    yield from faults(values)
+    yield from saturation_order(values)
+
+
+def gensae_faults(values: Mapping[str, float]) -> Faults:
+    """Yield them, and what contradicts itself in an exponential saturation."""
+    yield from faults(values)
+    yield from power_order(values)
+
+
+GENSAL = Machine(
+    name="GENSAL",
+    title="salient poles, quadratic saturation by E'q",
+    sheet=SHEET,
+    d_axis=D_AXIS,
+    q_axis=("PSIQ",),
+    source=source,
+    field=gensal_field,
+    slopes=d_slopes,
+    q_slopes=gensal_q_slopes,
+    rest=rest,
+    quadrature=unsaturated_quadrature,
+    faults=gensal_faults,
+    records=(record("GENSAL", CONS),),
+)
+
+GENSAE = Machine(
+    name="GENSAE",
+    title="salient poles, exponential saturation by the air-gap flux",
+    sheet=SHEET,
+    d_axis=D_AXIS,
+    q_axis=("PSIQ",),
+    source=source,
+    field=gensae_field,
+    slopes=d_slopes,
+    q_slopes=gensae_q_slopes,
+    rest=rest,
+    quadrature=partial(quadrature, power_curve),
+    faults=gensae_faults,
+    records=(record("GENSAE", CONS),),
+)
