@@ -32,6 +32,8 @@ ORDER = (
     "exfit.models",
     "exfit.plant.parts",
     "exfit.plant.open_circuit",
+    "exfit.plant.infinite_bus",
+    "exfit.plant.playback",
     "exfit.plant.alone",
     "exfit.plant",
     "exfit.record",

@@ -1,25 +1,48 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
 from exfit.plant.alone import alone
+from exfit.plant.infinite_bus import Given, Stabilised, flow_sheet, infinite_bus
 from exfit.plant.open_circuit import open_circuit
 from exfit.plant.parts import (
     MACHINE,
+    NETWORK,
     SATURATION,
+    STABILISER,
     VT0,
     Names,
     SaturationForm,
     exciter_inputs,
     exciter_parameters,
 )
+from exfit.plant.playback import (
+    DRIVING,
+    EFD0,
+    VREF0,
+    initial,
+    machine_playback,
+    playback,
+)
 
 __all__ = [
+    "DRIVING",
+    "EFD0",
     "MACHINE",
+    "NETWORK",
     "SATURATION",
+    "STABILISER",
+    "VREF0",
     "VT0",
+    "Given",
     "Names",
     "SaturationForm",
+    "Stabilised",
     "alone",
     "exciter_inputs",
     "exciter_parameters",
+    "flow_sheet",
+    "infinite_bus",
+    "initial",
+    "machine_playback",
     "open_circuit",
+    "playback",
 ]

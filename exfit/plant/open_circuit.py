@@ -1,8 +1,11 @@
 """A machine whose breaker is open, at rated speed."""
 
+from collections.abc import Callable
 from functools import cache
+from typing import NamedTuple
 
 from exfit.engine.system import Motion, Rest, Signals, System
+from exfit.engine.trace import Signal
 from exfit.models.machines import Axes, Machine
 from exfit.models.sheet import Model
 from exfit.plant.parts import (
@@ -27,6 +30,32 @@ SIGNALS = ("vref", "vt", "efd", "ifd")
 NO_CURRENT = Axes(0.0, 0.0)
 
 
+class OpenMachine(NamedTuple):
+    """A machine on open circuit at one instant; ``moved(efd, d)`` writes its slopes."""
+
+    vt: Signal
+    ifd: Signal
+    moved: Callable[[Signal, Names], None]
+
+
+def machine_on_open_circuit(machine: Machine, x: Signals, p: Names) -> OpenMachine:
+    """Return what a machine without stator current shows; the fluxes of its q axis are zero."""
+    s = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
+    ifd = machine.field(s, NO_CURRENT, p)
+
+    def moved(efd: Signal, d: Names) -> None:
+        machine.slopes(s, efd, ifd, NO_CURRENT, p, d)
+
+    return OpenMachine(machine.source(s, p).voltage.q, ifd, moved)
+
+
+def at_rest(machine: Machine, vt: Signal, p: Names) -> tuple[dict[str, Signal], Signal]:
+    """Return the states that hold vt without stator current, and the field current."""
+    fluxes = Names()
+    machine.rest(Axes(0.0, vt), NO_CURRENT, p, fluxes)
+    return values_of(fluxes, machine.d_axis), machine.field(fluxes, NO_CURRENT, p)
+
+
 @cache
 def open_circuit(
     model: Model,
@@ -44,25 +73,20 @@ def open_circuit(
     states = (*machine.d_axis, *model.states)
 
     def rest(p: Signals) -> Rest:
-        of_machine, fluxes = named_parameters(p, MACHINE, machine.sheet), Names()
-        machine.rest(Axes(0.0, p[VT0]), NO_CURRENT, of_machine, fluxes)
-        ifd = machine.field(fluxes, NO_CURRENT, of_machine)
+        fluxes, ifd = at_rest(machine, p[VT0], named_parameters(p, MACHINE, machine.sheet))
         u = exciter_inputs(vt=p[VT0], ifd=ifd)
         found = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
-        return Rest({**values_of(fluxes, machine.d_axis), **found.states}, found.setpoints)
+        return Rest({**fluxes, **found.states}, found.setpoints)
 
     def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
-        of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
-        fluxes = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
-        vt = machine.source(fluxes, of_machine).voltage.q
-        ifd = machine.field(fluxes, NO_CURRENT, of_machine)
+        d = Names()
+        at = machine_on_open_circuit(machine, x, named_parameters(p, MACHINE, machine.sheet))
         vref = r["vref"] + u["vref"]
-        seen = exciter_inputs(vref=vref, vt=vt, ifd=ifd, vs=u.get("vs", 0.0))
-        efd = model.equations(
-            state_of(model, x, r), seen, exciter_parameters(p, model, saturation), d
-        )
-        machine.slopes(fluxes, efd, ifd, NO_CURRENT, of_machine, d)
-        outputs = {"vref": vref, "vt": vt, "efd": efd, "ifd": ifd, **x}
+        seen = exciter_inputs(vref=vref, vt=at.vt, ifd=at.ifd, vs=u.get("vs", 0.0))
+        values = exciter_parameters(p, model, saturation)
+        efd = model.equations(state_of(model, x, r), seen, values, d)
+        at.moved(efd, d)
+        outputs = {"vref": vref, "vt": at.vt, "efd": efd, "ifd": at.ifd, **x}
         return motion(d, states, outputs)
 
     return System(
