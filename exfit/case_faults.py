@@ -10,82 +10,99 @@ from math import inf, isfinite
 from typing import Any
 
 from exfit.case_form import near, show
+from exfit.case_parts import WITHOUT_EXCITER, Part, Parts
 from exfit.models.blocks import SHORTEST
-from exfit.models.machines import Machine
-from exfit.models.sheet import (
-    Model,
-    Parameter,
-    Sheet,
-    crossed_limits,
-    exponential_faults,
-    saturation_faults,
-    typical,
-)
+from exfit.models.sheet import Parameter
+from exfit.plant import DRIVING, MACHINE
 from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
 Contradictions = Iterable[tuple[str, str]]
 
-FIXED: Place = ("parameters", "fixed")
-FREE: Place = ("parameters", "free")
-MACHINE: Place = ("plant", "parameters")
 TAKEN = ("fit", "response", "history", "overlay", "convergence", "trajectories")
+EVENTS: Mapping[str, tuple[str, ...]] = {
+    "open-circuit": ("vref", "vs"),
+    "infinite-bus": ("vref", "vs", "E", "network"),
+    "playback": ("vref",),
+    "machine-playback": (),
+    "none": ("vref",),
+}
+SIGNALS: Mapping[str, tuple[str, ...]] = {
+    "open-circuit": ("vt", "efd", "ifd"),
+    "infinite-bus": ("vt", "efd", "ifd", "p", "q"),
+    "playback": ("vref", *DRIVING, "efd"),
+    "machine-playback": ("efd", "vt", "ifd"),
+    "none": ("vt",),
+}
+NEEDED: Mapping[str, tuple[str, ...]] = {
+    "playback": ("vt", "efd"),
+    "machine-playback": ("efd",),
+}
 
 
-def contradictions(data: Data, exciter: Model | None, machine: Machine | None) -> Iterator[Fault]:
+def contradictions(data: Data, parts: Parts) -> Iterator[Fault]:
     """Yield the faults of a case file's data beyond its form."""
-    if exciter is not None:
-        yield from _exciter_faults(data, exciter)
-    if machine is not None:
-        yield from _machine_faults(data, machine)
-    yield from _trial_faults((), data, data)
+    kind = str(_section(data, "plant").get("type"))
+    yield from _model_faults(data, kind)
+    for part in parts.all:
+        yield from _part_faults(data, part, kind)
+    yield from _stabiliser_faults(data, parts, kind)
+    yield from _trial_faults((), data, data, kind)
     for at, trial in enumerate(_list(data, "validate")):
-        yield from _trial_faults(("validate", at), trial, data)
+        yield from _trial_faults(("validate", at), trial, data, kind)
     yield from _repeated_names(_list(data, "validate"))
     if "accept" in data and not _list(data, "validate"):
         yield Fault(("accept",), "there is no validation that it could judge")
 
 
-def resolved(rows: Sheet, *given: Mapping[str, float]) -> dict[str, float]:
-    """Return a value for each parameter of a sheet: typical unless given, the last one wins."""
-    values = typical(rows)
-    for some in given:
-        values |= {symbol: value for symbol, value in some.items() if symbol in values}
-    return values
+def _model_faults(data: Data, kind: str) -> Iterator[Fault]:
+    if kind not in WITHOUT_EXCITER:
+        if "model" not in data:
+            yield Fault(("model",), "is missing")
+        return
+    for key in ("model", "saturation", "parameters", "stabiliser"):
+        if key in data:
+            yield Fault((key,), f"does not go with plant {kind}: the machine stands alone")
 
 
-def _exciter_faults(data: Data, exciter: Model) -> Iterator[Fault]:
-    fixed, free = _section(data, *FIXED), _section(data, *FREE)
-    rows = {row.symbol: row for row in exciter.sheet}
-    yield from _unknown_symbols(FIXED, fixed, rows, exciter.name)
-    yield from _unknown_symbols(FREE, free, rows, exciter.name)
-    yield from (Fault((*FREE, symbol), "both fixed and free") for symbol in free if symbol in fixed)
-    yield from _outside_sheet(FIXED, fixed, rows)
-    for symbol in free:
-        yield from _bound_faults((*FREE, symbol), _section(free, symbol), rows.get(symbol))
-
+def _part_faults(data: Data, part: Part, kind: str) -> Iterator[Fault]:
+    """Yield the faults of what the file gives for one part, and of its free parameters."""
+    fixed = _section(data, *part.fixed)
+    free = {} if part.free is None else _section(data, *part.free)
+    places = {symbol: (*part.fixed, symbol) for symbol in fixed}
+    rows = {row.symbol: row for row in part.sheet}
+    yield from _unknown_symbols(part.fixed, fixed, rows, part.name)
+    yield from _outside_sheet(part.fixed, fixed, rows)
+    if part.free is not None:
+        yield from _unknown_symbols(part.free, free, rows, part.name)
+        for symbol in free:
+            if symbol in fixed:
+                yield Fault((*part.free, symbol), "both fixed and free")
+            yield from _bound_faults((*part.free, symbol), _section(free, symbol), rows.get(symbol))
+            places[symbol] = (*part.free, symbol, "start")
     starts = {symbol: _section(free, symbol).get("start") for symbol in free}
-    given = {symbol: (*FIXED, symbol) for symbol in fixed}
-    given |= {symbol: (*FREE, symbol, "start") for symbol in free}
-    values = _readable(exciter.sheet, fixed, starts)
-    yield from _placed(FIXED[:1], given, crossed_limits(values))
-    yield from _placed(FIXED[:1], given, saturation_faults(values))
-    if str(data.get("saturation")).startswith("exponential"):
-        yield from _placed(("saturation",), given, exponential_faults(values))
+    values = _readable(part, fixed, starts)
+    section = part.fixed if part.fixed[0] == "plant" else part.fixed[:1]
+    yield from _placed(section, places, part.check(values))
+    if part.prefix == MACHINE and kind == "infinite-bus" and values.get("Tppd0", 1.0) < SHORTEST:
+        text = f"Tppd0: {show(values['Tppd0'])} is for open circuit; on load it must be positive"
+        yield Fault(places.get("Tppd0", part.fixed), text)
 
 
-def _machine_faults(data: Data, machine: Machine) -> Iterator[Fault]:
-    parameters = _section(data, *MACHINE)
-    rows = {row.symbol: row for row in machine.sheet}
-    single = [
-        *_unknown_symbols(MACHINE, parameters, rows, machine.name),
-        *_outside_sheet(MACHINE, parameters, rows),
-    ]
-    yield from single
-    values = _readable(machine.sheet, parameters)
-    if not single and len(values) == len(rows):
-        given = {symbol: (*MACHINE, symbol) for symbol in parameters}
-        yield from _placed(MACHINE, given, machine.faults(values))
+def _stabiliser_faults(data: Data, parts: Parts, kind: str) -> Iterator[Fault]:
+    section = _section(data, "stabiliser")
+    if not section:
+        return
+    if kind in ("playback", "none"):
+        yield Fault(("stabiliser",), f"does not go with plant {kind}: nothing feeds it")
+    if kind == "open-circuit" and _section(section, "free"):
+        yield Fault(("stabiliser", "free"), "on open circuit a stabiliser does not act")
+    inputs = section.get("inputs")
+    if parts.stabiliser is not None and isinstance(inputs, list):
+        wanted = len(parts.stabiliser.inputs)
+        if len(inputs) != wanted:
+            text = f"{len(inputs)} given; {parts.stabiliser.name} listens to {wanted}"
+            yield Fault(("stabiliser", "inputs"), text)
 
 
 def _unknown_symbols(
@@ -143,33 +160,79 @@ def _placed(section: Place, given: Mapping[str, Place], found: Contradictions) -
             yield Fault(others[0] if others else section, f"{symbol} (typical): {text}")
 
 
-def _trial_faults(place: Place, trial: Any, data: Data) -> Iterator[Fault]:
+def _trial_faults(place: Place, trial: Any, data: Data, kind: str) -> Iterator[Fault]:
     """Yield what does not fit together in a test and its record."""
     test, record = _section(trial, "test"), _section(trial, "record")
-    yield from _step_faults((*place, "test"), test)
+    yield from _event_faults((*place, "test"), test, kind)
+    for index, switch in enumerate(_list(test, "network")):
+        if "E" in _numbers(switch) and "E" not in _section(data, "plant", "network"):
+            here = (*place, "test", "network", index, "E")
+            yield Fault(here, "only where plant.network gives E; test.E changes it by steps")
     has_record = isinstance(trial, dict) and "record" in trial
     if has_record:
         yield from _record_faults(place, test, record)
+        yield from _channel_faults((*place, "record"), _section(record, "channels"), kind)
+    elif kind in NEEDED:
+        yield Fault((*place, "record"), f"is missing: plant {kind} plays it back")
     elif not place:
         yield from _missing_without_record((*place, "test"), test)
     vt0 = _numbers(test).get("vt0")
-    kind = _section(data, "plant").get("type")
-    if kind == "open-circuit" and vt0 is not None and vt0 <= 0:
+    if kind in SIGNALS and kind != "none" and vt0 is not None and vt0 <= 0:
         yield Fault((*place, "test", "vt0"), f"{show(vt0)} is not above 0")
-    if kind == "none":
-        for signal in _section(record, "channels"):
-            if signal in ("efd", "ifd"):
-                here = (*place, "record", "channels", signal)
-                yield Fault(here, "without a plant there is only vt")
 
 
-def _step_faults(place: Place, test: Data) -> Iterator[Fault]:
+def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
+    for signal in channels:
+        if signal not in SIGNALS.get(kind, (signal,)):
+            known = ", ".join(SIGNALS[kind])
+            here = (*place, "channels", signal)
+            yield Fault(here, f"does not go with plant {kind}, which has {known}")
+    for signal in NEEDED.get(kind, ()):
+        if channels and signal not in channels:
+            yield Fault((*place, "channels", signal), f"is missing: plant {kind} needs it")
+    if kind == "machine-playback" and channels and not {"vt", "ifd"} & channels.keys():
+        yield Fault((*place, "channels"), "neither vt nor ifd: there is nothing to compare")
+
+
+def _event_faults(place: Place, test: Data, kind: str) -> Iterator[Fault]:
+    """Yield the faults of the steps and switchings of a test."""
+    events = {"vref", "vs", "E", "network"}
+    for name in sorted(events):
+        yield from _step_faults((*place, name), test, name)
+        if name in test and name not in EVENTS.get(kind, (name,)):
+            yield Fault((*place, name), f"does not go with plant {kind}")
+    instants = _instants(test)
+    if test and kind not in NEEDED and not events & test.keys():
+        yield Fault(place, f"no step: give one of {', '.join(EVENTS.get(kind, ('vref',)))}")
+    if "begin" in test and kind in NEEDED:
+        yield Fault((*place, "begin"), f"does not go with plant {kind}: the record drives it")
+    steady = _numbers(test).get("steady_until")
+    if steady is None and kind in NEEDED and not instants:
+        yield Fault((*place, "steady_until"), "is missing: until when is the record at rest?")
+    if steady is not None and instants and steady > min(instants):
+        text = f"{show(steady)} s is after the first step, at {show(min(instants))} s"
+        yield Fault((*place, "steady_until"), text)
+
+
+def _instants(test: Data) -> list[float]:
+    """Return the readable instants of all events of a test."""
+    return [
+        numbers["at"]
+        for name in ("vref", "vs", "E", "network")
+        for numbers in map(_numbers, _list(test, name))
+        if "at" in numbers
+    ]
+
+
+def _step_faults(place: Place, test: Data, name: str) -> Iterator[Fault]:
     before: float | None = None
     end = _numbers(test).get("duration")
-    for index, step in enumerate(_list(test, "vref")):
-        here, numbers = (*place, "vref", index), _numbers(step)
+    for index, step in enumerate(_list(test, name)):
+        here, numbers = (*place, index), _numbers(step)
         if numbers.get("step") == 0:
             yield Fault((*here, "step"), "0 is no step")
+        if name == "network" and isinstance(step, dict) and not {"R", "X", "E"} & step.keys():
+            yield Fault(here, "changes nothing: give R, X or E")
         at = numbers.get("at")
         if at is not None and before is not None and at <= before:
             yield Fault(
@@ -208,12 +271,13 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
             here, f"{show(begin)} s is after {show(start)} s, where the record's window starts"
         )
     start = start if begin is None else begin
-    for index, step in enumerate(_list(test, "vref")):
-        at = _numbers(step).get("at")
-        if at is not None and not start <= at < end:
-            limits = f"{show(start)} ... {show(end)} s"
-            here = (*place, "test", "vref", index, "at")
-            yield Fault(here, f"{show(at)} s lies outside the window {limits} of the record")
+    for name in ("vref", "vs", "E", "network"):
+        for index, step in enumerate(_list(test, name)):
+            at = _numbers(step).get("at")
+            if at is not None and not start <= at < end:
+                limits = f"{show(start)} ... {show(end)} s"
+                here = (*place, "test", name, index, "at")
+                yield Fault(here, f"{show(at)} s lies outside the window {limits} of the record")
 
 
 def _missing_without_record(place: Place, test: Data) -> Iterator[Fault]:
@@ -239,12 +303,12 @@ def _repeated_names(trials: list[Any]) -> Iterator[Fault]:
         seen.setdefault(name.casefold(), repr(name))
 
 
-def _readable(rows: Sheet, *given: Data) -> dict[str, float]:
+def _readable(part: Part, *given: Data) -> dict[str, float]:
     """Return the resolved values without those that the file gives in no readable form."""
     unreadable = {
         symbol for some in given for symbol, value in some.items() if not _is_number(value)
     }
-    values = resolved(rows, *map(_numbers, given))
+    values = part.resolved(*map(_numbers, given))
     return {symbol: value for symbol, value in values.items() if symbol not in unreadable}
 
 

@@ -6,8 +6,6 @@ from pathlib import Path
 from exfit.case import Case
 from exfit.case_form import near
 from exfit.errors import CaseError
-from exfit.models.sheet import crossed_limits, exponential_faults, saturation_faults
-from exfit.plant import MACHINE
 from exfit.trial import values_of
 from exfit.yaml_lines import read_text, read_yaml
 
@@ -17,9 +15,7 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
 
     Raises CaseError, naming ``place``, for a symbol that no data sheet has or a value it excludes.
     """
-    rows = {row.symbol: row for row in case.exciter.sheet}
-    if case.machine is not None:
-        rows |= {MACHINE + row.symbol: row for row in case.machine.sheet}
+    rows = {part.prefix + row.symbol: row for part in case.parts.all for row in part.sheet}
     faults = []
     for name, value in given.items():
         if name not in rows:
@@ -36,13 +32,9 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
 
 def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
     """Yield what does not fit together in the values of a system."""
-    found = [*crossed_limits(values), *saturation_faults(values)]
-    if case.saturation != "quadratic":
-        found += exponential_faults(values)
-    if case.machine is not None:
-        own = {row.symbol: values[MACHINE + row.symbol] for row in case.machine.sheet}
-        found += [(MACHINE + symbol, text) for symbol, text in case.machine.faults(own)]
-    yield from (f"{symbol}: {text}" for symbol, text in found)
+    for part in case.parts.all:
+        own = {row.symbol: values[part.prefix + row.symbol] for row in part.sheet}
+        yield from (f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own))
 
 
 def read_parameters(case: Case, path: Path) -> dict[str, float]:
@@ -56,8 +48,8 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
     texts = [f"{path}: {fault.text}" for fault in faults]
     if not isinstance(parameters, dict) or not parameters:
         raise CaseError([*texts, f"{path}: parameters: missing"])
-    if str(content.get("model", case.exciter.name)).upper() != case.exciter.name:
-        texts.append(f"{path}: model: {content['model']}, but {case.path} has {case.exciter.name}")
+    if str(content.get("model", case.subject)).upper() != case.subject:
+        texts.append(f"{path}: model: {content['model']}, but {case.path} has {case.subject}")
     texts += [
         f"{path}: parameters.{name}: {value!r} is not a number"
         for name, value in parameters.items()

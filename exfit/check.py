@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from exfit.case import Case
 from exfit.models.blocks import SHORTEST
 from exfit.notes import typical_notes
-from exfit.plant import VT0
 from exfit.residuals import Channel, Residuals
 from exfit.simulate import Course, Simulator
 from exfit.trial import (
@@ -62,13 +61,15 @@ class Check:
 def check(case: Case) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
     system = system_of(case)
+    levels: Mapping[str, float]
     if case.record is None:
-        simulator, vt0 = plain_simulator(case)
+        simulator, levels = plain_simulator(case)
         channels: tuple[Channel, ...] = (Channel("vt", np.zeros(len(simulator.times))),)
     else:
         trial = fitted_trial(case)
-        simulator, vt0, channels = trial.simulator, trial.vt0, trial.channels
-    values = {**values_of(case, {}), VT0: vt0}
+        simulator, levels, channels = trial.simulator, trial.levels, trial.channels
+    values = {**values_of(case, {}), **levels}
+    signals = tuple(channel.signal for channel in channels)
     free = free_of(case)
     names = [one.name for one in free]
     fixed = {name: value for name, value in values.items() if name not in names}
@@ -78,14 +79,14 @@ def check(case: Case) -> Check:
     still = Simulator(
         system, Course(0.0, FLAT_SECONDS, ()), np.linspace(0.0, FLAT_SECONDS, 601), simulator.step
     )
-    flat = still.response(values, ("vt",)).signals["vt"]
+    flat, _ = still.samples(values, signals)
     return Check(
         deviations=deviations(Residuals(simulator, channels, free, fixed)),
         bypassed=tuple(lags),
         substeps=substeps,
         step=simulator.step,
-        step_error=simulator.step_error(values, tuple(channel.signal for channel in channels)),
-        drift=float(np.max(np.abs(flat - vt0))),
+        step_error=simulator.step_error(values, signals),
+        drift=float(np.max(np.abs(flat - flat[0]))),
         notes=tuple(typical_notes(case)),
     )
 

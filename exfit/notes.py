@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.case import Case
-from exfit.plant import MACHINE
+from exfit.case import Case, InfiniteBus
 from exfit.residuals import Residuals
 from exfit.result import Comparison
 from exfit.simulate import parameters_used
@@ -57,7 +56,9 @@ def notes(
         )
 
 
-def match_notes(fitted: Comparison, tried: Sequence[Comparison], vt0: float) -> Iterator[str]:
+def match_notes(
+    fitted: Comparison, tried: Sequence[Comparison], vt0: float | None
+) -> Iterator[str]:
     """Yield where the response does not describe the record, or does not hold on another one."""
     if not fitted.fit_percent > 0.0:
         yield (
@@ -69,7 +70,7 @@ def match_notes(fitted: Comparison, tried: Sequence[Comparison], vt0: float) -> 
         way = measured.final_value - measured.initial_value
         if way * (simulated.final_value - simulated.initial_value) < 0.0:
             yield f"the record moves by {way:+.3g} pu, the response the other way"
-        if abs(measured.initial_value - vt0) > FAR * abs(vt0):
+        if vt0 is not None and abs(measured.initial_value - vt0) > FAR * abs(vt0):
             yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
     for one in tried:
         if one.rmse > MUCH_WORSE * fitted.rmse:
@@ -81,16 +82,17 @@ def match_notes(fitted: Comparison, tried: Sequence[Comparison], vt0: float) -> 
 
 def typical_notes(case: Case) -> Iterator[str]:
     """Yield which values were taken from the data sheet, because the case does not give them."""
-    used = parameters_used(system_of(case))
-    exciter = [name for name in case.typical_symbols if name in used]
-    machine = [name for name in case.typical_machine_symbols if MACHINE + name in used]
-    for owner, names, values in (
-        (case.exciter.name, exciter, case.values()),
-        ("machine", machine, case.machine_values()),
-    ):
-        if names:
-            listed = ", ".join(f"{name} {values[name]:g}" for name in names)
-            yield f"typical values taken for {owner}: {listed}"
+    used, values, typical = parameters_used(system_of(case)), case.values(), case.typical()
+    for part in case.parts.all:
+        names = [part.prefix + row.symbol for row in part.sheet]
+        taken = [name for name in names if name in typical and name in used]
+        if taken:
+            listed = ", ".join(
+                f"{name.removeprefix(part.prefix)} {values[name]:g}" for name in taken
+            )
+            yield f"typical values taken for {part.name}: {listed}"
+    if case.parts.stabiliser is not None and not isinstance(case.plant, InfiniteBus):
+        yield f"{case.parts.stabiliser.name} does not act: the breaker is open"
 
 
 def redundant(jacobian: Array, names: Sequence[str]) -> Iterator[list[str]]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,9 +152,21 @@ class Comparison:
         }
 
 
+class PartOf(NamedTuple):
+    """A part of what was fitted: its kind, its model, how its parameters' names begin."""
+
+    kind: str
+    name: str
+    prefix: str
+
+
 @dataclass(frozen=True)
 class FitResult:
-    """A fit: what was found, how, and how well it matches."""
+    """A fit: what was found, how, and how well it matches.
+
+    ``parameters`` holds the fitted ones, ``fixed`` all others, of every part, under their names in
+    the system: KA, machine.Tpd0.
+    """
 
     case: Path
     name: str
@@ -163,7 +175,7 @@ class FitResult:
     parameters: Mapping[str, FittedParameter]
     fixed: Mapping[str, float]
     typical: tuple[str, ...]
-    machine: Mapping[str, float]
+    parts: tuple[PartOf, ...]
     comparison: Comparison
     status: int
     message: str
@@ -192,8 +204,16 @@ class FitResult:
 
     @property
     def values(self) -> dict[str, float]:
-        """Every parameter of the exciter."""
+        """Every parameter of all parts."""
         return {**self.fixed, **{name: one.value for name, one in self.parameters.items()}}
+
+    def values_of(self, prefix: str) -> dict[str, float]:
+        """Return the values of one part by symbol; the exciter's prefix is empty."""
+        own = {name: v for name, v in self.values.items() if name.startswith(prefix)}
+        if not prefix:
+            others = tuple(part.prefix for part in self.parts if part.prefix)
+            own = {name: v for name, v in own.items() if not name.startswith(others)}
+        return {name.removeprefix(prefix): value for name, value in own.items()}
 
     @property
     def accepted(self) -> bool:
@@ -221,9 +241,13 @@ class FitResult:
                 }
                 for name, one in self.parameters.items()
             },
-            "fixed": dict(self.fixed),
+            "fixed": {
+                name: value
+                for name, value in self.values_of("").items()
+                if name not in self.parameters
+            },
             "typical": list(self.typical),
-            "machine": dict(self.machine),
+            **self._parts_as_json(),
             "cost": self.comparison.cost,
             "start_cost": self.start_cost,
             "rmse": self.comparison.rmse,
@@ -243,6 +267,16 @@ class FitResult:
             "versions": dict(self.versions),
             "inputs": dict(self.inputs),
         }
+
+    def _parts_as_json(self) -> dict[str, Any]:
+        """Return the values of machine, network and stabiliser, and the names of their models."""
+        content: dict[str, Any] = {}
+        parts = {part.kind: part for part in self.parts}
+        for kind in ("machine", "network", "stabiliser"):
+            part = parts.get(kind)
+            content[kind] = {} if part is None else self.values_of(part.prefix)
+            content[f"{kind}_model"] = None if part is None else part.name
+        return content
 
 
 def to_json(content: Mapping[str, Any]) -> str:
@@ -337,6 +371,8 @@ def parameter_file(result: FitResult) -> str:
     ]
     for name, value in result.values.items():
         one = result.parameters.get(name)
+        if one is None and name not in result.values_of(""):
+            continue  # as the case has it
         if one is None:
             origin = "typical" if name in result.typical else "fixed"
         else:

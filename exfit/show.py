@@ -99,10 +99,8 @@ def _cells(line: Iteration) -> tuple[str, ...]:
 
 def task(case: Case, strategy: str | None) -> str:
     """Return what a fit is about to do."""
-    free = ", ".join(case.parameters.free)
-    return (
-        f"{case.path.stem}: {case.exciter.name}, {strategy or case.estimate.strategy}; free {free}"
-    )
+    free = ", ".join(case.free())
+    return f"{case.path.stem}: {case.subject}, {strategy or case.estimate.strategy}; free {free}"
 
 
 def written(console: Console, folder: Path) -> None:

@@ -15,7 +15,7 @@ from exfit.notes import match_notes, notes
 from exfit.plant import VT0
 from exfit.record import file_hash
 from exfit.residuals import JACOBIANS, Residuals
-from exfit.result import Comparison, FitResult, FittedParameter, Iteration
+from exfit.result import Comparison, FitResult, FittedParameter, Iteration, PartOf
 from exfit.simulate import Response
 from exfit.trial import (
     Trial,
@@ -79,12 +79,12 @@ def fit(
     return FitResult(
         case=case.path,
         name=case.path.stem,
-        model=case.exciter.name,
+        model=case.subject,
         strategy=method,
         parameters=_parameters(case, residuals, values),
-        fixed={name: v for name, v in case.values().items() if name not in case.parameters.free},
-        typical=case.typical_symbols,
-        machine=case.machine_values(),
+        fixed={name: v for name, v in case.values().items() if name not in case.free()},
+        typical=case.typical(),
+        parts=tuple(PartOf(part.kind, part.name, part.prefix) for part in case.parts.all),
         comparison=compared,
         status=found.status,
         message=found.message,
@@ -98,7 +98,7 @@ def fit(
         seconds=clock.perf_counter() - began,
         notes=(
             *notes(case, residuals, found, compared),
-            *match_notes(compared, tried, trial.vt0),
+            *match_notes(compared, tried, trial.levels.get(VT0)),
         ),
         validation=tried,
         versions=versions(),
@@ -127,7 +127,7 @@ def refuse_unfit(case: Case, residuals: Residuals) -> None:
 
 
 def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, FittedParameter]:
-    units = {row.symbol: row.unit for row in case.exciter.sheet}
+    units = case.units()
     return {
         one.name: FittedParameter(
             value=values[one.name],
@@ -162,7 +162,7 @@ def versions() -> dict[str, str]:
 def inputs(case: Case, *trials: Trial) -> dict[str, str]:
     """Return the SHA-256 of every file that went into a result."""
     files = {"case": file_hash(case.path)}
-    if case.model.endswith(".py"):
+    if case.model is not None and case.model.endswith(".py"):
         files["model"] = file_hash(case.folder / case.model)
     labels = ["record", *(f"validate.{one.name}" for one in case.validations)]
     return files | {
@@ -186,10 +186,10 @@ def simulate(case: Case, changes: Values) -> Simulation:
     values = values_of(case, changes)
     if case.record is not None:
         trial = trial_of(case, case.test, case.record).secured(values)
-        response = trial.simulator.response({**values, VT0: trial.vt0})
+        response = trial.simulator.response({**values, **trial.levels})
         return Simulation(response, trial.compare("record", values))
-    simulator, vt0 = plain_simulator(case)
-    at = {**values, VT0: vt0}
+    simulator, levels = plain_simulator(case)
+    at = {**values, **levels}
     response = secured(simulator, at, case.path).response(at)
     return Simulation(response, None)
 

@@ -1,22 +1,47 @@
 """A test of a case, ready to be simulated: its system, its course, its record."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from traceback import extract_tb
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case import BumpTest, Case, NoPlant, RecordFile, initial_voltage
+from exfit.case import (
+    BumpTest,
+    Case,
+    InfiniteBus,
+    MachinePlayback,
+    OpenCircuit,
+    Playback,
+    RecordFile,
+    initial_level,
+    initial_voltage,
+)
 from exfit.engine.system import System, trace
 from exfit.errors import CaseError, ModelError, SimulationError
 from exfit.features import Features, features
-from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
+from exfit.models.sheet import Model
+from exfit.plant import (
+    DRIVING,
+    SATURATION,
+    VREF0,
+    VT0,
+    SaturationForm,
+    Stabilised,
+    alone,
+    infinite_bus,
+    initial,
+    machine_playback,
+    open_circuit,
+    playback,
+)
 from exfit.record import Record
 from exfit.residuals import Channel, Free, Residuals
 from exfit.result import Comparison, Overlay
-from exfit.simulate import MOST_STEPS, Change, Course, Simulator
+from exfit.simulate import MOST_STEPS, Change, Course, Played, Simulator, parameters_used
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -25,15 +50,68 @@ Values = Mapping[str, float]
 def system_of(case: Case) -> System:
     """Return the exciter of a case in its plant.
 
-    Raises ModelError where the equations of a user's own model cannot be traced.
+    Raises ModelError where the equations of a user's own model cannot be traced, CaseError where a
+    record lacks a signal that drives it.
     """
-    if case.machine is None or isinstance(case.plant, NoPlant):
-        system = alone(case.exciter)
-    else:
-        system = open_circuit(case.exciter, case.machine, SATURATION[case.saturation])
-    if case.model.endswith(".py"):
+    system = _system_of(case)
+    if case.model is not None and case.model.endswith(".py"):
         _refuse_untraceable(system, (case.folder / case.model).absolute())
     return system
+
+
+def _system_of(case: Case) -> System:
+    plant, parts, saturation = case.plant, case.parts, SATURATION[case.saturation]
+    exciter, machine = parts.exciter, parts.machine
+    if machine is not None and isinstance(plant, MachinePlayback):
+        return machine_playback(machine)
+    if exciter is None:
+        raise CaseError([f"{case.path}: model: missing"])
+    if machine is not None and isinstance(plant, OpenCircuit):
+        return open_circuit(exciter, machine, saturation, inputs_of(case))
+    if machine is not None and isinstance(plant, InfiniteBus):
+        given = "E" if "E" in plant.network else "Q"
+        return infinite_bus(exciter, machine, saturation, inputs_of(case), given, stabilised(case))
+    if isinstance(plant, Playback):
+        driving = driving_signals(case, exciter, saturation)
+        return playback(exciter, saturation, driving, plant.vref is not None)
+    return alone(exciter)
+
+
+def inputs_of(case: Case) -> tuple[str, ...]:
+    """Return the inputs that the tests of a case change; the reference always is one."""
+    changed = {change.signal for test in case.tests for change in changes(case, test)}
+    return tuple(name for name in ("vref", "vs", "E", "R", "X") if name in changed | {"vref"})
+
+
+def stabilised(case: Case) -> Stabilised | None:
+    """Return the stabiliser of a case with the signals that it listens to."""
+    model = case.parts.stabiliser
+    if model is None or case.stabiliser is None:
+        return None
+    return Stabilised(model, case.stabiliser.inputs or model.inputs)
+
+
+def driving_signals(case: Case, exciter: Model, saturation: SaturationForm) -> tuple[str, ...]:
+    """Return the recorded signals that drive the exciter of a case in all its records.
+
+    Raises CaseError where the exciter needs the field current and a record lacks it.
+    """
+    files = {"record": case.record}
+    files |= {f"validate.{one.name}": one.record for one in case.validations}
+    given = [set(file.channels) for file in files.values() if file is not None]
+    needs = driven_by(exciter, saturation)
+    for place, file in files.items():
+        if file is not None and "ifd" in needs and "ifd" not in file.channels:
+            text = f"channels.ifd: is missing: it drives {exciter.name}"
+            raise CaseError([f"{case.path}: {place}: {text}"])
+    return tuple(signal for signal in DRIVING if all(signal in signals for signals in given))
+
+
+@cache
+def driven_by(exciter: Model, saturation: SaturationForm) -> frozenset[str]:
+    """Return the signals of its plant that reach an exciter."""
+    used = parameters_used(playback(exciter, saturation, DRIVING))
+    return frozenset(signal for signal in DRIVING if initial(signal) in used)
 
 
 def _refuse_untraceable(system: System, path: Path) -> None:
@@ -47,10 +125,9 @@ def _refuse_untraceable(system: System, path: Path) -> None:
         raise ModelError(f"{path}{lines[-1] if lines else ''}: {kind}{fault}") from fault
 
 
-def values_of(case: Case, changes: Values) -> dict[str, float]:
-    """Return every parameter of the system but vt0: as the case has it, with changes upon it."""
-    machine = {MACHINE + name: value for name, value in case.machine_values().items()}
-    return {**case.values(), **machine, **changes}
+def values_of(case: Case, changed: Values) -> dict[str, float]:
+    """Return every parameter of the parts of a case: as it has them, with changes upon them."""
+    return {**case.values(), **changed}
 
 
 def secured(simulator: Simulator, values: Values, case: Path) -> Simulator:
@@ -66,23 +143,26 @@ def secured(simulator: Simulator, values: Values, case: Path) -> Simulator:
 
 @dataclass(frozen=True)
 class Trial:
-    """A test of a case and its record, ready to be simulated."""
+    """A test of a case and its record, ready to be simulated.
+
+    ``levels`` are the parameters that the record gives: where the signals stand at the start.
+    """
 
     case: Path
     simulator: Simulator
     record: Record
-    vt0: float
+    levels: Mapping[str, float]
     channels: tuple[Channel, ...]
 
     def secured(self, values: Values) -> "Trial":
         """Return the trial with sub-steps enough all along the response to the values."""
-        at = {**values, VT0: self.vt0}
+        at = {**values, **self.levels}
         return replace(self, simulator=secured(self.simulator, at, self.case))
 
     def compare(
         self, name: str, values: Values, start: Values | None = None, limit: float | None = None
     ) -> Comparison:
-        """Return the response to the values (all but vt0) beside the record; secure it first."""
+        """Return the response to the values beside the record; secure it first."""
         samples, substeps = self._samples(values)
         first = None if start is None else self._samples(start)[0]
         overlays = {
@@ -108,19 +188,37 @@ class Trial:
 
     def _samples(self, values: Values) -> tuple[Array, int]:
         signals = tuple(channel.signal for channel in self.channels)
-        return self.simulator.samples({**values, VT0: self.vt0}, signals)
+        return self.simulator.samples({**values, **self.levels}, signals)
 
     def _features(self, signal: Array) -> Features | None:
         """Read off the first step of the reference that the record shows."""
         time = self.record.time
-        instants = [change.at for change in self.simulator.course.steps if change.at >= time[0]]
-        until = instants[1] if len(instants) > 1 else float(time[-1])
-        return features(time, signal, instants[0], until) if instants else None
+        inside = [change for change in self.simulator.course.steps if change.at >= time[0]]
+        if not inside or inside[0].signal != "vref":
+            return None
+        later = [change.at for change in inside if change.at > inside[0].at]
+        until = later[0] if later else float(time[-1])
+        return features(time, signal, inside[0].at, until)
 
 
-def course_of(test: BumpTest, start: float, end: float) -> Course:
-    """Return a test as the simulator takes it."""
-    return Course(start, end, tuple(Change(step.at, step.step) for step in test.vref))
+def changes(case: Case, test: BumpTest) -> Iterator[Change]:
+    """Yield what a test changes, input by input."""
+    for signal in ("vref", "vs", "E"):
+        yield from (Change(step.at, step.step, signal) for step in getattr(test, signal))
+    if isinstance(case.plant, InfiniteBus):
+        values = case.values()
+        now = {name: values.get(f"network.{name}", 0.0) for name in ("R", "X", "E")}
+        for switch in test.network:
+            for name in now:
+                then = getattr(switch, name)
+                if then is not None:
+                    yield Change(switch.at, then - now[name], name)
+                    now[name] = then
+
+
+def course_of(case: Case, test: BumpTest, span: tuple[float, float]) -> Course:
+    """Return a test from start to end, s, as the simulator takes it."""
+    return Course(*span, tuple(sorted(changes(case, test), key=lambda change: change.at)))
 
 
 def trial_of(case: Case, test: BumpTest, file: RecordFile) -> Trial:
@@ -130,23 +228,44 @@ def trial_of(case: Case, test: BumpTest, file: RecordFile) -> Trial:
     """
     record = case.measure(test, file)
     system = system_of(case)
-    for signal in file.channels:
-        if signal not in system.outputs:
-            raise CaseError(
-                [f"{case.path}: record.channels.{signal}: {case.model} has no {signal}"]
-            )
     begin = float(record.time[0]) if test.begin is None else test.begin
-    course = course_of(test, begin, float(record.time[-1]))
+    course = course_of(case, test, (begin, float(record.time[-1])))
+    levels = levels_of(case, test, record)
+    driving = [signal for signal in file.channels if signal in system.inputs]
+    if driving:
+        heard: dict[str, Array] = {signal: _moved(test, record, signal) for signal in driving}
+        course = replace(course, played=Played(record.time, heard))
     return Trial(
         case.path,
         Simulator(system, course, record.time, case.simulation.step),
         record,
-        initial_voltage(test, record),
+        levels,
         tuple(
             Channel(signal, record.signals[signal], channel.weight)
             for signal, channel in file.channels.items()
+            if signal not in driving and signal in system.outputs
         ),
     )
+
+
+def _moved(test: BumpTest, record: Record, signal: str) -> Array:
+    """Return by how much a recorded signal deviates from where it starts."""
+    if signal == "vt":
+        return record.signals[signal] - initial_voltage(test, record)
+    return record.signals[signal] - initial_level(test, record, signal)
+
+
+def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
+    """Return the parameters that a record gives: the levels of its signals at the start."""
+    if not isinstance(case.plant, Playback):
+        return {VT0: initial_voltage(test, record)}
+    levels = {
+        initial(signal): initial_level(test, record, signal)
+        for signal in (*DRIVING, "efd")
+        if signal in record.signals
+    }
+    known = {} if case.plant.vref is None else {VREF0: case.plant.vref}
+    return {**levels, VT0: initial_voltage(test, record), **known}
 
 
 def fitted_trial(case: Case) -> Trial:
@@ -156,8 +275,8 @@ def fitted_trial(case: Case) -> Trial:
     return trial_of(case, case.test, case.record)
 
 
-def plain_simulator(case: Case) -> tuple[Simulator, float]:
-    """Return the simulator and the initial voltage of a case without a record.
+def plain_simulator(case: Case) -> tuple[Simulator, dict[str, float]]:
+    """Return the simulator and the initial levels of a case without a record.
 
     Raises CaseError where the case does not say how long and from which voltage.
     """
@@ -177,8 +296,8 @@ def plain_simulator(case: Case) -> tuple[Simulator, float]:
             ]
         )
     times = np.linspace(0.0, test.duration, round(count) + 1)
-    course = course_of(test, 0.0, test.duration)
-    return Simulator(system_of(case), course, times, case.simulation.step), test.vt0
+    course = course_of(case, test, (0.0, test.duration))
+    return Simulator(system_of(case), course, times, case.simulation.step), {VT0: test.vt0}
 
 
 def residuals_of(case: Case, trial: Trial) -> Residuals:
@@ -186,10 +305,10 @@ def residuals_of(case: Case, trial: Trial) -> Residuals:
 
     Raises CaseError where no parameter is free, or none of the signals depends on one that is.
     """
-    free = case.parameters.free
+    free = case.free()
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
-    fixed = {**values_of(case, {}), VT0: trial.vt0}
+    fixed = {**values_of(case, {}), **trial.levels}
     return Residuals(
         trial.simulator,
         trial.channels,
@@ -202,5 +321,5 @@ def free_of(case: Case) -> list[Free]:
     """Return the free parameters of a case."""
     return [
         Free(name, one.start, one.min, one.max, one.scale == "log")
-        for name, one in case.parameters.free.items()
+        for name, one in case.free().items()
     ]

@@ -68,7 +68,7 @@ def result(free=2, iterations=4, phases=("lm", "dgn"), at_bound=None):
         },
         fixed={},
         typical=(),
-        machine={},
+        parts=(),
         comparison=comparison(start=RISE),
         status=1,
         message="the gradient vanished",

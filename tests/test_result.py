@@ -13,7 +13,7 @@ from exfit.case import load_case
 from exfit.result import FitResult, Overlay
 
 ROOT = Path(__file__).parent.parent
-INSIDE = {"comparison": "fit"}  # under another name
+INSIDE = {"comparison": "fit", "parts": "machine_model"}  # under another name
 ELSEWHERE = {"name", "history"}  # in the name of the folder and in the history
 
 laws = settings(deadline=None, derandomize=True, max_examples=25)

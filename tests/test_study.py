@@ -178,7 +178,9 @@ def test_the_initial_voltage_is_the_mean_before_the_step_where_the_case_gives_no
     down = loaded.validations[0]
     trial = trial_of(loaded, down.test, down.record)
     before = trial.record.time < 1.0
-    assert trial.vt0 == pytest.approx(np.mean(trial.record.signals["vt"][before]), rel=1e-12)
+    assert trial.levels[VT0] == pytest.approx(
+        np.mean(trial.record.signals["vt"][before]), rel=1e-12
+    )
     assert residuals_of(loaded, fitted_trial(loaded)).fixed[VT0] == 1.0
 
 

@@ -17,6 +17,8 @@ MODELS: dict[str, Model] = {
     )
 }
 
+STABILISERS: dict[str, Model] = {}
+
 
 def find(name: str, folder: Path) -> Model:
     """Return the model of a catalogue name, an alias, or a .py file relative to ``folder``.

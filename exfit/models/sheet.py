@@ -72,7 +72,7 @@ class Model:
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
     ``x`` and returns the reference that does so. Setpoints are what it finds at the start and then
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
-    its PSS/E records, its own one first.
+    its PSS/E records, its own one first; ``inputs`` the signals that a stabiliser listens to.
     """
 
     name: str
@@ -83,6 +83,7 @@ class Model:
     states: tuple[str, ...]
     setpoints: tuple[str, ...]
     records: tuple[Record, ...]
+    inputs: tuple[str, ...]
     equations: Callable[..., Any]
     rest: Callable[..., Any]
 
@@ -126,6 +127,7 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         states=tuple(states.split()),
         setpoints=tuple(setpoints.split()),
         records=tuple(parts.get("RECORDS", ())),
+        inputs=tuple(parts.get("INPUTS", ())),
         equations=parts["equations"],
         rest=parts["rest"],
     )

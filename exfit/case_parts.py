@@ -1,0 +1,175 @@
+"""The parts of a case that have a data sheet: exciter, machine, network, stabiliser."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from exfit.case_form import near
+from exfit.errors import ModelError
+from exfit.models import STABILISERS, find
+from exfit.models.machines import MACHINES, Machine
+from exfit.models.sheet import (
+    Model,
+    Sheet,
+    crossed_limits,
+    exponential_faults,
+    saturation_faults,
+    typical,
+)
+from exfit.plant import MACHINE, NETWORK, STABILISER, flow_sheet
+from exfit.yaml_lines import Fault, Place
+
+Data = Mapping[str, Any]
+Contradictions = Iterator[tuple[str, str]]
+
+WITH_MACHINE = ("open-circuit", "infinite-bus", "machine-playback")
+WITHOUT_EXCITER = ("machine-playback",)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a case: its kind, the model it names, where the file gives its parameters.
+
+    Its parameters are those of its sheet, in the system under ``prefix``. ``check(values)`` yields
+    (symbol, text) for values that contradict each other.
+    """
+
+    kind: str
+    name: str
+    prefix: str
+    sheet: Sheet
+    fixed: Place
+    free: Place | None
+    check: Callable[[Mapping[str, float]], Contradictions] = field(compare=False)
+
+    def resolved(self, *given: Mapping[str, float]) -> dict[str, float]:
+        """Return a value for each parameter: typical unless given, the last one wins."""
+        values = typical(self.sheet)
+        for some in given:
+            values |= {symbol: value for symbol, value in some.items() if symbol in values}
+        return values
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The models that a case names, and all its parts."""
+
+    exciter: Model | None
+    machine: Machine | None
+    stabiliser: Model | None
+    all: tuple[Part, ...]
+
+
+def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
+    """Return the parts of a case file's data; add a fault for a name that stands for none."""
+    plant = data.get("plant")
+    plant = plant if isinstance(plant, dict) else {}
+    exciter = None if plant.get("type") in WITHOUT_EXCITER else _exciter(data, folder, faults)
+    machine = _machine(plant, faults) if plant.get("type") in WITH_MACHINE else None
+    stabiliser = _stabiliser(data, faults)
+    found = []
+    if exciter is not None:
+        exponential = str(data.get("saturation")).startswith("exponential")
+        found.append(exciter_part(exciter, exponential))
+    if machine is not None:
+        found.append(machine_part(machine))
+    if plant.get("type") == "infinite-bus":
+        network = plant.get("network")
+        found.append(network_part(network if isinstance(network, dict) else {}))
+    if stabiliser is not None:
+        found.append(stabiliser_part(stabiliser))
+    return Parts(exciter, machine, stabiliser, tuple(found))
+
+
+def exciter_part(model: Model, exponential: bool) -> Part:
+    """Return the part of an exciter, with an exponential saturation or a quadratic one."""
+
+    def check(values: Mapping[str, float]) -> Contradictions:
+        yield from crossed_limits(values)
+        yield from saturation_faults(values)
+        if exponential:
+            yield from exponential_faults(values)
+
+    places: tuple[Place, Place] = ("parameters", "fixed"), ("parameters", "free")
+    return Part("exciter", model.name, "", model.sheet, *places, check)
+
+
+def machine_part(machine: Machine) -> Part:
+    """Return the part of a machine."""
+
+    def check(values: Mapping[str, float]) -> Contradictions:
+        if len(values) == len(machine.sheet):
+            yield from machine.faults(values)
+
+    places: tuple[Place, Place] = ("plant", "parameters"), ("plant", "free")
+    return Part("machine", machine.name, MACHINE, machine.sheet, *places, check)
+
+
+def stabiliser_part(model: Model) -> Part:
+    """Return the part of a stabiliser."""
+    places: tuple[Place, Place] = ("stabiliser", "parameters"), ("stabiliser", "free")
+    return Part(
+        "stabiliser",
+        model.name,
+        STABILISER,
+        model.sheet,
+        *places,
+        lambda v: iter(crossed_limits(v)),
+    )
+
+
+def network_part(given: Data) -> Part:
+    """Return the part of a network, whose start is given by E where the file has E."""
+
+    def check(values: Mapping[str, float]) -> Contradictions:
+        for symbol in ("f0", "X", "P"):
+            if symbol not in given:
+                yield symbol, "is missing"
+        if "Q" not in given and "E" not in given:
+            yield "Q", "is missing: with P it says where to start; or E, the voltage of the source"
+        if "Q" in given and "E" in given:
+            yield "Q", "follows from E: give one of them"
+        if values.get("R") == values.get("X") == 0.0:
+            yield "X", "0 with R = 0 leaves nothing between the machine and the source"
+
+    sheet = flow_sheet("E" if "E" in given else "Q")
+    if "Q" in given and "E" in given:
+        sheet = (*sheet, *(row for row in flow_sheet("Q") if row.symbol == "Q"))
+    return Part("network", "the network", NETWORK, sheet, ("plant", "network"), None, check)
+
+
+def _exciter(data: Data, folder: Path, faults: list[Fault]) -> Model | None:
+    name = data.get("model")
+    if not isinstance(name, str) or not name:
+        return None
+    try:
+        return find(name, folder)
+    except ModelError as error:
+        faults.append(Fault(("model",), str(error)))
+        return None
+
+
+def _machine(plant: Data, faults: list[Fault]) -> Machine | None:
+    name = _known(plant, ("plant", "machine"), MACHINES, "machine", faults)
+    return None if name is None else MACHINES[name]
+
+
+def _stabiliser(data: Data, faults: list[Fault]) -> Model | None:
+    section = data.get("stabiliser")
+    section = section if isinstance(section, dict) else {}
+    name = _known(section, ("stabiliser", "model"), STABILISERS, "stabiliser", faults)
+    return None if name is None else STABILISERS[name]
+
+
+def _known(
+    section: Data, place: Place, catalogue: Mapping[str, Any], kind: str, faults: list[Fault]
+) -> str | None:
+    """Return the entry that a section names; add a fault where there is none of that name."""
+    name = section.get(str(place[-1]))
+    if not isinstance(name, str) or not name:
+        return None
+    if name.upper() in catalogue:
+        return name.upper()
+    faults.append(Fault(place, f"{name!r} is not a {kind} model; {near(name, catalogue)}"))
+    return None
