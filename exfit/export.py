@@ -199,7 +199,7 @@ def _warnings(one: Written) -> Iterator[str]:
         yield f"{record.name}: {record.doubt}"
     if one.typical:
         names = ", ".join(one.typical)
-        yield f"{record.name}: as in exfit's typical data, so check that they are the unit's: {names}"
+        yield f"{record.name}: as in exfit's typical data, check that it is the unit's: {names}"
 
 
 def _matters(symbol: str, value: float) -> bool:

@@ -119,9 +119,10 @@ def _heads(record: Fields, faults: list[Fault]) -> Iterator[Head]:
     wrong = []
     if fields[0].quoted or not (bus.isascii() and bus.isdigit() and 0 < int(bus[:10]) < 10**6):
         wrong.append(f"{show_value(bus)} is not the number of a bus")
-    if not 0 < len(machine_id) <= LONGEST_ID or "*" in machine_id:
+    if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
         wrong.append(f"{show_value(machine_id)} is not a machine id of one or two characters")
     if not wrong:
+        label = "".join(letter if letter.isprintable() else "?" for letter in label)
         yield Head(int(bus), label.upper(), machine_id, line, fields[3:])
     elif definition_of(name) is not None:
         faults += [Fault(line, f"{name.upper()}: {text}") for text in wrong]
