@@ -53,7 +53,8 @@ def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Ex
     written = [*_machine(result, warnings), exciter, *_stabiliser(result, warnings)]
     for one in written:
         warnings += _warnings(one)
-    comments = [*_origin(result, exciter), *(text for one in written for text in _comments(one))]
+    comments = [*_origin(result, exciter), *(f"{text}." for text in result.warnings())]
+    comments += [text for one in written for text in _comments(one)]
     lines = [line for text in comments for line in _wrapped(text)]
     lines += [record_text(one.definition, one.values, bus, machine_id) for one in written]
     return Exported("\n".join(lines) + "\n", tuple(f"{source}: {text}" for text in warnings))

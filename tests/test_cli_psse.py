@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -15,6 +16,7 @@ from test_psse import SAMPLE, SOUND, THREE, garbage, replaced
 from exfit import cli
 from exfit.case import load_case
 from exfit.models import MODELS
+from exfit.models.sheet import record
 from exfit.psse import definition_of, read_unit
 
 ROOT = Path(__file__).parent.parent
@@ -181,6 +183,45 @@ def test_a_file_that_exists_is_kept_unless_forced(run, fitted, command):
     code, _, err = run(command, source, "-o", "taken/below")
     assert code == 1
     assert "cannot be written" in err
+
+
+# ---- a stabiliser
+
+STABILISER = replace(
+    MODELS["FIRST_ORDER"], name="PSSX", records=(record("PSSX", "a k", icons={"MODE": 1}),)
+)
+
+
+@pytest.fixture
+def pssx(monkeypatch):
+    """Let exfit know one stabiliser of which only the data matter."""
+    monkeypatch.setattr("exfit.psse.records.STABILISERS", {"PSSX": STABILISER})
+
+
+def test_a_stabiliser_goes_into_the_case_with_its_model_and_parameters(run, pssx):
+    Path("unit.dyr").write_text(SOUND + "1 PSSX 1 0 1e-5 20 /\n")
+    code, out, err = run("import", "unit.dyr")
+    assert (code, err) == (0, "Warning: unit.dyr:5: PSSX: MODE: 0 is not modelled; 1 is taken\n")
+    found = yaml.safe_load(out)
+    assert found["stabiliser"] == {"model": "PSSX", "parameters": {"k": 20.0, "a": 1e-5}}
+
+
+def test_a_fitted_stabiliser_is_written_behind_its_exciter(run, fitted, pssx):
+    parameters = {**result_of(fitted)["parameters"], "stabiliser.k": {"value": 7.0}}
+    changes = {"stabiliser_model": "PSSX", "stabiliser": {"k": 5.0, "a": 3.0}}
+    named(fitted, parameters=parameters, **changes)
+    code, out, _ = run("export", fitted)
+    assert code == 0
+    assert out.splitlines()[-1].split() == ["1", "'PSSX'", "1", "1", "3.0", "7.0", "/"]
+    assert "// PSSX: fitted: k." in out.splitlines()
+    unit = read_unit(out, "out.dyr")
+    assert unit.stabiliser is not None
+    assert unit.stabiliser.values == {"k": 7.0, "a": 3.0}
+
+
+def test_a_stabiliser_without_a_record_is_left_out_with_a_warning(run, fitted):
+    named(fitted, stabiliser_model="OWN_PSS", stabiliser={"k": 5.0})
+    assert "stabiliser OWN_PSS has no PSS/E record: it is left out" in run("export", fitted)[2]
 
 
 # ---- export
@@ -359,8 +400,8 @@ def test_a_fit_of_a_user_s_own_model_has_no_record(run):
     shutil.copy(ROOT / "exfit" / "models" / "first_order.py", "ac1a.py")
     rows = "\n".join(f"{t:.6g},{v:.9g}" for t, v in zip(TIME, TRUTH, strict=True))
     Path("up.csv").write_text(f"t,v\n{rows}\n")
-    record = {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}
-    case = {**FIRST_ORDER, "model": "ac1a.py", "record": record}
+    measured = {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}
+    case = {**FIRST_ORDER, "model": "ac1a.py", "record": measured}
     Path("case.yaml").write_text(yaml.safe_dump(case))
     assert run("fit", "case.yaml", "--no-plots", "-q", "-o", "run")[0] == 0
     assert result_of("run")["model"] == "AC1A"

@@ -290,6 +290,12 @@ FAULTS = {
     ),
     "a value too many": (" 766 ", " 766 1 ", "unit.dyr:2: ESAC1A: 20 values after the id"),
     "a value too few": (" 766 ", " ", "ESAC1A: 18 values after the id, but the record has 19"),
+    "a repeat count in place of values": (
+        " 1.3 .024 ",
+        " 2*1.3 ",
+        "KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN\n"
+        "unit.dyr:3: ESAC1A: '2*1.3' repeats a value; write each one out",
+    ),
     "the order of the symbols": (" 766 ", " ", "(19 constants): TR TB TC KA TA VAMAX VAMIN TE"),
     "a value outside the sheet": (
         " 766 ",
@@ -363,7 +369,7 @@ THREE = TWO + SOUND.replace("1 GENROU", "9 GENROU").replace("1 ESAC1A", "9 ESAC1
         ((1,), ["2 units; choose", "bus 1, id 1: GENROU, ESAC1A", "bus 1, id 2: GENROU, ESAC1A"]),
         ((None, "1"), ["2 units; choose", "bus 1, id 1", "bus 9, id 1"]),
         ((8,), ["no record of bus 8", "bus 1, id 1", "bus 1, id 2", "bus 9, id 1"]),
-        ((9, "2"), ["no record of bus 9, id 2", "bus 1, id 1"]),
+        ((9, "2"), ["no record of bus 9, id '2'", "bus 1, id 1"]),
     ],
 )
 def test_a_unit_among_several_must_be_chosen(given, lines):

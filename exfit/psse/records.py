@@ -92,7 +92,8 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     """Return what the fields behind a record's id say; ``line`` is where the record begins."""
     record, names = definition.record, definition.names
     if len(fields) != len(names):
-        return Reading({}, [Fault(line, _wrong_count(definition, len(fields)))], [])
+        count = Fault(line, _wrong_count(definition, len(fields)))
+        return Reading({}, [count, *_no_numbers(record.name, fields)], [])
     lines = dict(zip(names, (field.line for field in fields), strict=True))
 
     def placed(found: Iterable[tuple[str, str]]) -> list[Fault]:
@@ -146,6 +147,15 @@ def _numbers(
         except ValueError as error:
             faults.append((name, str(error)))
     return values, faults
+
+
+def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[Fault]:
+    """Yield what is no number, such as a repeat count: it may be why the count is wrong."""
+    for field in fields:
+        try:
+            number(field)
+        except ValueError as error:
+            yield Fault(field.line, f"{name}: {error}")
 
 
 def _unmodelled(record: Record, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:

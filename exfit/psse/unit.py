@@ -149,7 +149,7 @@ def _chosen(heads: list[Head], file: str, bus: int | None, machine_id: str | Non
             [f"{file}: {len(meant)} units; choose by --bus and --id", *_list(meant)]
         )
     asked = ", ".join(
-        f"{label} {value}"
+        f"{label} {value!r}"
         for label, value in (("bus", bus), ("id", machine_id))
         if value is not None
     )
