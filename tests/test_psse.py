@@ -393,7 +393,8 @@ def test_a_long_list_of_units_is_cut():
 def test_what_other_units_and_devices_hold_is_no_fault():
     others = (
         "'VSC 1' 'VSCDCT' 1 2 3*0. /\n200 'DISTR1', 300, '1 ', 1,, 2 /\n"
-        "300 'ESST99' 1 x y z /\n / a line of comment\n\n400 'IEELBL' '*' 2*1.0 /\n"
+        "Line 'Toggler' Line_1 1.0 /\n300 'ESST99' 1 x y z /\n"
+        " / a line of comment\n\n400 'IEELBL' '*' 2*1.0 /\n"
     )
     unit = read_unit(others + SOUND, "unit.dyr", 1)
     assert unit.exciter.values["KA"] == 766.0
