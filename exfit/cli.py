@@ -4,6 +4,7 @@ Everything but click is imported in the command that needs it, so that help appe
 """
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -214,6 +215,89 @@ def check(case: Path) -> None:
         raise SystemExit(NOT_CONVERGED)
 
 
+file_option = click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File to write; without it, to the terminal.",
+)
+force_option = click.option("--force", is_flag=True, help="Write over a file that exists.")
+BUSES = click.IntRange(1, 999_999)
+
+
+@main.command("import", short_help="Make a case of a PSS/E dynamics file.")
+@click.argument("unit", type=click.Path(path_type=Path))
+@click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit.")
+@click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
+@file_option
+@force_option
+def import_(
+    unit: Path, bus: int | None, machine_id: str | None, output: Path | None, force: bool
+) -> None:
+    """Make a case of the machine, exciter and stabiliser in UNIT, a PSS/E .dyr file.
+
+    The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
+    holds several units, --bus and --id choose one.
+    """
+    from exfit.case_writer import case_text, import_unit
+    from exfit.psse import located
+
+    if output is not None:
+        _refuse_existing(output, force)
+    found = import_unit(unit, bus, machine_id)
+    _write(case_text(found, unit.name), output, located(found.warnings, str(unit)))
+    if output is not None:
+        click.echo(f"written to {output}; next: exfit simulate {output}")
+
+
+@main.command(short_help="Write the result of a fit as PSS/E records.")
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option(
+    "--format",
+    "_format",
+    type=click.Choice(["dyr"]),
+    default="dyr",
+    help="Kind of file: dyr, a PSS/E dynamics file (default).",
+)
+@click.option("--bus", type=BUSES, metavar="N", default=1, help="Bus of the unit (default: 1).")
+@click.option(
+    "--id",
+    "machine_id",
+    metavar="ID",
+    default="1",
+    callback=lambda _, __, value: _machine_id(value),
+    help="Machine id of the unit (default: 1).",
+)
+@click.option(
+    "--model", metavar="NAME", help="Another record of the exciter's model, such as ESAC8B."
+)
+@file_option
+@force_option
+def export(
+    result: Path,
+    _format: str,
+    bus: int,
+    machine_id: str,
+    model: str | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Write the machine, exciter and stabiliser of RESULT as PSS/E records.
+
+    RESULT is the result.json of a fit, or the folder that holds it. What a record cannot hold, or
+    what is not sure about it, is told.
+    """
+    from exfit.export import export as exported
+
+    if output is not None:
+        _refuse_existing(output, force)
+    found = exported(result, bus, machine_id, model)
+    _write(found.text, output, found.warnings)
+    if output is not None:
+        click.echo(f"written to {output}")
+
+
 @main.command(short_help="List the models, or describe one.")
 @click.argument("name", required=False)
 def models(name: str | None) -> None:
@@ -243,6 +327,31 @@ def _load(case: Path) -> "Case":
     from exfit.case import load_case
 
     return load_case(case)
+
+
+def _refuse_existing(output: Path, force: bool) -> None:
+    """Raise ExfitError where a file would be lost: it may be the only copy of someone's work."""
+    if output.is_dir():
+        raise ExfitError(f"{output}: cannot be written: it is a folder")
+    if output.exists() and not force:
+        raise ExfitError(f"{output}: exists already; --force writes over it")
+
+
+def _write(text: str, output: Path | None, warnings: Iterable[str]) -> None:
+    from exfit.result import write
+
+    if output is None:
+        click.echo(text, nl=False)
+    else:
+        write(output, text)
+    for warning in warnings:
+        click.echo(f"Warning: {warning}", err=True)
+
+
+def _machine_id(value: str) -> str:
+    if not (1 <= len(value) <= 2 and value.isascii() and value.isalnum()):
+        raise click.BadParameter(f"{value!r} is not one or two letters or digits.")
+    return value
 
 
 def _folder(case: Path, command: str) -> Path:

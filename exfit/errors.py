@@ -7,12 +7,20 @@ class ExfitError(Exception):
     """Input that cannot be used; the message names the place, the value and the limit."""
 
 
-class CaseError(ExfitError):
-    """Faults of a case file, all of them together."""
+class FileError(ExfitError):
+    """Faults of a file, all of them together."""
 
     def __init__(self, faults: Iterable[str]) -> None:
         self.faults = tuple(faults)
         super().__init__("\n".join(self.faults))
+
+
+class CaseError(FileError):
+    """A case that cannot be used."""
+
+
+class DynamicsError(FileError):
+    """A PSS/E dynamics file that cannot be used."""
 
 
 class RecordError(ExfitError):

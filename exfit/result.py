@@ -136,6 +136,7 @@ class Comparison:
         """Return the figures, without the samples."""
         return {
             "name": self.name,
+            "record": self.record.name,
             "rmse": self.rmse,
             "max_error": self.max_error,
             "fit_percent": self.fit_percent,
@@ -377,11 +378,12 @@ def parameter_file(result: FitResult) -> str:
             origin = "typical" if name in result.typical else "fixed"
         else:
             origin = f"fitted, on its {one.at_bound}" if one.at_bound else "fitted"
-        lines.append(f"  {name}: {_yaml_number(value)}  # {origin}")
+        lines.append(f"  {name}: {yaml_number(value)}  # {origin}")
     return "\n".join(lines) + "\n"
 
 
-def _yaml_number(value: float) -> str:
+def yaml_number(value: float) -> str:
+    """Return a number that gives the same float back to every reader of YAML."""
     text = repr(float(value))
     mantissa, e, exponent = text.partition("e")
     # YAML 1.1 takes 1e-05 for text, 1.0e-05 for a number

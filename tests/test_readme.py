@@ -83,3 +83,13 @@ def test_a_fit_leaves_the_files_of_the_table_and_no_others(tmp_path, monkeypatch
     (validation,) = result.validation
     named = {name.replace("NAME", validation.name) for name in told}
     assert {path.name for path in (tmp_path / "run").iterdir()} == named
+
+
+def test_the_unit_of_the_readme_becomes_a_case_as_it_says(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder.parent)
+    session = re.search(r"^\$ exfit (import .*?)\n(.*?)^\$", README, re.DOTALL | re.MULTILINE)
+    with pytest.raises(SystemExit) as ended:
+        main(session[1].split(), prog_name="exfit")
+    shown = capsys.readouterr()
+    assert (ended.value.code or 0, shown.err + shown.out) == (0, session[2])
+    assert load_case(Path("unit.yaml")).model == "AC1A"

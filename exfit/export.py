@@ -1,0 +1,238 @@
+"""The PSS/E records of a fit: its result.json, read back and written as a dynamics file."""
+
+import json
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from exfit import __version__
+from exfit.case_form import near, show, show_value
+from exfit.errors import ExfitError
+from exfit.models import MODELS
+from exfit.models.machines import MACHINES
+from exfit.psse import Definition, alternatives, definitions, record_text
+
+Data = Mapping[str, Any]
+
+WIDTH = 80  # columns
+WHOLE_FIT = "result.json"
+NO_LIMIT = 99.0  # pu: data sheets write limits that never act as 99 or 999
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A dynamics file, and what its user must know."""
+
+    text: str
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Written:
+    """A record with its values; ``fitted`` and ``typical`` name those that are it."""
+
+    definition: Definition
+    values: Mapping[str, float]
+    fitted: tuple[str, ...]
+    typical: tuple[str, ...]
+
+
+def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Exported:
+    """Return the PSS/E records of a fit, given its result.json or the folder that holds it.
+
+    ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
+    file is no result of a fit, or its model has no record.
+    """
+    source = path / WHOLE_FIT if path.is_dir() else path
+    result = _Result(source)
+    warnings = [*result.warnings()]
+    exciter = _exciter(result, name)
+    written = [*_machine(result, warnings), exciter, *_stabiliser(result, warnings)]
+    for one in written:
+        warnings += _warnings(one)
+    comments = [*_origin(result, exciter), *(f"{text}." for text in result.warnings())]
+    comments += [text for one in written for text in _comments(one)]
+    lines = [line for text in comments for line in _wrapped(text)]
+    lines += [record_text(one.definition, one.values, bus, machine_id) for one in written]
+    return Exported("\n".join(lines) + "\n", tuple(f"{source}: {text}" for text in warnings))
+
+
+class _Result:
+    """A result.json, its parts checked when they are asked for."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            content = json.loads(path.read_bytes())
+        except OSError as error:
+            raise ExfitError(f"{path}: cannot be read: {error.strerror}") from None
+        except (ValueError, RecursionError) as error:
+            raise ExfitError(f"{path}: not JSON: {error}") from None
+        self.content: Data = content if isinstance(content, dict) else {}
+        if not {"model", "parameters", "fixed"} <= self.content.keys():
+            raise ExfitError(f"{path}: not the result of a fit: model, parameters or fixed missing")
+
+    def text(self, key: str) -> str | None:
+        """Return a text, None where there is none."""
+        found = self.content.get(key)
+        return found if isinstance(found, str) else None
+
+    def mapping(self, key: str) -> Data:
+        """Return a mapping, an empty one where there is none."""
+        found = self.content.get(key)
+        return found if isinstance(found, dict) else {}
+
+    def fitted(self) -> dict[str, float]:
+        """Return the fitted values under the names of the fit."""
+        found = self.mapping("parameters")
+        return {
+            name: self._number(f"parameters.{name}.value", one.get("value"))
+            for name, one in found.items()
+            if isinstance(one, dict)
+        }
+
+    def values(self, key: str, prefix: str) -> dict[str, float]:
+        """Return the values of a part: those that stayed, and over them those that were fitted."""
+        kept = {
+            name: self._number(f"{key}.{name}", value) for name, value in self.mapping(key).items()
+        }
+        return {**kept, **self.fitted_of(prefix)}
+
+    def fitted_of(self, prefix: str) -> dict[str, float]:
+        """Return the fitted values of a part; its prefix is empty for the exciter."""
+        return {
+            name.removeprefix(prefix): value
+            for name, value in self.fitted().items()
+            if name.startswith(prefix) and "." not in name.removeprefix(prefix)
+        }
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what of the fit itself must be known."""
+        if self.content.get("success") is False:
+            yield f"the fit did not converge: {self.text('message')}"
+        form = self.text("saturation") or "quadratic"
+        if form != "quadratic":
+            yield f"fitted with saturation: {form}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
+
+    def _number(self, place: str, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            raise ExfitError(f"{self.path}: {place}: {show_value(value)} is not a number")
+        return float(value)
+
+
+def _exciter(result: _Result, name: str | None) -> Written:
+    model_name = result.text("model") or ""
+    model = MODELS.get(model_name)
+    if model is None or "model" in result.mapping("inputs"):
+        raise ExfitError(
+            f"{result.path}: {model_name} is not a model of the catalogue: it has no PSS/E record"
+        )
+    known = {one.record.name: one for one in alternatives(model)}
+    if not known:
+        raise ExfitError(f"{result.path}: {model_name} has no PSS/E record")
+    wanted = next(iter(known)) if name is None else name.upper()
+    if wanted not in known:
+        raise ExfitError(f"--model {name}: {model_name} is not written so; {near(wanted, known)}")
+    typical = result.content.get("typical")
+    return _written(
+        result,
+        known[wanted],
+        "fixed",
+        "",
+        [str(one) for one in typical] if isinstance(typical, list) else [],
+    )
+
+
+def _machine(result: _Result, warnings: list[str]) -> Iterator[Written]:
+    name = result.text("machine_model")
+    known = alternatives(MACHINES[name]) if name in MACHINES else []
+    if not known:
+        what = "no machine is named" if name is None else f"machine {name} has no PSS/E record"
+        warnings.append(f"{what}: only the exciter is written")
+        return
+    yield _written(result, known[0], "machine", "machine.")
+
+
+def _stabiliser(result: _Result, warnings: list[str]) -> Iterator[Written]:
+    name = result.text("stabiliser_model")
+    if name is None:
+        return
+    known = [one for one in definitions() if one.kind == "stabiliser" and one.model.name == name]
+    if not known:
+        warnings.append(f"stabiliser {name} has no PSS/E record: it is left out")
+        return
+    yield _written(result, known[0], "stabiliser", "stabiliser.")
+
+
+def _written(
+    result: _Result, definition: Definition, key: str, prefix: str, typical: Iterable[str] = ()
+) -> Written:
+    """Return a record with the values of a result; raises ExfitError where one is missing."""
+    values, fitted = result.values(key, prefix), result.fitted_of(prefix)
+    missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
+    if missing:
+        raise ExfitError(f"{result.path}: {key}: missing: {', '.join(missing)}")
+    assumed = set(typical) | {
+        row.symbol
+        for row in definition.model.sheet
+        if prefix and values[row.symbol] == row.typical and row.typical != 0.0
+    }
+    in_record = definition.record.cons
+    return Written(
+        definition,
+        values,
+        tuple(name for name in in_record if name in fitted),
+        tuple(name for name in in_record if name in assumed and name not in fitted),
+    )
+
+
+def _warnings(one: Written) -> Iterator[str]:
+    """Yield what a record cannot hold, leaves open, or takes from no one's data."""
+    record = one.definition.record
+    for row in one.definition.model.sheet:
+        value = one.values[row.symbol]
+        if row.symbol not in record.cons and _matters(row.symbol, value):
+            yield f"{record.name} cannot hold {row.symbol} = {show(value)}: it is lost"
+    if record.doubt:
+        yield f"{record.name}: {record.doubt}"
+    if one.typical:
+        names = ", ".join(one.typical)
+        yield f"{record.name}: as in exfit's typical data, check that it is the unit's: {names}"
+
+
+def _matters(symbol: str, value: float) -> bool:
+    """Tell whether a value does anything: a gain of 0 and a limit out of reach do not."""
+    if symbol.endswith("MAX"):
+        return value < NO_LIMIT
+    if symbol.endswith("MIN"):
+        return value > -NO_LIMIT
+    return value != 0.0
+
+
+def _origin(result: _Result, exciter: Written) -> Iterator[str]:
+    record = result.mapping("fit").get("record")
+    rmse = result.content.get("rmse")
+    to = f" to {record}" if isinstance(record, str) else ""
+    error = f", rmse {rmse:.3g} pu" if isinstance(rmse, float) else ""
+    yield f"exfit {__version__}: {exciter.definition.model.name} fitted{to}{error}."
+    if (case := result.text("case")) is not None:
+        yield f"Case: {case}."
+
+
+def _comments(one: Written) -> Iterator[str]:
+    record = one.definition.record
+    if one.fitted:
+        yield f"{record.name}: fitted: {' '.join(one.fitted)}."
+    for warning in _warnings(one):
+        yield f"{warning}."
+
+
+def _wrapped(text: str) -> list[str]:
+    """Return a comment in lines; what is not ASCII is not sure to be read."""
+    plain = "".join(letter if " " <= letter <= "~" else "?" for letter in text)
+    return textwrap.wrap(
+        plain, WIDTH, initial_indent="// ", subsequent_indent="//   ", break_on_hyphens=False
+    )
