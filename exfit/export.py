@@ -2,7 +2,7 @@
 
 import json
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -136,14 +136,7 @@ def _exciter(result: _Result, name: str | None) -> Written:
     wanted = next(iter(known)) if name is None else name.upper()
     if wanted not in known:
         raise ExfitError(f"--model {name}: {model_name} is not written so; {near(wanted, known)}")
-    typical = result.content.get("typical")
-    return _written(
-        result,
-        known[wanted],
-        "fixed",
-        "",
-        [str(one) for one in typical] if isinstance(typical, list) else [],
-    )
+    return _written(result, known[wanted], "fixed", "")
 
 
 def _machine(result: _Result, warnings: list[str]) -> Iterator[Written]:
@@ -167,25 +160,20 @@ def _stabiliser(result: _Result, warnings: list[str]) -> Iterator[Written]:
     yield _written(result, known[0], "stabiliser", "stabiliser.")
 
 
-def _written(
-    result: _Result, definition: Definition, key: str, prefix: str, typical: Iterable[str] = ()
-) -> Written:
+def _written(result: _Result, definition: Definition, key: str, prefix: str) -> Written:
     """Return a record with the values of a result; raises ExfitError where one is missing."""
     values, fitted = result.values(key, prefix), result.fitted_of(prefix)
     missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
     if missing:
         raise ExfitError(f"{result.path}: {key}: missing: {', '.join(missing)}")
-    assumed = set(typical) | {
-        row.symbol
-        for row in definition.model.sheet
-        if prefix and values[row.symbol] == row.typical and row.typical != 0.0
-    }
+    told = result.content.get("typical")
+    assumed = told if isinstance(told, list) else []
     in_record = definition.record.cons
     return Written(
         definition,
         values,
         tuple(name for name in in_record if name in fitted),
-        tuple(name for name in in_record if name in assumed and name not in fitted),
+        tuple(name for name in in_record if prefix + name in assumed),
     )
 
 

@@ -173,6 +173,7 @@ class FitResult:
     name: str
     model: str
     strategy: str
+    saturation: str
     parameters: Mapping[str, FittedParameter]
     fixed: Mapping[str, float]
     typical: tuple[str, ...]
@@ -232,6 +233,7 @@ class FitResult:
             "case": str(self.case),
             "model": self.model,
             "strategy": self.strategy,
+            "saturation": self.saturation,
             "parameters": {
                 name: {
                     "value": one.value,

@@ -81,6 +81,7 @@ def fit(
         name=case.path.stem,
         model=case.subject,
         strategy=method,
+        saturation=case.saturation,
         parameters=_parameters(case, residuals, values),
         fixed={name: v for name, v in case.values().items() if name not in case.free()},
         typical=case.typical(),

@@ -63,6 +63,7 @@ def result(free=2, iterations=4, phases=("lm", "dgn"), at_bound=None):
         name="bump",
         model="AC1A",
         strategy="lm-then-dgn",
+        saturation="quadratic",
         parameters={
             name: FittedParameter(end[name], 1.0, 0.1, 10.0, at_bound, "pu") for name in names
         },

@@ -201,7 +201,7 @@ def each_case_holds_the_numbers_of_its_file(definition, seed):
             assert data == values
     if definition.kind != "stabiliser":
         parsed = parse_case(case, Path("case.yaml"))
-        assert parsed.typical_symbols == parsed.typical_machine_symbols == ()
+        assert parsed.typical() == ()
 
 
 def test_a_case_holds_the_numbers_of_its_file(definition):

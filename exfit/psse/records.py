@@ -4,14 +4,11 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from exfit import models
 from exfit.case_form import show
-from exfit.models import MODELS
+from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Record, Sheet, crossed_limits, saturation_faults, typical
 from exfit.psse.fields import Fault, Field, number, whole
-
-STABILISERS: Mapping[str, Model] = getattr(models, "STABILISERS", {})
 
 WIDTH = 80  # columns of a file
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
