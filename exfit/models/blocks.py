@@ -6,17 +6,19 @@ A block with a non-windup limit returns its slope as ``Limited``: held at the li
 put back on it after every step, so that a response has no jags where a step ends beyond the limit.
 """
 
-from math import inf
+from math import inf, radians
 from math import sqrt as root
 from typing import NamedTuple
 
-from exfit.engine.trace import Signal, clip, exp, larger, log, smaller, sqrt, where
+from exfit.engine.trace import Signal, clip, cos, exp, larger, log, sin, smaller, sqrt, where
 
 __all__ = [
     "SHORTEST",
     "Limited",
     "Saturation",
     "clip",
+    "compound_source",
+    "cos",
     "exp",
     "exponential",
     "exponential_se",
@@ -31,12 +33,16 @@ __all__ = [
     "limited_integrator",
     "limited_lag",
     "log",
+    "pi",
+    "pi_rest",
     "pid",
     "quadratic",
     "rate",
     "rectifier",
     "rectifier_supply",
+    "sin",
     "smaller",
+    "source_voltage",
     "sqrt",
     "washout",
     "where",
@@ -44,6 +50,7 @@ __all__ = [
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
 SQRT3 = root(3.0)
+RADIANS = radians(1.0)  # per degree
 
 
 class Limited(NamedTuple):
@@ -202,3 +209,45 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
     This one is a Newton step, so that a state put back on it does not hunt around the limit.
     """
     return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)
+
+
+def pi(
+    u: Signal, integral: Signal, KP: Signal, KI: Signal, low: Signal = -inf, high: Signal = inf
+) -> tuple[Signal, Signal]:
+    """KP + KI / s, limited as a PID is; return the output and the slope of the integral."""
+    y, slope, _ = pid(u, integral, 0.0, KP, KI, 0.0, 1.0, low, high)
+    return y, slope
+
+
+def pi_rest(y: Signal, KP: Signal, KI: Signal) -> tuple[Signal, Signal]:
+    """Return the input and the integral that hold a PI at y, whichever of its gains is zero."""
+    integrates = KI > 0.0
+    return where(integrates, 0.0, y / where(integrates, 1.0, KP)), where(integrates, y, 0.0)
+
+
+def compound_source(
+    vt: Signal,
+    p: Signal,
+    q: Signal,
+    KP: Signal,
+    KI: Signal,
+    XL: Signal = 0.0,
+    THETAP: Signal = 0.0,
+) -> Signal:
+    """Return VE = |KP VT + j (KI + KP XL) IT|, where KP stands at THETAP degrees.
+
+    IT = (p - j q) / VT, with VT on the real axis. Everything is turned back by THETAP, so that on
+    open circuit no angle is left and VE = KP VT.
+    """
+    theta = THETAP * RADIANS
+    active, reactive = p / vt, q / vt
+    cosine, sine = cos(theta), sin(theta)
+    along = KP * (vt + XL * reactive) + KI * (cosine * reactive + sine * active)
+    across = KP * XL * active + KI * (cosine * active - sine * reactive)
+    return sqrt(along * along + across * across)
+
+
+def source_voltage(u: Signal, p: Signal) -> Signal:
+    """Return VB, what a compound source gives behind its rectifier, at most VBMAX."""
+    ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
+    return smaller(rectifier(ve, p.KC * u.ifd), p.VBMAX)
