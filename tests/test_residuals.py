@@ -18,7 +18,15 @@ from exfit.simulate import Change, Course, Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
-FREE = {"AC1A": ("KA", "TE", "KF", "KC", "KD"), "AC8B": ("KPR", "TE", "TDR", "KC", "KD")}
+FREE = {
+    "AC1A": ("KA", "TE", "KF", "KC", "KD"),
+    "AC8B": ("KPR", "TE", "TDR", "KC", "KD"),
+    "ST2A": ("KA", "TE", "KF", "KP", "KC"),
+    "ST3A": ("KA", "TB", "KM", "KP", "KC"),
+    "ST4B": ("KPR", "KIR", "TA", "KP", "KC"),
+    "SCRX": ("K", "TATB", "TB", "TE"),
+    "SEXS": ("K", "TATB", "TB", "TE"),
+}
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 

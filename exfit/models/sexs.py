@@ -18,8 +18,8 @@ SHEET = sheet(
     ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
     ("K", 100.0, "pu", (0.01, 100000.0), "regulator gain"),
     ("TE", 0.05, "s", (0.0, 10.0), "exciter time constant"),
-    ("EMIN", -5.0, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
-    ("EMAX", 5.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
+    ("EMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
+    ("EMAX", 4.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
 )
 
 RECORDS = (record("SEXS", "TATB TB K TE EMIN EMAX"),)
