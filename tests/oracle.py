@@ -38,13 +38,10 @@ def typical_values(name: str, machine: str = "GENROU", **changes: float) -> dict
 
 
 def lively_values(name: str, machine: str = "GENROU", **changes: float) -> dict[str, float]:
-    """Return typical data with no block bypassed: every lag and every integral takes part."""
+    """Return typical data with no block bypassed: every lag takes part."""
     system, values = system_of(name, machine), typical_values(name, machine)
     for symbol in system.time_constants:
         values[symbol] = values[symbol] or 0.03
-    for row in MODELS[name].sheet:
-        if row.unit == "pu/s":
-            values[row.symbol] = values[row.symbol] or 0.5
     return values | {symbol.replace("machine_", MACHINE): v for symbol, v in changes.items()}
 
 

@@ -23,7 +23,22 @@ from exfit.simulate import Change, Course, Simulator
 REFERENCE = Path(__file__).parent / "reference"
 J = 1j
 
-# sample data (b) of ST4B, with room for a field voltage that KG = 1 feeds back whole
+# sample data of ST4B: (a), and (b) with room for a field voltage that KG = 1 feeds back whole
+POTENTIAL_ST4B = {
+    "KPR": 10.75,
+    "KIR": 10.75,
+    "TA": 0.02,
+    "KPM": 1.0,
+    "KIM": 0.0,
+    "KG": 0.0,
+    "KP": 9.3,
+    "KI": 0.0,
+    "VBMAX": 11.63,
+    "KC": 0.113,
+    "XL": 0.124,
+    "VMMAX": 99.0,
+    "VMMIN": -99.0,
+}
 COMPOUND_ST4B = {
     "KPR": 20.0,
     "KIR": 20.0,
@@ -166,7 +181,8 @@ LINEAR = [
     ("ST3A", st3a, {"VRMIN": -20.0, "VMMIN": -1.0}),
     ("ST3A", st3a, {"VBMAX": 5.0, "KG": 0.5}),
     ("ST3A", st3a, {"VGMAX": 0.5, "KA": 5.0}),
-    ("ST4B", st4b, {"KIM": 0.0}),  # sample data (a)
+    ("ST4B", st4b, {}),
+    ("ST4B", st4b, POTENTIAL_ST4B),
     ("ST4B", st4b, {"KIR": 0.0, "KIM": 0.0, "KG": 0.3}),
     ("ST4B", st4b, {"KPM": 0.7, "KIM": 3.0, "KG": 0.9, "VRMAX": 9.0}),
     ("ST4B", st4b, COMPOUND_ST4B),
@@ -219,9 +235,14 @@ CEILINGS = [
     ("ST2A", {"EFDMAX": 2.5}, lambda p, vt, ifd: 2.5),
     ("ST3A", {"VMMAX": 0.5}, lambda p, vt, ifd: 0.5 * behind(p, vt, ifd)),
     ("ST3A", {"VMMAX": 0.5, "VBMAX": 5.0}, lambda p, vt, ifd: 2.5),
-    ("ST4B", {"KP": 5.0}, lambda p, vt, ifd: behind(p, vt, ifd)),  # VRMAX = KPM = 1
+    ("ST4B", {"VMMAX": 0.5}, lambda p, vt, ifd: 0.5 * behind(p, vt, ifd)),
+    (
+        "ST4B",
+        POTENTIAL_ST4B | {"KP": 5.0},
+        lambda p, vt, ifd: behind(p, vt, ifd),
+    ),  # VRMAX = KPM = 1
     ("ST4B", COMPOUND_ST4B, lambda p, vt, ifd: behind(p, vt, ifd)),  # VMMAX = 1
-    ("SEXS", {"TATB": 0.2}, lambda p, vt, ifd: 4.0),
+    ("SEXS", {}, lambda p, vt, ifd: 4.0),
     ("SCRX", {}, lambda p, vt, ifd: 5.0 * vt),
     ("SCRX", {"CSWITCH": 1.0}, lambda p, vt, ifd: 5.0),
 ]

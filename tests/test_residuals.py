@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import lively_values, system_of
 
+from exfit.plant import VT0
 from exfit.residuals import (
     CENTRAL_STEP,
     JACOBIANS,
@@ -149,7 +150,7 @@ def test_what_is_fixed_stays(exciter):
 
 def test_a_set_that_cannot_be_simulated_costs_infinity(exciter):
     residuals = problem(exciter)
-    residuals.fixed = {**residuals.fixed, "VRMAX": 0.1}
+    residuals.fixed = {**residuals.fixed, VT0: float("nan")}
     got = residuals(residuals.start)
     assert got.shape == (101,)
     assert (got == np.inf).all()

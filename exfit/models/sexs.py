@@ -16,7 +16,7 @@ from exfit.models.sheet import record, sheet
 SHEET = sheet(
     ("TATB", 0.1, "1", (0.0, 100.0), "regulator lead, as a share of its lag"),
     ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
-    ("K", 100.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("K", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
     ("TE", 0.05, "s", (0.0, 10.0), "exciter time constant"),
     ("EMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
     ("EMAX", 4.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),

@@ -27,23 +27,25 @@ from exfit.models.sheet import record, sheet
 
 ALIASES = ("ESST4B",)
 
+# the gains are those that OpenIPSL compared with PSS/E: the samples of the standard cut a loop
+
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KPR", 10.75, "pu", (0.0, 100000.0), "proportional gain of the regulator"),
-    ("KIR", 10.75, "pu/s", (0.0, 100000.0), "integral gain of the regulator"),
+    ("KPR", 2.97, "pu", (0.0, 100000.0), "proportional gain of the regulator"),
+    ("KIR", 2.97, "pu/s", (0.0, 100000.0), "integral gain of the regulator"),
     ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
     ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant"),
     ("KPM", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field voltage loop"),
-    ("KIM", 0.0, "pu/s", (0.0, 100000.0), "integral gain of the field voltage loop"),
-    ("VMMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
-    ("VMMIN", -99.0, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
-    ("KG", 0.0, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
-    ("KP", 9.3, "pu", (0.01, 100.0), "potential source gain"),
-    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
-    ("VBMAX", 11.63, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
-    ("KC", 0.113, "pu", (0.0, 100.0), "rectifier loading factor"),
-    ("XL", 0.124, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
+    ("KIM", 0.2, "pu/s", (0.0, 100000.0), "integral gain of the field voltage loop"),
+    ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
+    ("VMMIN", -0.87, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
+    ("KG", 0.1, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
+    ("KP", 6.73, "pu", (0.01, 100.0), "potential source gain"),
+    ("KI", 0.1, "pu", (0.0, 100.0), "current source gain, on load"),
+    ("VBMAX", 8.41, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+    ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
     ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
 )
 
