@@ -7,9 +7,9 @@ vc1 ────────┘                EMIN     │
                                       └─ VT where CSWITCH = 0, 1 where it is 1
 
 TA = TATB TB: the record gives the ratio TA/TB. The limits of the lag are
-non-windup. Not modelled: UEL and OEL at the summing point, and what a bridge does
-that carries no negative field current (rc/rfd > 0), where OpenIPSL and Dynawo
-disagree; a voltage step on open circuit does not lead there.
+non-windup. Not modelled: UEL and OEL at the summing point, and what a bridge
+does that carries no negative field current (rc/rfd > 0), where OpenIPSL and
+Dynawo disagree. A voltage step on open circuit hardly ever leads there.
 """
 
 from exfit.engine.trace import Signal
@@ -23,7 +23,7 @@ SHEET = sheet(
     ("TE", 0.02, "s", (0.0, 10.0), "exciter time constant"),
     ("EMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the bridge voltage"),
     ("EMAX", 5.0, "pu", (-9999.0, 9999.0), "ceiling of the bridge voltage"),
-    ("CSWITCH", 0.0, "1", (0.0, 1.0), "0 where the bus feeds the bridge, 1 where it does not"),
+    ("CSWITCH", 0.0, "1", (0.0, 1.0), "feed of the bridge: 0 bus, 1 solid"),
 )
 
 # rc/rfd = 0 is a bridge that carries negative field current

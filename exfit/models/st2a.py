@@ -9,7 +9,7 @@ vref + vs ─►(+)─►[larger]─►[  KA  ]─►(x)─►(+)─►[  1  ]�
 vc1 ►[  1  ]┘ └──────────[  sKF  ]◄────────────────────┘
      [1+sTR]             [1 + sTF]
 
-VB = VE FEX(KC IFD / VE) with VE = |KP VT + j KI IT|, and 1 where KP = KI = 0, as
+VB = VE FEX(KC IFD / VE) with VE = |KP VT + j KI IT|, and 1 where KP = KI = 0 as
 in PSS/E. The limits of the regulator and of efd are non-windup. The current IT,
 and so KI, acts on load only. Not modelled: UEL and OEL at the summing point.
 """

@@ -2,12 +2,12 @@
 
               VIMAX                        VRMAX            VMMAX
 vref + vs ►(+)►[clip]►[larger]►[1 + sTC]►[  KA  ]─►(+)─►[  KM  ]─►(x)─┬─► efd
-          -▲   VIMIN     ▲     [1 + sTB] [1+sTA]   -▲   [1+sTM]    ▲  │
-           │            vuel               VRMIN    │       VMMIN  VB │
-vc1 ►[  1  ]                                        │                 │
-     [1+sTR]                                        └─VG─[smaller]◄[KG]
-                                                            ▲
-                                                          VGMAX
+           -▲  VIMIN     ▲     [1 + sTB] [1+sTA]   -▲   [1+sTM]    ▲  │
+            │           vuel               VRMIN    │       VMMIN  VB │
+vc1 ►[  1  ]┘                                       │                 │
+     [1+sTR]                                        └[smaller]◄─[KG]◄─┘
+                                                         ▲
+                                                       VGMAX
 
 VB = VE FEX(KC IFD / VE), at most VBMAX, with the source
 VE = |KP∠THETAP VT + j (KI + KP∠THETAP XL) IT|, THETAP in degrees. The limits of

@@ -2,16 +2,16 @@
 
               VRMAX                           VMMAX
 vref + vs ►(+)►[KPR + KIR/s]►[  1  ]─►(+)►[KPM + KIM/s]►[smaller]─►(x)─┬─► efd
-          -▲       VRMIN     [1+sTA]  -▲      VMMIN         ▲       ▲  │
-           │                           │                   voel     VB │
-vc1 ►[  1  ]                           └─────────────[ KG ]◄───────────┘
+           -▲      VRMIN     [1+sTA]  -▲      VMMIN         ▲       ▲  │
+            │                          │                   voel     VB │
+vc1 ►[  1  ]┘                          └─────────────[ KG ]◄───────────┘
      [1+sTR]
 
 VB = VE FEX(KC IFD / VE), at most VBMAX, with the source
-VE = |KP∠THETAP VT + j (KI + KP∠THETAP XL) IT|, THETAP in degrees. An integral is
-frozen while its PI is at its limit. KPM and KG close a loop without any lag; the
-equations solve it. The current IT, and so KI, XL and THETAP, act on load only.
-Not modelled: UEL at the summing point, and the VGMAX that later editions add.
+VE = |KP∠THETAP VT + j (KI + KP∠THETAP XL) IT|, THETAP in degrees. An integral
+is frozen while its PI is at its limit. KPM and KG close a loop without any lag;
+the equations solve it. The current IT, and so KI, XL and THETAP, act on load
+only. Not modelled: UEL at the summing point, and VGMAX of later editions.
 """
 
 from exfit.engine.trace import Signal
