@@ -196,7 +196,7 @@ LINEAR = [
 def test_a_small_step_on_a_machine_without_saturation_is_that_of_the_diagram(
     name, diagram, changes
 ):
-    """The closed loop; what the product VM VB adds is of the second order, 1e-5 of it all."""
+    """The closed loop; what the product VM VB adds is of the second order, 2e-5 of it all."""
     values = lively_values(name, "ONE_AXIS", machine_S10=0.0, machine_S12=0.0) | changes
     times, size = np.linspace(0.0, 3.0, 301), 1e-5
     X, Y = diagram(values)
@@ -209,7 +209,7 @@ def test_a_small_step_on_a_machine_without_saturation_is_that_of_the_diagram(
     simulator = Simulator(system_of(name, "ONE_AXIS"), course, times, 5e-4)
     got = simulator.response(values, ("vt",)).signals["vt"] - 1.0
     assert np.abs(expected).max() > 0.3 * size
-    assert np.abs(got - expected).max() < 2e-4 * size
+    assert np.abs(got - expected).max() < 5e-5 * size
 
 
 # --- large steps ----------------------------------------------------------------------------------
@@ -369,6 +369,7 @@ def test_a_step_of_sexs_is_that_of_another_simulator():
     simulator = Simulator(system_of("SEXS"), course, times, 1e-3)
     got = simulator.response(values | {VT0: 1.0}).signals
     assert got["vref"][0] == pytest.approx(told["vref_initial"], abs=1e-9)
-    # its trapezoidal rule, and its first step of 1e-6 s after the event
-    assert np.abs(got["vt"] - columns["vt"]).max() < 2e-5
-    assert np.abs(got["efd"] - columns["efd"])[times != told["steps"][0][0]].max() < 2e-2
+    # what its trapezoidal rule errs by at 1 ms, several times over
+    assert np.abs(got["vt"] - columns["vt"]).max() < 1e-6
+    assert np.abs(got["ifd"] - columns["ifd"]).max() < 5e-6
+    assert np.abs(got["efd"] - columns["efd"]).max() < 2e-5
