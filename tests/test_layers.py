@@ -21,6 +21,7 @@ ORDER = (
     "exfit.engine.emit",
     "exfit.engine.kernel",
     "exfit.models.sheet",
+    "exfit.models.phasors",
     "exfit.models.blocks",
     "exfit.models.machines.machine",
     "exfit.models.machines.d_axis",

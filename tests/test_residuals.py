@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import lively_values, system_of
 
+from exfit.plant import VT0
 from exfit.residuals import (
     CENTRAL_STEP,
     JACOBIANS,
@@ -18,7 +19,15 @@ from exfit.simulate import Change, Course, Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
-FREE = {"AC1A": ("KA", "TE", "KF", "KC", "KD"), "AC8B": ("KPR", "TE", "TDR", "KC", "KD")}
+FREE = {
+    "AC1A": ("KA", "TE", "KF", "KC", "KD"),
+    "AC8B": ("KPR", "TE", "TDR", "KC", "KD"),
+    "ST2A": ("KA", "TE", "KF", "KP", "KC"),
+    "ST3A": ("KA", "TB", "KM", "KP", "KC"),
+    "ST4B": ("KPR", "KIR", "TA", "KP", "KC"),
+    "SCRX": ("K", "TATB", "TB", "TE"),
+    "SEXS": ("K", "TATB", "TB", "TE"),
+}
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 
@@ -141,7 +150,7 @@ def test_what_is_fixed_stays(exciter):
 
 def test_a_set_that_cannot_be_simulated_costs_infinity(exciter):
     residuals = problem(exciter)
-    residuals.fixed = {**residuals.fixed, "VRMAX": 0.1}
+    residuals.fixed = {**residuals.fixed, VT0: float("nan")}
     got = residuals(residuals.start)
     assert got.shape == (101,)
     assert (got == np.inf).all()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from oracle import drawn_values, lively_values, system_of, typical_values
 from scipy.integrate import solve_ivp
 
-from exfit.engine.system import Motion, Rest, System
+from exfit.engine.system import Motion, Rest, System, trace
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.plant import VT0
@@ -54,7 +54,7 @@ def test_at_the_instant_of_a_step_the_value_is_that_before_it(model):
         course = Course(0.0, 1.0, (Change(at, 0.02),))
         times = np.array([at - 1e-3, at, at + 1e-3])
         vref = samples(model, lively_values(model), course, times, outputs=("vref",))[:, 0]
-        assert vref[1] == vref[0]
+        assert vref[1] == pytest.approx(vref[0], abs=1e-14)
         assert vref[2] - vref[1] == pytest.approx(0.02)
 
 
@@ -187,9 +187,20 @@ def test_halving_the_step_hardly_moves_a_response_that_meets_limits(exciter):
     course = Course(0.0, 2.0, (Change(0.3, 0.3), Change(1.1, -0.4)))
     fine = samples(exciter, values, course, step=3.125e-5)
     errors = [np.abs(samples(exciter, values, course, step=h) - fine).max() for h in (1e-3, 2.5e-4)]
-    # a state may be held a part of a step too early: what follows it errs by the step squared
-    assert errors[0] < 2e-5
-    assert errors[1] < 2e-5 / 8
+    # a state may be held a part of a step too early: what follows it errs by the step squared;
+    # an integral is frozen a part of a step too early, and misses that part
+    most, order = (3e-5, 1.0) if freezes(exciter, values, course) else (2e-5, 1.5)
+    assert errors[0] < most
+    assert errors[1] < most / 4.0**order
+
+
+def freezes(exciter, values, course):
+    """Tell whether a state that has no limits of its own stands still for a while."""
+    system = system_of(exciter)
+    states = samples(exciter, values, course, outputs=system.states)
+    still = (np.diff(states[course.steps[0].at < CLOCK], axis=0) == 0.0).any(axis=0)
+    limited = [node.op == "clip" for node in trace(system, ("vt",)).clamped]
+    return bool((still & ~np.array(limited)).any())
 
 
 BEYOND = {
@@ -202,13 +213,26 @@ BEYOND = {
         "VFEMAX": 0.5,
         "VEMIN": 9.0,
     },
+    "ST2A": {"VRMAX": 0.1, "VRMIN": 0.9, "EFDMAX": 0.5},
+    "ST3A": {
+        "VIMAX": 0.001,
+        "VIMIN": 0.1,
+        "VRMAX": 0.5,
+        "VRMIN": 9.0,
+        "VMMAX": 0.05,
+        "VMMIN": 0.9,
+    },
+    "ST4B": {"VRMAX": 0.05, "VRMIN": 0.9, "VMMAX": 0.05, "VMMIN": 0.9},
+    "SCRX": {"EMAX": 0.5, "EMIN": 3.0},
+    "SEXS": {"EMAX": 0.5, "EMIN": 3.0},
 }
+CUT = ("VBMAX", "VGMAX")  # what they cut, other signals make up for: a start may lie beyond them
 CASES = [(name, symbol) for name in BEYOND for symbol in BEYOND[name]]
 
 
 def test_every_limit_is_tried(exciter):
     limits = [s for s in system_of(exciter).parameters if s.endswith(("MAX", "MIN"))]
-    assert sorted(BEYOND[exciter]) == sorted(limits)
+    assert sorted(BEYOND[exciter]) == sorted(set(limits) - set(CUT))
 
 
 @pytest.mark.parametrize("bypassed", [True, False])
@@ -223,39 +247,57 @@ def test_a_start_beyond_a_limit_names_it_with_both_values(name, symbol, bypassed
     assert told.startswith("no state of rest at vt0 = 1 pu: the start needs ")
     if symbol != "VFEMAX":  # the limit of VE that follows from it is told
         assert f"{symbol} = {limit:g}" in told
-    simulator = Simulator(system_of(name), UP, CLOCK, 1e-3)
-    needed = simulator.response(values, ("VE", "vt")).signals["VE"][0]
     number = float(told.split("needs ")[1].split(",")[0])
     if symbol in ("VFEMAX", "VEMIN"):
+        simulator = Simulator(system_of(name), UP, CLOCK, 1e-3)
+        needed = simulator.response(values, ("VE", "vt")).signals["VE"][0]
         assert number == pytest.approx(needed, rel=1e-5)
     else:
-        assert 0.5 < number < 9.0
+        assert (number > limit) == symbol.endswith("MAX")
+
+
+ON_ITS_LIMIT = {
+    "AC1A": ("VA", "VRMAX"),
+    "AC8B": ("VR", "VRMAX"),
+    "ST2A": ("VR", "VRMAX"),
+    "ST3A": ("VR", "VRMAX"),
+    "ST4B": ("VM", "VMMAX"),
+    "SCRX": ("EB", "EMAX"),
+    "SEXS": ("EFD", "EMAX"),
+}
 
 
 def test_a_start_exactly_on_a_limit_is_a_start(exciter):
     """What holds the start is allowed; a hair less is not."""
     values = lively_values(exciter)
-    state = {"AC1A": "VA", "AC8B": "VR"}[exciter]
+    state, limit = ON_ITS_LIMIT[exciter]
     simulator = Simulator(system_of(exciter), AT_REST, CLOCK, 1e-3)
     needed = simulator.response(values, (state,)).signals[state][0]
-    vt = simulator.response(values | {"VRMAX": needed * (1 + 1e-12)}, ("vt",)).signals["vt"]
+    vt = simulator.response(values | {limit: needed * (1 + 1e-12)}, ("vt",)).signals["vt"]
     assert vt == pytest.approx(1.0, abs=1e-9)
-    with pytest.raises(SimulationError, match="VRMAX"):
-        simulator.response(values | {"VRMAX": needed * (1 - 1e-3)})
+    with pytest.raises(SimulationError, match=limit):
+        simulator.response(values | {limit: needed * (1 - 1e-3)})
 
 
 def test_values_that_define_no_start_are_refused(exciter):
-    for wrong in ({"KA": 0.0}, {"TE": float("nan")}, {"KC": float("inf")}, {VT0: float("nan")}):
+    values, nan = lively_values(exciter), float("nan")
+    wrong = {"KA": 0.0, "K": 0.0, "TE": nan, "TA": nan, "KC": float("inf"), VT0: nan}
+    for symbol in wrong.keys() & values.keys():
         with pytest.raises(SimulationError):
-            samples(exciter, lively_values(exciter) | wrong)
+            samples(exciter, values | {symbol: wrong[symbol]})
 
 
 # --- sub-steps ------------------------------------------------------------------------------------
 
 
 def stiff_values(name, seed):
-    """Return values whose gains and times lie anywhere within a factor of ten."""
-    return drawn_values(name, seed, spread=10.0)
+    """Return values whose gains and times lie anywhere within a factor of ten.
+
+    But for what may cut a feedback at rest: such a loop closes on its way, faster than anything
+    that the start shows.
+    """
+    values = drawn_values(name, seed, spread=10.0)
+    return values | dict.fromkeys(values.keys() & set(CUT), 9999.0)
 
 
 @pytest.mark.parametrize("step", [1e-3, 2e-2])
@@ -280,7 +322,8 @@ def test_no_response_is_unstable_without_a_word(model, step):
 def test_sub_steps_follow_the_shortest_time_constant(exciter):
     for T in (1e-2, 2e-4):
         simulator = Simulator(system_of(exciter), UP, CLOCK, 1e-2)
-        values = lively_values(exciter) | {"TR": T}
+        values = lively_values(exciter)
+        values["TR" if "TR" in values else "TE"] = T
         parts = simulator.substeps(values)
         assert parts >= np.ceil(1e-2 / T)
         assert simulator.samples(values, ("vt",))[1] == parts

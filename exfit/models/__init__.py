@@ -5,7 +5,7 @@ from pathlib import Path
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import ac1a, ac8b, first_order
+from exfit.models import ac1a, ac8b, first_order, scrx, sexs, st2a, st3a, st4b
 from exfit.models.sheet import Model, model
 
 MODELS: dict[str, Model] = {
@@ -13,6 +13,11 @@ MODELS: dict[str, Model] = {
     for name, module in (
         ("AC1A", ac1a),
         ("AC8B", ac8b),
+        ("ST2A", st2a),
+        ("ST3A", st3a),
+        ("ST4B", st4b),
+        ("SCRX", scrx),
+        ("SEXS", sexs),
         ("FIRST_ORDER", first_order),
     )
 }

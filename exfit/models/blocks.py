@@ -6,30 +6,19 @@ A block with a non-windup limit returns its slope as ``Limited``: held at the li
 put back on it after every step, so that a response has no jags where a step ends beyond the limit.
 """
 
-from math import inf, pi
+from math import inf, radians
 from math import sqrt as root
 from typing import NamedTuple
 
-from exfit.engine.trace import (
-    Signal,
-    clip,
-    cos,
-    exp,
-    is_zero,
-    larger,
-    log,
-    sin,
-    smaller,
-    sqrt,
-    where,
-)
+from exfit.engine.trace import Signal, clip, cos, exp, larger, log, sin, smaller, sqrt, where
+from exfit.models.phasors import modulus
 
 __all__ = [
     "SHORTEST",
     "Limited",
     "Saturation",
-    "angle",
     "clip",
+    "compound_source",
     "cos",
     "exp",
     "exponential",
@@ -45,7 +34,8 @@ __all__ = [
     "limited_integrator",
     "limited_lag",
     "log",
-    "modulus",
+    "pi",
+    "pi_rest",
     "pid",
     "quadratic",
     "rate",
@@ -53,6 +43,7 @@ __all__ = [
     "rectifier_supply",
     "sin",
     "smaller",
+    "source_voltage",
     "sqrt",
     "washout",
     "where",
@@ -60,21 +51,7 @@ __all__ = [
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
 SQRT3 = root(3.0)
-NEWTON_STEPS = 4  # to an angle: each cubes the error, which is 0.33 at first
-
-
-def modulus(a: Signal, b: Signal) -> Signal:
-    """Return sqrt(a^2 + b^2); where b is not there at all, a, which is then positive."""
-    return a if is_zero(b) else sqrt(a * a + b * b)
-
-
-def angle(x: Signal, y: Signal) -> Signal:
-    """Return the angle of the point (x, y), in radians between -pi and pi; not for x = y = 0."""
-    size = sqrt(x * x + y * y)
-    found = where(y < 0.0, -pi / 2.0, pi / 2.0) * (1.0 - x / size)
-    for _ in range(NEWTON_STEPS):
-        found = found + (y * cos(found) - x * sin(found)) / size
-    return found
+RADIANS = radians(1.0)  # per degree
 
 
 class Limited(NamedTuple):
@@ -233,3 +210,45 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
     This one is a Newton step, so that a state put back on it does not hunt around the limit.
     """
     return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)
+
+
+def pi(
+    u: Signal, integral: Signal, KP: Signal, KI: Signal, low: Signal = -inf, high: Signal = inf
+) -> tuple[Signal, Signal]:
+    """KP + KI / s, limited as a PID is; return the output and the slope of the integral."""
+    y, slope, _ = pid(u, integral, 0.0, KP, KI, 0.0, 1.0, low, high)
+    return y, slope
+
+
+def pi_rest(y: Signal, KP: Signal, KI: Signal) -> tuple[Signal, Signal]:
+    """Return the input and the integral that hold a PI at y, whichever of its gains is zero."""
+    integrates = KI > 0.0
+    return where(integrates, 0.0, y / where(integrates, 1.0, KP)), where(integrates, y, 0.0)
+
+
+def compound_source(
+    vt: Signal,
+    p: Signal,
+    q: Signal,
+    KP: Signal,
+    KI: Signal,
+    XL: Signal = 0.0,
+    THETAP: Signal = 0.0,
+) -> Signal:
+    """Return VE = |KP VT + j (KI + KP XL) IT|, where KP stands at THETAP degrees.
+
+    IT = (p - j q) / VT, with VT on the real axis. Everything is turned back by THETAP, so that on
+    open circuit no angle is left and VE = KP VT.
+    """
+    theta = THETAP * RADIANS
+    active, reactive = p / vt, q / vt
+    cosine, sine = cos(theta), sin(theta)
+    along = KP * (vt + XL * reactive) + KI * (cosine * reactive + sine * active)
+    across = KP * XL * active + KI * (cosine * active - sine * reactive)
+    return modulus(along, across)
+
+
+def source_voltage(u: Signal, p: Signal) -> Signal:
+    """Return VB, what a compound source gives behind its rectifier, at most VBMAX."""
+    ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
+    return smaller(rectifier(ve, p.KC * u.ifd), p.VBMAX)

@@ -5,9 +5,9 @@ from math import pi
 from typing import Literal, NamedTuple
 
 from exfit.engine.system import Motion, Rest, Signals, System
-from exfit.engine.trace import Signal
-from exfit.models.blocks import angle, cos, modulus, sin, sqrt
+from exfit.engine.trace import Signal, cos, sin, sqrt
 from exfit.models.machines import Axes, Machine, Source
+from exfit.models.phasors import angle, modulus
 from exfit.models.sheet import Model, Sheet, sheet
 from exfit.plant.parts import (
     MACHINE,

@@ -1,0 +1,41 @@
+"""SEXS: simplified excitation system (PSS/E; AC4 of the IEEE report of 1981).
+
+                             EMAX
+vref + vs ─►(+)─►[1 + sTA]─►[  K  ]─► efd
+           -▲    [1 + sTB]  [1+sTE]
+vc1 ────────┘                EMIN
+
+TA = TATB TB: the record gives the ratio TA/TB. The limits of the lag are
+non-windup. Not modelled: UEL and OEL at the summing point.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import lead_lag, limited_lag
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TATB", 0.1, "1", (0.0, 100.0), "regulator lead, as a share of its lag"),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
+    ("K", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TE", 0.05, "s", (0.0, 10.0), "exciter time constant"),
+    ("EMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
+    ("EMAX", 4.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
+)
+
+RECORDS = (record("SEXS", "TATB TB K TE EMIN EMAX"),)
+
+STATES = "VL EFD"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vl, d.VL = lead_lag(u.vref + u.vs - u.vc1, s.VL, p.TATB * p.TB, p.TB)
+    efd, d.EFD = limited_lag(vl, s.EFD, p.K, p.TE, p.EMIN, p.EMAX)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    error = efd / p.K
+    x.VL, x.EFD = error, efd
+    return u.vc1 + error - u.vs

@@ -1,0 +1,74 @@
+"""ST2A: compound-source rectifier exciter (IEEE Std 421.5-2005, 7.2).
+
+                                 VRMAX              EFDMAX
+vref + vs ─►(+)─►[larger]─►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─► efd
+           -▲ ▲-     ▲     [1+sTA]    ▲    ▲-  [ sTE ] │
+            │ │     vuel     VRMIN    VB   │      0    │
+            │ │                            └───[ KE ]◄─┤
+            │ │                                        │
+vc1 ►[  1  ]┘ └──────────[  sKF  ]◄────────────────────┘
+     [1+sTR]             [1 + sTF]
+
+VB = VE FEX(KC IFD / VE) with VE = |KP VT + j KI IT|, and 1 where KP = KI = 0 as
+in PSS/E. The limits of the regulator and of efd are non-windup. The current IT,
+and so KI, acts on load only. Not modelled: UEL and OEL at the summing point.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    compound_source,
+    lag,
+    larger,
+    limited_integrator,
+    limited_lag,
+    rectifier,
+    washout,
+    where,
+)
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESST2A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 120.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.15, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KE", 1.0, "pu", (0.01, 10.0), "exciter constant"),
+    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("KP", 4.88, "pu", (0.0, 100.0), "potential source gain"),
+    ("KI", 8.0, "pu", (0.0, 100.0), "current source gain, on load"),
+    ("KC", 1.82, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("EFDMAX", 4.5, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
+)
+
+RECORDS = (record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),)
+
+STATES = "VC VR EFD VF"
+
+
+def source(u: Signal, p: Signal) -> Signal:
+    """Return VB, the voltage behind the rectifier."""
+    ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI)
+    return where((p.KP <= 0.0) & (p.KI <= 0.0), 1.0, rectifier(ve, p.KC * u.ifd))
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
+    error = larger(u.vref + u.vs - vc - vf, u.vuel)
+    vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    vb = source(u, p)
+    efd, d.EFD = limited_integrator(vr * vb - p.KE * s.EFD, s.EFD, p.TE, 0.0, p.EFDMAX)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vr = p.KE * efd / source(u, p)
+    x.VC, x.VR, x.EFD, x.VF = u.vc1, vr, efd, efd
+    return u.vc1 + vr / p.KA - u.vs
