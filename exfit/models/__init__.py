@@ -5,14 +5,20 @@ from pathlib import Path
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import ac1a, ac8b, first_order
+from exfit.models import ac1a, ac2a, ac3a, ac4a, ac5a, ac6a, ac8b, exac4, first_order
 from exfit.models.sheet import Model, model
 
 MODELS: dict[str, Model] = {
     name: model(name, vars(module))
     for name, module in (
         ("AC1A", ac1a),
+        ("AC2A", ac2a),
+        ("AC3A", ac3a),
+        ("AC4A", ac4a),
+        ("AC5A", ac5a),
+        ("AC6A", ac6a),
         ("AC8B", ac8b),
+        ("EXAC4", exac4),
         ("FIRST_ORDER", first_order),
     )
 }
