@@ -1,22 +1,24 @@
 """AC2A: alternator exciter with high initial response (IEEE Std 421.5-2005, 6.2).
 
-                             VAMAX              UEL OEL   VRMAX
-vref + vs ──►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[KB]─►HV─►LV─►[clip]─── VR ──┐
-           -▲   ▲-[1 + sTB]  [1+sTA] -▲                   VRMIN          │
-            │   │            VAMIN    │                                  ▼
-vc1 ►[  1  ]┘   │ [  sKF  ]           │                   VE <= VEMAX   (+)
-     [1+sTR]    └─[1 + sTF]◄──┐     [KH]◄─┐   efd ◄─(x)◄─┬─[  1  ]◄──────┘▲-
-                              │           │          ▲   │ [ sTE ]        │
-                              │           │         FEX  │ VE >= 0        │
-                              │           │          ▲   ▼                │
-                              └───────────┴──────────┼─ VFE ──────────────┘
-                                              KC IFD / VE
+                              VAMAX            UEL OEL   VRMAX
+vref + vs ──►(+)─►[1 + sTC]──►[  KA  ]──►(+)─►[KB]─►HV─►LV─►[clip]─┐
+           -▲   ▲-[1 + sTB]   [1+sTA]   -▲                  VRMIN  │ VR
+            │   │             VAMIN      │           VE <= VEMAX   ▼
+vc1 ►[  1  ]┘   │                        │   ┌─ VE ─┬─[  1  ]◄────(+)
+     [1+sTR]    │                        │   ▼      │ [ sTE ]     -▲
+                │                 efd ◄──┼──(x)     │ VE >= 0      │
+                │                        │   ▲      │              │
+                │                        │  FEX     └──► VFE ──────┤
+                │                        │   ▲                     │
+                │ [  sKF  ]              │  KC IFD / VE            │
+                └─[1 + sTF]◄──────┐      └─[KH]◄───────────────────┤
+                                  └────────────────────────────────┘
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX, that is
 (VFEMAX - KD IFD) / (KE + SE(VE)): the limit of the exciter's field current.
 The limits of the lag and of VE are non-windup; the clamp to VRMAX, VRMIN is
-not. KH closes a loop around the exciter that shortens its time constant, so at
-rest VA = VFE / KB + KH VFE.
+not. KH closes a loop that shortens the exciter's time constant, so at rest
+VA = VFE / KB + KH VFE. UEL and OEL are gates, and do not act by themselves.
 """
 
 from exfit.engine.trace import Signal

@@ -1,22 +1,23 @@
-"""AC3A: alternator exciter that feeds its own regulator (IEEE Std 421.5-2005, 6.3).
+"""AC3A: alternator exciter, its own supply (IEEE Std 421.5-2005, 6.3).
 
-                         UEL          VAMAX   KR efd       VE <= VEMAX
-vref + vs ►(+)►[1 + sTC]►HV──►(+)────►[  KA  ]──►(x)─►(+)─►[  1  ]─┬ VE ►(x)┬► efd
-         -▲    [1 + sTB]     -▲       [1+sTA]        -▲    [ sTE ] │      ▲ │
-          │                   │       VAMIN           │    VEMIN   │    FEX │
-vc1 [  1  ]            [   s   ]◄─ VN ◄─[KF | KN]◄─┐  └── VFE ◄────┘        │
- └─►[1+sTR]            [1 + sTF]          EFDN     └────────────────────────┘
+                         UEL       VAMAX   KR efd      VE <= VEMAX
+vref + vs ►(+)►[1 + sTC]─►HV─►(+)─►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─ VE ─►(x)─┬►efd
+          -▲   [1 + sTB]     -▲    [1+sTA]       -▲    [ sTE ] │        ▲  │
+           │                  │    VAMIN          │    VEMIN   │       FEX │
+vc1 ►[  1  ]┘                 │                   └─── VFE ◄───┘        ▲  │
+     [1+sTR]       [   s   ]  │                                KC IFD / VE │
+                   [1 + sTF]──┘◄── VN ◄─[ KF to EFDN, then KN ]◄───────────┘
 
-VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX; IN = KC IFD / VE.
-VN = KF efd up to EFDN and grows by KN per efd beyond it: the regulator is
-supplied by the exciter, so its gain grows with efd, and the feedback with it.
-The limits of the lag and of VE are non-windup.
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. VN grows by KF
+per efd up to EFDN and by KN beyond it: the exciter supplies its regulator, so
+that the gain of both grows with efd. The limits of the lag and of VE are
+non-windup; the UEL gate does not act by itself.
 
-Left out: KLV and VLV, the low voltage limiter of the 1981 model (EXAC3), which
-IEEE Std 421.5 replaced by VEMIN and PSS/E's ESAC3A does not have; the summing
-OEL. VF is subtracted behind the lead-lag and behind the UEL gate, as the models
-written after PSS/E's ESAC3A do. VEMIN: 0.1 here; copies of the sample data that
-say 0 let VE rest at 0 for good, where the regulator has no supply.
+VF is subtracted behind the lead-lag, as in the models written after PSS/E's
+ESAC3A. Left out: the low voltage limiter (KLV, VLV) of the model of 1981,
+which IEEE Std 421.5 and ESAC3A replaced by VEMIN; an OEL, which is added to vs.
+VEMIN is 0.1 here; copies of the sample data that say 0 let VE end at 0 for
+good, where the regulator has no supply.
 """
 
 from exfit.engine.trace import Signal

@@ -1,15 +1,16 @@
 """AC4A: alternator with a controlled rectifier (IEEE Std 421.5-2005, 6.4).
 
-              VIMAX              UEL  VRMAX - KC IFD
-vref + vs ►(+)►[clip]►[1 + sTC]──►HV─►[  KA  ]──► efd
-          -▲  VIMIN   [1 + sTB]       [1+sTA]
-           │                          VRMIN
+                 VIMAX             UEL  VRMAX - KC IFD
+vref + vs ─►(+)─►[clip]─►[1 + sTC]─►HV─►[  KA  ]─► efd
+           -▲    VIMIN   [1 + sTB]      [1+sTA]
+            │                           VRMIN
 vc1 ►[  1  ]┘
      [1+sTR]
 
-The limits of the lag are non-windup, and only the upper one sinks with the field
-current. The alternator itself is that limit: its voltage is held by a regulator
-of its own. Left out: a summing OEL. PSS/E's EXAC4 differs in its limits.
+The limits of the lag are non-windup, and only the upper one sinks with the
+field current; the UEL gate does not act by itself. The alternator's own
+regulator is left out, as in the standard, and so is an OEL, which is added to
+vs. PSS/E's older EXAC4 differs in its limits: it is a model of its own.
 """
 
 from exfit.engine.trace import Signal
@@ -32,7 +33,7 @@ SHEET = sheet(
     ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
     ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
     ("TA", 0.015, "s", (0.0, 10.0), "regulator time constant"),
-    ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage without load"),
+    ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
     ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
     ("KC", 0.0, "pu", (0.0, 100.0), "rectifier loading factor"),
 )

@@ -1,13 +1,22 @@
-"""AC6A: alternator exciter with a field current limiter (IEEE Std 421.5-2005, 6.6).
+"""AC6A: alternator exciter, field current limiter (IEEE Std 421.5-2005, 6.6).
 
-                              VAMAX          VT VRMAX        VE >= 0
-vref + vs ►(+)►[ 1+sTK ]─►[1 + sTC]─ VA ►(+)─►[clip]─ VR ►(+)─►[  1  ]─┬ VE ►(x)► efd
-         -▲   [KA -----]  [1 + sTB]     -▲  VT VRMIN    -▲   [ sTE ] │      ▲
-          │    [ 1+sTA ]   VAMIN          │               │           │     FEX
-vc1 [  1  ]                               │               └─── VFE ◄──┤      ▲
- └─►[1+sTR]                               │            VHMAX          │  KC IFD / VE
-                                          └─[1 + sTJ]◄─[KH]◄─(+)◄─ VFE ┘
-                                            [1 + sTH]   0     -▲ VFELIM
+                               VAMAX          VT VRMAX      VE >= 0
+vref + vs ─►(+)─►[1 + sTK] KA─►[1 + sTC]─►(+)─►[clip]─►(+)─►[  1  ]─┬─►(x)─► efd
+           -▲    [1 + sTA]     [1 + sTB] -▲           -▲    [ sTE ] │   ▲
+            │                  VAMIN      │   VT VRMIN │         VE │  FEX
+vc1 ►[  1  ]┘                             │            │            │   ▲
+     [1+sTR]                              │            ├─── VFE ◄───┘   │
+                               [1 + sTJ]──┘  VHMAX     ▼          KC IFD / VE
+                               [1 + sTH]◄────[ KH ]◄──(+)
+                                             0        -▲
+                                                       └─── VFELIM
+
+VFE = KE VE + VX(VE) + KD IFD. The field current limiter acts above VFELIM; at
+rest VA = VFE + KH (VFE - VFELIM) there. The limit of the second lead-lag is
+non-windup in the way of annex E: at the limit its state follows the limited
+output with the lag TC. The limit of VE is non-windup; the clamps of VR and of
+the limiter are not. TB = 0 bypasses TC with it, TA = 0 TK, TH = 0 TJ. Left out:
+UEL and OEL, which are added to vs.
 """
 
 from exfit.engine.trace import Signal

@@ -1,16 +1,16 @@
-"""EXAC4: alternator with a controlled rectifier (IEEE 1981, type AC4).
+"""EXAC4: alternator with a controlled rectifier (IEEE type AC4 of 1981).
 
-              VIMAX                         VRMAX - KC IFD
-vref + vs ►(+)►[clip]►[1 + sTC]─►[  KA  ]──►[clip]──► efd
-          -▲  VIMIN   [1 + sTB]  [1+sTA]
-           │                                VRMIN - KC IFD
+                 VIMAX                       VRMAX - KC IFD
+vref + vs ─►(+)─►[clip]─►[1 + sTC]─►[  KA  ]─►[clip]─► efd
+           -▲    VIMIN   [1 + sTB]  [1+sTA]
+            │                                VRMIN - KC IFD
 vc1 ►[  1  ]┘
      [1+sTR]
 
-As AC4A, but for the end: the limit is a clamp behind the lag, which runs on
-beyond it, and the field current lowers both sides. So draw it the PSS/E manual's
-readers: two programs that were written after it agree. A third one makes the
-limit non-windup. Left out: UEL and OEL, which are added to vs.
+AC4A with other limits: the clamp stands behind the lag, which runs on beyond
+it (windup), and the field current lowers both sides of it. Two models written
+after PSS/E's EXAC4 have it so; a third has the same limits, but non-windup.
+Left out: UEL and OEL, which are added to vs.
 """
 
 from exfit.engine.trace import Signal
@@ -29,8 +29,8 @@ SHEET = sheet(
     ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
     ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
     ("TA", 0.015, "s", (0.0, 10.0), "regulator time constant"),
-    ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage without load"),
-    ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage without load"),
+    ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
+    ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
     ("KC", 0.0, "pu", (0.0, 100.0), "rectifier loading factor"),
 )
 
