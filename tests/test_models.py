@@ -253,11 +253,11 @@ def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(model):
             continue
         values = typical | dict.fromkeys(leads_of(sheets, symbol), 0.0)
         none, small, twice, thrice = responses(
-            model, [values | {symbol: k * 2.0 * SHORTEST} for k in range(4)], size=0.02
+            model, [values | {symbol: k * 2.0 * SHORTEST} for k in range(4)], size=0.005
         )
         # the difference is a T + b T^2 + c T^3 ...: the three small ones tell a and b
-        assert np.abs(3.0 * (small - twice) + thrice - none).max() < 1e-5, symbol
-        assert np.abs(small - none).max() < 2e-3, symbol
+        assert np.abs(3.0 * (small - twice) + thrice - none).max() < 2.5e-6, symbol
+        assert np.abs(small - none).max() < 5e-4, symbol
 
 
 def test_a_time_constant_beyond_notice_equals_zero(model):

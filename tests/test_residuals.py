@@ -18,7 +18,16 @@ from exfit.simulate import Change, Course, Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
-FREE = {"AC1A": ("KA", "TE", "KF", "KC", "KD"), "AC8B": ("KPR", "TE", "TDR", "KC", "KD")}
+FREE = {
+    "AC1A": ("KA", "TE", "KF", "KC", "KD"),
+    "AC2A": ("KA", "KB", "TE", "KH", "KD"),
+    "AC3A": ("KA", "TE", "KF", "KR", "KD"),
+    "AC4A": ("KA", "TA", "TB", "TC"),
+    "AC5A": ("KA", "TE", "KF", "TF1", "KE"),
+    "AC6A": ("KA", "TE", "TK", "KC", "KD"),
+    "AC8B": ("KPR", "TE", "TDR", "KC", "KD"),
+    "EXAC4": ("KA", "TA", "TB", "TC"),
+}
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 
@@ -141,7 +150,8 @@ def test_what_is_fixed_stays(exciter):
 
 def test_a_set_that_cannot_be_simulated_costs_infinity(exciter):
     residuals = problem(exciter)
-    residuals.fixed = {**residuals.fixed, "VRMAX": 0.1}
+    ceilings = {"VRMAX", "VAMAX"} & residuals.fixed.keys()
+    residuals.fixed = {**residuals.fixed, **dict.fromkeys(ceilings, 0.1)}
     got = residuals(residuals.start)
     assert got.shape == (101,)
     assert (got == np.inf).all()

