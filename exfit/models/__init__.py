@@ -1,23 +1,44 @@
-"""The catalogue of exciter models, by the names that IEEE 421.5 and PSS/E give them."""
+"""The catalogue of exciters and stabilisers, by the names of IEEE 421.5 and PSS/E."""
 
 import difflib
 from pathlib import Path
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import ac1a, ac8b, first_order, scrx, sexs, st2a, st3a, st4b
+from exfit.models import (
+    ac1a,
+    ac2a,
+    ac3a,
+    ac4a,
+    ac5a,
+    ac6a,
+    ac8b,
+    exac4,
+    first_order,
+    scrx,
+    sexs,
+    st2a,
+    st3a,
+    st4b,
+)
 from exfit.models.sheet import Model, model
 
 MODELS: dict[str, Model] = {
     name: model(name, vars(module))
     for name, module in (
         ("AC1A", ac1a),
+        ("AC2A", ac2a),
+        ("AC3A", ac3a),
+        ("AC4A", ac4a),
+        ("AC5A", ac5a),
+        ("AC6A", ac6a),
         ("AC8B", ac8b),
         ("ST2A", st2a),
         ("ST3A", st3a),
         ("ST4B", st4b),
-        ("SCRX", scrx),
+        ("EXAC4", exac4),
         ("SEXS", sexs),
+        ("SCRX", scrx),
         ("FIRST_ORDER", first_order),
     )
 }

@@ -33,6 +33,7 @@ __all__ = [
     "limited",
     "limited_integrator",
     "limited_lag",
+    "limited_lead_lag",
     "log",
     "pi",
     "pi_rest",
@@ -252,3 +253,19 @@ def source_voltage(u: Signal, p: Signal) -> Signal:
     """Return VB, what a compound source gives behind its rectifier, at most VBMAX."""
     ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
     return smaller(rectifier(ve, p.KC * u.ifd), p.VBMAX)
+
+
+def limited_lead_lag(
+    u: Signal, x: Signal, TC: Signal, TB: Signal, low: Signal, high: Signal
+) -> tuple[Signal, Limited]:
+    """(1 + sTC) / (1 + sTB) with the non-windup limit of IEEE Std 421.5-2005, annex E.
+
+    The state is that of ``lead_lag`` between the limits; at a limit it follows the limited output
+    with the lag TC, so that it never runs away. With TC = 0 this is ``limited_lag``.
+    """
+    lead = TC * rate(TB)
+    y = clip(where(TB < SHORTEST, u, x + lead * (u - x)), low, high)
+    at_once = TC < SHORTEST
+    follows = where(TB < SHORTEST, 0.0, (y - x) * rate(TC))
+    slope = where(at_once, (u - x) * rate(TB), follows)
+    return y, limited(slope, x, where(at_once, low, -inf), where(at_once, high, inf))
