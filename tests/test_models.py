@@ -160,8 +160,12 @@ def test_a_flat_run_stays_flat_for_a_minute(model, saturation):
 
 
 def test_halving_the_step_cuts_the_error_sixteenfold(model):
-    """Small enough to stay off the limits and the knees; the step lies on the grid."""
+    """Small enough to stay off the limits and the knees; the step lies on the grid.
+
+    The law is one of the method: no lag is so short that the coarsest step would jump it.
+    """
     system, values = system_of(model), lively_values(model)
+    values |= {symbol: max(values[symbol], 0.03) for symbol in system.time_constants}
 
     def ends(steps):
         code = Kernel(system, ("vt",))
@@ -194,14 +198,15 @@ def tried(row, value):
 
 def moves(model, symbol, row):
     values = lively_values(model)
-    (before,) = responses(model, [values])
-    for value in tried(row, values[symbol]):
-        try:
-            (after,) = responses(model, [values | {symbol: value}])
-        except SimulationError:
-            continue
-        if np.abs(after - before).max() > 1e-6:
-            return True
+    for size in (0.3, 1.0):  # a limit of the field current stands beyond the smaller bump
+        (before,) = responses(model, [values], size=size)
+        for value in tried(row, values[symbol]):
+            try:
+                (after,) = responses(model, [values | {symbol: value}], size=size)
+            except SimulationError:
+                continue
+            if np.abs(after - before).max() > 1e-6:
+                return True
     return False
 
 
@@ -279,7 +284,7 @@ def test_a_state_stays_at_a_limit_only_while_pushed_against_it(exciter):
             drawn_back = held[:-1] & (at.slopes[name][:-1] != 0.0)
             assert (np.diff(x[name])[drawn_back] != 0.0).all(), name
             met |= {name} if held.any() and drawn_back.any() else set()
-    assert met
+    assert met or not limited_states(exciter)  # some exciters have clamps only
 
 
 # --- the catalogue --------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from pathlib import Path
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import ac1a, ac8b, first_order
+from exfit.models import ac1a, ac8b, exst1, first_order, st1a, st5b, st6b, st7b
 from exfit.models.sheet import Model, model
 
 MODELS: dict[str, Model] = {
@@ -13,6 +13,11 @@ MODELS: dict[str, Model] = {
     for name, module in (
         ("AC1A", ac1a),
         ("AC8B", ac8b),
+        ("ST1A", st1a),
+        ("ST5B", st5b),
+        ("ST6B", st6b),
+        ("ST7B", st7b),
+        ("EXST1", exst1),
         ("FIRST_ORDER", first_order),
     )
 }

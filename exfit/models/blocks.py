@@ -30,12 +30,14 @@ __all__ = [
     "limited",
     "limited_integrator",
     "limited_lag",
+    "limited_lead_lag",
     "log",
     "pid",
     "quadratic",
     "rate",
     "rectifier",
     "rectifier_supply",
+    "regulator_output",
     "smaller",
     "sqrt",
     "washout",
@@ -202,3 +204,33 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
     This one is a Newton step, so that a state put back on it does not hunt around the limit.
     """
     return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)
+
+
+def limited_lead_lag(
+    u: Signal, x: Signal, TC: Signal, TB: Signal, low: Signal, high: Signal
+) -> tuple[Signal, Limited]:
+    """(1 + sTC) / (1 + sTB) with a non-windup limit; the state is u seen through the lag TB.
+
+    Where TB > TC the state is held where the output meets its limit (IEEE Std 421.5-2005, annex E);
+    a lead has no such representation there: its output is clamped, its state runs on.
+    """
+    y, slope = lead_lag(u, x, TC, TB)
+    share = TC * rate(TB)
+    lags = (share < 1.0) & (TB >= SHORTEST)
+    rest = 1.0 / where(lags, 1.0 - share, 1.0)
+    lowest = where(lags, (low - share * u) * rest, -inf)
+    highest = where(lags, (high - share * u) * rest, inf)
+    return clip(y, low, high), limited(slope, x, lowest, highest)
+
+
+def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Signal = 0.0) -> Signal:
+    """Return the output of KA / (1 + sTA), before any limit, from which a rate feedback is taken.
+
+    With TA = 0 output and feedback wait for each other; that loop is solved here: ``vl`` is what
+    the regulator would get without the feedback, ``gain`` how much of a step gets there at once,
+    ``taken`` what is subtracted from the output before the feedback takes it. A limit in the loop
+    may be put on the result: the loop is monotonous, so that a limit holds there as it does here.
+    """
+    loop = p.KA * gain * p.KF * rate(p.TF)
+    prompt = (p.KA * vl + loop * (s.VF + taken)) / (1.0 + loop)
+    return where(p.TA < SHORTEST, prompt, s.VA)
