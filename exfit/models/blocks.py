@@ -208,19 +208,16 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
 
 def limited_lead_lag(
     u: Signal, x: Signal, TC: Signal, TB: Signal, low: Signal, high: Signal
-) -> tuple[Signal, Limited]:
-    """(1 + sTC) / (1 + sTB) with a non-windup limit; the state is u seen through the lag TB.
+) -> tuple[Signal, Signal]:
+    """(1 + sTC) / (1 + sTB), limited; the state is u seen through the lag TB.
 
-    Where TB > TC the state is held where the output meets its limit (IEEE Std 421.5-2005, annex E);
-    a lead has no such representation there: its output is clamped, its state runs on.
+    The state is frozen while it would push the output further beyond its limit. That of a lead
+    (TC > TB) never does: it runs on.
     """
     y, slope = lead_lag(u, x, TC, TB)
-    share = TC * rate(TB)
-    lags = (share < 1.0) & (TB >= SHORTEST)
-    rest = 1.0 / where(lags, 1.0 - share, 1.0)
-    lowest = where(lags, (low - share * u) * rest, -inf)
-    highest = where(lags, (high - share * u) * rest, inf)
-    return clip(y, low, high), limited(slope, x, lowest, highest)
+    growth = (TB - TC) * slope
+    outward = ((y >= high) & (growth > 0.0)) | ((y <= low) & (growth < 0.0))
+    return clip(y, low, high), where(outward, 0.0, slope)
 
 
 def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Signal = 0.0) -> Signal:

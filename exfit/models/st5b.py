@@ -1,21 +1,20 @@
 """ST5B: static exciter with two lead-lags in series (IEEE Std 421.5-2005, 7.5).
 
-              VUEL  VOEL       VRMAX/KR    VRMAX/KR    VRMAX
-vref ─►(+)─────►[gates]─►(+)─►[1 + sTC2]─►[1 + sTC1]─►[clip KR]─┐ VR
-       -▲                 ▲   [1 + sTB2]  [1 + sTB1]            │
-        │                 │    VRMIN/KR    VRMIN/KR    VRMIN    │
-vc1 ►[  1  ]              vs           VT VRMAX                 ▼
-     [1+sTR]                     efd ◄──[  1   ]◄──────────────(+)
-                                        [1+sT1 ]               -▲
-                                       VT VRMIN                 │
-                                                             KC IFD
+             VUEL  VOEL       VRMAX/KR    VRMAX/KR        VRMAX
+vref ─►(+)───►[gates]──►(+)─►[1 + sTC1]─►[1 + sTC2]─►[KR]─►[clip]─┐ VR
+       -▲                ▲   [1 + sTB1]  [1 + sTB2]       VRMIN   │
+        │                │    VRMIN/KR    VRMIN/KR                │
+vc1 ►[  1  ]             vs             VT VRMAX                  ▼
+     [1+sTR]                      efd ◄──[  1  ]◄────────────────(+)
+                                         [1+sT1]                 -▲
+                                        VT VRMIN                  │
+                                                               KC IFD
 
-The limits of the lag T1 are non-windup, and so is that of a lead-lag which lags
-(TB > TC); one which leads is clamped, its state runs on: the standard defines no
-other limit for it, and its own data make TC2/TB2 one. Sources disagree: Dynawo
-limits the second lead-lag only, InterPSS both and takes TC1/TB1 first. Followed
-is the figure, with the limits on both and TC2/TB2 first; while no limit is met
-these are all the same.
+The limit of the lag T1 is non-windup. A lead-lag at its limit is frozen while it
+pushes on; one that leads (TC > TB, as TC2/TB2 in the standard's data) does not.
+Sources disagree on the chain. Followed are PowerWorld and InterPSS, whose order is
+that of the PSS/E record, with the limits on both; Dynawo takes TC2/TB2 first and
+limits TC1/TB1 only. While no limit is met these are the same.
 
 Left out: the lead-lags TUC, TUB and TOC, TOB that take over while a limiter has
 the gate; while none acts they have no effect.
@@ -27,10 +26,10 @@ from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
     ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("TC1", 0.8, "s", (0.0, 100.0), "lead of the second lead-lag"),
-    ("TB1", 6.0, "s", (0.0, 100.0), "lag of the second lead-lag"),
-    ("TC2", 0.08, "s", (0.0, 100.0), "lead of the first lead-lag"),
-    ("TB2", 0.01, "s", (0.0, 100.0), "lag of the first lead-lag"),
+    ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead"),
+    ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag"),
+    ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead"),
+    ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag"),
     ("KR", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
     ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor"),
@@ -46,7 +45,7 @@ RECORDS = (
     ),
 )
 
-STATES = "VC VL2 VL1 VE"
+STATES = "VC VL1 VL2 VE"
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -54,9 +53,9 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     low, high = p.VRMIN / p.KR, p.VRMAX / p.KR
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = smaller(larger(u.vref - vc, u.vuel), u.voel) + u.vs
-    vl2, d.VL2 = limited_lead_lag(error, s.VL2, p.TC2, p.TB2, low, high)
-    vl1, d.VL1 = limited_lead_lag(vl2, s.VL1, p.TC1, p.TB1, low, high)
-    vr = clip(p.KR * vl1, p.VRMIN, p.VRMAX)
+    vl1, d.VL1 = limited_lead_lag(error, s.VL1, p.TC1, p.TB1, low, high)
+    vl2, d.VL2 = limited_lead_lag(vl1, s.VL2, p.TC2, p.TB2, low, high)
+    vr = clip(p.KR * vl2, p.VRMIN, p.VRMAX)
     loaded = vr - p.KC * u.ifd
     efd, d.VE = limited_lag(loaded, s.VE, 1.0, p.T1, u.vt * p.VRMIN, u.vt * p.VRMAX)
     return efd
@@ -65,5 +64,5 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
     error = (efd + p.KC * u.ifd) / p.KR
-    x.VC, x.VL2, x.VL1, x.VE = u.vc1, error, error, efd
+    x.VC, x.VL1, x.VL2, x.VE = u.vc1, error, error, efd
     return u.vc1 + error - u.vs
