@@ -18,7 +18,15 @@ from exfit.simulate import Change, Course, Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
-FREE = {"AC1A": ("KA", "TE", "KF", "KC", "KD"), "AC8B": ("KPR", "TE", "TDR", "KC", "KD")}
+FREE = {
+    "AC1A": ("KA", "TE", "KF", "KC", "KD"),
+    "AC8B": ("KPR", "TE", "TDR", "KC", "KD"),
+    "ST1A": ("KA", "TC", "TB", "KF", "TA"),
+    "ST5B": ("KR", "TC1", "TB1", "TB2", "KC"),
+    "ST6B": ("KPA", "KIA", "KDA", "KM", "TG"),
+    "ST7B": ("KPA", "TG", "TC", "TB", "TIA"),
+    "EXST1": ("KA", "TC", "TB", "KF", "TF"),
+}
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 

@@ -14,8 +14,9 @@ vc1 ►[  1  ]┘   └──[  sKF  ]◄─────────────
                         KLR (IFD - ILR), where positive ──┘
 
 The limits of the lag are non-windup; the two clamps are not. The gates are the
-higher of the signal and VUEL, then the lower of that and VOEL. The rate feedback
-is taken before the last clamp (as ANDES, OpenIPSL and Dynawo do, and the figure).
+higher of the signal and VUEL, then the lower of that and VOEL. The rate
+feedback is taken before the last clamp (as ANDES, OpenIPSL and Dynawo do, and
+the figure).
 
 In a PSS/E record UEL = 1 and VOS = 1: limiter and stabiliser act on the error.
 Left out: UEL = 2 (a gate behind VIMAX), UEL = 3 (the gate drawn here, with a

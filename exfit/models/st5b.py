@@ -10,11 +10,11 @@ vc1 ►[  1  ]             vs             VT VRMAX                  ▼
                                         VT VRMIN                  │
                                                                KC IFD
 
-The limit of the lag T1 is non-windup. A lead-lag at its limit is frozen while it
-pushes on; one that leads (TC > TB, as TC2/TB2 in the standard's data) does not.
-Sources disagree on the chain. Followed are PowerWorld and InterPSS, whose order is
-that of the PSS/E record, with the limits on both; Dynawo takes TC2/TB2 first and
-limits TC1/TB1 only. While no limit is met these are the same.
+The limit of the lag T1 is non-windup. A lead-lag at its limit is frozen while
+it pushes on; one that leads (TC > TB, as TC2/TB2 in the standard's data) does
+not. Sources disagree on the chain. Followed are PowerWorld and InterPSS, whose
+order is that of the PSS/E record, with the limits on both; Dynawo takes TC2/TB2
+first and limits TC1/TB1 only. While no limit is met these are the same.
 
 Left out: the lead-lags TUC, TUB and TOC, TOB that take over while a limiter has
 the gate; while none acts they have no effect.

@@ -10,13 +10,13 @@ vc1 ►[  1  ]                                   -▲                     │  (
                          KLR (KCI ILR - IFD), at least VRMIN ─────────┘  efd
 
 The integral is frozen while the PID is at its limit; the other limits are plain
-clamps. VR multiplies the terminal voltage VT: a supply from the terminals, as in
-PSS/E; PSLF lets VRMULT choose, and Dynawo has a whole potential circuit. VS acts
-behind the gate. In the standard the regulator is a PI (KDA = 0); the record of
-PSS/E has the derivative, and so has the typical data, a small one.
+clamps. VR multiplies the terminal voltage VT: a supply from the terminals, as
+in PSS/E; PSLF lets VRMULT choose, and Dynawo has a whole potential circuit. VS
+acts behind the gate. In the standard the regulator is a PI (KDA = 0); the
+record of PSS/E has the derivative, and so has the typical data, a small one.
 
-Left out: the overexcitation limiter, which is added to the error before the gate
-(OEL = 1 in a PSS/E record) or behind it (OEL = 2).
+Left out: the overexcitation limiter, which is added to the error before the
+gate (OEL = 1 in a PSS/E record) or behind it (OEL = 2).
 """
 
 from exfit.engine.trace import Signal

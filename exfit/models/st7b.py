@@ -1,26 +1,28 @@
 """ST7B: static exciter, PI by a feedback of its output (IEEE Std 421.5-2005, 7.7).
 
-       VMAX         vs                                            VT VRMAX
-vref ─►[clip]─────►(+)─►[KPA]─►[HV]─►[LV]─►[1 + sTC]─►(+)─►[gates]─►[clip]─┬► efd
-       VMIN        -▲           ▲     ▲    [1 + sTB]   ▲   VUEL   VT VRMIN │
-                    │           │     │                │   VOEL            │
-vc1 ►[  1  ]─►[1 + sTG]         │     │             VF ├──[  KIA ]◄────────┘
-     [1+sTR]  [1 + sTF]         │     │                │  [1+sTIA]
+       VMAX         vs                                              VT VRMAX
+vref ─►[clip]─────►(+)─►[KPA]─►[HV]─►[LV]─►[1 + sTC]─►(+)─►[gates]─►[clip]─┬►efd
+       VMIN        -▲           ▲     ▲    [1 + sTB]   ▲  VUEL VOEL        │
+                    │           │     │                │          VT VRMIN │
+vc1 ►[  1  ]─►[1 + sTG]         │     │                │                   │
+     [1+sTR]  [1 + sTF]         │     │             VF └──[  KIA  ]◄───────┘
+                                │     │                   [1+sTIA ]
                                 │     └─ VT VRMAX - KL VF
                                 └─────── VT VRMIN - KH VF
 
 The feedback adds: with KIA = 1 it makes a PI regulator, KPA (1 + 1/(sTIA)), and
 the two gates keep it from winding up. The limits are clamps, none non-windup.
 
-Sources disagree on the feedback. Dynawo (and InterPSS after it) subtracts VF; one
-version of InterPSS adds sKIA/(1+sTIA). Followed is the standard's text, by which
-the regulator is a PI (with TC > TB a PID); only so do its data, KPA = 40 and
-KIA = 1, hold a voltage, and only so do the gates fit the clamp behind them.
+Sources disagree on the feedback. Dynawo (and InterPSS after it) subtracts VF;
+one version of InterPSS adds sKIA/(1+sTIA). Followed is the standard's text, by
+which the regulator is a PI (with TC > TB a PID); only so do its data, KPA = 40
+and KIA = 1, hold a voltage, and only so do the gates fit the clamp behind them.
 
-Left out: limiters at the reference (OEL, UEL = 1 or 2 in a PSS/E record), stator
-current limiter and droop. The gates are those of OEL, UEL = 3; without a limiter
-all are the same, and the record says 0, none. The standard's data for VMAX and
-VMIN are 1.1 and 0.9; typical here is a reference that is free in a test.
+Left out: limiters at the reference (OEL, UEL = 1 or 2 in a PSS/E record),
+stator current limiter and droop. The gates are those of OEL, UEL = 3; without a
+limiter all are the same, and the record says 0, none. The standard's data for
+VMAX and VMIN are 1.1 and 0.9; typical here is a reference that is free in a
+test.
 """
 
 from exfit.engine.trace import Signal
