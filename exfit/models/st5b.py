@@ -31,8 +31,8 @@ SHEET = sheet(
     ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead"),
     ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag"),
     ("KR", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
-    ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling, and at rated voltage"),
+    ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor, and at rated voltage"),
     ("T1", 0.004, "s", (0.0, 10.0), "firing circuit time constant"),
     ("KC", 0.004, "pu", (0.0, 100.0), "rectifier loading factor"),
 )

@@ -63,7 +63,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vg, d.VG = lead_lag(vc, s.VG, p.TG, p.TF)
     error = clip(u.vref, p.VMIN, p.VMAX) + u.vs - vg
-    va = smaller(larger(p.KPA * error, floor - p.KH * s.VF), ceiling - p.KL * s.VF)
+    va = clip(p.KPA * error, floor - p.KH * s.VF, ceiling - p.KL * s.VF)
     vl, d.VL = lead_lag(va, s.VL, p.TC, p.TB)
     efd = clip(smaller(larger(vl + s.VF, u.vuel), u.voel), floor, ceiling)
     _, d.VF = lag(efd, s.VF, p.KIA, p.TIA)
