@@ -42,6 +42,7 @@ __all__ = [
     "rate",
     "rectifier",
     "rectifier_supply",
+    "regulator_output",
     "sin",
     "smaller",
     "source_voltage",
@@ -269,3 +270,16 @@ def limited_lead_lag(
     follows = where(TB < SHORTEST, 0.0, (y - x) * rate(TC))
     slope = where(at_once, (u - x) * rate(TB), follows)
     return y, limited(slope, x, where(at_once, low, -inf), where(at_once, high, inf))
+
+
+def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Signal = 0.0) -> Signal:
+    """Return the output of KA / (1 + sTA), before any limit, from which a rate feedback is taken.
+
+    With TA = 0 output and feedback wait for each other; that loop is solved here: ``vl`` is what
+    the regulator would get without the feedback, ``gain`` how much of a step gets there at once,
+    ``taken`` what is subtracted from the output before the feedback takes it. A limit in the loop
+    may be put on the result: the loop is monotonous, so that a limit holds there as it does here.
+    """
+    loop = p.KA * gain * p.KF * rate(p.TF)
+    prompt = (p.KA * vl + loop * (s.VF + taken)) / (1.0 + loop)
+    return where(p.TA < SHORTEST, prompt, s.VA)
