@@ -5,14 +5,26 @@ from pathlib import Path
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import ac1a, ac8b, first_order
+from exfit.models import (
+    ac1a,
+    ac7b,
+    ac8b,
+    esac8b,
+    exac1,
+    exac2,
+    first_order,
+)
 from exfit.models.sheet import Model, model
 
 MODELS: dict[str, Model] = {
     name: model(name, vars(module))
     for name, module in (
         ("AC1A", ac1a),
+        ("AC7B", ac7b),
         ("AC8B", ac8b),
+        ("ESAC8B", esac8b),
+        ("EXAC1", exac1),
+        ("EXAC2", exac2),
         ("FIRST_ORDER", first_order),
     )
 }

@@ -22,6 +22,7 @@ __all__ = [
     "exponential_se",
     "field_ceiling",
     "field_demand",
+    "high_pass",
     "inf",
     "integrator",
     "lag",
@@ -31,11 +32,14 @@ __all__ = [
     "limited_integrator",
     "limited_lag",
     "log",
+    "pi",
+    "pi_rest",
     "pid",
     "quadratic",
     "rate",
     "rectifier",
     "rectifier_supply",
+    "second_order",
     "smaller",
     "sqrt",
     "washout",
@@ -202,3 +206,35 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
     This one is a Newton step, so that a state put back on it does not hunt around the limit.
     """
     return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)
+
+
+def pi(
+    u: Signal, integral: Signal, KP: Signal, KI: Signal, low: Signal = -inf, high: Signal = inf
+) -> tuple[Signal, Signal]:
+    """KP + KI / s, limited as a PID is; return the output and the slope of the integral."""
+    y, slope, _ = pid(u, integral, 0.0, KP, KI, 0.0, 1.0, low, high)
+    return y, slope
+
+
+def pi_rest(y: Signal, KP: Signal, KI: Signal) -> tuple[Signal, Signal]:
+    """Return the input and the integral that hold a PI at y, whichever of its gains is zero."""
+    integrates = KI > 0.0
+    return where(integrates, 0.0, y / where(integrates, 1.0, KP)), where(integrates, y, 0.0)
+
+
+def high_pass(u: Signal, x: Signal, T: Signal) -> tuple[Signal, Signal]:
+    """sT / (1 + sT), or 1 where T = 0: a washout that is left out; at rest x = u."""
+    return where(T < SHORTEST, u, u - x), (u - x) * rate(T)
+
+
+def second_order(
+    u: Signal, x: Signal, v: Signal, A1: Signal, A2: Signal
+) -> tuple[Signal, Signal, Signal]:
+    """1 / (1 + s A1 + s^2 A2); v is the slope of x; return the output and both slopes.
+
+    Where A2 is so small that one of its poles is faster than ``SHORTEST``, it is the lag A1.
+    """
+    curved = SHORTEST * larger(A1, SHORTEST) < A2
+    bend = (u - x - A1 * v) / where(curved, A2, 1.0)
+    y = where(curved | (A1 >= SHORTEST), x, u)
+    return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
