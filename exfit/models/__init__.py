@@ -1,4 +1,4 @@
-"""The catalogue of exciter models, by the names that IEEE 421.5 and PSS/E give them."""
+"""The catalogue of exciters and stabilisers, by the names of IEEE 421.5 and PSS/E."""
 
 import difflib
 from pathlib import Path
@@ -13,6 +13,9 @@ from exfit.models import (
     exac1,
     exac2,
     first_order,
+    pss1a,
+    pss2b,
+    stab1,
 )
 from exfit.models.sheet import Model, model
 
@@ -26,6 +29,15 @@ MODELS: dict[str, Model] = {
         ("EXAC1", exac1),
         ("EXAC2", exac2),
         ("FIRST_ORDER", first_order),
+    )
+}
+
+STABILISERS: dict[str, Model] = {
+    name: model(name, vars(module))
+    for name, module in (
+        ("PSS1A", pss1a),
+        ("PSS2B", pss2b),
+        ("STAB1", stab1),
     )
 }
 

@@ -72,7 +72,9 @@ class Model:
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
     ``x`` and returns the reference that does so. Setpoints are what it finds at the start and then
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
-    its PSS/E records, its own one first.
+    its PSS/E records, its own one first. ``inputs`` are what a stabiliser sees of its plant, if not
+    told otherwise, as vsi1 and vsi2: "speed" (its deviation), "p" or "vt", all per unit; its
+    output at rest is 0 and its ``rest`` returns nothing.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Model:
     records: tuple[Record, ...]
     equations: Callable[..., Any]
     rest: Callable[..., Any]
+    inputs: tuple[str, ...] = ()
 
 
 def model(name: str, parts: Mapping[str, Any]) -> Model:
@@ -128,6 +131,7 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         records=tuple(parts.get("RECORDS", ())),
         equations=parts["equations"],
         rest=parts["rest"],
+        inputs=tuple(parts.get("INPUTS", ())),
     )
 
 
