@@ -8,6 +8,7 @@ from oracle import (
     MACHINE_SATURATION,
     WITHOUT_PLANT,
     drawn_values,
+    fastest_rate,
     levels,
     lively_values,
     system_of,
@@ -157,15 +158,6 @@ def test_a_flat_run_stays_flat_for_a_minute(model, saturation):
 
 
 # --- the method -----------------------------------------------------------------------------------
-
-
-def fastest_rate(system, values):
-    """Return the spectral radius (1/s) of the system at rest."""
-    p = vector(system, values)
-    code = LinearKernel(system)
-    rest = code.rest(p)
-    _, jacobian = code.motion(p, rest.r, rest.x, np.zeros(len(system.inputs)))
-    return np.abs(np.linalg.eigvals(jacobian)).max()
 
 
 def test_halving_the_step_cuts_the_error_sixteenfold(model):

@@ -18,7 +18,14 @@ from exfit.simulate import Change, Course, Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
-FREE = {"AC1A": ("KA", "TE", "KF", "KC", "KD"), "AC8B": ("KPR", "TE", "TDR", "KC", "KD")}
+FREE = {
+    "AC1A": ("KA", "TE", "KF", "KC", "KD"),
+    "AC7B": ("KPR", "KIR", "TE", "KF1", "KC"),
+    "AC8B": ("KPR", "TE", "TDR", "KC", "KD"),
+    "ESAC8B": ("KP", "TE", "TD", "KI"),
+    "EXAC1": ("KA", "TE", "KF", "KC", "KD"),
+    "EXAC2": ("KA", "TE", "KF", "KC", "KH"),
+}
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 

@@ -82,16 +82,15 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vfe = field_demand(s.VE, u.ifd, p)
     vemax = field_ceiling(s.VE, vfe, p)
-    efd = rectifier(s.VE, p.KC * u.ifd)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
     error = u.vref + u.vs - vc - vf
     vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
-    inner = vr - p.KF1 * efd - p.KF2 * vfe
+    inner = vr - p.KF1 * rectifier(s.VE, p.KC * u.ifd) - p.KF2 * vfe
     va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
     vfd = larger(p.KP * u.vt * va, -p.KL * vfe)
-    _, d.VE = limited_integrator(vfd - vfe, s.VE, p.TE, p.VEMIN, vemax)
-    return efd
+    ve, d.VE = limited_integrator(vfd - vfe, s.VE, p.TE, p.VEMIN, vemax)
+    return rectifier(ve, p.KC * u.ifd)
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
