@@ -7,9 +7,9 @@ vc1 ►[  1  ]┘                        VRMIN  │            │
      [1+sTR]                                └──── VFE ◄──┘
 
 VFE = KE efd + VX(efd). The limits of the lag are non-windup; the PID has none,
-so that its integral runs on while the lag is at its limit. There is no rectifier
-and no demagnetisation: efd is the exciter voltage itself, without limits of its
-own. The AC8B of 2005 is another model, with KC, KD and limits of PID and VE.
+so that its integral runs on while the lag is at its limit. No rectifier and no
+demagnetisation: efd is the exciter voltage itself, without limits of its own.
+AC8B (2005) is another model, with KC, KD and limits of the PID and of VE.
 """
 
 from exfit.engine.trace import Signal
@@ -18,10 +18,10 @@ from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KP", 80.0, "pu", (0.0, 100000.0), "proportional gain"),
-    ("KI", 5.0, "pu/s", (0.0, 100000.0), "integral gain"),
-    ("KD", 10.0, "pu s", (0.0, 100000.0), "derivative gain"),
-    ("TD", 0.1, "s", (0.001, 10.0), "lag of the derivative"),
+    ("KP", 40.0, "pu", (0.0, 100000.0), "proportional gain"),
+    ("KI", 10.0, "pu/s", (0.0, 100000.0), "integral gain"),
+    ("KD", 15.0, "pu s", (0.0, 100000.0), "derivative gain"),
+    ("TD", 0.02, "s", (0.001, 10.0), "lag of the derivative"),
     ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
     ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
     ("VRMAX", 35.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
