@@ -72,9 +72,7 @@ class Model:
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
     ``x`` and returns the reference that does so. Setpoints are what it finds at the start and then
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
-    its PSS/E records, its own one first. ``inputs`` are what a stabiliser sees of its plant, if not
-    told otherwise, as vsi1 and vsi2: "speed" (its deviation), "p" or "vt", all per unit; its
-    output at rest is 0 and its ``rest`` returns nothing.
+    its PSS/E records, its own one first; ``inputs`` the signals that a stabiliser listens to.
     """
 
     name: str
@@ -85,9 +83,9 @@ class Model:
     states: tuple[str, ...]
     setpoints: tuple[str, ...]
     records: tuple[Record, ...]
+    inputs: tuple[str, ...]
     equations: Callable[..., Any]
     rest: Callable[..., Any]
-    inputs: tuple[str, ...] = ()
 
 
 def model(name: str, parts: Mapping[str, Any]) -> Model:
@@ -129,9 +127,9 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         states=tuple(states.split()),
         setpoints=tuple(setpoints.split()),
         records=tuple(parts.get("RECORDS", ())),
+        inputs=tuple(parts.get("INPUTS", ())),
         equations=parts["equations"],
         rest=parts["rest"],
-        inputs=tuple(parts.get("INPUTS", ())),
     )
 
 
