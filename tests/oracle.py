@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from exfit.engine.kernel import Span
+from exfit.engine.kernel import LinearKernel, Span
 from exfit.engine.system import System
 from exfit.engine.trace import clip
 from exfit.models import MODELS
@@ -76,6 +76,14 @@ def levels(steps: int, *changes: tuple[int, float]) -> np.ndarray:
 def vector(system: System, values: Mapping[str, float]) -> np.ndarray:
     """Return the values in the system's order."""
     return np.array([values[name] for name in system.parameters])
+
+
+def fastest_rate(system: System, values: Mapping[str, float]) -> float:
+    """Return the spectral radius (1/s) of a system at rest."""
+    code, p = LinearKernel(system), vector(system, values)
+    rest = code.rest(p)
+    _, jacobian = code.motion(p, rest.r, rest.x, np.zeros(len(system.inputs)))
+    return float(np.abs(np.linalg.eigvals(jacobian)).max())
 
 
 def float_run(

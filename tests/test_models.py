@@ -8,6 +8,7 @@ from oracle import (
     MACHINE_SATURATION,
     WITHOUT_PLANT,
     drawn_values,
+    fastest_rate,
     levels,
     lively_values,
     system_of,
@@ -198,13 +199,14 @@ def responses(model, sets, saturation="quadratic", size=0.3):
 
 
 def tried(row, value):
-    """Return values of a parameter, near and far from its own."""
-    factors = [value * factor for factor in (0.005, 0.01, 0.05, 0.2, 0.5, 2.0, 5.0)]
+    """Return values of a parameter, near and far from its own, and beyond zero."""
+    factors = [value * factor for factor in (0.005, 0.01, 0.05, 0.2, 0.5, 2.0, 5.0, -0.03)]
     shifts = [value + shift for shift in (-5.0, -0.5, 0.5, 1.0)]
     return [v for v in (*factors, *shifts) if row.low <= v <= row.high and v != value]
 
 
-def moves(model, symbol, row):
+def awake_values(model):
+    """Return lively data without gains of zero: the lag behind one would be inert."""
     values = lively_values(model)
     for size in (0.3, 1.0):  # a limit of the field current stands beyond the smaller bump
         (before,) = responses(model, [values], size=size)
@@ -307,14 +309,14 @@ def limited_states(model):
 
 
 def test_a_state_stays_at_a_limit_only_while_pushed_against_it(exciter):
-    """Over a bump up and down: none is ever beyond, none stays that is drawn back."""
+    """Over a bump up, down and up: none is ever beyond, none stays that is drawn back."""
     system, values = system_of(exciter), lively_values(exciter)
     code = Kernel(system, system.outputs)
     p = vector(system, values)[:, None]
     start = code.start(p)
     r = dict(zip(system.setpoints, start.r[:, 0], strict=True))
     met = set()
-    for size in (0.0, 1.0, -1.0, 0.0):
+    for size in (0.0, 1.0, -1.0, 0.0, 1.0):
         (out,) = code.run(p, start, [Span(np.full((1201, 1), size), 1e-3, 1)])
         x = {name: out[:, system.outputs.index(name), 0] for name in system.states}
         at = system.motion(values, r, x, {"vref": np.full(1201, size)})

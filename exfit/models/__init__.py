@@ -12,10 +12,16 @@ from exfit.models import (
     ac4a,
     ac5a,
     ac6a,
+    ac7b,
     ac8b,
+    esac8b,
+    exac1,
+    exac2,
     exac4,
     exst1,
     first_order,
+    pss1a,
+    pss2b,
     scrx,
     sexs,
     st1a,
@@ -25,6 +31,7 @@ from exfit.models import (
     st5b,
     st6b,
     st7b,
+    stab1,
 )
 from exfit.models.sheet import Model, model
 
@@ -37,6 +44,7 @@ MODELS: dict[str, Model] = {
         ("AC4A", ac4a),
         ("AC5A", ac5a),
         ("AC6A", ac6a),
+        ("AC7B", ac7b),
         ("AC8B", ac8b),
         ("ST1A", st1a),
         ("ST2A", st2a),
@@ -45,7 +53,10 @@ MODELS: dict[str, Model] = {
         ("ST5B", st5b),
         ("ST6B", st6b),
         ("ST7B", st7b),
+        ("EXAC1", exac1),
+        ("EXAC2", exac2),
         ("EXAC4", exac4),
+        ("ESAC8B", esac8b),
         ("EXST1", exst1),
         ("SEXS", sexs),
         ("SCRX", scrx),
@@ -53,7 +64,14 @@ MODELS: dict[str, Model] = {
     )
 }
 
-STABILISERS: dict[str, Model] = {}
+STABILISERS: dict[str, Model] = {
+    name: model(name, vars(module))
+    for name, module in (
+        ("PSS1A", pss1a),
+        ("PSS2B", pss2b),
+        ("STAB1", stab1),
+    )
+}
 
 
 def find(name: str, folder: Path) -> Model:

@@ -25,6 +25,7 @@ __all__ = [
     "exponential_se",
     "field_ceiling",
     "field_demand",
+    "high_pass",
     "inf",
     "integrator",
     "lag",
@@ -44,6 +45,7 @@ __all__ = [
     "rectifier_supply",
     "regulator_output",
     "sin",
+    "second_order",
     "smaller",
     "source_voltage",
     "sqrt",
@@ -283,3 +285,21 @@ def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Sign
     loop = p.KA * gain * p.KF * rate(p.TF)
     prompt = (p.KA * vl + loop * (s.VF + taken)) / (1.0 + loop)
     return where(p.TA < SHORTEST, prompt, s.VA)
+
+
+def high_pass(u: Signal, x: Signal, T: Signal) -> tuple[Signal, Signal]:
+    """sT / (1 + sT), or 1 where T = 0: a washout that is left out; at rest x = u."""
+    return where(T < SHORTEST, u, u - x), (u - x) * rate(T)
+
+
+def second_order(
+    u: Signal, x: Signal, v: Signal, A1: Signal, A2: Signal
+) -> tuple[Signal, Signal, Signal]:
+    """1 / (1 + s A1 + s^2 A2); v is the slope of x; return the output and both slopes.
+
+    Where A2 is so small that one of its poles is faster than ``SHORTEST``, it is the lag A1.
+    """
+    curved = SHORTEST * larger(A1, SHORTEST) < A2
+    bend = (u - x - A1 * v) / where(curved, A2, 1.0)
+    y = where(curved | (A1 >= SHORTEST), x, u)
+    return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
