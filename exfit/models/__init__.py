@@ -5,14 +5,32 @@ from pathlib import Path
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import ac1a, ac8b, first_order
+from exfit.models import (
+    ac1a,
+    ac8b,
+    dc1a,
+    dc2a,
+    dc3a,
+    dc4b,
+    exdc2,
+    first_order,
+    ieeet1,
+    ieeex1,
+)
 from exfit.models.sheet import Model, model
 
 MODELS: dict[str, Model] = {
     name: model(name, vars(module))
     for name, module in (
+        ("DC1A", dc1a),
+        ("DC2A", dc2a),
+        ("DC3A", dc3a),
+        ("DC4B", dc4b),
         ("AC1A", ac1a),
         ("AC8B", ac8b),
+        ("IEEET1", ieeet1),
+        ("IEEEX1", ieeex1),
+        ("EXDC2", exdc2),
         ("FIRST_ORDER", first_order),
     )
 }

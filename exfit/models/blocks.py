@@ -14,9 +14,13 @@ from exfit.engine.trace import Signal, clip, exp, larger, log, smaller, sqrt, wh
 
 __all__ = [
     "SHORTEST",
+    "CommutatorStart",
     "Limited",
     "Saturation",
     "clip",
+    "commutator",
+    "commutator_demand",
+    "commutator_start",
     "exp",
     "exponential",
     "exponential_se",
@@ -40,6 +44,7 @@ __all__ = [
     "sqrt",
     "washout",
     "where",
+    "zero",
 ]
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
@@ -202,3 +207,46 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
     This one is a Newton step, so that a state put back on it does not hunt around the limit.
     """
     return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)
+
+
+# --- commutator (DC) exciters ---------------------------------------------------------------------
+
+
+def zero(x: Signal) -> Signal:
+    """Say whether a value is 0, which in some data means: to be computed."""
+    return (x <= 0.0) & (x >= 0.0)
+
+
+def commutator_demand(efd: Signal, KE: Signal, p: Signal) -> Signal:
+    """KE EFD + VX(EFD), the regulator voltage that holds EFD."""
+    return KE * efd + p.saturation(efd).vx
+
+
+def commutator(
+    vr: Signal, efd: Signal, KE: Signal, p: Signal, low: Signal = -inf
+) -> tuple[Signal, Limited]:
+    """1 / (sTE) with KE + SE(EFD) fed back: an exciter with a commutator (421.5, clause 5)."""
+    return limited_integrator(vr - commutator_demand(efd, KE, p), efd, p.TE, low)
+
+
+class CommutatorStart(NamedTuple):
+    """What a commutator exciter finds at its start, and the VR that holds EFD there."""
+
+    KE: Signal
+    VRMAX: Signal
+    VRMIN: Signal
+    vr: Signal
+
+
+def commutator_start(efd: Signal, p: Signal) -> CommutatorStart:
+    """Return KE, VRMAX and VRMIN, computed as PSS/E does where they are given as 0.
+
+    VRMAX = 0: the VR that holds the higher of E1, E2 (with KE only where KE > 0), and
+    VRMIN = -VRMAX. KE = 0, self-excited: such that VR starts at VRMAX / 10.
+    """
+    high = larger(p.E1, p.E2)
+    computed = zero(p.VRMAX)
+    ceiling = where(computed, commutator_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
+    floor = where(computed, -ceiling, p.VRMIN)
+    KE = where(zero(p.KE), (ceiling / 10.0 - p.saturation(efd).vx) / efd, p.KE)
+    return CommutatorStart(KE, ceiling, floor, commutator_demand(efd, KE, p))
