@@ -18,7 +18,17 @@ from exfit.simulate import Change, Course, Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
-FREE = {"AC1A": ("KA", "TE", "KF", "KC", "KD"), "AC8B": ("KPR", "TE", "TDR", "KC", "KD")}
+FREE = {
+    "DC1A": ("KA", "TE", "KF", "TF", "TA"),
+    "DC2A": ("KA", "TE", "KF", "TF", "TA"),
+    "DC3A": ("KV", "TE", "TR", "KE"),
+    "DC4B": ("KP", "KI", "TE", "TA"),
+    "AC1A": ("KA", "TE", "KF", "KC", "KD"),
+    "AC8B": ("KPR", "TE", "TDR", "KC", "KD"),
+    "IEEET1": ("KA", "TE", "KF", "TF", "TA"),
+    "IEEEX1": ("KA", "TE", "KF", "TF1", "TA"),
+    "EXDC2": ("KA", "TE", "KF", "TF1", "TA"),
+}
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 
@@ -141,7 +151,7 @@ def test_what_is_fixed_stays(exciter):
 
 def test_a_set_that_cannot_be_simulated_costs_infinity(exciter):
     residuals = problem(exciter)
-    residuals.fixed = {**residuals.fixed, "VRMAX": 0.1}
+    residuals.fixed = {**residuals.fixed, "VRMAX": 0.01}
     got = residuals(residuals.start)
     assert got.shape == (101,)
     assert (got == np.inf).all()

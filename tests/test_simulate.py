@@ -20,13 +20,21 @@ from exfit.simulate import (
     stretches,
 )
 
-UP = Course(0.0, 2.0, (Change(0.5, 0.005),))  # off the limits
+UP = Course(0.0, 2.0, (Change(0.5, 3e-4),))  # off the limits
 CLOCK = np.linspace(0.0, 2.0, 201)
 laws = settings(deadline=None, derandomize=True, max_examples=25)
 
 
 def samples(name, values, course=UP, times=CLOCK, step=1e-3, outputs=("vt",)):
     return Simulator(system_of(name), course, times, step).samples(values, outputs)[0]
+
+
+ROUNDING = 1e-12  # pu, of a run of thousands of steps
+
+
+def fastest(name, values):
+    """Return the largest of all 1/T, at least 50 1/s."""
+    return max([50.0, *(1.0 / values[T] for T in system_of(name).time_constants)])
 
 
 # --- grid and samples -----------------------------------------------------------------------------
@@ -51,14 +59,14 @@ def test_at_the_instant_of_a_step_the_value_is_that_before_it(model):
         course = Course(0.0, 1.0, (Change(at, 0.02),))
         times = np.array([at - 1e-3, at, at + 1e-3])
         vref = samples(model, lively_values(model), course, times, outputs=("vref",))[:, 0]
-        assert vref[1] == vref[0]
+        assert vref[1] == pytest.approx(vref[0], abs=1e-15)  # the rounding of a mean of both
         assert vref[2] - vref[1] == pytest.approx(0.02)
 
 
 def test_a_step_between_grid_points_is_the_same_step_later(model):
     """Two grids of one response: they differ by the method's error alone."""
     values, delay = lively_values(model), 0.00037
-    later = Course(0.0, 2.0, (Change(0.5 + delay, 0.005),))
+    later = Course(0.0, 2.0, (Change(0.5 + delay, UP.steps[0].step),))
     got = samples(model, values, later, CLOCK[:-1] + delay)
     assert np.abs(got - samples(model, values)[:-1]).max() < 1e-9
 
@@ -96,10 +104,13 @@ def test_samples_at_uneven_times_err_as_little_as_the_method(model):
     """Halving the step divides the error of samples between grid points by sixteen."""
     values, rng = lively_values(model), np.random.default_rng(4)
     times = np.sort(rng.uniform(0.01, 2.0, 200))
-    course = Course(0.0, 2.0, (Change(0.0, 0.002),))
+    course = Course(0.0, 2.0, (Change(0.0, 3e-4),))
     finest = samples(model, values, course, times, 1.25e-4)
-    errors = [np.abs(samples(model, values, course, times, h) - finest).max() for h in (4e-3, 2e-3)]
-    assert errors[0] / errors[1] > 11.0
+    step = 0.2 / fastest(model, values)
+    errors = [
+        np.abs(samples(model, values, course, times, h) - finest).max() for h in (step, step / 2)
+    ]
+    assert errors[0] / errors[1] > 11.0 or errors[0] < ROUNDING
     assert errors[1] < 1e-8
 
 
@@ -184,12 +195,17 @@ def test_halving_the_step_hardly_moves_a_response_that_meets_limits(exciter):
     course = Course(0.0, 2.0, (Change(0.3, 0.3), Change(1.1, -0.4)))
     fine = samples(exciter, values, course, step=3.125e-5)
     errors = [np.abs(samples(exciter, values, course, step=h) - fine).max() for h in (1e-3, 2.5e-4)]
-    # a state may be held a part of a step too early: what follows it errs by the step squared
-    assert errors[0] < 2e-5
-    assert errors[1] < 2e-5 / 8
+    # a state may be held a part of a step too early: what follows it errs by the step squared,
+    # as a share of the shortest time constant
+    allowed = 2e-5 * (fastest(exciter, values) / 50.0) ** 2
+    assert errors[0] < allowed
+    assert errors[1] < allowed / 8
 
 
+REGULATOR = {"VRMAX": 0.05, "VRMIN": 9.0}
 BEYOND = {
+    **dict.fromkeys(("DC1A", "DC2A", "IEEET1", "IEEEX1", "EXDC2"), REGULATOR),
+    **dict.fromkeys(("DC3A", "DC4B"), REGULATOR | {"VEMIN": 9.0}),
     "AC1A": {"VAMAX": 0.5, "VAMIN": 9.0, "VRMAX": 0.5, "VRMIN": 9.0},
     "AC8B": {
         "VPIDMAX": 0.5,
@@ -211,7 +227,10 @@ def test_every_limit_is_tried(exciter):
 @pytest.mark.parametrize("bypassed", [True, False])
 @pytest.mark.parametrize(("name", "symbol"), CASES)
 def test_a_start_beyond_a_limit_names_it_with_both_values(name, symbol, bypassed):
-    values = (typical_values if bypassed else lively_values)(name)
+    values = lively_values(name)
+    if bypassed:
+        lags = system_of(name).time_constants
+        values |= {T: value for T, value in typical_values(name).items() if T in lags}
     limit = BEYOND[name][symbol]
     side = "above" if symbol.endswith("MAX") else "below"
     with pytest.raises(SimulationError, match=f"{side} {symbol}") as caught:
@@ -219,20 +238,22 @@ def test_a_start_beyond_a_limit_names_it_with_both_values(name, symbol, bypassed
     told = str(caught.value)
     assert told.startswith("no state of rest at vt0 = 1 pu: the start needs ")
     if symbol != "VFEMAX":  # the limit of VE that follows from it is told
-        assert f"{symbol} = {limit:g}" in told
+        # as it was given, or as it is computed at the start where it is given as 0
+        assert f"{symbol} = {limit:g}" in told or f"{symbol}0 = {limit:g}" in told
     simulator = Simulator(system_of(name), UP, CLOCK, 1e-3)
-    needed = simulator.response(values, ("VE", "vt")).signals["VE"][0]
+    output = "VE" if "VE" in simulator.system.states else "EFD"
+    needed = simulator.response(values, (output, "vt")).signals[output][0]
     number = float(told.split("needs ")[1].split(",")[0])
     if symbol in ("VFEMAX", "VEMIN"):
         assert number == pytest.approx(needed, rel=1e-5)
     else:
-        assert 0.5 < number < 9.0
+        assert 0.05 < number < 9.0
 
 
 def test_a_start_exactly_on_a_limit_is_a_start(exciter):
     """What holds the start is allowed; a hair less is not."""
     values = lively_values(exciter)
-    state = {"AC1A": "VA", "AC8B": "VR"}[exciter]
+    state = {"AC1A": "VA", "DC3A": "VRH"}.get(exciter, "VR")
     simulator = Simulator(system_of(exciter), UP.without_steps(), CLOCK, 1e-3)
     needed = simulator.response(values, (state,)).signals[state][0]
     vt = simulator.response(values | {"VRMAX": needed * (1 + 1e-12)}, ("vt",)).signals["vt"]
@@ -242,9 +263,12 @@ def test_a_start_exactly_on_a_limit_is_a_start(exciter):
 
 
 def test_values_that_define_no_start_are_refused(exciter):
-    for wrong in ({"KA": 0.0}, {"TE": float("nan")}, {"KC": float("inf")}, {VT0: float("nan")}):
+    values, nan, inf = lively_values(exciter), float("nan"), float("inf")
+    for symbol, wrong in (("KA", 0.0), ("TE", nan), ("KC", inf), (VT0, nan)):
+        if symbol not in values:
+            continue
         with pytest.raises(SimulationError):
-            samples(exciter, lively_values(exciter) | wrong)
+            samples(exciter, values | {symbol: wrong})
 
 
 # --- sub-steps ------------------------------------------------------------------------------------
@@ -267,9 +291,11 @@ def test_no_response_is_unstable_without_a_word(model, step):
             coarse = samples(model, values, course, times, step)
         except SimulationError:
             continue
-        fine = samples(model, values, course, times, step / 4)
+        fine, finer = (samples(model, values, course, times, step / n) for n in (4, 16))
         # where a limit holds a step of a fast loop, its end is known to a sub-step
-        assert np.abs(coarse - fine).max() < 2e-2 * np.ptp(fine) + 1e-4, seed
+        # contacts close a part of a step late, and the later ones follow the earlier ones
+        late = 8.0 * np.abs(fine - finer).max()
+        assert np.abs(coarse - fine).max() < 2e-2 * np.ptp(fine) + 1e-4 + late, seed
         simulated += 1
     assert simulated > 10
 
