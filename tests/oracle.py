@@ -38,10 +38,18 @@ def typical_values(name: str, machine: str = "GENROU", **changes: float) -> dict
 
 
 def lively_values(name: str, machine: str = "GENROU", **changes: float) -> dict[str, float]:
-    """Return typical data with no block bypassed: every lag takes part."""
+    """Return typical data with no block bypassed: every lag takes part.
+
+    Where 0 means that a value is computed at the start, it is given: there is a jump at 0.
+    """
     system, values = system_of(name, machine), typical_values(name, machine)
     for symbol in system.time_constants:
         values[symbol] = values[symbol] or 0.03
+    rest = LinearKernel(system).rest(vector(system, values))
+    for setpoint, found in zip(system.setpoints, rest.r, strict=True):
+        symbol = setpoint.removesuffix("0")
+        if values.get(symbol) == 0.0:
+            values[symbol] = float(found)
     return values | {symbol.replace("machine_", MACHINE): v for symbol, v in changes.items()}
 
 

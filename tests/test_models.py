@@ -1,5 +1,6 @@
 """What every model of the catalogue keeps to; a new model is tested unasked."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -79,8 +80,8 @@ def test_every_ceiling_has_its_floor(model):
     symbols = [row.symbol for row in MODELS[model].sheet]
     for symbol in symbols:
         if symbol.endswith("MIN"):
-            # the ceiling of VE may be given by another signal, VFEMAX
-            assert {symbol.replace("MIN", "MAX"), "VFEMAX"} & set(symbols), symbol
+            # what an exciter reaches is limited by saturation or by VFEMAX: its floor may be alone
+            assert symbol == "VEMIN" or symbol.replace("MIN", "MAX") in symbols, symbol
 
 
 def test_a_title_and_a_drawing_are_present_and_narrow(model):
@@ -126,7 +127,8 @@ def test_rest_is_rest(exciter, machine, saturation):
 def test_an_exciter_alone_rests_at_any_output_and_voltage(exciter):
     found = MODELS[exciter]
     p = exciter_parameters(lively_values(exciter), found, SATURATION["quadratic"])
-    for efd in (0.5, 1.0, 2.0):
+    # below every ceiling at every voltage
+    for efd in (0.5, 1.0, 1.5):
         for vt in VOLTAGES:
             u = exciter_inputs(vt=vt, vc1=1.01 * vt, ifd=0.9 * efd, vs=0.01, p=0.7, q=0.2)
             x, d = Names(), Names()
@@ -176,7 +178,15 @@ def test_halving_the_step_cuts_the_error_sixteenfold(model):
     system, values = system_of(model), lively_values(model)
     parts = Simulator(system, Course(0.0, 0.5, ()), np.array([0.5]), 0.01 / 0.4).substeps(values)
 
-    def ends(steps):
+
+def test_halving_the_step_cuts_the_error_sixteenfold(model):
+    """In the largest bump that meets no limit and no knee; the step lies on the grid."""
+    system, values = system_of(model), lively_values(model)
+    fastest = 1.0 / min((values[T] for T in system.time_constants), default=1.0)
+    # the next term of the error is smaller by step * rate, a third at most
+    least = 50 * math.ceil(3.0 * 0.01 * fastest - 1e-9)
+
+    def ends(steps, size):
         code = Kernel(system, ("vt",))
         p = vector(system, values)[:, None]
         span = Span(np.full((steps + 1, 1), 1e-3), 0.5 / steps, parts)
@@ -186,7 +196,6 @@ def test_halving_the_step_cuts_the_error_sixteenfold(model):
     finest = ends(128 * coarsest)
     errors = [np.abs(ends(steps * coarsest) - finest).max() for steps in (1, 2, 4)]
     for coarse, fine in pairwise(errors):
-        # the next term of the error is smaller by step * rate, a fifth to a third here
         assert 15.0 < coarse / fine < 19.0
 
 
@@ -349,7 +358,7 @@ def test_a_model_is_found_by_its_name_and_aliases_in_any_case(model, tmp_path):
 def test_an_unknown_name_is_answered_with_the_nearest(tmp_path):
     with pytest.raises(ModelError, match="did you mean AC8B"):
         find("AC88", tmp_path)
-    with pytest.raises(ModelError, match=r"XYZ is not in the catalogue \(AC1A, "):
+    with pytest.raises(ModelError, match=r"XYZ is not in the catalogue \(DC1A, ESDC1A, "):
         find("XYZ", tmp_path)
 
 

@@ -33,6 +33,14 @@ def samples(name, values, course=UP, times=CLOCK, step=1e-3, outputs=("vt",)):
     return Simulator(system_of(name), course, times, step).samples(values, outputs)[0]
 
 
+ROUNDING = 1e-12  # pu, of a run of thousands of steps
+
+
+def fastest(name, values):
+    """Return the largest of all 1/T, at least 50 1/s."""
+    return max([50.0, *(1.0 / values[T] for T in system_of(name).time_constants)])
+
+
 # --- grid and samples -----------------------------------------------------------------------------
 
 
@@ -103,10 +111,13 @@ def test_samples_at_uneven_times_err_as_little_as_the_method(model):
     """Halving the step divides the error of samples between grid points by sixteen."""
     values, rng = lively_values(model), np.random.default_rng(4)
     times = np.sort(rng.uniform(0.01, 2.0, 200))
-    course = Course(0.0, 2.0, (Change(0.0, 0.002),))
+    course = Course(0.0, 2.0, (Change(0.0, 3e-4),))
     finest = samples(model, values, course, times, 1.25e-4)
-    errors = [np.abs(samples(model, values, course, times, h) - finest).max() for h in (4e-3, 2e-3)]
-    assert errors[0] / errors[1] > 11.0
+    step = 0.2 / fastest(model, values)
+    errors = [
+        np.abs(samples(model, values, course, times, h) - finest).max() for h in (step, step / 2)
+    ]
+    assert errors[0] / errors[1] > 11.0 or errors[0] < ROUNDING
     assert errors[1] < 1e-8
 
 
@@ -207,7 +218,10 @@ def freezes(exciter, values, course):
     return bool((still & ~np.array(limited)).any())
 
 
+REGULATOR = {"VRMAX": 0.05, "VRMIN": 9.0}
 BEYOND = {
+    **dict.fromkeys(("DC1A", "DC2A", "IEEET1", "IEEEX1", "EXDC2"), REGULATOR),
+    **dict.fromkeys(("DC3A", "DC4B"), REGULATOR | {"VEMIN": 9.0}),
     "AC1A": {"VAMAX": 0.5, "VAMIN": 9.0, "VRMAX": 0.5, "VRMIN": 9.0},
     "AC2A": {"VAMAX": 0.5, "VAMIN": 9.0, "VRMAX": 0.5, "VRMIN": 9.0, "VFEMAX": 0.5},
     "AC3A": {"VAMAX": 0.1, "VAMIN": 9.0, "VEMIN": 9.0, "VFEMAX": 0.5},
@@ -251,7 +265,10 @@ def test_every_limit_is_tried(exciter):
 @pytest.mark.parametrize("bypassed", [True, False])
 @pytest.mark.parametrize(("name", "symbol"), CASES)
 def test_a_start_beyond_a_limit_names_it_with_both_values(name, symbol, bypassed):
-    values = (typical_values if bypassed else lively_values)(name)
+    values = lively_values(name)
+    if bypassed:
+        lags = system_of(name).time_constants
+        values |= {T: value for T, value in typical_values(name).items() if T in lags}
     limit = BEYOND[name][symbol]
     side = "above" if symbol.endswith("MAX") else "below"
     with pytest.raises(SimulationError, match=f"{side} {symbol}") as caught:
@@ -352,7 +369,9 @@ def test_no_response_is_unstable_without_a_word(model, step):
             assert np.isfinite(coarse).all()
             continue
         # where a limit holds a step of a fast loop, its end is known to a sub-step
-        assert np.abs(coarse - fine).max() < 2e-2 * np.ptp(fine) + 1e-4, seed
+        # contacts close a part of a step late, and the later ones follow the earlier ones
+        late = 8.0 * np.abs(fine - finer).max()
+        assert np.abs(coarse - fine).max() < 2e-2 * np.ptp(fine) + 1e-4 + late, seed
         simulated += 1
     assert simulated > 10
 

@@ -15,11 +15,15 @@ from exfit.models.phasors import modulus
 
 __all__ = [
     "SHORTEST",
+    "CommutatorStart",
     "Limited",
     "Saturation",
     "clip",
     "compound_source",
     "cos",
+    "commutator",
+    "commutator_demand",
+    "commutator_start",
     "exp",
     "exponential",
     "exponential_se",
@@ -51,6 +55,7 @@ __all__ = [
     "sqrt",
     "washout",
     "where",
+    "zero",
 ]
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
@@ -303,3 +308,46 @@ def second_order(
     bend = (u - x - A1 * v) / where(curved, A2, 1.0)
     y = where(curved | (A1 >= SHORTEST), x, u)
     return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
+
+
+# --- commutator (DC) exciters ---------------------------------------------------------------------
+
+
+def zero(x: Signal) -> Signal:
+    """Say whether a value is 0, which in some data means: to be computed."""
+    return (x <= 0.0) & (x >= 0.0)
+
+
+def commutator_demand(efd: Signal, KE: Signal, p: Signal) -> Signal:
+    """KE EFD + VX(EFD), the regulator voltage that holds EFD."""
+    return KE * efd + p.saturation(efd).vx
+
+
+def commutator(
+    vr: Signal, efd: Signal, KE: Signal, p: Signal, low: Signal = -inf
+) -> tuple[Signal, Limited]:
+    """1 / (sTE) with KE + SE(EFD) fed back: an exciter with a commutator (421.5, clause 5)."""
+    return limited_integrator(vr - commutator_demand(efd, KE, p), efd, p.TE, low)
+
+
+class CommutatorStart(NamedTuple):
+    """What a commutator exciter finds at its start, and the VR that holds EFD there."""
+
+    KE: Signal
+    VRMAX: Signal
+    VRMIN: Signal
+    vr: Signal
+
+
+def commutator_start(efd: Signal, p: Signal) -> CommutatorStart:
+    """Return KE, VRMAX and VRMIN, computed as PSS/E does where they are given as 0.
+
+    VRMAX = 0: the VR that holds the higher of E1, E2 (with KE only where KE > 0), and
+    VRMIN = -VRMAX. KE = 0, self-excited: such that VR starts at VRMAX / 10.
+    """
+    high = larger(p.E1, p.E2)
+    computed = zero(p.VRMAX)
+    ceiling = where(computed, commutator_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
+    floor = where(computed, -ceiling, p.VRMIN)
+    KE = where(zero(p.KE), (ceiling / 10.0 - p.saturation(efd).vx) / efd, p.KE)
+    return CommutatorStart(KE, ceiling, floor, commutator_demand(efd, KE, p))
