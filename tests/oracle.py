@@ -9,9 +9,11 @@ from exfit.engine.kernel import LinearKernel, Span
 from exfit.engine.system import System
 from exfit.engine.trace import clip
 from exfit.models import MODELS
+from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
+from exfit.simulate import parameters_used
 
 WITHOUT_PLANT = ("FIRST_ORDER",)
 MACHINE_SATURATION = {"S10": 0.12, "S12": 0.4}
@@ -86,12 +88,20 @@ def vector(system: System, values: Mapping[str, float]) -> np.ndarray:
     return np.array([values[name] for name in system.parameters])
 
 
-def fastest_rate(system: System, values: Mapping[str, float]) -> float:
-    """Return the spectral radius (1/s) of a system at rest."""
+def rates_at_rest(system: System, values: Mapping[str, float]) -> np.ndarray:
+    """Return the eigenvalues (1/s) of a system at rest, without those of bypassed blocks."""
     code, p = LinearKernel(system), vector(system, values)
     rest = code.rest(p)
     _, jacobian = code.motion(p, rest.r, rest.x, np.zeros(len(system.inputs)))
-    return float(np.abs(np.linalg.eigvals(jacobian)).max())
+    moving = np.abs(jacobian).max(axis=1) > 0.0  # the state of a bypassed block stays put
+    return np.linalg.eigvals(jacobian[np.ix_(moving, moving)])
+
+
+def fastest_rate(system: System, values: Mapping[str, float]) -> float:
+    """Return the fastest rate (1/s) of a system: of its modes at rest, and of its lags."""
+    used = parameters_used(system)
+    lags = [1.0 / values[T] for T in system.time_constants if T in used and values[T] >= SHORTEST]
+    return max(lags + list(np.abs(rates_at_rest(system, values))))
 
 
 def float_run(

@@ -30,7 +30,8 @@ AC8B_NAMES = {
     "VPMAX": "VPIDMAX",
     "VPMIN": "VPIDMIN",
 }
-MODEL_NAMES = {"EXAC1": "AC1A", "AC8B": "AC8B", "IEEET1": "IEEET1", "ESDC2A": "DC2A"}
+# the model that another program has under a name
+MODEL_NAMES = {"EXAC1": "AC1A", "ESDC2A": "DC2A", "ESAC5A": "AC5A"}
 RENAMED = {"AC8B": AC8B_NAMES, "DC2A": {"TF1": "TF"}}
 NOT_OURS = ("bus", "Switch")
 WITHOUT_LIMITS = {"VAMAX": 9999.0, "VAMIN": -9999.0}
@@ -38,8 +39,8 @@ WITHOUT_LIMITS = {"VAMAX": 9999.0, "VAMIN": -9999.0}
 
 def reference(name):
     """Return the model, the values, the course and the columns of a reference trajectory."""
-    told = json.loads((REFERENCE / f"reference_{name}.json").read_text())
-    model = MODEL_NAMES[told["model"]]
+    told = json.loads((REFERENCE / f"{name}.json").read_text())
+    model = MODEL_NAMES.get(told["model"], told["model"])
     names, given = RENAMED.get(model, {}), told["params_in_effect"]
     values = {names.get(k, k): v for k, v in given.items() if k not in NOT_OURS}
     if model == "AC1A":
@@ -47,7 +48,7 @@ def reference(name):
     values |= {MACHINE + k: v for k, v in typical(MACHINES["GENROU"].sheet).items()}
     of_machine = told["generator"]
     values |= {MACHINE + ours: of_machine[theirs] for theirs, ours in MACHINE_NAMES.items()}
-    with (REFERENCE / f"reference_{name}.csv").open() as file:
+    with (REFERENCE / f"{name}.csv").open() as file:
         header, *rows = csv.reader(file)
     columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
     times = columns["t"]

@@ -4,79 +4,21 @@ The transfer functions are assembled from the block diagrams of IEEE Std 421.5-2
 algebra of polynomials: no state and no equation of the models is used.
 """
 
-import csv
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
+from diagrams import Transfer, alone, field_current, lag, lead_lag, rectified, saturation, washout
 from oracle import system_of, typical_values
-from scipy import signal
+from references import reference
 
 from exfit.models import MODELS, find
-from exfit.models.blocks import Limited, limited_lead_lag
-from exfit.models.machines import MACHINES
+from exfit.models.blocks import limited_lead_lag
 from exfit.models.sheet import typical
-from exfit.plant import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
 from exfit.simulate import Change, Course, Simulator
 
-REFERENCE = Path(__file__).parent / "reference"
 ALTERNATORS = ("AC2A", "AC3A", "AC4A", "AC5A", "AC6A", "EXAC4")
 
 
 # --- small signals: transfer functions ------------------------------------------------------------
-
-
-class Rational:
-    """A transfer function, with the algebra of block diagrams."""
-
-    def __init__(self, numerator, denominator=(1.0,)):
-        self.numerator, self.denominator = np.poly1d(numerator), np.poly1d(denominator)
-
-    def __mul__(self, other):
-        other = rational(other)
-        return Rational(
-            (self.numerator * other.numerator).c, (self.denominator * other.denominator).c
-        )
-
-    __rmul__ = __mul__
-
-    def __add__(self, other):
-        other = rational(other)
-        crossed = self.numerator * other.denominator + other.numerator * self.denominator
-        return Rational(crossed.c, (self.denominator * other.denominator).c)
-
-    __radd__ = __add__
-
-    def fed_back(self, path):
-        """Return the loop of this forward path and a path subtracted at its input."""
-        path = rational(path)
-        open_loop = self.denominator * path.denominator + self.numerator * path.numerator
-        return Rational((self.numerator * path.denominator).c, open_loop.c)
-
-    def step(self, times):
-        return signal.step((self.numerator.c, self.denominator.c), T=times)[1]
-
-
-def rational(value):
-    return value if isinstance(value, Rational) else Rational([value])
-
-
-def first_order(p, lead, lag):
-    """(1 + s lead) / (1 + s lag), from the names of the time constants."""
-    return Rational([p[lead], 1.0], [p[lag], 1.0])
-
-
-def lagged(K, T):
-    return Rational([K], [T, 1.0])
-
-
-def quadratic_slope(e, p):
-    """Return d(VX)/dVE of the parabola through two points, by its own fit."""
-    (e1, s1), (e2, s2) = sorted([(p["E1"], p["SE1"]), (p["E2"], p["SE2"])])
-    roots = np.sqrt([e1 * s1, e2 * s2])
-    slope, offset = np.polyfit([e1, e2], roots, 1)
-    return 2.0 * slope * max(slope * e + offset, 0.0)
 
 
 def at_rest(p, efd, ifd):
@@ -84,45 +26,45 @@ def at_rest(p, efd, ifd):
     load = p["KC"] * ifd
     ve = efd + load / np.sqrt(3.0)  # the first arc: IN is small
     assert load / ve < np.sqrt(3.0) / 4.0
-    return ve, 1.0, p["KE"] + quadratic_slope(ve, p)
+    return ve, 1.0, p["KE"] + saturation(ve, p)[1]
 
 
 def ac2a(p, efd, ifd):
     _, gain, slope = at_rest(p, efd, ifd)
-    alternator = lagged(1.0 / slope, p["TE"] / slope)
+    alternator = lag(1.0 / slope, p["TE"] / slope)
     inner = (p["KB"] * alternator).fed_back(p["KH"] * slope)
-    forward = first_order(p, "TC", "TB") * lagged(p["KA"], p["TA"]) * inner
-    return gain * forward.fed_back(slope * Rational([p["KF"], 0.0], [p["TF"], 1.0]))
+    forward = lead_lag(p["TC"], p["TB"]) * lag(p["KA"], p["TA"]) * inner
+    return gain * forward.fed_back(slope * washout(p["KF"], p["TF"]))
 
 
 def ac3a(p, efd, ifd):
     ve, gain, slope = at_rest(p, efd, ifd)
-    assert quadratic_slope(ve, p) == 0.0  # below the knee: VFE is a straight line
+    assert saturation(ve, p)[1] == 0.0  # below the knee: VFE is a straight line
     vfe = p["KE"] * ve + p["KD"] * ifd
     # VR = KR efd VA: around a rest, KR efd0 dVA + (VFE0 / efd0) defd
-    alternator = Rational([1.0], [p["TE"], slope - vfe / efd * gain])
+    alternator = Transfer([1.0], [p["TE"], slope - vfe / efd * gain])
     feedback = p["KF"] if efd < p["EFDN"] else p["KN"]
-    forward = lagged(p["KA"], p["TA"]) * (p["KR"] * efd) * alternator * gain
-    return first_order(p, "TC", "TB") * forward.fed_back(Rational([feedback, 0.0], [p["TF"], 1.0]))
+    forward = lag(p["KA"], p["TA"]) * (p["KR"] * efd) * alternator * gain
+    return lead_lag(p["TC"], p["TB"]) * forward.fed_back(washout(feedback, p["TF"]))
 
 
 def ac4a(p, efd, ifd):
-    return first_order(p, "TC", "TB") * lagged(p["KA"], p["TA"])
+    return lead_lag(p["TC"], p["TB"]) * lag(p["KA"], p["TA"])
 
 
 def ac5a(p, efd, ifd):
-    slope = p["KE"] + quadratic_slope(efd, p)
-    path = Rational([p["KF"], 0.0], [p["TF1"], 1.0]) * first_order(p, "TF3", "TF2")
-    regulator = lagged(p["KA"], p["TA"]).fed_back(path)
-    return regulator * lagged(1.0 / slope, p["TE"] / slope)
+    slope = p["KE"] + saturation(efd, p)[1]
+    path = washout(p["KF"], p["TF1"]) * lead_lag(p["TF3"], p["TF2"])
+    regulator = lag(p["KA"], p["TA"]).fed_back(path)
+    return regulator * lag(1.0 / slope, p["TE"] / slope)
 
 
 def ac6a(p, efd, ifd):
     ve, gain, slope = at_rest(p, efd, ifd)
-    alternator = lagged(1.0 / slope, p["TE"] / slope)
-    limiter = p["KH"] * slope * first_order(p, "TJ", "TH")
+    alternator = lag(1.0 / slope, p["TE"] / slope)
+    limiter = p["KH"] * slope * lead_lag(p["TJ"], p["TH"])
     acts = p["KE"] * ve + p["KD"] * ifd > p["VFELIM"]
-    regulator = p["KA"] * first_order(p, "TK", "TA") * first_order(p, "TC", "TB")
+    regulator = p["KA"] * lead_lag(p["TK"], p["TA"]) * lead_lag(p["TC"], p["TB"])
     return gain * regulator * (alternator.fed_back(limiter) if acts else alternator)
 
 
@@ -146,44 +88,14 @@ CASES = [
 ]
 
 
-def alone_response(name, values, steps, duration, h):
-    """Return efd at constant vt and ifd, a column per step of the reference, by Runge-Kutta."""
-    model = MODELS[name]
-    p = exciter_parameters(values, model, SATURATION["quadratic"])
-    u, start = exciter_inputs(vt=1.0, ifd=IFD), Names()
-    u.vref = model.rest(EFD, u, p, start) + np.array(steps)
-    x = np.array([vars(start)[state] * np.ones(len(steps)) for state in model.states])
-
-    def motion(x):
-        d = Names()
-        efd = model.equations(Names(**dict(zip(model.states, x, strict=True))), u, p, d)
-        return efd, [vars(d)[state] for state in model.states]
-
-    def slopes(x):
-        return np.array([getattr(s, "slope", s) * np.ones(len(steps)) for s in motion(x)[1]])
-
-    found = []
-    for _ in range(round(duration / h) + 1):
-        found.append(motion(x)[0])
-        k1 = slopes(x)
-        k2 = slopes(x + h / 2 * k1)
-        k3 = slopes(x + h / 2 * k2)
-        k4 = slopes(x + h * k3)
-        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        for k, bound in enumerate(motion(x)[1]):
-            if isinstance(bound, Limited):
-                x[k] = np.clip(x[k], bound.low, bound.high)
-    return np.array(found)
-
-
 @pytest.mark.parametrize(("name", "changes"), CASES)
 def test_a_small_step_gives_the_response_of_the_block_diagram(name, changes):
     values = typical(MODELS[name].sheet) | {"TR": 0.02} | LIVELY[name] | changes
     bypassed = {"TF2": 1.0, "TF3": 1.0} if values.get("TF2") == 0.0 else {}
     expected = LINEAR[name](values | bypassed, EFD, IFD)
     size = 1e-6
-    got = alone_response(name, values, [size], 0.5, 1e-3)[:, 0] - EFD
-    times = np.linspace(0.0, 0.5, len(got))
+    times, efd = alone(name, values, vref=size)
+    got = efd - EFD
     linear = size * expected.step(times)
     # what remains, 1e-6 at most, is curvature over a change of 1e-4 pu and the error of the step
     assert np.abs(linear).max() > 1e-6
@@ -193,27 +105,12 @@ def test_a_small_step_gives_the_response_of_the_block_diagram(name, changes):
 # --- large signals: the ceilings of the standard --------------------------------------------------
 
 
-def fex(IN):
-    """Return the rectifier's factor as the standard prints it, with exact constants."""
-    if np.sqrt(3.0) / 4.0 >= IN:
-        return 1.0 - IN / np.sqrt(3.0)
-    return np.sqrt(0.75 - IN * IN) if IN < 0.75 else np.sqrt(3.0) * max(1.0 - IN, 0.0)
-
-
-def field_current(ve, p):
-    """Return KE VE + VX(VE) + KD IFD."""
-    vx = quadratic_slope(ve, p) ** 2
-    (e1, s1), (e2, s2) = sorted([(p["E1"], p["SE1"]), (p["E2"], p["SE2"])])
-    slope = np.polyfit([e1, e2], np.sqrt([e1 * s1, e2 * s2]), 1)[0]
-    return p["KE"] * ve + vx / (4.0 * slope * slope) + p.get("KD", 0.0) * IFD
-
-
 def where_field_current_is(wanted, p):
     """Return VE, by bisection."""
     low, high = 0.0, 100.0
     for _ in range(100):
         ve = (low + high) / 2.0
-        low, high = (ve, high) if field_current(ve, p) < wanted else (low, ve)
+        low, high = (ve, high) if field_current(ve, IFD, p) < wanted else (low, ve)
     return low
 
 
@@ -227,13 +124,13 @@ def ceiling(name, p):
         ve = where_field_current_is(p["VRMAX"], p)
     else:
         ve = where_field_current_is(p["VFEMAX"], p)
-    return ve * fex(p["KC"] * IFD / ve)
+    return rectified(ve, p["KC"] * IFD)
 
 
 def floor(name, p):
     """Return the efd that a large step down reaches."""
     if name == "AC3A":
-        return p["VEMIN"] * fex(p["KC"] * IFD / p["VEMIN"])
+        return rectified(p["VEMIN"], p["KC"] * IFD)
     return {"AC4A": p["VRMIN"], "EXAC4": p["VRMIN"] - p.get("KC", 0.0) * IFD}.get(name, 0.0)
 
 
@@ -244,7 +141,7 @@ AT_LIMITS = {"AC6A": {"VFELIM": 999.0}, "AC4A": {"KC": 0.3}, "EXAC4": {"KC": 0.3
 @pytest.mark.parametrize("name", ALTERNATORS)
 def test_a_large_step_drives_efd_to_the_ceiling_and_to_the_floor_of_the_standard(name):
     values = typical(MODELS[name].sheet) | AT_LIMITS.get(name, {})
-    up, down = alone_response(name, values, [0.5, -0.5], 6.0, 4e-3)[-1]
+    up, down = alone(name, values, vref=[0.5, -0.5], time=6.0, step=4e-3)[1][-1]
     assert up == pytest.approx(ceiling(name, values), rel=1e-3)
     assert down == pytest.approx(floor(name, values), abs=1e-6)
 
@@ -252,10 +149,10 @@ def test_a_large_step_drives_efd_to_the_ceiling_and_to_the_floor_of_the_standard
 def test_the_field_current_limiter_of_ac6a_holds_the_field_current_near_its_reference():
     """With VA at VAMAX, VFE = VAMAX - KH (VFE - VFELIM) holds at rest."""
     p = typical(MODELS["AC6A"].sheet) | {"VFELIM": 5.0}
-    up = alone_response("AC6A", p, [0.5], 6.0, 4e-3)[-1, 0]
+    up = alone("AC6A", p, vref=0.5, time=6.0, step=4e-3)[1][-1]
     vfe = (p["VAMAX"] + p["KH"] * p["VFELIM"]) / (1.0 + p["KH"])
     ve = where_field_current_is(vfe, p)
-    assert up == pytest.approx(ve * fex(p["KC"] * IFD / ve), rel=1e-4)
+    assert up == pytest.approx(rectified(ve, p["KC"] * IFD), rel=1e-4)
 
 
 def test_the_clamp_of_exac4_winds_up_and_the_limit_of_ac4a_does_not():
@@ -311,32 +208,6 @@ def test_a_limited_lead_lag_without_lead_is_a_limited_lag():
 
 # --- another simulator ----------------------------------------------------------------------------
 
-MACHINE_NAMES = {
-    "Td10": "Tpd0",
-    "Td20": "Tppd0",
-    "xd": "Xd",
-    "xd1": "Xpd",
-    "xd2": "Xppd",
-    "xl": "Xl",
-    "S10": "S10",
-    "S12": "S12",
-}
-
-
-def reference(name):
-    """Return the values, the course and the columns of a trajectory of another simulator."""
-    told = json.loads((REFERENCE / f"andes_{name}_up5.json").read_text())
-    values = {k: v for k, v in told["params_in_effect"].items() if k != "bus"}
-    values |= {MACHINE + k: v for k, v in typical(MACHINES["GENROU"].sheet).items()}
-    of_machine = told["generator"]
-    values |= {MACHINE + ours: of_machine[theirs] for theirs, ours in MACHINE_NAMES.items()}
-    with (REFERENCE / f"andes_{name}_up5.csv").open() as file:
-        header, *rows = csv.reader(file)
-    columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
-    steps = tuple(Change(*step) for step in told["steps"])
-    course = Course(columns["t"][0], columns["t"][-1], steps)
-    return values | {VT0: 1.0}, course, columns, told
-
 
 @pytest.mark.parametrize(
     ("name", "model", "vt", "efd"),
@@ -355,7 +226,7 @@ def test_a_step_is_that_of_another_simulator(name, model, vt, efd):
     program. Rounded constants have no part in it: neither model has a rectifier; saturation is
     quadratic in both.
     """
-    values, course, columns, told = reference(name)
+    _, values, course, columns, told = reference(f"andes_{name}_up5")
     simulator = Simulator(system_of(model), course, columns["t"], 1e-3)
     assert values.keys() == set(simulator.system.parameters)
     got = simulator.response(values).signals

@@ -105,7 +105,7 @@ def test_a_unit_among_several_is_chosen(run, workplace):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("ESAC1A", "ESAC9Z", ["unit.dyr:2: ESAC9Z: exfit has no exciter of that name", "ESAC1A"]),
+        ("ESAC1A", "ESAC1AZ", ["unit.dyr:2: ESAC1AZ: exfit has no exciter of that name", "ESAC1A"]),
         ("GENROU", "GENCLS", ["unit.dyr:1: GENCLS: exfit has no machine of that name"]),
         (" 766 ", " ", ["unit.dyr:2: ESAC1A: 18 values", "19", "TR TB TC KA TA"]),
         (" 766 ", " -1 ", ["unit.dyr:2: ESAC1A: KA: -1 lies outside 0.01 ... 100000 pu"]),

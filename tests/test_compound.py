@@ -1,26 +1,21 @@
 """Compound-source exciters and the simplified ones, against their block diagrams typed again."""
 
 import cmath
-import csv
-import json
 import math
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
+from diagrams import Transfer, lag, lead_lag, pid, rectified, standing, washout
 from oracle import lively_values, system_of, typical_values
-from scipy import signal
+from references import reference
 
 from exfit.engine.trace import Graph, evaluate, in_order
 from exfit.models import MODELS
 from exfit.models.blocks import compound_source
-from exfit.models.machines import MACHINES
-from exfit.models.sheet import typical
-from exfit.plant import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
+from exfit.plant import MACHINE, Names
 from exfit.simulate import Change, Course, Simulator
 
-REFERENCE = Path(__file__).parent / "reference"
 J = 1j
 
 # sample data of ST4B: (a), and (b) with room for a field voltage that KG = 1 feeds back whole
@@ -103,34 +98,6 @@ def test_on_open_circuit_a_source_is_its_voltage_and_current_and_angle_are_gone(
 # --- linear response: the block diagrams as transfer functions ------------------------------------
 
 
-class Ratio:
-    """A transfer function as a ratio of polynomials of s."""
-
-    def __init__(self, over, under=(1.0,)):
-        self.over, self.under = np.atleast_1d(over), np.atleast_1d(under)
-
-    def __add__(self, other):
-        one, two = np.polymul(self.over, other.under), np.polymul(other.over, self.under)
-        return Ratio(np.polyadd(one, two), np.polymul(self.under, other.under))
-
-    def __mul__(self, other):
-        return Ratio(np.polymul(self.over, other.over), np.polymul(self.under, other.under))
-
-    def __truediv__(self, other):
-        return self * Ratio(other.under, other.over)
-
-
-ONE = Ratio(1.0)
-
-
-def first(K, T, lead=0.0):
-    return Ratio([K * lead, K], [T, 1.0])
-
-
-def pi(KP, KI):
-    return Ratio([KP, KI], [1.0, 0.0])
-
-
 def bridge(p):
     """Return VB / VT on open circuit, where IFD = VT: the first arc of the rectifier."""
     share = p["KP"] - p["KC"] / math.sqrt(3.0)
@@ -143,36 +110,36 @@ def bridge(p):
 
 def st2a(p):
     vb, slope = bridge(p)
-    regulator = first(p["KA"], p["TA"])
-    feedback = Ratio([p["KF"], 0.0], [p["TF"], 1.0])
-    loop = Ratio([p["TE"], p["KE"]]) + Ratio(vb) * regulator * feedback
-    return Ratio(vb) * regulator / loop, Ratio(p["KE"] / vb * slope) / loop
+    regulator = lag(p["KA"], p["TA"])
+    feedback = washout(p["KF"], p["TF"])
+    loop = Transfer([p["TE"], p["KE"]]) + Transfer(vb) * regulator * feedback
+    return Transfer(vb) * regulator / loop, Transfer(p["KE"] / vb * slope) / loop
 
 
 def with_field_voltage_loop(p, regulator, inner, KG):
     vb, slope = bridge(p)
-    loop = ONE + Ratio(vb * KG) * inner
-    return Ratio(vb) * inner * regulator / loop, Ratio(1.0 / vb * slope) / loop
+    loop = Transfer(1.0) + Transfer(vb * KG) * inner
+    return Transfer(vb) * inner * regulator / loop, Transfer(1.0 / vb * slope) / loop
 
 
 def st3a(p):
-    regulator = first(1.0, p["TB"], p["TC"]) * first(p["KA"], p["TA"])
+    regulator = lead_lag(p["TC"], p["TB"]) * lag(p["KA"], p["TA"])
     KG = p["KG"] if p["KG"] < p["VGMAX"] else 0.0
-    return with_field_voltage_loop(p, regulator, first(p["KM"], p["TM"]), KG)
+    return with_field_voltage_loop(p, regulator, lag(p["KM"], p["TM"]), KG)
 
 
 def st4b(p):
-    regulator = pi(p["KPR"], p["KIR"]) * first(1.0, p["TA"])
-    return with_field_voltage_loop(p, regulator, pi(p["KPM"], p["KIM"]), p["KG"])
+    regulator = pid(p["KPR"], p["KIR"]) * lag(1.0, p["TA"])
+    return with_field_voltage_loop(p, regulator, pid(p["KPM"], p["KIM"]), p["KG"])
 
 
 def sexs(p):
-    lead_lag = first(1.0, p["TB"], p["TATB"] * p["TB"])
-    return lead_lag * first(p["K"], p["TE"]), Ratio(0.0)
+    leading = lead_lag(p["TATB"] * p["TB"], p["TB"])
+    return leading * lag(p["K"], p["TE"]), Transfer(0.0)
 
 
 def scrx(p):
-    return sexs(p)[0], Ratio(0.0 if p["CSWITCH"] == 1.0 else 1.0)
+    return sexs(p)[0], Transfer(0.0 if p["CSWITCH"] == 1.0 else 1.0)
 
 
 LINEAR = [
@@ -200,11 +167,10 @@ def test_a_small_step_on_a_machine_without_saturation_is_that_of_the_diagram(
     values = lively_values(name, "ONE_AXIS", machine_S10=0.0, machine_S12=0.0) | changes
     times, size = np.linspace(0.0, 3.0, 301), 1e-5
     X, Y = diagram(values)
-    machine = first(1.0, values[MACHINE + "Tpd0"])
-    transducer = first(1.0, values.get("TR", 0.0))
-    minus = Ratio(-1.0)
-    closed = machine * X / (ONE + minus * machine * Y + machine * X * transducer)
-    expected = size * signal.step((closed.over, closed.under), T=times)[1]
+    machine = lag(1.0, values[MACHINE + "Tpd0"])
+    transducer = lag(1.0, values.get("TR", 0.0))
+    closed = machine.fed_back(-1.0 * Y + X * transducer) * X
+    expected = size * closed.step(times)
     course = Course(0.0, 3.0, (Change(0.0, size),))
     simulator = Simulator(system_of(name, "ONE_AXIS"), course, times, 5e-4)
     got = simulator.response(values, ("vt",)).signals["vt"] - 1.0
@@ -213,18 +179,6 @@ def test_a_small_step_on_a_machine_without_saturation_is_that_of_the_diagram(
 
 
 # --- large steps ----------------------------------------------------------------------------------
-
-
-def rectified(ve, load):
-    """Return VE FEX, arc by arc as printed but with exact constants."""
-    share = load / ve
-    if share <= 0.0:
-        return ve
-    if share <= math.sqrt(3.0) / 4.0:
-        return ve * (1.0 - share / math.sqrt(3.0))
-    if share < 0.75:
-        return ve * math.sqrt(0.75 - share**2)
-    return ve * math.sqrt(3.0) * max(1.0 - share, 0.0)
 
 
 def behind(p, vt, ifd):
@@ -276,13 +230,10 @@ def test_without_any_source_st2a_is_fed_by_one_per_unit():
 # --- on load, and at the gates --------------------------------------------------------------------
 
 
-def standing(name, changes=(), **inputs):
-    """Return a model's inputs and parameters, and the rest of efd = 2 on load."""
-    found = MODELS[name]
-    p = exciter_parameters(typical_values(name) | dict(changes), found, SATURATION["quadratic"])
-    u, x = exciter_inputs(vt=0.97, ifd=2.1, p=0.8, q=0.35, **inputs), Names()
-    u.vref = found.rest(2.0, u, p, x)
-    return found, u, p, x
+def on_load(name, changes=()):
+    """Return a model's inputs, parameters and states at the rest of efd = 2 on load."""
+    values = typical_values(name) | dict(changes)
+    return standing(name, values, efd=2.0, vt=0.97, ifd=2.1, p=0.8, q=0.35)
 
 
 @pytest.mark.parametrize(
@@ -295,7 +246,7 @@ def standing(name, changes=(), **inputs):
 )
 def test_on_load_the_bridge_is_fed_by_the_compound_source(name, driver, changes):
     """At rest the driver is efd / VB (in ST2A KE = 1)."""
-    _, u, p, x = standing(name, changes)
+    u, p, x = on_load(name, changes)
     XL, THETAP = vars(p).get("XL", 0.0), vars(p).get("THETAP", 0.0)
     ve = source_in_phasors(u.vt, u.p, u.q, p.KP, p.KI, XL, THETAP)
     assert getattr(x, driver) == pytest.approx(2.0 / rectified(ve, p.KC * u.ifd), rel=1e-12)
@@ -310,9 +261,9 @@ PI_GAINS = [
 
 @pytest.mark.parametrize("gains", PI_GAINS)
 def test_st4b_rests_whichever_of_its_gains_are_zero(gains):
-    found, u, p, x = standing("ST4B", gains | {"VRMAX": 9.0})
+    u, p, x = on_load("ST4B", gains | {"VRMAX": 9.0})
     d = Names()
-    assert found.equations(x, u, p, d) == pytest.approx(2.0, rel=1e-12)
+    assert MODELS["ST4B"].equations(x, u, p, d) == pytest.approx(2.0, rel=1e-12)
     assert list(vars(d).values()) == pytest.approx([0.0] * 4, abs=1e-12)
 
 
@@ -320,11 +271,11 @@ def test_the_field_voltage_loop_of_st4b_closes_on_itself():
     """The PI sees the very field voltage that it gives: limited, gated or neither."""
     rng = np.random.default_rng(11)
     for _ in range(300):
-        found, u, p, x = standing("ST4B", {"VMMAX": 0.5, "VMMIN": -0.3, "KIM": 2.0})
+        u, p, x = on_load("ST4B", {"VMMAX": 0.5, "VMMIN": -0.3, "KIM": 2.0})
         p.KPM, p.KG, x.VA, x.VM = rng.uniform([0.0, 0.0, -3.0, -0.5], [5.0, 2.0, 3.0, 0.5])
         u.voel = rng.choice([np.inf, 0.1])
         d = Names()
-        efd = found.equations(x, u, p, d)
+        efd = MODELS["ST4B"].equations(x, u, p, d)
         ve = source_in_phasors(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
         vb = min(rectified(ve, p.KC * u.ifd), p.VBMAX)
         inner = p.KPM * (x.VA - p.KG * efd) + x.VM
@@ -337,9 +288,10 @@ def test_the_field_voltage_loop_of_st4b_closes_on_itself():
 
 @pytest.mark.parametrize("name", ["ST2A", "ST3A"])
 def test_an_underexcitation_limiter_takes_the_error_over_when_it_is_larger(name):
-    found, u, p, x = standing(name, {"TA": 0.1, "VMMAX": 9.0})
+    u, p, x = on_load(name, {"TA": 0.1, "VMMAX": 9.0})
     state, gain = {"ST2A": ("VR", p.KA / p.TA), "ST3A": ("VL", 1.0 / 10.0)}[name]
     free, gated, below = Names(), Names(), Names()
+    found = MODELS[name]
     found.equations(x, u, p, free)
     found.equations(x, Names(**{**vars(u), "vuel": 0.05}), p, gated)
     found.equations(x, Names(**{**vars(u), "vuel": -0.05}), p, below)
@@ -352,22 +304,11 @@ def test_an_underexcitation_limiter_takes_the_error_over_when_it_is_larger(name)
 
 # --- another simulator ----------------------------------------------------------------------------
 
-MACHINE_NAMES = {"Td10": "Tpd0", "Td20": "Tppd0", "xd": "Xd", "xd1": "Xpd", "xd2": "Xppd"}
-MACHINE_NAMES |= {"xl": "Xl", "S10": "S10", "S12": "S12"}
-
 
 def test_a_step_of_sexs_is_that_of_another_simulator():
-    told = json.loads((REFERENCE / "andes_sexs_up5.json").read_text())
-    values = {symbol: told["params_in_effect"][symbol] for symbol in typical(MODELS["SEXS"].sheet)}
-    values |= {MACHINE + k: v for k, v in typical(MACHINES["GENROU"].sheet).items()}
-    values |= {MACHINE + ours: told["generator"][name] for name, ours in MACHINE_NAMES.items()}
-    with (REFERENCE / "andes_sexs_up5.csv").open() as file:
-        header, *rows = csv.reader(file)
-    columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
-    times = columns["t"]
-    course = Course(times[0], times[-1], tuple(Change(*step) for step in told["steps"]))
-    simulator = Simulator(system_of("SEXS"), course, times, 1e-3)
-    got = simulator.response(values | {VT0: 1.0}).signals
+    _, values, course, columns, told = reference("andes_sexs_up5")
+    simulator = Simulator(system_of("SEXS"), course, columns["t"], 1e-3)
+    got = simulator.response(values).signals
     assert got["vref"][0] == pytest.approx(told["vref_initial"], abs=1e-9)
     # what its trapezoidal rule errs by at 1 ms, several times over
     assert np.abs(got["vt"] - columns["vt"]).max() < 1e-6

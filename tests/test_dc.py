@@ -1,12 +1,10 @@
 """Commutator exciters against another simulator, transfer functions and the standard's formulas."""
 
-from functools import reduce
-
 import numpy as np
 import pytest
-from oracle import system_of, typical_values, vector
+from diagrams import Transfer, lag, lead_lag, pid, washout
+from oracle import rates_at_rest, system_of, typical_values, vector
 from references import reference
-from scipy import signal
 from scipy.optimize import brentq
 
 from exfit.engine.kernel import LinearKernel
@@ -55,7 +53,7 @@ def respond(name, values, *changes, end=3.0, outputs=("vt", "efd")):
 @pytest.mark.parametrize("name", ["ieeet1", "esdc2a"])
 def test_a_bump_up_is_that_of_another_simulator(name):
     """Nothing is rounded there: what differs is its trapezoidal rule at 1 ms."""
-    model, values, course, columns, told = reference(name)
+    model, values, course, columns, told = reference(f"reference_{name}")
     system = system_of(model)
     assert values.keys() == set(system.parameters)
     got = Simulator(system, course, columns["t"], 1e-3).response(values).signals
@@ -68,71 +66,39 @@ def test_a_bump_up_is_that_of_another_simulator(name):
 # --- small steps: transfer functions --------------------------------------------------------------
 
 
-def product(*factors):
-    return reduce(np.polymul, factors)
-
-
-def total(*terms):
-    return reduce(np.polyadd, terms)
-
-
-def lag_of(T):
-    return [T, 1.0]
-
-
-def exciter_of(p, KE, efd):
-    """Return the denominator of 1 / (sTE + KE + dVX/dE)."""
-    slope = (vx(efd + 1e-5) - vx(efd - 1e-5)) / 2e-5
-    return [p["TE"], KE + slope]
-
-
 def effective_KE(p, efd):
     return p["KE"] if p["KE"] != 0.0 else p["VRMAX"] / (10.0 * efd) - vx(efd) / efd
 
 
+def field_of(p, KE, efd):
+    """Return 1 / (sTE + KE + dVX/dE)."""
+    slope = (vx(efd + 1e-5) - vx(efd - 1e-5)) / 2e-5
+    return Transfer(1.0, [p["TE"], KE + slope])
+
+
 def continuous_loop(p, vt0):
     """Return vt / vref of a lead-lag regulator with rate feedback from EFD."""
-    regulator = [p["KA"] * p.get("TC", 0.0), p["KA"]]
-    lags = product(lag_of(p.get("TB", 0.0)), lag_of(p["TA"]))
-    field = exciter_of(p, effective_KE(p, vt0), vt0)
-    rate, washing = [p["KF"], 0.0], lag_of(p.get("TF", p.get("TF1")))
-    measured, machine = lag_of(p["TR"]), lag_of(TD0)
-    closed = total(
-        product(lags, field, washing, machine, measured),
-        product(regulator, rate, machine, measured),
-        product(regulator, washing),
-    )
-    return product(regulator, washing, measured), closed
+    regulator = lead_lag(p.get("TC", 0.0), p.get("TB", 0.0)) * lag(p["KA"], p["TA"])
+    forward = regulator * field_of(p, effective_KE(p, vt0), vt0)
+    rated = forward.fed_back(washout(p["KF"], p.get("TF", p.get("TF1"))))
+    return (rated * lag(1.0, TD0)).fed_back(lag(1.0, p["TR"]))
 
 
 def pid_loop(p, vt0):
     """Return vt / vref of DC4B, whose regulator is fed from the terminals."""
-    KE = effective_KE(p, vt0)
-    pid = total(
-        product([p["KP"], p["KI"]], lag_of(p["TD"])),
-        [p["KD"], 0.0, 0.0],
-    )
-    poles = product([1.0, 0.0], lag_of(p["TD"]))
+    KE, machine = effective_KE(p, vt0), lag(1.0, TD0)
     at_rest = (KE * vt0 + vx(vt0)) / (p["KA"] * vt0)  # the PID's output
-    regulator, field = lag_of(p["TA"]), exciter_of(p, KE, vt0)
-    rate, washing = [p["KF"], 0.0], lag_of(p["TF"])
-    measured, machine = lag_of(p["TR"]), lag_of(TD0)
-    forward = product([p["KA"] * vt0], pid)
-    closed = total(
-        product(regulator, poles, field, measured, machine, washing),
-        product(forward, total(washing, product(rate, machine, measured))),
-        product([-p["KA"] * at_rest], poles, measured, washing),
-    )
-    return product(forward, measured, washing), closed
+    regulator = vt0 * pid(p["KP"], p["KI"], p["KD"], p["TD"])
+    fed = lag(p["KA"], p["TA"]) * field_of(p, KE, vt0)
+    rated = fed.fed_back(regulator * washout(p["KF"], p["TF"]) + -at_rest * machine)
+    return (regulator * rated * machine).fed_back(lag(1.0, p["TR"]))
 
 
 def rheostat_loop(p, vt0):
     """Return vt / vref of DC3A between its contacts."""
-    speed = (p["VRMAX"] - p["VRMIN"]) / (p["KV"] * p["TRH"])
-    measured, machine = lag_of(p["TR"]), lag_of(TD0)
-    field = exciter_of(p, p["KE"], vt0)
-    closed = total(product([1.0, 0.0], field, machine, measured), [speed])
-    return product([speed], measured), closed
+    rheostat = Transfer((p["VRMAX"] - p["VRMIN"]) / (p["KV"] * p["TRH"]), [1.0, 0.0])
+    forward = rheostat * field_of(p, p["KE"], vt0) * lag(1.0, TD0)
+    return forward.fed_back(lag(1.0, p["TR"]))
 
 
 LOOPS = {"DC4B": pid_loop, "DC3A": rheostat_loop}
@@ -152,7 +118,7 @@ def test_a_small_step_is_that_of_the_transfer_function(name, KE, vt0):
     got = respond(name, values, (0.0, size))[:, 0]
     loop = LOOPS.get(name, continuous_loop)
     times = np.linspace(0.0, 3.0, 301)
-    expected = signal.step(loop(values, vt0), T=times)[1]
+    expected = loop(values, vt0).step(times)
     # VX curves by some 1e-5 of the step, and the method errs by (step / shortest lag)^4 / 120
     assert np.abs((got - vt0) / size - expected).max() < 1e-5 * np.abs(expected).max()
     assert np.abs(expected).max() > 1e-2  # it moves
@@ -280,12 +246,7 @@ def test_the_typical_data_are_stable_on_open_circuit(name):
 
 def growth(name, values, machine):
     """Return the largest real part (1/s) of the eigenvalues at rest."""
-    system = system_of(name, machine)
-    code, p = LinearKernel(system), vector(system, values)
-    rest = code.rest(p)
-    jacobian = code.motion(p, rest.r, rest.x, np.zeros(1))[1]
-    moving = np.abs(jacobian).max(axis=1) > 0.0  # the state of a bypassed block stays put
-    return np.linalg.eigvals(jacobian[np.ix_(moving, moving)]).real.max()
+    return rates_at_rest(system_of(name, machine), values).real.max()
 
 
 def test_the_rheostat_of_the_standard_s_sample_hunts_on_open_circuit():

@@ -1,5 +1,6 @@
 """Machine code: what it computes equals the float run of the same equations; the cache is safe."""
 
+import re
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -247,16 +248,23 @@ def test_an_array_of_another_kind_is_refused(model):
 # --- derivatives ----------------------------------------------------------------------------------
 
 
-def differences(system, values, outputs, spans, name, h):
-    """Return the derivative to one parameter by two central differences, error of order h^4."""
+CENTRAL = {1: 8.0, -1: -8.0, 2: -1.0, -2: 1.0}
+INWARD = {0: -25.0, 1: 48.0, 2: -36.0, 3: 16.0, 4: -3.0}
+
+
+def differences(system, values, outputs, spans, name, h, shares=None):
+    """Return the derivative to one parameter by differences (of 12 h), with an error of order h^4.
+
+    They are central ones unless a value is at zero, an edge: beyond it the response may be another.
+    """
     scale = max(abs(values[name]), 0.1) * h
-    sets = [values | {name: values[name] + k * scale} for k in (1, -1, 2, -2)]
+    shares = shares or CENTRAL
+    sets = [values | {name: values[name] + k * scale} for k in shares]
     code = compiled(system, outputs, LANES)
     columns = [vector(system, one) for one in sets]
-    p = np.stack(columns + columns[:1] * (LANES - 4), axis=1)
+    p = np.stack(columns + columns[:1] * (LANES - len(sets)), axis=1)
     out = np.concatenate(code.run(p, code.start(p), spans))
-    near, far = out[:, :, 0] - out[:, :, 1], out[:, :, 2] - out[:, :, 3]
-    return (8.0 * near - far) / (12.0 * scale)
+    return out[:, :, : len(sets)] @ np.array(list(shares.values())) / (12.0 * scale)
 
 
 def exact(system, values, outputs, spans, free):
@@ -275,13 +283,13 @@ def small_bump(size=0.002):
 
 
 def smooth_bump(system, values):
-    """Return the largest bump that a derivative in front of a limit lets through."""
+    """Return the larger bump that a derivative in front of a limit lets through."""
 
     def moved(size):
         return np.concatenate(run(system, values, ("vt",), small_bump(size))) - values[VT0]
 
     sizes = (0.002, 1e-4)
-    linear = [s for s in sizes if np.allclose(moved(s), 2.0 * moved(s / 2), atol=1e-2 * s, rtol=0)]
+    linear = [s for s in sizes if np.abs(moved(s) - 2.0 * moved(s / 2)).max() < 1e-2 * s]
     return small_bump(linear[0])
 
 
@@ -303,28 +311,36 @@ def test_tangents_equal_central_differences_for_every_parameter(name, saturation
         assert (error <= 1e-6 * size + 3e-10 / max(abs(values[symbol]), 0.1)).all(), symbol
 
 
+LIMIT = re.compile("MAX|MIN|LR|LIM")
+
+
 def test_tangents_equal_differences_where_limits_act(exciter):
     """The response has kinks where a limit is met; so short a difference stays between them.
 
-    Where a kink lies within the longer one, the shorter one tells.
+    Where a kink, or the end of a frozen integral, lies within the longer one, a shorter one tells.
+    At a parameter of zero, the edge of its range, the derivative is the one into the range.
     """
-    system, values = system_of(exciter), drawn_values(exciter, 22)
-    # a zero is an edge: a ceiling VRMAX - KC IFD that neither sinks nor rises ties with its state
-    values = {symbol: value or 0.05 for symbol, value in values.items()}
+    system, met = system_of(exciter), set()
     spans = [Span(levels(500, (0, 0.3)), STEP, 1), Span(levels(500, (0, -0.3)), STEP, 1)]
-    _, slopes = exact(system, values, ("vt",), spans, system.parameters)
-    met = []
-    for column, symbol in enumerate(system.parameters):
-        errors = []
-        for h, rounding in ((1e-5, 1e-8), (1e-6, 1e-7)):
-            expected = differences(system, values, ("vt",), spans, symbol, h)
-            # rounding, 1e-14 over a step of h / 10 at least, is all that these differences err by
-            error = np.abs(slopes[:, :, column] - expected).max()
-            errors.append(error - 1e-6 * np.abs(expected).max() - rounding)
-        assert min(errors) < 0.0, symbol
-        if "MAX" in symbol and np.abs(slopes[:, :, column]).max() > 1e-3:
-            met.append(symbol)
+    for seed in range(22, 32):
+        values = drawn_values(exciter, seed)
+        _, slopes = exact(system, values, ("vt",), spans, system.parameters)
+        moved = dict(zip(system.parameters, np.abs(slopes).max(axis=(0, 1)), strict=True))
+        met = {symbol for symbol in moved if LIMIT.search(symbol) and moved[symbol] > 1e-3}
+        if met:
+            break
     assert met
+    for column, symbol in enumerate(system.parameters):
+        shares = CENTRAL if values[symbol] else INWARD
+        for h in (1e-5, 1e-6, 1e-7):
+            expected = differences(system, values, ("vt",), spans, symbol, h, shares)
+            error = np.abs(slopes[:, :, column] - expected).max()
+            # rounding, 1e-14 over a step of h / 10 at least, is all that these differences err by
+            rounding = 1e-13 / h * (1.0 if values[symbol] else 10.0)
+            agrees = error < 1e-6 * np.abs(expected).max() + rounding
+            if agrees:
+                break
+        assert agrees, symbol
 
 
 def test_the_tangent_run_gives_the_values_of_the_plain_run(model):

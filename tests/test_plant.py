@@ -17,7 +17,7 @@ from exfit.simulate import Change, Course, Simulator
 @pytest.mark.parametrize("name", ["ac1a", "ac8b_unit1", "ac8b_unit2"])
 def test_a_bump_up_and_down_is_that_of_another_simulator(name):
     """The other one rounds the rectifier's constants, which moves vt by 4e-6."""
-    model, values, course, columns, told = reference(name)
+    model, values, course, columns, told = reference(f"reference_{name}")
     system = system_of(model)
     assert values.keys() == set(system.parameters)
     simulator = Simulator(system, course, columns["t"], 1e-3)

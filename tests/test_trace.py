@@ -99,6 +99,18 @@ def test_derivatives_equal_central_differences(x, y, direction):
     assert exact == pytest.approx((4 * difference(1) - difference(2)) / 3, abs=1e-9)
 
 
+@pytest.mark.parametrize(("value", "moves_with"), [(0.3, "x"), (-1.0, "low"), (2.0, "high")])
+def test_what_lies_on_a_limit_moves_with_it(value, moves_with):
+    """There a limit puts a state back: it is exactly on it, not a hair beyond."""
+    graph = Graph()
+    x, low, high = nodes = [graph.symbol(name, varies=True) for name in ("x", "low", "high")]
+    held = clip(x, low, high)
+    for node in nodes:
+        (slope,) = tangents([held], {node: graph.constant(1.0)})
+        told = evaluate([slope], {x: value, low: -1.0, high: 2.0})[slope]
+        assert told == (1.0 if node.args[0] == moves_with else 0.0)
+
+
 @pytest.mark.parametrize("condition", ["x < y", "x > y", "x <= y", "x >= y"])
 def test_a_comparison_means_the_same_on_nodes_and_numbers(condition):
     compare = eval(f"lambda x, y: where({condition}, 1.0, 2.0)", {"where": where})

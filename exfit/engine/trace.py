@@ -328,7 +328,8 @@ def _tangent(node: Node, t: list[Node]) -> Node:
             return graph.select(args[0], t[1], t[2])
         case "clip":
             x, low, high = args
-            return graph.select(x < low, t[1], graph.select(x > high, t[2], t[0]))
+            # a state that was put back on its limit is exactly there, and moves with it
+            return graph.select(x <= low, t[1], graph.select(high <= x, t[2], t[0]))
         case "exp":
             return node * t[0]
         case "log":

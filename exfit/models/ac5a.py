@@ -20,7 +20,7 @@ here, 1 and 1 (which cancel) elsewhere.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import lag, lead_lag, limited_integrator, limited_lag, washout
+from exfit.models.blocks import exciter, exciter_demand, lag, lead_lag, limited_lag, washout
 from exfit.models.sheet import record, sheet
 
 ALIASES = ("ESAC5A",)
@@ -54,13 +54,12 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vl, d.VL = lead_lag(s.VR, s.VL, p.TF3, p.TF2)
     vf, d.VF = washout(vl, s.VF, p.KF, p.TF1)
     vr, d.VR = limited_lag(u.vref + u.vs - vc - vf, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    vfe = p.KE * s.VE + p.saturation(s.VE).vx
-    efd, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
+    efd, d.VE = exciter(vr, s.VE, p.KE, p, low=0.0)
     return efd
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vfe = p.KE * efd + p.saturation(efd).vx
+    vfe = exciter_demand(efd, p.KE, p)
     x.VC, x.VR, x.VE, x.VL, x.VF = u.vc1, vfe, efd, vfe, vfe
     return u.vc1 + vfe / p.KA - u.vs

@@ -19,10 +19,10 @@ from exfit.models.blocks import (
     lag,
     limited_integrator,
     limited_lag,
+    pi_rest,
     pid,
     rectifier,
     rectifier_supply,
-    where,
 )
 from exfit.models.sheet import record, sheet
 
@@ -57,6 +57,7 @@ RECORDS = (
         "E1 SE1 E2 SE2",
         doubt="the order of AC8B is likely, not confirmed",
     ),
+    record("ESAC8B", "TR KPR KIR KDR TDR KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),
 )
 
 STATES = "VC VI VD VR VE"
@@ -78,7 +79,6 @@ def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
     ve = rectifier_supply(efd, p.KC * u.ifd)
     vfe = field_demand(ve, u.ifd, p)
-    integrates = p.KIR > 0.0
-    error = where(integrates, 0.0, vfe / (p.KA * where(integrates, 1.0, p.KPR)))
-    x.VC, x.VI, x.VD, x.VR, x.VE = u.vc1, where(integrates, vfe / p.KA, 0.0), error, vfe, ve
+    error, x.VI = pi_rest(vfe / p.KA, p.KPR, p.KIR)
+    x.VC, x.VD, x.VR, x.VE = u.vc1, error, vfe, ve
     return u.vc1 + error - u.vs

@@ -19,11 +19,11 @@ __all__ = [
     "Limited",
     "Saturation",
     "clip",
+    "commutator_start",
     "compound_source",
     "cos",
-    "commutator",
-    "commutator_demand",
-    "commutator_start",
+    "exciter",
+    "exciter_demand",
     "exp",
     "exponential",
     "exponential_se",
@@ -48,8 +48,8 @@ __all__ = [
     "rectifier",
     "rectifier_supply",
     "regulator_output",
-    "sin",
     "second_order",
+    "sin",
     "smaller",
     "source_voltage",
     "sqrt",
@@ -207,9 +207,21 @@ def exponential_se(e: Signal, E1: Signal, SE1: Signal, E2: Signal, SE2: Signal) 
     return Saturation(e * se, se * (1.0 + B * e))
 
 
+def exciter_demand(efd: Signal, KE: Signal, p: Signal) -> Signal:
+    """Return KE EFD + VX(EFD), the field signal that holds an exciter without rectifier at EFD."""
+    return KE * efd + p.saturation(efd).vx
+
+
+def exciter(
+    vr: Signal, efd: Signal, KE: Signal, p: Signal, low: Signal = -inf
+) -> tuple[Signal, Limited]:
+    """1 / sTE with KE EFD + VX(EFD) fed back: an exciter without a rectifier."""
+    return limited_integrator(vr - exciter_demand(efd, KE, p), efd, p.TE, low)
+
+
 def field_demand(ve: Signal, ifd: Signal, p: Signal) -> Signal:
     """Return VFE, the field signal that holds an alternator at VE while its rectifier gives IFD."""
-    return p.KE * ve + p.saturation(ve).vx + p.KD * ifd
+    return exciter_demand(ve, p.KE, p) + p.KD * ifd
 
 
 def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
@@ -310,24 +322,9 @@ def second_order(
     return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
 
 
-# --- commutator (DC) exciters ---------------------------------------------------------------------
-
-
 def zero(x: Signal) -> Signal:
     """Say whether a value is 0, which in some data means: to be computed."""
     return (x <= 0.0) & (x >= 0.0)
-
-
-def commutator_demand(efd: Signal, KE: Signal, p: Signal) -> Signal:
-    """KE EFD + VX(EFD), the regulator voltage that holds EFD."""
-    return KE * efd + p.saturation(efd).vx
-
-
-def commutator(
-    vr: Signal, efd: Signal, KE: Signal, p: Signal, low: Signal = -inf
-) -> tuple[Signal, Limited]:
-    """1 / (sTE) with KE + SE(EFD) fed back: an exciter with a commutator (421.5, clause 5)."""
-    return limited_integrator(vr - commutator_demand(efd, KE, p), efd, p.TE, low)
 
 
 class CommutatorStart(NamedTuple):
@@ -347,7 +344,7 @@ def commutator_start(efd: Signal, p: Signal) -> CommutatorStart:
     """
     high = larger(p.E1, p.E2)
     computed = zero(p.VRMAX)
-    ceiling = where(computed, commutator_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
+    ceiling = where(computed, exciter_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
     floor = where(computed, -ceiling, p.VRMIN)
     KE = where(zero(p.KE), (ceiling / 10.0 - p.saturation(efd).vx) / efd, p.KE)
-    return CommutatorStart(KE, ceiling, floor, commutator_demand(efd, KE, p))
+    return CommutatorStart(KE, ceiling, floor, exciter_demand(efd, KE, p))

@@ -20,8 +20,8 @@ Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
-    commutator,
     commutator_start,
+    exciter,
     lag,
     larger,
     lead_lag,
@@ -69,7 +69,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
     gated = larger(vl, u.vuel)
     vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
-    efd, d.EFD = commutator(vr, s.EFD, s.KE0, p, low=0.0)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p, low=0.0)
     return efd
 
 

@@ -21,8 +21,8 @@ Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
-    commutator,
     commutator_start,
+    exciter,
     lag,
     larger,
     lead_lag,
@@ -71,7 +71,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     gated = larger(vl, u.vuel)
     low, high = u.vt * s.VRMIN0, u.vt * s.VRMAX0
     vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, low, high)
-    efd, d.EFD = commutator(vr, s.EFD, s.KE0, p, low=0.0)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p, low=0.0)
     return efd
 
 

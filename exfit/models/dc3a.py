@@ -24,8 +24,8 @@ with those the rheostat hunts on open circuit.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
-    commutator,
-    commutator_demand,
+    exciter,
+    exciter_demand,
     lag,
     limited_integrator,
     where,
@@ -65,11 +65,11 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     travel = (p.VRMAX - p.VRMIN) * error
     vrh, d.VRH = limited_integrator(travel, s.VRH, p.KV * p.TRH, p.VRMIN, p.VRMAX)
     vr = where(error >= p.KV, p.VRMAX, where(error <= -p.KV, p.VRMIN, vrh))
-    efd, d.EFD = commutator(vr, s.EFD, p.KE, p, p.VEMIN)
+    efd, d.EFD = exciter(vr, s.EFD, p.KE, p, p.VEMIN)
     return efd
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VC, x.VRH, x.EFD = u.vc1, commutator_demand(efd, p.KE, p), efd
+    x.VC, x.VRH, x.EFD = u.vc1, exciter_demand(efd, p.KE, p), efd
     return u.vc1

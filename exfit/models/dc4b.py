@@ -32,15 +32,15 @@ computes neither.) Not modelled: UEL or OEL at the summing point.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
-    commutator,
     commutator_start,
+    exciter,
     lag,
     larger,
     limited_lag,
+    pi_rest,
     pid,
     smaller,
     washout,
-    where,
 )
 from exfit.models.sheet import record, sheet
 
@@ -86,7 +86,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD, low, high)
     fed = u.vt * smaller(larger(vpid, u.vuel), u.voel)
     vr, d.VR = limited_lag(fed, s.VR, p.KA, p.TA, u.vt * s.VRMIN0, u.vt * s.VRMAX0)
-    efd, d.EFD = commutator(vr, s.EFD, s.KE0, p, p.VEMIN)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p, p.VEMIN)
     return efd
 
 
@@ -94,8 +94,6 @@ def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
     start = commutator_start(efd, p)
     x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
-    vpid, integrates = start.vr / (p.KA * u.vt), p.KI > 0.0
-    error = where(integrates, 0.0, vpid / where(integrates, 1.0, p.KP))
-    x.VC, x.VI, x.VD = u.vc1, where(integrates, vpid, 0.0), error
-    x.VR, x.EFD, x.VF = start.vr, efd, efd
+    error, x.VI = pi_rest(start.vr / (p.KA * u.vt), p.KP, p.KI)
+    x.VC, x.VD, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
     return u.vc1 + error - u.vs

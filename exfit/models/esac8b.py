@@ -13,7 +13,7 @@ AC8B (2005) is another model, with KC, KD and limits of the PID and of VE.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import integrator, lag, limited_lag, pi_rest, pid
+from exfit.models.blocks import exciter, exciter_demand, lag, limited_lag, pi_rest, pid
 from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
@@ -39,24 +39,19 @@ RECORDS = (record("ESAC8B", "TR KP KI KD TD KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE
 STATES = "VC VI VD VR VE"
 
 
-def field_voltage(ve: Signal, p: Signal) -> Signal:
-    """Return VFE, the field signal that holds the exciter at VE."""
-    return p.KE * ve + p.saturation(ve).vx
-
-
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = u.vref + u.vs - vc
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD)
     vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    efd, d.VE = integrator(vr - field_voltage(s.VE, p), s.VE, p.TE)
+    efd, d.VE = exciter(vr, s.VE, p.KE, p)
     return efd
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vr = field_voltage(efd, p)
+    vr = exciter_demand(efd, p.KE, p)
     error, x.VI = pi_rest(vr / p.KA, p.KP, p.KI)
     x.VC, x.VD, x.VR, x.VE = u.vc1, error, vr, efd
     return u.vc1 + error - u.vs

@@ -22,8 +22,8 @@ Not modelled: speed, UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
-    commutator,
     commutator_start,
+    exciter,
     lag,
     lead_lag,
     limited_lag,
@@ -68,7 +68,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
     low, high = u.vt * s.VRMIN0, u.vt * s.VRMAX0
     vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, low, high)
-    efd, d.EFD = commutator(vr, s.EFD, s.KE0, p)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
     return efd
 
 

@@ -21,8 +21,8 @@ Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
-    commutator,
     commutator_start,
+    exciter,
     lag,
     lead_lag,
     limited_lag,
@@ -66,7 +66,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF1)
     vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
     vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
-    efd, d.EFD = commutator(vr, s.EFD, s.KE0, p)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
     return efd
 
 

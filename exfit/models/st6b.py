@@ -20,7 +20,7 @@ gate (OEL = 1 in a PSS/E record) or behind it (OEL = 2).
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, pid, smaller, where
+from exfit.models.blocks import clip, lag, larger, pi_rest, pid, smaller
 from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
@@ -69,7 +69,6 @@ def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
     vg = p.KG * efd
     va = (efd / u.vt + p.KM * vg) / (p.KFF + p.KM)
-    integrates = p.KIA > 0.0
-    error = where(integrates, 0.0, va / where(integrates, 1.0, p.KPA))
-    x.VC, x.VI, x.VD, x.VG = u.vc1, where(integrates, va, 0.0), error, vg
+    error, x.VI = pi_rest(va, p.KPA, p.KIA)
+    x.VC, x.VD, x.VG = u.vc1, error, vg
     return u.vc1 + error - u.vs

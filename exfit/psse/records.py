@@ -116,7 +116,8 @@ def record_text(
     definition: Definition, values: Mapping[str, float], bus: int, machine_id: str
 ) -> str:
     """Return a record as a dynamics file has it, each number in the digits that give it back."""
-    given = dict(values) | dict(definition.record.absent)
+    record = definition.record
+    given = dict.fromkeys(record.ignored, 0.0) | dict(values) | dict(record.absent)
     if {"E1", "SE1", "E2", "SE2"} <= given.keys() and given["E1"] > given["E2"]:
         for first, second in zip(*SORTED, strict=True):
             given[first], given[second] = given[second], given[first]
