@@ -234,8 +234,8 @@ def check(console: Console, found: Check) -> None:
     _verdict(
         console,
         found.flat,
-        f"a run without a step stays flat: vt drifts {found.drift:.1e} pu in 60 s",
-        f"a run without a step is NOT flat: vt drifts {found.drift:.1e} pu in 60 s",
+        f"a run without a step stays flat: it drifts by {found.drift:.1e} pu in 60 s",
+        f"a run without a step is NOT flat: it drifts by {found.drift:.1e} pu in 60 s",
     )
     step = f"{found.step:g} s"
     console.print(f"sub-steps: {found.substeps} to each step of {step}")
