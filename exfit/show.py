@@ -249,7 +249,12 @@ def _verdict(console: Console, good: bool, yes: str, no: str) -> None:
     console.print(f"[green]{yes}[/]" if good else f"[bold red]{no}[/]")
 
 
-def catalogue(console: Console, models: Iterable[Model], machines: Iterable[Machine]) -> None:
+def catalogue(
+    console: Console,
+    models: Iterable[Model],
+    machines: Iterable[Machine],
+    stabilisers: Iterable[Model],
+) -> None:
     """Show the names of all models."""
     table = plain_table("exciter", "also", "")
     for one in models:
@@ -259,6 +264,11 @@ def catalogue(console: Console, models: Iterable[Model], machines: Iterable[Mach
     table = plain_table("machine", "")
     for machine in machines:
         table.add_row(machine.name, machine.title)
+    console.print(table)
+    console.print()
+    table = plain_table("stabiliser", "")
+    for one in stabilisers:
+        table.add_row(one.name, one.title.partition(" (")[0])
     console.print(table)
 
 
