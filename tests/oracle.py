@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from exfit.engine.kernel import Span
+from exfit.engine.kernel import LinearKernel, Span
 from exfit.engine.system import System
 from exfit.engine.trace import clip
 from exfit.models import MODELS
@@ -38,10 +38,18 @@ def typical_values(name: str, machine: str = "GENROU", **changes: float) -> dict
 
 
 def lively_values(name: str, machine: str = "GENROU", **changes: float) -> dict[str, float]:
-    """Return typical data with no block bypassed: every lag takes part."""
+    """Return typical data with no block bypassed: every lag takes part.
+
+    Where 0 means that a value is computed at the start, it is given: there is a jump at 0.
+    """
     system, values = system_of(name, machine), typical_values(name, machine)
     for symbol in system.time_constants:
         values[symbol] = values[symbol] or 0.03
+    rest = LinearKernel(system).rest(vector(system, values))
+    for setpoint, found in zip(system.setpoints, rest.r, strict=True):
+        symbol = setpoint.removesuffix("0")
+        if values.get(symbol) == 0.0:
+            values[symbol] = float(found)
     return values | {symbol.replace("machine_", MACHINE): v for symbol, v in changes.items()}
 
 
@@ -76,6 +84,14 @@ def levels(steps: int, *changes: tuple[int, float]) -> np.ndarray:
 def vector(system: System, values: Mapping[str, float]) -> np.ndarray:
     """Return the values in the system's order."""
     return np.array([values[name] for name in system.parameters])
+
+
+def fastest_rate(system: System, values: Mapping[str, float]) -> float:
+    """Return the spectral radius (1/s) of a system at rest."""
+    code, p = LinearKernel(system), vector(system, values)
+    rest = code.rest(p)
+    _, jacobian = code.motion(p, rest.r, rest.x, np.zeros(len(system.inputs)))
+    return float(np.abs(np.linalg.eigvals(jacobian)).max())
 
 
 def float_run(

@@ -278,7 +278,7 @@ FORM = {
 }
 
 MEANING = {
-    "unknown model": ("AC1A", "AC1B", "model", ["AC1B", "AC1A, ESAC1A, AC8B"]),
+    "unknown model": ("AC1A", "AC1B", "model", ["AC1B", "AC1A, ESAC1A, AC2A"]),
     "missing model file": ("model: AC1A", "model: mine.py", "model", ["mine.py", "no such file"]),
     "unknown machine": ("GENROU", "GENRUO", "plant.machine", ["'GENRUO'", "did you mean GENROU?"]),
     "unknown fixed": ("KE: 1.0", "KEE: 1.0", "parameters.fixed.KEE", ["AC1A", "did you mean KE?"]),

@@ -15,16 +15,21 @@ from exfit.models.phasors import modulus
 
 __all__ = [
     "SHORTEST",
+    "CommutatorStart",
     "Limited",
     "Saturation",
     "clip",
     "compound_source",
     "cos",
+    "commutator",
+    "commutator_demand",
+    "commutator_start",
     "exp",
     "exponential",
     "exponential_se",
     "field_ceiling",
     "field_demand",
+    "high_pass",
     "inf",
     "integrator",
     "lag",
@@ -33,6 +38,7 @@ __all__ = [
     "limited",
     "limited_integrator",
     "limited_lag",
+    "limited_lead_lag",
     "log",
     "pi",
     "pi_rest",
@@ -41,12 +47,15 @@ __all__ = [
     "rate",
     "rectifier",
     "rectifier_supply",
+    "regulator_output",
     "sin",
+    "second_order",
     "smaller",
     "source_voltage",
     "sqrt",
     "washout",
     "where",
+    "zero",
 ]
 
 SHORTEST = 1e-4  # s; a faster lag is invisible in any record, and costs only sub-steps
@@ -252,3 +261,93 @@ def source_voltage(u: Signal, p: Signal) -> Signal:
     """Return VB, what a compound source gives behind its rectifier, at most VBMAX."""
     ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
     return smaller(rectifier(ve, p.KC * u.ifd), p.VBMAX)
+
+
+def limited_lead_lag(
+    u: Signal, x: Signal, TC: Signal, TB: Signal, low: Signal, high: Signal
+) -> tuple[Signal, Limited]:
+    """(1 + sTC) / (1 + sTB) with the non-windup limit of IEEE Std 421.5-2005, annex E.
+
+    The state is that of ``lead_lag`` between the limits; at a limit it follows the limited output
+    with the lag TC, so that it never runs away. With TC = 0 this is ``limited_lag``.
+    """
+    lead = TC * rate(TB)
+    y = clip(where(TB < SHORTEST, u, x + lead * (u - x)), low, high)
+    at_once = TC < SHORTEST
+    follows = where(TB < SHORTEST, 0.0, (y - x) * rate(TC))
+    slope = where(at_once, (u - x) * rate(TB), follows)
+    return y, limited(slope, x, where(at_once, low, -inf), where(at_once, high, inf))
+
+
+def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Signal = 0.0) -> Signal:
+    """Return the output of KA / (1 + sTA), before any limit, from which a rate feedback is taken.
+
+    With TA = 0 output and feedback wait for each other; that loop is solved here: ``vl`` is what
+    the regulator would get without the feedback, ``gain`` how much of a step gets there at once,
+    ``taken`` what is subtracted from the output before the feedback takes it. A limit in the loop
+    may be put on the result: the loop is monotonous, so that a limit holds there as it does here.
+    """
+    loop = p.KA * gain * p.KF * rate(p.TF)
+    prompt = (p.KA * vl + loop * (s.VF + taken)) / (1.0 + loop)
+    return where(p.TA < SHORTEST, prompt, s.VA)
+
+
+def high_pass(u: Signal, x: Signal, T: Signal) -> tuple[Signal, Signal]:
+    """sT / (1 + sT), or 1 where T = 0: a washout that is left out; at rest x = u."""
+    return where(T < SHORTEST, u, u - x), (u - x) * rate(T)
+
+
+def second_order(
+    u: Signal, x: Signal, v: Signal, A1: Signal, A2: Signal
+) -> tuple[Signal, Signal, Signal]:
+    """1 / (1 + s A1 + s^2 A2); v is the slope of x; return the output and both slopes.
+
+    Where A2 is so small that one of its poles is faster than ``SHORTEST``, it is the lag A1.
+    """
+    curved = SHORTEST * larger(A1, SHORTEST) < A2
+    bend = (u - x - A1 * v) / where(curved, A2, 1.0)
+    y = where(curved | (A1 >= SHORTEST), x, u)
+    return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
+
+
+# --- commutator (DC) exciters ---------------------------------------------------------------------
+
+
+def zero(x: Signal) -> Signal:
+    """Say whether a value is 0, which in some data means: to be computed."""
+    return (x <= 0.0) & (x >= 0.0)
+
+
+def commutator_demand(efd: Signal, KE: Signal, p: Signal) -> Signal:
+    """KE EFD + VX(EFD), the regulator voltage that holds EFD."""
+    return KE * efd + p.saturation(efd).vx
+
+
+def commutator(
+    vr: Signal, efd: Signal, KE: Signal, p: Signal, low: Signal = -inf
+) -> tuple[Signal, Limited]:
+    """1 / (sTE) with KE + SE(EFD) fed back: an exciter with a commutator (421.5, clause 5)."""
+    return limited_integrator(vr - commutator_demand(efd, KE, p), efd, p.TE, low)
+
+
+class CommutatorStart(NamedTuple):
+    """What a commutator exciter finds at its start, and the VR that holds EFD there."""
+
+    KE: Signal
+    VRMAX: Signal
+    VRMIN: Signal
+    vr: Signal
+
+
+def commutator_start(efd: Signal, p: Signal) -> CommutatorStart:
+    """Return KE, VRMAX and VRMIN, computed as PSS/E does where they are given as 0.
+
+    VRMAX = 0: the VR that holds the higher of E1, E2 (with KE only where KE > 0), and
+    VRMIN = -VRMAX. KE = 0, self-excited: such that VR starts at VRMAX / 10.
+    """
+    high = larger(p.E1, p.E2)
+    computed = zero(p.VRMAX)
+    ceiling = where(computed, commutator_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
+    floor = where(computed, -ceiling, p.VRMIN)
+    KE = where(zero(p.KE), (ceiling / 10.0 - p.saturation(efd).vx) / efd, p.KE)
+    return CommutatorStart(KE, ceiling, floor, commutator_demand(efd, KE, p))

@@ -36,13 +36,15 @@ class Record:
 
     ``icons`` are the integers before them, each a symbol and the only value that the model stands
     for; ``absent`` are symbols that the model does not have, with the only value that it stands
-    for; ``doubt`` says what is not settled about the order.
+    for; ``ignored`` are symbols that act only where a limiter does, which none is here: any value
+    will do; ``doubt`` says what is not settled about the order.
     """
 
     name: str
     cons: tuple[str, ...]
     icons: tuple[tuple[str, int], ...]
     absent: tuple[tuple[str, float], ...]
+    ignored: tuple[str, ...]
     doubt: str
 
 
@@ -52,6 +54,7 @@ def record(
     *,
     icons: Mapping[str, int] | None = None,
     absent: Mapping[str, float] | None = None,
+    ignored: str = "",
     doubt: str = "",
 ) -> Record:
     """Return a PSS/E record from its symbols in one text, ``"TR KA TA"``."""
@@ -60,6 +63,7 @@ def record(
         tuple(cons.split()),
         tuple((icons or {}).items()),
         tuple((absent or {}).items()),
+        tuple(ignored.split()),
         doubt,
     )
 

@@ -1,0 +1,99 @@
+"""AC2A: alternator exciter with high initial response (IEEE Std 421.5-2005, 6.2).
+
+                              VAMAX            UEL OEL   VRMAX
+vref + vs ──►(+)─►[1 + sTC]──►[  KA  ]──►(+)─►[KB]─►HV─►LV─►[clip]─┐
+           -▲   ▲-[1 + sTB]   [1+sTA]   -▲                  VRMIN  │ VR
+            │   │             VAMIN      │           VE <= VEMAX   ▼
+vc1 ►[  1  ]┘   │                        │   ┌─ VE ─┬─[  1  ]◄────(+)
+     [1+sTR]    │                        │   ▼      │ [ sTE ]     -▲
+                │                 efd ◄──┼──(x)     │ VE >= 0      │
+                │                        │   ▲      │              │
+                │                        │  FEX     └──► VFE ──────┤
+                │                        │   ▲                     │
+                │ [  sKF  ]              │  KC IFD / VE            │
+                └─[1 + sTF]◄──────┐      └─[KH]◄───────────────────┤
+                                  └────────────────────────────────┘
+
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX, that is
+(VFEMAX - KD IFD) / (KE + SE(VE)): the limit of the exciter's field current.
+The limits of the lag and of VE are non-windup; the clamp to VRMAX, VRMIN is
+not. KH closes a loop that shortens the exciter's time constant, so at rest
+VA = VFE / KB + KH VFE. UEL and OEL are gates, and do not act by themselves.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    field_ceiling,
+    field_demand,
+    lag,
+    larger,
+    lead_lag,
+    limited_integrator,
+    limited_lag,
+    rectifier,
+    rectifier_supply,
+    smaller,
+    washout,
+)
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESAC2A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
+    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant"),
+    ("VAMAX", 8.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VAMIN", -8.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KB", 25.0, "pu", (0.01, 10000.0), "second stage gain"),
+    ("VRMAX", 105.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
+    ("VRMIN", -95.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
+    ("TE", 0.6, "s", (0.01, 100.0), "exciter time constant"),
+    ("VFEMAX", 4.4, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
+    ("KH", 1.0, "pu", (0.0, 100.0), "gain of the exciter's field current feedback"),
+    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KD", 0.35, "pu", (0.0, 100.0), "demagnetising factor"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("E1", 4.4, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.037, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 3.3, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.012, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "ESAC2A",
+        "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2",
+    ),
+)
+
+STATES = "VC VL VA VE VF"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vemax = field_ceiling(s.VE, vfe, p)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    gated = smaller(larger(p.KB * (va - p.KH * vfe), u.vuel), u.voel)
+    vr = clip(gated, p.VRMIN, p.VRMAX)
+    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, 0.0, vemax)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    vfe = field_demand(ve, u.ifd, p)
+    va = vfe / p.KB + p.KH * vfe
+    error = va / p.KA
+    x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, va, ve, vfe
+    return u.vc1 + error - u.vs

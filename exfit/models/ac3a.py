@@ -1,0 +1,102 @@
+"""AC3A: alternator exciter, its own supply (IEEE Std 421.5-2005, 6.3).
+
+                         UEL       VAMAX   KR efd      VE <= VEMAX
+vref + vs ►(+)►[1 + sTC]─►HV─►(+)─►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─ VE ─►(x)─┬►efd
+          -▲   [1 + sTB]     -▲    [1+sTA]       -▲    [ sTE ] │        ▲  │
+           │                  │    VAMIN          │    VEMIN   │       FEX │
+vc1 ►[  1  ]┘                 │                   └─── VFE ◄───┘        ▲  │
+     [1+sTR]       [   s   ]  │                                KC IFD / VE │
+                   [1 + sTF]──┘◄── VN ◄─[ KF to EFDN, then KN ]◄───────────┘
+
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. VN grows by KF
+per efd up to EFDN and by KN beyond it: the exciter supplies its regulator, so
+that the gain of both grows with efd. The limits of the lag and of VE are
+non-windup; the UEL gate does not act by itself.
+
+VF is subtracted behind the lead-lag, as in the models written after PSS/E's
+ESAC3A. Left out: the low voltage limiter (KLV, VLV) of the model of 1981,
+which IEEE Std 421.5 and ESAC3A replaced by VEMIN; an OEL, which is added to vs.
+VEMIN is 0.1 here; copies of the sample data that say 0 let VE end at 0 for
+good, where the regulator has no supply.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    field_ceiling,
+    field_demand,
+    lag,
+    larger,
+    lead_lag,
+    limited_integrator,
+    limited_lag,
+    rectifier,
+    rectifier_supply,
+    washout,
+    where,
+)
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESAC3A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
+    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    ("KA", 45.62, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.013, "s", (0.0, 10.0), "regulator time constant"),
+    ("VAMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VAMIN", -0.95, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("TE", 1.17, "s", (0.01, 100.0), "exciter time constant"),
+    ("VEMIN", 0.1, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+    ("KR", 3.77, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
+    ("KF", 0.143, "pu", (0.0, 10.0), "stabilising feedback gain up to EFDN"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("KN", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain beyond EFDN"),
+    ("EFDN", 2.36, "pu", (0.0, 100.0), "field voltage where the feedback gain changes"),
+    ("KC", 0.104, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KD", 0.499, "pu", (0.0, 100.0), "demagnetising factor"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("VFEMAX", 16.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
+    ("E1", 6.24, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 1.143, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 4.68, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.1, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "ESAC3A",
+        "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2",
+    ),
+)
+
+STATES = "VC VL VA VE VF"
+
+
+def feedback(efd: Signal, p: Signal) -> Signal:
+    """Return VN, the field voltage through a gain that changes at EFDN."""
+    return where(efd < p.EFDN, p.KF * efd, p.KF * p.EFDN + p.KN * (efd - p.EFDN))
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vemax = field_ceiling(s.VE, vfe, p)
+    # before the integrator that makes it: the exciter feeds its own regulator
+    efd = rectifier(clip(s.VE, p.VEMIN, vemax), p.KC * u.ifd)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(feedback(efd, p), s.VF, 1.0, p.TF)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc, s.VL, p.TC, p.TB)
+    va, d.VA = limited_lag(larger(vl, u.vuel) - vf, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    _, d.VE = limited_integrator(p.KR * efd * va - vfe, s.VE, p.TE, p.VEMIN, vemax)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    va = field_demand(ve, u.ifd, p) / (p.KR * efd)
+    error = va / p.KA
+    x.VC, x.VL, x.VA, x.VE, x.VF = u.vc1, error, va, ve, feedback(efd, p)
+    return u.vc1 + error - u.vs

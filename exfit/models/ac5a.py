@@ -1,0 +1,66 @@
+"""AC5A: simplified brushless exciter (IEEE Std 421.5-2005, 6.5).
+
+                       VRMAX             VE >= 0
+vref + vs ──►(+)─►(+)─►[  KA  ]─┬─ VR ─►(+)─►[  1  ]─┬─ VE = efd ─►
+           -▲    -▲    [1+sTA]  │       -▲   [ sTE ] │
+            │     │    VRMIN    │        └─── VFE ◄──┘
+vc1 ►[  1  ]┘     │             │
+     [1+sTR]      └─[  sKF   ]◄─[1 + sTF3]
+                    [1 + sTF1]  [1 + sTF2]
+
+VFE = KE VE + VX(VE): the curve is that of the loaded exciter; there is neither
+a rectifier nor a field current. The limits of the lag and of VE are non-windup.
+The feedback is taken from VR, as the models written after PSS/E's ESAC5A do:
+efd of a brushless machine cannot be measured, and 1/(1 + sTF2) stands for the
+exciter. TF2 = 0 bypasses TF3 with it. TA > 0: the loop needs a lag.
+
+Left out: UEL and OEL, which are added to vs; PSS/E's own choice of KE or VRMAX
+where a record says 0. Copies of the sample data differ in TF2, TF3: 0.8 and 0
+here, 1 and 1 (which cancel) elsewhere.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import lag, lead_lag, limited_integrator, limited_lag, washout
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESAC5A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.02, "s", (0.001, 10.0), "regulator time constant"),
+    ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", -7.3, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KE", 1.0, "pu", (0.001, 10.0), "exciter constant"),
+    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("TF2", 0.8, "s", (0.0, 100.0), "stabilising feedback lag"),
+    ("TF3", 0.0, "s", (0.0, 100.0), "stabilising feedback lead"),
+    ("E1", 5.6, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.86, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 4.2, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.5, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (record("ESAC5A", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2"),)
+
+STATES = "VC VR VE VL VF"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vl, d.VL = lead_lag(s.VR, s.VL, p.TF3, p.TF2)
+    vf, d.VF = washout(vl, s.VF, p.KF, p.TF1)
+    vr, d.VR = limited_lag(u.vref + u.vs - vc - vf, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    vfe = p.KE * s.VE + p.saturation(s.VE).vx
+    efd, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vfe = p.KE * efd + p.saturation(efd).vx
+    x.VC, x.VR, x.VE, x.VL, x.VF = u.vc1, vfe, efd, vfe, vfe
+    return u.vc1 + vfe / p.KA - u.vs

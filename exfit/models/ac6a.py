@@ -1,0 +1,97 @@
+"""AC6A: alternator exciter, field current limiter (IEEE Std 421.5-2005, 6.6).
+
+                               VAMAX          VT VRMAX      VE >= 0
+vref + vs ─►(+)─►[1 + sTK] KA─►[1 + sTC]─►(+)─►[clip]─►(+)─►[  1  ]─┬─►(x)─► efd
+           -▲    [1 + sTA]     [1 + sTB] -▲           -▲    [ sTE ] │   ▲
+            │                  VAMIN      │   VT VRMIN │         VE │  FEX
+vc1 ►[  1  ]┘                             │            │            │   ▲
+     [1+sTR]                              │            ├─── VFE ◄───┘   │
+                               [1 + sTJ]──┘  VHMAX     ▼          KC IFD / VE
+                               [1 + sTH]◄────[ KH ]◄──(+)
+                                             0        -▲
+                                                       └─── VFELIM
+
+VFE = KE VE + VX(VE) + KD IFD. The field current limiter acts above VFELIM; at
+rest VA = VFE + KH (VFE - VFELIM) there. The limit of the second lead-lag is
+non-windup in the way of annex E: at the limit its state follows the limited
+output with the lag TC. The limit of VE is non-windup; the clamps of VR and of
+the limiter are not. TB = 0 bypasses TC with it, TA = 0 TK, TH = 0 TJ. Left out:
+UEL and OEL, which are added to vs.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    field_demand,
+    lag,
+    lead_lag,
+    limited_integrator,
+    limited_lead_lag,
+    rectifier,
+    rectifier_supply,
+)
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESAC6A",)
+
+SHEET = sheet(
+    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 536.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.086, "s", (0.0, 100.0), "regulator lag"),
+    ("TK", 0.18, "s", (0.0, 100.0), "regulator lead"),
+    ("TB", 9.0, "s", (0.0, 100.0), "second regulator lag"),
+    ("TC", 3.0, "s", (0.0, 100.0), "second regulator lead"),
+    ("VAMAX", 75.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VAMIN", -75.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("VRMAX", 44.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
+    ("VRMIN", -36.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
+    ("TE", 1.0, "s", (0.01, 100.0), "exciter time constant"),
+    ("VFELIM", 19.0, "pu", (-9999.0, 9999.0), "field current where the limiter begins"),
+    ("KH", 92.0, "pu", (0.0, 10000.0), "gain of the field current limiter"),
+    ("VHMAX", 75.0, "pu", (0.0, 9999.0), "ceiling of the field current limiter"),
+    ("TH", 0.08, "s", (0.0, 100.0), "field current limiter lag"),
+    ("TJ", 0.02, "s", (0.0, 100.0), "field current limiter lead"),
+    ("KC", 0.173, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KD", 1.91, "pu", (0.0, 100.0), "demagnetising factor"),
+    ("KE", 1.6, "pu", (0.0, 10.0), "exciter constant"),
+    ("E1", 7.4, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.214, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 5.55, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.044, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "ESAC6A",
+        "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 SE2",
+    ),
+)
+
+STATES = "VC VK VA VE VH"
+
+
+def limiter(vfe: Signal, p: Signal) -> Signal:
+    """Return VH, what the limiter asks for where the field current is above VFELIM."""
+    return clip(p.KH * (vfe - p.VFELIM), 0.0, p.VHMAX)
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vk, d.VK = lead_lag(p.KA * (u.vref + u.vs - vc), s.VK, p.TK, p.TA)
+    va, d.VA = limited_lead_lag(vk, s.VA, p.TC, p.TB, p.VAMIN, p.VAMAX)
+    vf, d.VH = lead_lag(limiter(vfe, p), s.VH, p.TJ, p.TH)
+    vr = clip(va - vf, u.vt * p.VRMIN, u.vt * p.VRMAX)
+    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    vfe = field_demand(ve, u.ifd, p)
+    vh = limiter(vfe, p)
+    va = vfe + vh
+    x.VC, x.VK, x.VA, x.VE, x.VH = u.vc1, va, va, ve, vh
+    return u.vc1 + va / p.KA - u.vs

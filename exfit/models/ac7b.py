@@ -1,0 +1,103 @@
+"""AC7B: alternator exciter with an inner field loop (IEEE Std 421.5-2005, 6.7).
+
+                      VRMAX              VAMAX
+vref + vs ─►(+)─►[KPR + KIR/s    ]─►(+)─►[KPA + KIA/s]─ VA ─►(x)─►[ HV ]─► VFD
+           -▲ ▲- [+ sKDR/(1+sTDR)]  -▲       VAMIN            ▲   [gate]
+            │ │       VRMIN          │                        │     ▲
+            │ │           KF1 efd + KF2 VFE                 KP VT  -KL VFE
+            │ │
+            │ │  [  sKF3 ]                    VE <= VEMAX
+            │ └──[1 + sTF]◄──┐   VFD ─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
+            │                │         -▲   [ sTE ] │        ▲
+vc1 ►[  1  ]┘                │          │    VEMIN  │       FEX
+     [1+sTR]                 └──────────┴─── VFE ◄──┘        ▲
+                                                        KC IFD / VE
+
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. The limits of VE
+are non-windup; the integrals of the PID and of the PI are frozen while they
+would push their output further beyond its limit. KP VT is the supply of the
+amplifier, with VT the terminal voltage itself. The exciter integrates, 1/sTE:
+the 1/(1+sTE) in the figure of 2005 is a misprint. Not modelled: the UEL input
+of the first summing point.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    field_ceiling,
+    field_demand,
+    lag,
+    larger,
+    limited_integrator,
+    pi,
+    pi_rest,
+    pid,
+    rectifier,
+    rectifier_supply,
+    washout,
+)
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KPR", 4.24, "pu", (0.0, 100000.0), "regulator proportional gain"),
+    ("KIR", 4.24, "pu/s", (0.0, 100000.0), "regulator integral gain"),
+    ("KDR", 0.0, "pu s", (0.0, 100000.0), "regulator derivative gain"),
+    ("TDR", 0.03, "s", (0.001, 10.0), "lag of the derivative"),
+    ("VRMAX", 5.79, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", -5.79, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KPA", 65.36, "pu", (0.0, 100000.0), "amplifier proportional gain"),
+    ("KIA", 59.69, "pu/s", (0.0, 100000.0), "amplifier integral gain"),
+    ("VAMAX", 1.0, "pu", (-9999.0, 9999.0), "amplifier ceiling"),
+    ("VAMIN", -0.95, "pu", (-9999.0, 9999.0), "amplifier floor"),
+    ("KP", 4.96, "pu", (0.001, 1000.0), "potential source gain"),
+    ("KL", 10.0, "pu", (0.0, 9999.0), "lower limit of the field voltage per field current"),
+    ("KF1", 0.212, "pu", (0.0, 100.0), "feedback gain of the generator field voltage"),
+    ("KF2", 0.0, "pu", (0.0, 100.0), "feedback gain of the exciter field current"),
+    ("KF3", 0.0, "pu", (0.0, 100.0), "rate feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "rate feedback time constant"),
+    ("KC", 0.18, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KD", 0.02, "pu", (0.0, 100.0), "demagnetising factor"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("TE", 1.1, "s", (0.01, 100.0), "exciter time constant"),
+    ("VFEMAX", 6.9, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
+    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+    ("E1", 6.3, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.44, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 4.725, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.075, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "AC7B",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "
+        "VFEMAX VEMIN E1 SE1 E2 SE2",
+    ),
+)
+
+STATES = "VC VI VD VF VA VE"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vemax = field_ceiling(s.VE, vfe, p)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
+    error = u.vref + u.vs - vc - vf
+    vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
+    inner = vr - p.KF1 * rectifier(s.VE, p.KC * u.ifd) - p.KF2 * vfe
+    va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
+    vfd = larger(p.KP * u.vt * va, -p.KL * vfe)
+    ve, d.VE = limited_integrator(vfd - vfe, s.VE, p.TE, p.VEMIN, vemax)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    vfe = field_demand(ve, u.ifd, p)
+    inner, x.VA = pi_rest(vfe / (p.KP * u.vt), p.KPA, p.KIA)
+    error, x.VI = pi_rest(inner + p.KF1 * efd + p.KF2 * vfe, p.KPR, p.KIR)
+    x.VC, x.VD, x.VF, x.VE = u.vc1, error, vfe, ve
+    return u.vc1 + error - u.vs

@@ -1,0 +1,84 @@
+"""DC2A: commutator exciter, bus-fed regulator (IEEE Std 421.5-2005, 5.2).
+
+                                  VT VRMAX       EFD >= 0
+vref + vs ─►(+)─►[1 + sTC]─►HV───►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+           -▲ ▲- [1 + sTB]  ▲     [1+sTA]   -▲   [ sTE ] │
+            │ │             │     VT VRMIN    │           │
+vc1 ►[  1  ]┘ │            VUEL              └── VFE ◄───┤
+     [1+sTR]  └─────────[  sKF  ]◄───────────────────────┘
+                        [1 + sTF]
+
+VFE = KE EFD + VX(EFD). As DC1A, but the regulator's limits are
+proportional to the terminal voltage VT. They are non-windup; EFD >= 0 is
+PSS/E's (ANDES has no such limit, and ignores TR).
+KE = 0 is self-excited: KE is computed at the start so that VR starts at
+VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+(SE(E) E where KE < 0), VRMIN = -VRMAX (ANDES: 999). The values in use are the
+setpoints KE0, VRMAX0, VRMIN0.
+Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    commutator,
+    commutator_start,
+    lag,
+    larger,
+    lead_lag,
+    limited_lag,
+    washout,
+)
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESDC2A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 300.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant"),
+    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
+    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    ("VRMAX", 4.95, "pu", (-9999.0, 9999.0), "regulator ceiling at VT = 1, or 0"),
+    ("VRMIN", -4.9, "pu", (-9999.0, 9999.0), "regulator floor at VT = 1"),
+    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
+    ("TE", 1.33, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.02, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 0.675, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("E1", 3.05, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.279, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 2.29, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.117, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "ESDC2A",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
+        absent={"Switch": 0.0},
+    ),
+)
+
+STATES = "VC VL VR EFD VF"
+SETPOINTS = "KE0 VRMAX0 VRMIN0"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    gated = larger(vl, u.vuel)
+    low, high = u.vt * s.VRMIN0, u.vt * s.VRMAX0
+    vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, low, high)
+    efd, d.EFD = commutator(vr, s.EFD, s.KE0, p, low=0.0)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    error = start.vr / p.KA
+    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
+    return u.vc1 + error - u.vs

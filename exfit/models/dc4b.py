@@ -1,0 +1,101 @@
+"""DC4B: commutator exciter, PID regulator (IEEE Std 421.5-2005, 5.4).
+
+                  VRMAX/KA           VUEL  VOEL
+vref + vs ─►(+)─►[KP + KI/s      ]───►HV───►LV──────┐
+           -▲ ▲- [+ sKD/(1 + sTD)]                  │
+vc1 ►[  1  ]┘ │   VRMIN/KA                          │
+     [1+sTR]  │                                     │
+              │      VT VRMAX                       │
+              │   ┌─[   KA   ]◄─────(x)◄────────────┘
+              │   │ [1 + sTA ]       ▲
+              │   │  VT VRMIN       VT
+              │   └►(+)─►[  1  ]─┬──────────────────► efd
+              │     -▲   [ sTE ] │
+              │      │    VEMIN  │
+              │      └── VFE ◄───┤
+              └──────[   sKF  ]◄─┘
+                     [1 + sTF ]
+
+VFE = KE EFD + VX(EFD). The limits of the lag and of EFD are non-windup;
+the integral is frozen while the PID is at its limit. The regulator is fed
+from the terminals: gain and limits are proportional to VT, as in the
+standard's drawing, OpenIPSL and InterPSS. The standard's sample data have
+KF = 0: the rate feedback stands in for a derivative.
+KE = 0 is self-excited: KE is computed at the start so that VR starts at
+VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+(SE(E) E where KE < 0), VRMIN = -VRMAX (ANDES: 999). The values in use are the
+setpoints KE0, VRMAX0, VRMIN0.
+(For DC4B that is OpenIPSL's KE and InterPSS's KE and VRMAX; the standard
+computes neither.) Not modelled: UEL or OEL at the summing point.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    commutator,
+    commutator_start,
+    lag,
+    larger,
+    limited_lag,
+    pid,
+    smaller,
+    washout,
+    where,
+)
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KP", 80.0, "pu", (0.0, 100000.0), "proportional gain"),
+    ("KI", 20.0, "pu/s", (0.0, 100000.0), "integral gain"),
+    ("KD", 20.0, "pu s", (0.0, 100000.0), "derivative gain"),
+    ("TD", 0.01, "s", (0.001, 10.0), "lag of the derivative"),
+    ("VRMAX", 2.7, "pu", (-9999.0, 9999.0), "regulator ceiling at VT = 1, or 0"),
+    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor at VT = 1"),
+    ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
+    ("TA", 0.2, "s", (0.0, 10.0), "regulator time constant"),
+    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
+    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+    ("E1", 2.33, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.27, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 1.75, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.08, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "DC4B",
+        "TR KP KI KD TD VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2",
+        icons={"OEL": 2, "UEL": 2},
+    ),
+)
+
+STATES = "VC VI VD VR EFD VF"
+SETPOINTS = "KE0 VRMAX0 VRMIN0"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
+    error = u.vref + u.vs - vc - vf
+    low, high = s.VRMIN0 / p.KA, s.VRMAX0 / p.KA
+    vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD, low, high)
+    fed = u.vt * smaller(larger(vpid, u.vuel), u.voel)
+    vr, d.VR = limited_lag(fed, s.VR, p.KA, p.TA, u.vt * s.VRMIN0, u.vt * s.VRMAX0)
+    efd, d.EFD = commutator(vr, s.EFD, s.KE0, p, p.VEMIN)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    vpid, integrates = start.vr / (p.KA * u.vt), p.KI > 0.0
+    error = where(integrates, 0.0, vpid / where(integrates, 1.0, p.KP))
+    x.VC, x.VI, x.VD = u.vc1, where(integrates, vpid, 0.0), error
+    x.VR, x.EFD, x.VF = start.vr, efd, efd
+    return u.vc1 + error - u.vs

@@ -1,0 +1,62 @@
+"""ESAC8B: Basler DECS, a PID regulator on a simple exciter (PSS/E).
+
+                                     VRMAX
+vref + vs ─►(+)─►[KP + KI/s    ]─►[  KA  ]─►(+)─►[  1  ]─┬─► efd
+           -▲    [+ sKD/(1+sTD)]  [1+sTA]  -▲    [ sTE ] │
+vc1 ►[  1  ]┘                        VRMIN  │            │
+     [1+sTR]                                └──── VFE ◄──┘
+
+VFE = KE efd + VX(efd). The limits of the lag are non-windup; the PID has none,
+so that its integral runs on while the lag is at its limit. No rectifier and no
+demagnetisation: efd is the exciter voltage itself, without limits of its own.
+AC8B (2005) is another model, with KC, KD and limits of the PID and of VE.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import integrator, lag, limited_lag, pi_rest, pid
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KP", 40.0, "pu", (0.0, 100000.0), "proportional gain"),
+    ("KI", 10.0, "pu/s", (0.0, 100000.0), "integral gain"),
+    ("KD", 15.0, "pu s", (0.0, 100000.0), "derivative gain"),
+    ("TD", 0.02, "s", (0.001, 10.0), "lag of the derivative"),
+    ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
+    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 35.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("TE", 1.2, "s", (0.01, 100.0), "exciter time constant"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("E1", 9.0, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 3.0, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 6.5, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.3, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (record("ESAC8B", "TR KP KI KD TD KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),)
+
+STATES = "VC VI VD VR VE"
+
+
+def field_voltage(ve: Signal, p: Signal) -> Signal:
+    """Return VFE, the field signal that holds the exciter at VE."""
+    return p.KE * ve + p.saturation(ve).vx
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = u.vref + u.vs - vc
+    vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KP, p.KI, p.KD, p.TD)
+    vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    efd, d.VE = integrator(vr - field_voltage(s.VE, p), s.VE, p.TE)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vr = field_voltage(efd, p)
+    error, x.VI = pi_rest(vr / p.KA, p.KP, p.KI)
+    x.VC, x.VD, x.VR, x.VE = u.vc1, error, vr, efd
+    return u.vc1 + error - u.vs

@@ -1,0 +1,70 @@
+"""EXAC1: alternator exciter with rate feedback (IEEE type AC1 of 1981).
+
+                             VRMAX          VE >= 0
+vref + vs ──►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
+           -▲   ▲-[1 + sTB]  [1+sTA]  -▲    [ sTE ] │        ▲
+            │   │            VRMIN     │            │       FEX
+vc1 ►[  1  ]┘   │  [  sKF  ]           │            │        ▲
+     [1+sTR]    └──[1 + sTF]◄──────────┴─── VFE ◄───┘   KC IFD / VE
+
+VFE = KE VE + VX(VE) + KD IFD. The limits of the lag and of VE are non-windup.
+AC1A is this with limits VAMAX and VAMIN of its own at the lag and a clamp to
+VRMAX and VRMIN behind it.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    field_demand,
+    lag,
+    lead_lag,
+    limited_integrator,
+    limited_lag,
+    rectifier,
+    rectifier_supply,
+    washout,
+)
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
+    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 6.03, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", -5.43, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KD", 0.38, "pu", (0.0, 100.0), "demagnetising factor"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("E1", 4.18, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.10, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 3.14, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (record("EXAC1", "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2"),)
+
+STATES = "VC VL VR VE VF"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    vfe = field_demand(ve, u.ifd, p)
+    error = vfe / p.KA
+    x.VC, x.VL, x.VR, x.VE, x.VF = u.vc1, error, vfe, ve, vfe
+    return u.vc1 + error - u.vs

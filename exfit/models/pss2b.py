@@ -1,0 +1,94 @@
+"""PSS2B: dual input stabiliser, speed and power (IEEE Std 421.5-2005, 8.2).
+
+      VSI1MAX                               ramp tracking
+vsi1 ─►[clip]─►[ sTW1 ]─►[ sTW2 ]─►[  1  ]─►(+)─►[ 1 + sT8  ]─►(+)─► v
+       VSI1MIN [1+sTW1]  [1+sTW2]  [1+sT6]   ▲   [(1+sT9)^M ]  -▲
+                                             │                  │
+                                            [KS3]               │
+      VSI2MAX                                │                  │
+vsi2 ─►[clip]─►[ sTW3 ]─►[ sTW4 ]─►[ KS2 ]───┴──────────────────┘
+       VSI2MIN [1+sTW3]  [1+sTW4]  [1+sT7]
+                                                     VSTMAX
+v ─►[KS1]─►[1 + sT1]─►[1 + sT3]─►[1 + sT10]─►[clip]─► vs
+           [1 + sT2]  [1 + sT4]  [1 + sT11]   VSTMIN
+
+The first input is the speed, the second the electrical power (KS2 = T7 / 2H).
+TW2 = 0 and TW4 = 0 leave out their washouts; T6, T7, T2, T4 or T11 = 0 bypass
+their blocks. The ramp tracking filter has N = 1, and M is a whole number from 1
+to 5. With T10 = T11 = 0 and input limits out of reach this is PSS2A, whose
+record has no such rows.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, high_pass, lag, lead_lag, where
+from exfit.models.sheet import record, sheet
+
+INPUTS = ("speed", "p")
+
+SHEET = sheet(
+    ("TW1", 10.0, "s", (0.01, 1000.0), "first washout of the first input"),
+    ("TW2", 10.0, "s", (0.0, 1000.0), "second washout of the first input"),
+    ("T6", 0.0, "s", (0.0, 100.0), "transducer lag of the first input"),
+    ("TW3", 10.0, "s", (0.01, 1000.0), "first washout of the second input"),
+    ("TW4", 0.0, "s", (0.0, 1000.0), "second washout of the second input"),
+    ("T7", 10.0, "s", (0.0, 1000.0), "transducer lag of the second input"),
+    ("KS2", 0.99, "pu", (-1000.0, 1000.0), "gain of the second input"),
+    ("KS3", 1.0, "pu", (-1000.0, 1000.0), "share of the second input that is filtered"),
+    ("T8", 0.5, "s", (0.0, 100.0), "lead of the ramp tracking filter"),
+    ("T9", 0.1, "s", (0.001, 100.0), "lag of the ramp tracking filter"),
+    ("M", 5.0, "1", (1.0, 5.0), "number of lags of the ramp tracking filter"),
+    ("KS1", 20.0, "pu", (-10000.0, 10000.0), "stabiliser gain"),
+    ("T1", 0.15, "s", (0.0, 100.0), "first lead"),
+    ("T2", 0.025, "s", (0.0, 100.0), "first lag"),
+    ("T3", 0.15, "s", (0.0, 100.0), "second lead"),
+    ("T4", 0.025, "s", (0.0, 100.0), "second lag"),
+    ("T10", 0.0, "s", (0.0, 100.0), "third lead"),
+    ("T11", 0.033, "s", (0.0, 100.0), "third lag"),
+    ("VSI1MAX", 0.08, "pu", (-9999.0, 9999.0), "ceiling of the first input"),
+    ("VSI1MIN", -0.08, "pu", (-9999.0, 9999.0), "floor of the first input"),
+    ("VSI2MAX", 1.25, "pu", (-9999.0, 9999.0), "ceiling of the second input"),
+    ("VSI2MIN", -1.25, "pu", (-9999.0, 9999.0), "floor of the second input"),
+    ("VSTMAX", 0.1, "pu", (-9999.0, 9999.0), "ceiling of the output"),
+    ("VSTMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
+)
+
+RECORDS = (
+    record(
+        "PSS2B",
+        # M and N are the last two of six integers; M is a parameter here
+        "M N TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 "
+        "VSI1MAX VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN",
+        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0},
+        absent={"N": 1.0},
+    ),
+)
+
+STATES = "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 V1 V3 V10"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return vs."""
+    vsi1 = clip(u.vsi1, p.VSI1MIN, p.VSI1MAX)
+    w1, d.W1 = high_pass(vsi1, s.W1, p.TW1)
+    w2, d.W2 = high_pass(w1, s.W2, p.TW2)
+    v6, d.V6 = lag(w2, s.V6, 1.0, p.T6)
+    vsi2 = clip(u.vsi2, p.VSI2MIN, p.VSI2MAX)
+    w3, d.W3 = high_pass(vsi2, s.W3, p.TW3)
+    w4, d.W4 = high_pass(w3, s.W4, p.TW4)
+    v7, d.V7 = lag(w4, s.V7, p.KS2, p.T7)
+    ramp, d.R1 = lead_lag(v6 + p.KS3 * v7, s.R1, p.T8, p.T9)
+    ramp, d.R2 = lag(ramp, s.R2, 1.0, where(p.M >= 2.0, p.T9, 0.0))
+    ramp, d.R3 = lag(ramp, s.R3, 1.0, where(p.M >= 3.0, p.T9, 0.0))
+    ramp, d.R4 = lag(ramp, s.R4, 1.0, where(p.M >= 4.0, p.T9, 0.0))
+    ramp, d.R5 = lag(ramp, s.R5, 1.0, where(p.M >= 5.0, p.T9, 0.0))
+    v1, d.V1 = lead_lag(p.KS1 * (ramp - v7), s.V1, p.T1, p.T2)
+    v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
+    v10, d.V10 = lead_lag(v3, s.V10, p.T10, p.T11)
+    return clip(v10, p.VSTMIN, p.VSTMAX)
+
+
+def rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is then 0."""
+    x.W1, x.W2, x.V6 = clip(u.vsi1, p.VSI1MIN, p.VSI1MAX), 0.0, 0.0
+    x.W3, x.W4, x.V7 = clip(u.vsi2, p.VSI2MIN, p.VSI2MAX), 0.0, 0.0
+    x.R1 = x.R2 = x.R3 = x.R4 = x.R5 = x.V1 = x.V3 = x.V10 = 0.0

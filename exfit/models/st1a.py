@@ -1,0 +1,110 @@
+"""ST1A: potential-source controlled rectifier (IEEE Std 421.5-2005, 7.1).
+
+                  VIMAX                               VAMAX
+vref + vs ──►(+)─►[clip]─►[1 + sTC]─►[1 + sTC1]─►[  KA  ]─┐ VA
+           -▲   ▲-VIMIN   [1 + sTB]  [1 + sTB1]  [1+sTA]  │
+            │   │                                 VAMIN   ▼
+vc1 ►[  1  ]┘   └──[  sKF  ]◄──────────────┐             (+)
+     [1+sTR]       [1 + sTF]               │             -▲
+                                           │              │
+                   VT VRMAX - KC IFD       │              │
+           efd ◄────────[clip]◄────────────┴──[gates]◄────┤
+                       VT VRMIN                           │
+                                                          │
+                        KLR (IFD - ILR), where positive ──┘
+
+The limits of the lag are non-windup; the two clamps are not. The gates are the
+higher of the signal and VUEL, then the lower of that and VOEL. The rate
+feedback is taken before the last clamp (as ANDES, OpenIPSL and Dynawo do, and
+the figure).
+
+In a PSS/E record UEL = 1 and VOS = 1: limiter and stabiliser act on the error.
+Left out: UEL = 2 (a gate behind VIMAX), UEL = 3 (the gate drawn here, with a
+limiter) and VOS = 2 (a stabiliser added to VA). Typical data are the standard's
+(its KF = 0 and its limiter's KLR and ILR come from other sets of it).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    lag,
+    larger,
+    lead_lag,
+    limited_lag,
+    regulator_output,
+    smaller,
+    washout,
+)
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESST1A",)
+
+SHEET = sheet(
+    ("TR", 0.04, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("VIMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
+    ("VIMIN", -99.0, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
+    ("TC1", 0.0, "s", (0.0, 100.0), "second regulator lead"),
+    ("TB1", 0.0, "s", (0.0, 100.0), "second regulator lag"),
+    ("KA", 190.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
+    ("VAMAX", 14.5, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VAMIN", -14.5, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("VRMAX", 7.8, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
+    ("VRMIN", -6.7, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
+    ("KC", 0.08, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("KF", 0.001, "pu", (0.0, 10.0), "rate feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "rate feedback time constant"),
+    ("KLR", 4.54, "pu", (0.0, 1000.0), "field current limiter gain"),
+    ("ILR", 4.4, "pu", (-9999.0, 9999.0), "field current limit"),
+)
+
+RECORDS = (
+    record(
+        "ESST1A",
+        "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
+        icons={"UEL": 1, "VOS": 1},
+    ),
+)
+
+STATES = "VC VL VL1 VA VF"
+
+
+def leads(vi: Signal, first: Signal, second: Signal, p: Signal) -> Signal:
+    """Return the output of both lead-lags, whose states are given."""
+    return lead_lag(lead_lag(vi, first, p.TC, p.TB)[0], second, p.TC1, p.TB1)[0]
+
+
+def excess(u: Signal, p: Signal) -> Signal:
+    """Return what the field current limiter takes from the regulator's output."""
+    return p.KLR * larger(u.ifd - p.ILR, 0.0)
+
+
+def gated(va: Signal, u: Signal, p: Signal) -> Signal:
+    """Return what the limiters leave of the regulator's output."""
+    return smaller(larger(clip(va, p.VAMIN, p.VAMAX) - excess(u, p), u.vuel), u.voel)
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = u.vref + u.vs - vc
+    vl, gain = leads(error, s.VL, s.VL1, p), leads(1.0, 0.0, 0.0, p)
+    fed_back = gated(regulator_output(s, p, vl, gain, excess(u, p)), u, p)
+    vf, _ = washout(fed_back, s.VF, p.KF, p.TF)
+    vi = clip(error - vf, p.VIMIN, p.VIMAX)
+    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
+    vl1, d.VL1 = lead_lag(vl, s.VL1, p.TC1, p.TB1)
+    va, d.VA = limited_lag(vl1, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    vr = gated(va, u, p)
+    _, d.VF = washout(vr, s.VF, p.KF, p.TF)
+    return clip(vr, u.vt * p.VRMIN, u.vt * p.VRMAX - p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    va = efd + excess(u, p)
+    error = va / p.KA
+    x.VC, x.VL, x.VL1, x.VA, x.VF = u.vc1, error, error, va, efd
+    return u.vc1 + error - u.vs

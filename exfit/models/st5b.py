@@ -1,0 +1,68 @@
+"""ST5B: static exciter with two lead-lags in series (IEEE Std 421.5-2005, 7.5).
+
+             VUEL  VOEL       VRMAX/KR    VRMAX/KR        VRMAX
+vref ─►(+)───►[gates]──►(+)─►[1 + sTC1]─►[1 + sTC2]─►[KR]─►[clip]─┐ VR
+       -▲                ▲   [1 + sTB1]  [1 + sTB2]       VRMIN   │
+        │                │    VRMIN/KR    VRMIN/KR                │
+vc1 ►[  1  ]             vs             VT VRMAX                  ▼
+     [1+sTR]                      efd ◄──[  1  ]◄────────────────(+)
+                                         [1+sT1]                 -▲
+                                        VT VRMIN                  │
+                                                               KC IFD
+
+The limit of the lag T1 is non-windup, and those of the lead-lags are so in the
+way of annex E: at a limit the state follows the limited output with the lag TC.
+Sources disagree on the chain. Followed are PowerWorld and InterPSS, whose
+order is that of the PSS/E record, with the limits on both; Dynawo takes TC2/TB2
+first and limits TC1/TB1 only. While no limit is met these are the same.
+
+Left out: the lead-lags TUC, TUB and TOC, TOB that take over while a limiter has
+the gate; while none acts they have no effect.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, lag, larger, limited_lag, limited_lead_lag, smaller
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead"),
+    ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag"),
+    ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead"),
+    ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag"),
+    ("KR", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling, and at rated voltage"),
+    ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor, and at rated voltage"),
+    ("T1", 0.004, "s", (0.0, 10.0), "firing circuit time constant"),
+    ("KC", 0.004, "pu", (0.0, 100.0), "rectifier loading factor"),
+)
+
+RECORDS = (
+    record(
+        "ST5B",
+        "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
+        ignored="TUC1 TUB1 TUC2 TUB2 TOC1 TOB1 TOC2 TOB2",
+    ),
+)
+
+STATES = "VC VL1 VL2 VE"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    low, high = p.VRMIN / p.KR, p.VRMAX / p.KR
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = smaller(larger(u.vref - vc, u.vuel), u.voel) + u.vs
+    vl1, d.VL1 = limited_lead_lag(error, s.VL1, p.TC1, p.TB1, low, high)
+    vl2, d.VL2 = limited_lead_lag(vl1, s.VL2, p.TC2, p.TB2, low, high)
+    vr = clip(p.KR * vl2, p.VRMIN, p.VRMAX)
+    loaded = vr - p.KC * u.ifd
+    efd, d.VE = limited_lag(loaded, s.VE, 1.0, p.T1, u.vt * p.VRMIN, u.vt * p.VRMAX)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    error = (efd + p.KC * u.ifd) / p.KR
+    x.VC, x.VL1, x.VL2, x.VE = u.vc1, error, error, efd
+    return u.vc1 + error - u.vs
