@@ -57,6 +57,7 @@ RECORDS = (
         "E1 SE1 E2 SE2",
         doubt="the order of AC8B is likely, not confirmed",
     ),
+    record("ESAC8B", "TR KPR KIR KDR TDR KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),
 )
 
 STATES = "VC VI VD VR VE"

@@ -107,16 +107,20 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     lacking = [
         (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
         for row in definition.model.sheet
-        if row.symbol not in record.cons
+        if row.symbol not in definition.names
     ]
-    return Reading(values, placed(wrong), doubt + placed([*_unmodelled(record, given), *lacking]))
+    symbols = [row.symbol for row in definition.model.sheet]
+    return Reading(
+        values, placed(wrong), doubt + placed([*_unmodelled(record, symbols, given), *lacking])
+    )
 
 
 def record_text(
     definition: Definition, values: Mapping[str, float], bus: int, machine_id: str
 ) -> str:
     """Return a record as a dynamics file has it, each number in the digits that give it back."""
-    given = dict(values) | dict(definition.record.absent)
+    given = {**dict.fromkeys(definition.record.ignored, 0.0), **values}
+    given |= dict(definition.record.absent)
     if {"E1", "SE1", "E2", "SE2"} <= given.keys() and given["E1"] > given["E2"]:
         for first, second in zip(*SORTED, strict=True):
             given[first], given[second] = given[second], given[first]
@@ -124,7 +128,7 @@ def record_text(
         str(bus),
         f"'{definition.record.name}'",
         machine_id if machine_id.isalnum() else f"'{machine_id}'",
-        *(str(value) for _, value in definition.record.icons),
+        *(str(int(given.get(name, value))) for name, value in definition.record.icons),
         *(repr(float(given[name])).upper() for name in definition.record.cons),
         "/",
     ]
@@ -155,11 +159,13 @@ def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[Fault]:
             yield Fault(field.line, f"{name}: {error}")
 
 
-def _unmodelled(record: Record, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for what the model stands for in one way only."""
+def _unmodelled(
+    record: Record, symbols: Iterable[str], given: Mapping[str, float]
+) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for what the model, of these symbols, has in one way only."""
     for name, modelled in (*record.icons, *record.absent):
         found = given.get(name, modelled)
-        if found != modelled:
+        if found != modelled and name not in symbols:
             yield name, f"{show(found)} is not modelled; {show(modelled)} is taken"
 
 
