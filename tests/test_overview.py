@@ -26,14 +26,18 @@ def test_every_model_has_its_figure_and_the_page_shows_it(written):
 
 
 def test_typical_data_give_a_step_that_settles(exciter):
-    """Whatever the regulator: vt rises, hardly swings through, and stays near the new reference."""
+    """Whatever the regulator, vt ends near the new reference.
+
+    The standard's AC6A swings through by half of the step; DC3A has a motor that is still running,
+    and a dead band.
+    """
     signals = sample_response(MODELS[exciter]).signals
     vt = signals["vt"]
     rise = vt[-1] - vt[0]
     assert vt[0] == pytest.approx(1.0, abs=1e-9)
-    assert 0.6 * 0.05 < rise < 1.1 * 0.05
-    assert vt.max() - vt[-1] < 0.35 * rise
-    assert np.ptp(vt[-400:]) < 0.1 * rise
+    assert 0.9 * 0.05 < rise < 1.2 * 0.05
+    assert vt.max() - vt[-1] < 0.55 * rise
+    assert np.ptp(vt[-400:]) < 0.15 * rise
     assert np.isfinite(signals["efd"]).all()
 
 
