@@ -12,11 +12,21 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from exfit.engine.kernel import LinearKernel
-from exfit.models import MODELS
+from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plant import MACHINE, NETWORK, SATURATION, VT0, flow_sheet, infinite_bus, open_circuit
-from exfit.simulate import Change, Course, Simulator
+from exfit.plant import (
+    MACHINE,
+    NETWORK,
+    SATURATION,
+    STABILISER,
+    VT0,
+    Stabilised,
+    flow_sheet,
+    infinite_bus,
+    open_circuit,
+)
+from exfit.simulate import Change, Course, Simulator, parameters_used
 
 REFERENCE = Path(__file__).parent / "reference"
 QUADRATIC = SATURATION["quadratic"]
@@ -324,3 +334,97 @@ def test_exact_derivatives_on_load_equal_central_differences(machine):
         difference = (up - down) / (2.0 * h)
         size = max(np.abs(difference).max(), 1e-3)
         assert np.abs(slopes[:, :, column] - difference).max() < 3e-6 * size, name
+
+
+# --- stabilisers ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=list(STABILISERS))
+def stabiliser(request):
+    return STABILISERS[request.param]
+
+
+def stabilised(stabiliser, inputs=None, exciter="SEXS"):
+    """Return a system with a stabiliser, and values of a unit that swings for long without it."""
+    heard = Stabilised(stabiliser, inputs or stabiliser.inputs)
+    made = infinite_bus(
+        MODELS[exciter], MACHINES["GENROU"], QUADRATIC, ("vref", "vs", "X"), "Q", heard
+    )
+    values = values_on_load(MACHINES["GENROU"], exciter=exciter, network_X=0.5)
+    values |= {STABILISER + name: value for name, value in typical(stabiliser.sheet).items()}
+    return made, values | {"EMIN": -9.0, "EMAX": 9.0, "TE": 0.02, "TB": 0.03, "TATB": 0.3}
+
+
+def test_a_stabiliser_waits_at_rest(stabiliser):
+    made, values = stabilised(stabiliser)
+    simulator = Simulator(made, Course(0.0, 60.0, ()), np.linspace(0.0, 60.0, 61), 1e-3)
+    signals = simulator.response(values).signals
+    assert np.abs(signals["vt"] - values[VT0]).max() < 1e-9
+    assert np.ptp(signals["vref"]) == 0.0
+
+
+def test_all_parameters_of_a_stabiliser_reach_the_system(stabiliser):
+    made, values = stabilised(stabiliser)
+    assert {name for name in values if name.startswith(STABILISER)} <= parameters_used(made)
+
+
+def damping_of_the_swing(made, values):
+    """Return the damping ratio of the mode between 0.5 and 2.5 Hz that is damped least."""
+    p = vector(made, values)
+    rest = LinearKernel(made).rest(p)
+    _, jacobian = LinearKernel(made).motion(p, rest.r, rest.x, np.zeros(len(made.inputs)))
+    modes = np.linalg.eigvals(jacobian)
+    swings = modes[(modes.imag > 0.5 * 2.0 * pi) & (modes.imag < 2.5 * 2.0 * pi)]
+    return (-swings.real / np.abs(swings)).min()
+
+
+def test_a_stabiliser_damps_the_swing():
+    """A fast exciter at high gain with and without PSS2B and PSS1A as they are tuned for speed."""
+    for name, gain in (("PSS2B", "KS1"), ("PSS1A", "KS")):
+        made, values = stabilised(STABILISERS[name])
+        without = damping_of_the_swing(made, values | {STABILISER + gain: 0.0})
+        assert damping_of_the_swing(made, values) > without + 0.02, name
+
+
+def test_a_step_of_vs_is_one_of_the_reference(machine):
+    """Both meet the same sum, with and without a stabiliser in between."""
+    made = system(machine)
+    values = values_on_load(machine)
+    one, other = (
+        Simulator(made, Course(0.0, 4.0, (Change(0.5, 0.01, signal),)), CLOCK, 1e-3)
+        .response(values, ("vt",))
+        .signals["vt"]
+        for signal in ("vref", "vs")
+    )
+    np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-13)
+
+
+def test_a_stabiliser_hears_what_it_is_told_to():
+    """Of speed, power and voltage only what is named moves its states."""
+    for heard in ("speed", "p", "vt"):
+        made, values = stabilised(STABILISERS["PSS1A"], (heard,))
+        course = Course(0.0, 1.0, (Change(0.1, 0.1, "X"),))
+        response = Simulator(made, course, np.linspace(0.0, 1.0, 11), 1e-3).response(values)
+        moved = [np.ptp(x) for name, x in response.signals.items() if STABILISER in name]
+        assert max(moved) > 0.0, heard
+
+
+def test_exact_derivatives_reach_through_a_stabiliser(stabiliser):
+    """With gains so low that the unit is stable: a growing swing would end at limits."""
+    made, values = stabilised(stabiliser)
+    gains = {STABILISER + name for name in ("KS", "KS1", "K_T")} & values.keys()
+    values |= {name: 0.2 * values[name] for name in gains}
+    assert damping_of_the_swing(made, values) > 0.0
+    course = Course(0.0, 2.0, (Change(0.2, 0.0005),))
+    simulator = Simulator(made, course, np.linspace(0.0, 2.0, 41), 1e-3)
+    free = tuple(
+        STABILISER + row.symbol for row in stabiliser.sheet if row.unit == "s" and row.typical > 0.0
+    )
+    _, slopes = simulator.tangents(values, ("vt",), free)
+    for column, name in enumerate(free):
+        h = 1e-4 * values[name]
+        sets = [values | {name: values[name] + side * h} for side in (1, -1)]
+        up, down = np.moveaxis(simulator.samples_of_many(sets, ("vt",)), 2, 0)
+        difference = ((up - down) / (2.0 * h))[:, 0]
+        size = max(np.abs(difference).max(), 1e-4)
+        assert np.abs(slopes[:, 0, column] - difference).max() < 1e-5 * size, name
