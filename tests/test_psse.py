@@ -356,11 +356,13 @@ def test_all_faults_of_a_unit_are_told_at_once_in_the_order_of_their_lines():
     ]
 
 
-def test_no_saturation_as_four_zeros_is_refused_with_the_way_to_write_it():
-    faults = fault_of(replaced("3.14 .03 4.18 .1", "0 0 0 0"))
-    assert len(faults) == 2
-    assert all("1 0 2 0" in fault for fault in faults)
-    assert read_unit(replaced("3.14 .03 4.18 .1", "1 0 2 0"), "unit.dyr").exciter.values["E2"] == 2
+def test_no_saturation_may_be_written_as_four_zeros():
+    """The voltages then say nothing; a zero beside a saturation is a fault."""
+    values = read_unit(replaced("3.14 .03 4.18 .1", "0 0 0 0"), "unit.dyr").exciter.values
+    assert (values["SE1"], values["SE2"]) == (0.0, 0.0)
+    assert 0.0 < values["E1"] < values["E2"]
+    (fault,) = fault_of(replaced("3.14 .03 4.18 .1", "0 0 4.18 .1"))
+    assert "E1: 0 lies outside" in fault
 
 
 TWO = SOUND + SOUND.replace("1 GENROU 1", "1 GENROU 2").replace("1 ESAC1A 1", "1 ESAC1A 2")

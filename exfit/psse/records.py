@@ -12,7 +12,7 @@ from exfit.psse.fields import Fault, Field, number, whole
 
 WIDTH = 80  # columns of a file
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
-NO_SATURATION = "; without saturation write two voltages with SE = 0, such as 1 0 2 0"
+UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,8 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
 
     given, unreadable = _numbers(definition, fields)
     known = {row.symbol: given[row.symbol] for row in definition.model.sheet if row.symbol in given}
+    if all(known.get(name) == 0.0 for name in UNSATURATED):
+        known |= UNSATURATED  # the voltages say nothing
     values = {**typical(definition.model.sheet), **known}
     wrong = [*unreadable, *_outside(definition.model.sheet, known)]
     wrong = wrong or [*contradictions(definition.model, values)]
@@ -175,8 +177,7 @@ def _outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, st
         value = values.get(row.symbol, row.low)
         if not row.low <= value <= row.high:
             limits = f"{show(row.low)} ... {show(row.high)} {row.unit}"
-            hint = NO_SATURATION if row.symbol in ("E1", "E2") and value == 0.0 else ""
-            yield row.symbol, f"{show(value)} lies outside {limits}, its data sheet's range{hint}"
+            yield row.symbol, f"{show(value)} lies outside {limits}, its data sheet's range"
 
 
 def _wrong_count(definition: Definition, found: int) -> str:
