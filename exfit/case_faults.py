@@ -155,6 +155,8 @@ def _placed(section: Place, given: Mapping[str, Place], found: Contradictions) -
     for symbol, text in found:
         if symbol in given:
             yield Fault(given[symbol], text)
+        elif text.startswith("is missing"):
+            yield Fault((*section, symbol), text)
         else:
             others = [given[word] for word in re.findall(r"\w+", text) if word in given]
             yield Fault(others[0] if others else section, f"{symbol} (typical): {text}")

@@ -300,14 +300,30 @@ def export(
 
 @main.command(short_help="List the models, or describe one.")
 @click.argument("name", required=False)
-def models(name: str | None) -> None:
+@click.option(
+    "--plot",
+    "folder",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write a page with a figure of every model.",
+)
+def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
     from exfit import show
-    from exfit.models import MODELS, find
+    from exfit.models import MODELS, STABILISERS, find
     from exfit.models.machines import MACHINES
 
-    if name is None:
-        show.catalogue(show.console(), MODELS.values(), MACHINES.values())
+    if folder is not None:
+        from exfit import files
+        from exfit.overview import write_overview
+
+        files.refuse_unwritable(folder)
+        write_overview(folder)
+        show.written(show.console(), folder)
+    elif name is None:
+        show.catalogue(show.console(), MODELS.values(), MACHINES.values(), STABILISERS.values())
+    elif name.upper() in STABILISERS:
+        show.model(show.console(), STABILISERS[name.upper()])
     elif name.upper() in MACHINES:
         show.machine(show.console(), MACHINES[name.upper()])
     else:

@@ -83,7 +83,7 @@ def match_notes(
 def typical_notes(case: Case) -> Iterator[str]:
     """Yield which values were taken from the data sheet, because the case does not give them."""
     used, values, typical = parameters_used(system_of(case)), case.values(), case.typical()
-    for part in case.parts.all:
+    for part in [part for part in case.parts.all if part.kind != "network"]:
         names = [part.prefix + row.symbol for row in part.sheet]
         taken = [name for name in names if name in typical and name in used]
         if taken:

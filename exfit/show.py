@@ -234,8 +234,8 @@ def check(console: Console, found: Check) -> None:
     _verdict(
         console,
         found.flat,
-        f"a run without a step stays flat: vt drifts {found.drift:.1e} pu in 60 s",
-        f"a run without a step is NOT flat: vt drifts {found.drift:.1e} pu in 60 s",
+        f"a run without a step stays flat: it drifts by {found.drift:.1e} pu in 60 s",
+        f"a run without a step is NOT flat: it drifts by {found.drift:.1e} pu in 60 s",
     )
     step = f"{found.step:g} s"
     console.print(f"sub-steps: {found.substeps} to each step of {step}")
@@ -249,7 +249,12 @@ def _verdict(console: Console, good: bool, yes: str, no: str) -> None:
     console.print(f"[green]{yes}[/]" if good else f"[bold red]{no}[/]")
 
 
-def catalogue(console: Console, models: Iterable[Model], machines: Iterable[Machine]) -> None:
+def catalogue(
+    console: Console,
+    models: Iterable[Model],
+    machines: Iterable[Machine],
+    stabilisers: Iterable[Model],
+) -> None:
     """Show the names of all models."""
     table = plain_table("exciter", "also", "")
     for one in models:
@@ -259,6 +264,11 @@ def catalogue(console: Console, models: Iterable[Model], machines: Iterable[Mach
     table = plain_table("machine", "")
     for machine in machines:
         table.add_row(machine.name, machine.title)
+    console.print(table)
+    console.print()
+    table = plain_table("stabiliser", "")
+    for one in stabilisers:
+        table.add_row(one.name, one.title.partition(" (")[0])
     console.print(table)
 
 

@@ -68,6 +68,7 @@ ORDER = (
     "exfit.plots",
     "exfit.case_writer",
     "exfit.export",
+    "exfit.overview",
     "exfit.trial",
     "exfit.changes",
     "exfit.notes",

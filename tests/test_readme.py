@@ -10,6 +10,8 @@ import pytest
 from exfit import files, study
 from exfit.case import load_case
 from exfit.cli import main
+from exfit.models import MODELS, STABILISERS
+from exfit.models.machines import MACHINES
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -20,9 +22,9 @@ test: {vt0: 1.0, duration: 5.0, vref: [{at: 1.0, step: 0.02}]}
 """
 
 
-def block(language):
-    """Return the first block of the README in a language."""
-    return re.search(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)[1]
+def block(language, number=0):
+    """Return a block of the README in a language, by default the first."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)[number]
 
 
 def first_column(after):
@@ -57,6 +59,19 @@ def test_the_case_of_the_readme_is_valid_and_its_records_can_be_read(folder):
     assert case.measure(case.test, case.record).time.size > 1
     for one in case.validations:
         assert case.measure(one.test, one.record).time.size > 1
+
+
+def test_the_unit_on_load_of_the_readme_can_be_simulated(folder):
+    (folder / "case.yaml").write_text("model: AC1A\n" + block("yaml", 1), encoding="utf-8")
+    response = study.simulate(load_case(folder / "case.yaml"), {}).response
+    assert response.signals["p"][0] == pytest.approx(0.8, rel=1e-9)
+    assert response.signals["vt"][0] == pytest.approx(1.0, rel=1e-9)
+    assert np.ptp(response.signals["delta"]) > 0.05
+
+
+def test_the_readme_names_every_model():
+    words = set(re.findall(r"\w+", README))
+    assert {*MODELS, *MACHINES, *STABILISERS} <= words
 
 
 def test_the_model_of_the_readme_starts_at_rest_and_follows_a_step(folder):

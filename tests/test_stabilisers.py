@@ -312,8 +312,9 @@ def test_a_drawing_is_narrow_and_shows_every_parameter(stabiliser):
 
 def test_a_record_lists_every_parameter_once(stabiliser):
     for record in stabiliser.records:
-        absent = dict(record.absent)
-        assert sorted(record.cons) == sorted([*(row.symbol for row in stabiliser.sheet), *absent])
+        symbols = [row.symbol for row in stabiliser.sheet]
+        integers = [name for name, _ in record.icons if name in symbols]
+        assert sorted([*record.cons, *integers]) == sorted([*symbols, *dict(record.absent)])
 
 
 def test_the_inputs_are_signals_of_a_plant(stabiliser):

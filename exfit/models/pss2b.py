@@ -55,11 +55,9 @@ SHEET = sheet(
 RECORDS = (
     record(
         "PSS2B",
-        # M and N are the last two of six integers; M is a parameter here
-        "M N TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 "
+        "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 "
         "VSI1MAX VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN",
-        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0},
-        absent={"N": 1.0},
+        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
     ),
 )
 

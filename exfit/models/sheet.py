@@ -35,9 +35,9 @@ class Record:
     """How a PSS/E file lists a model: the symbols of its constants (CONs) in their order.
 
     ``icons`` are the integers before them, each a symbol and the only value that the model stands
-    for; ``absent`` are symbols that the model does not have, with the only value that it stands
-    for; ``ignored`` are symbols that act only where a limiter does, which none is here: any value
-    will do; ``doubt`` says what is not settled about the order.
+    for, unless its sheet has the symbol; ``absent`` are symbols that the model does not have, with
+    the only value that it stands for; ``ignored`` are symbols that act only where a limiter does,
+    which none is here: any value will do; ``doubt`` says what is not settled about the order.
     """
 
     name: str

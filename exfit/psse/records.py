@@ -12,7 +12,7 @@ from exfit.psse.fields import Fault, Field, number, whole
 
 WIDTH = 80  # columns of a file
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
-NO_SATURATION = "; without saturation write two voltages with SE = 0, such as 1 0 2 0"
+UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,8 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
 
     given, unreadable = _numbers(definition, fields)
     known = {row.symbol: given[row.symbol] for row in definition.model.sheet if row.symbol in given}
+    if all(known.get(name) == 0.0 for name in UNSATURATED):
+        known |= UNSATURATED  # the voltages say nothing
     values = {**typical(definition.model.sheet), **known}
     wrong = [*unreadable, *_outside(definition.model.sheet, known)]
     wrong = wrong or [*contradictions(definition.model, values)]
@@ -107,17 +109,20 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     lacking = [
         (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
         for row in definition.model.sheet
-        if row.symbol not in record.cons
+        if row.symbol not in definition.names
     ]
-    return Reading(values, placed(wrong), doubt + placed([*_unmodelled(record, given), *lacking]))
+    symbols = [row.symbol for row in definition.model.sheet]
+    return Reading(
+        values, placed(wrong), doubt + placed([*_unmodelled(record, symbols, given), *lacking])
+    )
 
 
 def record_text(
     definition: Definition, values: Mapping[str, float], bus: int, machine_id: str
 ) -> str:
     """Return a record as a dynamics file has it, each number in the digits that give it back."""
-    record = definition.record
-    given = dict.fromkeys(record.ignored, 0.0) | dict(values) | dict(record.absent)
+    given = {**dict.fromkeys(definition.record.ignored, 0.0), **values}
+    given |= dict(definition.record.absent)
     if {"E1", "SE1", "E2", "SE2"} <= given.keys() and given["E1"] > given["E2"]:
         for first, second in zip(*SORTED, strict=True):
             given[first], given[second] = given[second], given[first]
@@ -125,7 +130,7 @@ def record_text(
         str(bus),
         f"'{definition.record.name}'",
         machine_id if machine_id.isalnum() else f"'{machine_id}'",
-        *(str(value) for _, value in definition.record.icons),
+        *(str(int(given.get(name, value))) for name, value in definition.record.icons),
         *(repr(float(given[name])).upper() for name in definition.record.cons),
         "/",
     ]
@@ -156,11 +161,13 @@ def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[Fault]:
             yield Fault(field.line, f"{name}: {error}")
 
 
-def _unmodelled(record: Record, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for what the model stands for in one way only."""
+def _unmodelled(
+    record: Record, symbols: Iterable[str], given: Mapping[str, float]
+) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for what the model, of these symbols, has in one way only."""
     for name, modelled in (*record.icons, *record.absent):
         found = given.get(name, modelled)
-        if found != modelled:
+        if found != modelled and name not in symbols:
             yield name, f"{show(found)} is not modelled; {show(modelled)} is taken"
 
 
@@ -170,8 +177,7 @@ def _outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, st
         value = values.get(row.symbol, row.low)
         if not row.low <= value <= row.high:
             limits = f"{show(row.low)} ... {show(row.high)} {row.unit}"
-            hint = NO_SATURATION if row.symbol in ("E1", "E2") and value == 0.0 else ""
-            yield row.symbol, f"{show(value)} lies outside {limits}, its data sheet's range{hint}"
+            yield row.symbol, f"{show(value)} lies outside {limits}, its data sheet's range"
 
 
 def _wrong_count(definition: Definition, found: int) -> str:
