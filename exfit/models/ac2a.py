@@ -53,7 +53,7 @@ SHEET = sheet(
     ("VRMIN", -95.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
     ("TE", 0.6, "s", (0.01, 100.0), "exciter time constant"),
     ("VFEMAX", 4.4, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
-    ("KH", 1.0, "pu", (0.0, 100.0), "gain of the exciter's field current feedback"),
+    ("KH", 1.0, "pu", (0.0, 100.0), "feedback gain of the exciter's field current"),
     ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain"),
     ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
     ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor"),

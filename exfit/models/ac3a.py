@@ -14,7 +14,7 @@ that the gain of both grows with efd. The limits of the lag and of VE are
 non-windup; the UEL gate does not act by itself.
 
 VF is subtracted behind the lead-lag, as in the models written after PSS/E's
-ESAC3A. Left out: the low voltage limiter (KLV, VLV) of the model of 1981,
+ESAC3A. Not modelled: the low voltage limiter (KLV, VLV) of the model of 1981,
 which IEEE Std 421.5 and ESAC3A replaced by VEMIN; an OEL, which is added to vs.
 VEMIN is 0.1 here; copies of the sample data that say 0 let VE end at 0 for
 good, where the regulator has no supply.

@@ -14,9 +14,9 @@ The feedback is taken from VR, as the models written after PSS/E's ESAC5A do:
 efd of a brushless machine cannot be measured, and 1/(1 + sTF2) stands for the
 exciter. TF2 = 0 bypasses TF3 with it. TA > 0: the loop needs a lag.
 
-Left out: UEL and OEL, which are added to vs; PSS/E's own choice of KE or VRMAX
-where a record says 0. Copies of the sample data differ in TF2, TF3: 0.8 and 0
-here, 1 and 1 (which cancel) elsewhere.
+Not modelled: UEL and OEL, which are added to vs; PSS/E's own choice of KE or
+VRMAX where a record says 0. Copies of the sample data differ in TF2, TF3: 0.8
+and 0 here, 1 and 1 (which cancel) elsewhere.
 """
 
 from exfit.engine.trace import Signal

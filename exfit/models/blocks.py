@@ -93,6 +93,24 @@ def washout(u: Signal, x: Signal, K: Signal, T: Signal) -> tuple[Signal, Signal]
     return K * slope, slope
 
 
+def high_pass(u: Signal, x: Signal, T: Signal) -> tuple[Signal, Signal]:
+    """sT / (1 + sT), or 1 where T = 0: a washout that is left out; at rest x = u."""
+    return where(T < SHORTEST, u, u - x), (u - x) * rate(T)
+
+
+def second_order(
+    u: Signal, x: Signal, v: Signal, A1: Signal, A2: Signal
+) -> tuple[Signal, Signal, Signal]:
+    """1 / (1 + s A1 + s^2 A2); v is the slope of x; return the output and both slopes.
+
+    Where A2 is so small that one of its poles is faster than ``SHORTEST``, it is the lag A1.
+    """
+    curved = SHORTEST * larger(A1, SHORTEST) < A2
+    bend = (u - x - A1 * v) / where(curved, A2, 1.0)
+    y = where(curved | (A1 >= SHORTEST), x, u)
+    return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
+
+
 def integrator(u: Signal, x: Signal, T: Signal = 1.0) -> tuple[Signal, Signal]:
     """1 / sT; T is never zero."""
     return x, u / T
@@ -110,6 +128,22 @@ def limited_lag(
     """K / (1 + sT) with a non-windup limit."""
     y = clip(where(T < SHORTEST, K * u, x), low, high)
     return y, limited((K * u - x) * rate(T), x, low, high)
+
+
+def limited_lead_lag(
+    u: Signal, x: Signal, TC: Signal, TB: Signal, low: Signal, high: Signal
+) -> tuple[Signal, Limited]:
+    """(1 + sTC) / (1 + sTB) with the non-windup limit of IEEE Std 421.5-2005, annex E.
+
+    The state is that of ``lead_lag`` between the limits; at a limit it follows the limited output
+    with the lag TC, so that it never runs away. With TC = 0 this is ``limited_lag``.
+    """
+    lead = TC * rate(TB)
+    y = clip(where(TB < SHORTEST, u, x + lead * (u - x)), low, high)
+    at_once = TC < SHORTEST
+    follows = where(TB < SHORTEST, 0.0, (y - x) * rate(TC))
+    slope = where(at_once, (u - x) * rate(TB), follows)
+    return y, limited(slope, x, where(at_once, low, -inf), where(at_once, high, inf))
 
 
 def limited_integrator(
@@ -139,6 +173,33 @@ def pid(
     slope = KI * u
     outward = ((y >= high) & (slope > 0.0)) | ((y <= low) & (slope < 0.0))
     return clip(y, low, high), where(outward, 0.0, slope), washed
+
+
+def pi(
+    u: Signal, integral: Signal, KP: Signal, KI: Signal, low: Signal = -inf, high: Signal = inf
+) -> tuple[Signal, Signal]:
+    """KP + KI / s, limited as a PID is; return the output and the slope of the integral."""
+    y, slope, _ = pid(u, integral, 0.0, KP, KI, 0.0, 1.0, low, high)
+    return y, slope
+
+
+def pi_rest(y: Signal, KP: Signal, KI: Signal) -> tuple[Signal, Signal]:
+    """Return the input and the integral that hold a PI at y, whichever of its gains is zero."""
+    integrates = KI > 0.0
+    return where(integrates, 0.0, y / where(integrates, 1.0, KP)), where(integrates, y, 0.0)
+
+
+def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Signal = 0.0) -> Signal:
+    """Return the output of KA / (1 + sTA), before any limit, from which a rate feedback is taken.
+
+    With TA = 0 output and feedback wait for each other; that loop is solved here: ``vl`` is what
+    the regulator would get without the feedback, ``gain`` how much of a step gets there at once,
+    ``taken`` what is subtracted from the output before the feedback takes it. A limit in the loop
+    may be put on the result: the loop is monotonous, so that a limit holds there as it does here.
+    """
+    loop = p.KA * gain * p.KF * rate(p.TF)
+    prompt = (p.KA * vl + loop * (s.VF + taken)) / (1.0 + loop)
+    return where(p.TA < SHORTEST, prompt, s.VA)
 
 
 def rectifier(ve: Signal, load: Signal) -> Signal:
@@ -233,18 +294,32 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
     return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)
 
 
-def pi(
-    u: Signal, integral: Signal, KP: Signal, KI: Signal, low: Signal = -inf, high: Signal = inf
-) -> tuple[Signal, Signal]:
-    """KP + KI / s, limited as a PID is; return the output and the slope of the integral."""
-    y, slope, _ = pid(u, integral, 0.0, KP, KI, 0.0, 1.0, low, high)
-    return y, slope
+def zero(x: Signal) -> Signal:
+    """Say whether a value is 0, which in some data means: to be computed."""
+    return (x <= 0.0) & (x >= 0.0)
 
 
-def pi_rest(y: Signal, KP: Signal, KI: Signal) -> tuple[Signal, Signal]:
-    """Return the input and the integral that hold a PI at y, whichever of its gains is zero."""
-    integrates = KI > 0.0
-    return where(integrates, 0.0, y / where(integrates, 1.0, KP)), where(integrates, y, 0.0)
+class CommutatorStart(NamedTuple):
+    """What a commutator exciter finds at its start, and the VR that holds EFD there."""
+
+    KE: Signal
+    VRMAX: Signal
+    VRMIN: Signal
+    vr: Signal
+
+
+def commutator_start(efd: Signal, p: Signal) -> CommutatorStart:
+    """Return KE, VRMAX and VRMIN, computed as PSS/E does where they are given as 0.
+
+    VRMAX = 0: the VR that holds the higher of E1, E2 (with KE only where KE > 0), and
+    VRMIN = -VRMAX. KE = 0, self-excited: such that VR starts at VRMAX / 10.
+    """
+    high = larger(p.E1, p.E2)
+    computed = zero(p.VRMAX)
+    ceiling = where(computed, exciter_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
+    floor = where(computed, -ceiling, p.VRMIN)
+    KE = where(zero(p.KE), (ceiling / 10.0 - p.saturation(efd).vx) / efd, p.KE)
+    return CommutatorStart(KE, ceiling, floor, exciter_demand(efd, KE, p))
 
 
 def compound_source(
@@ -273,78 +348,3 @@ def source_voltage(u: Signal, p: Signal) -> Signal:
     """Return VB, what a compound source gives behind its rectifier, at most VBMAX."""
     ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
     return smaller(rectifier(ve, p.KC * u.ifd), p.VBMAX)
-
-
-def limited_lead_lag(
-    u: Signal, x: Signal, TC: Signal, TB: Signal, low: Signal, high: Signal
-) -> tuple[Signal, Limited]:
-    """(1 + sTC) / (1 + sTB) with the non-windup limit of IEEE Std 421.5-2005, annex E.
-
-    The state is that of ``lead_lag`` between the limits; at a limit it follows the limited output
-    with the lag TC, so that it never runs away. With TC = 0 this is ``limited_lag``.
-    """
-    lead = TC * rate(TB)
-    y = clip(where(TB < SHORTEST, u, x + lead * (u - x)), low, high)
-    at_once = TC < SHORTEST
-    follows = where(TB < SHORTEST, 0.0, (y - x) * rate(TC))
-    slope = where(at_once, (u - x) * rate(TB), follows)
-    return y, limited(slope, x, where(at_once, low, -inf), where(at_once, high, inf))
-
-
-def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Signal = 0.0) -> Signal:
-    """Return the output of KA / (1 + sTA), before any limit, from which a rate feedback is taken.
-
-    With TA = 0 output and feedback wait for each other; that loop is solved here: ``vl`` is what
-    the regulator would get without the feedback, ``gain`` how much of a step gets there at once,
-    ``taken`` what is subtracted from the output before the feedback takes it. A limit in the loop
-    may be put on the result: the loop is monotonous, so that a limit holds there as it does here.
-    """
-    loop = p.KA * gain * p.KF * rate(p.TF)
-    prompt = (p.KA * vl + loop * (s.VF + taken)) / (1.0 + loop)
-    return where(p.TA < SHORTEST, prompt, s.VA)
-
-
-def high_pass(u: Signal, x: Signal, T: Signal) -> tuple[Signal, Signal]:
-    """sT / (1 + sT), or 1 where T = 0: a washout that is left out; at rest x = u."""
-    return where(T < SHORTEST, u, u - x), (u - x) * rate(T)
-
-
-def second_order(
-    u: Signal, x: Signal, v: Signal, A1: Signal, A2: Signal
-) -> tuple[Signal, Signal, Signal]:
-    """1 / (1 + s A1 + s^2 A2); v is the slope of x; return the output and both slopes.
-
-    Where A2 is so small that one of its poles is faster than ``SHORTEST``, it is the lag A1.
-    """
-    curved = SHORTEST * larger(A1, SHORTEST) < A2
-    bend = (u - x - A1 * v) / where(curved, A2, 1.0)
-    y = where(curved | (A1 >= SHORTEST), x, u)
-    return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
-
-
-def zero(x: Signal) -> Signal:
-    """Say whether a value is 0, which in some data means: to be computed."""
-    return (x <= 0.0) & (x >= 0.0)
-
-
-class CommutatorStart(NamedTuple):
-    """What a commutator exciter finds at its start, and the VR that holds EFD there."""
-
-    KE: Signal
-    VRMAX: Signal
-    VRMIN: Signal
-    vr: Signal
-
-
-def commutator_start(efd: Signal, p: Signal) -> CommutatorStart:
-    """Return KE, VRMAX and VRMIN, computed as PSS/E does where they are given as 0.
-
-    VRMAX = 0: the VR that holds the higher of E1, E2 (with KE only where KE > 0), and
-    VRMIN = -VRMAX. KE = 0, self-excited: such that VR starts at VRMAX / 10.
-    """
-    high = larger(p.E1, p.E2)
-    computed = zero(p.VRMAX)
-    ceiling = where(computed, exciter_demand(high, larger(p.KE, 0.0), p), p.VRMAX)
-    floor = where(computed, -ceiling, p.VRMIN)
-    KE = where(zero(p.KE), (ceiling / 10.0 - p.saturation(efd).vx) / efd, p.KE)
-    return CommutatorStart(KE, ceiling, floor, exciter_demand(efd, KE, p))

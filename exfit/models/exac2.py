@@ -44,7 +44,7 @@ SHEET = sheet(
     ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant"),
     ("VAMAX", 8.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VAMIN", -8.0, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("KB", 25.0, "pu", (0.01, 100000.0), "second stage gain"),
+    ("KB", 25.0, "pu", (0.01, 10000.0), "second stage gain"),
     ("VRMAX", 105.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VRMIN", -95.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
     ("TE", 0.6, "s", (0.01, 100.0), "exciter time constant"),

@@ -7,10 +7,10 @@ vref + vs ─►(+)─►[clip]─►[1 + sTC]─►[  KA  ]─►[clip]─► e
 vc1 ►[  1  ]┘
      [1+sTR]
 
-AC4A with other limits: the clamp stands behind the lag, which runs on beyond
-it (windup), and the field current lowers both sides of it. Two models written
-after PSS/E's EXAC4 have it so; a third has the same limits, but non-windup.
-Left out: UEL and OEL, which are added to vs.
+AC4A with other limits: the clamp stands behind the lag, which runs on beyond it
+(windup), and the field current lowers both sides of it. Two models written
+after PSS/E's EXAC4 have it so; a third has the same limits, but non-windup. Not
+modelled: UEL and OEL, which are added to vs.
 """
 
 from exfit.engine.trace import Signal

@@ -29,8 +29,8 @@ SHEET = sheet(
     ("VRMAX", 8.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -3.0, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
     ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
-    ("KF", 0.1, "pu", (0.0, 10.0), "rate feedback gain"),
-    ("TF", 1.0, "s", (0.01, 100.0), "rate feedback time constant"),
+    ("KF", 0.1, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
 )
 
 RECORDS = (record("EXST1", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF"),)

@@ -19,9 +19,10 @@ feedback is taken before the last clamp (as ANDES, OpenIPSL and Dynawo do, and
 the figure).
 
 In a PSS/E record UEL = 1 and VOS = 1: limiter and stabiliser act on the error.
-Left out: UEL = 2 (a gate behind VIMAX), UEL = 3 (the gate drawn here, with a
-limiter) and VOS = 2 (a stabiliser added to VA). Typical data are the standard's
-(its KF = 0 and its limiter's KLR and ILR come from other sets of it).
+Not modelled: UEL = 2 (a gate behind VIMAX), UEL = 3 (the gate drawn here, with
+a limiter) and VOS = 2 (a stabiliser added to VA). Typical data are the
+standard's (its KF = 0 and its limiter's KLR and ILR come from other sets of
+it).
 """
 
 from exfit.engine.trace import Signal
@@ -54,8 +55,8 @@ SHEET = sheet(
     ("VRMAX", 7.8, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -6.7, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
     ("KC", 0.08, "pu", (0.0, 100.0), "rectifier loading factor"),
-    ("KF", 0.001, "pu", (0.0, 10.0), "rate feedback gain"),
-    ("TF", 1.0, "s", (0.01, 100.0), "rate feedback time constant"),
+    ("KF", 0.001, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
     ("KLR", 4.54, "pu", (0.0, 1000.0), "field current limiter gain"),
     ("ILR", 4.4, "pu", (-9999.0, 9999.0), "field current limit"),
 )

@@ -16,8 +16,8 @@ Sources disagree on the chain. Followed are PowerWorld and InterPSS, whose
 order is that of the PSS/E record, with the limits on both; Dynawo takes TC2/TB2
 first and limits TC1/TB1 only. While no limit is met these are the same.
 
-Left out: the lead-lags TUC, TUB and TOC, TOB that take over while a limiter has
-the gate; while none acts they have no effect.
+Not modelled: the lead-lags TUC, TUB and TOC, TOB that take over while a limiter
+has the gate; while none acts they have no effect.
 """
 
 from exfit.engine.trace import Signal

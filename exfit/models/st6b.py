@@ -15,7 +15,7 @@ in PSS/E; PSLF lets VRMULT choose, and Dynawo has a whole potential circuit. VS
 acts behind the gate. In the standard the regulator is a PI (KDA = 0); the
 record of PSS/E has the derivative, and so has the typical data, a small one.
 
-Left out: the overexcitation limiter, which is added to the error before the
+Not modelled: the overexcitation limiter, which is added to the error before the
 gate (OEL = 1 in a PSS/E record) or behind it (OEL = 2).
 """
 
@@ -38,7 +38,7 @@ SHEET = sheet(
     ("ILR", 4.164, "pu", (0.0, 9999.0), "field current limit"),
     ("VRMAX", 4.81, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -3.85, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
-    ("KG", 1.0, "pu", (0.0, 1000.0), "feedback gain of the field voltage loop"),
+    ("KG", 1.0, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
     ("TG", 0.02, "s", (0.001, 10.0), "feedback lag of the field voltage loop"),
 )
 

@@ -18,7 +18,7 @@ one version of InterPSS adds sKIA/(1+sTIA). Followed is the standard's text, by
 which the regulator is a PI (with TC > TB a PID); only so do its data, KPA = 40
 and KIA = 1, hold a voltage, and only so do the gates fit the clamp behind them.
 
-Left out: limiters at the reference (OEL, UEL = 1 or 2 in a PSS/E record),
+Not modelled: limiters at the reference (OEL, UEL = 1 or 2 in a PSS/E record),
 stator current limiter and droop. The gates are those of OEL, UEL = 3; without a
 limiter all are the same, and the record says 0, none. The standard's data for
 VMAX and VMIN are 1.1 and 0.9; typical here is a reference that is free in a
