@@ -1,5 +1,6 @@
 """What exfit is compared with: the float run of the same equations, and systems to run."""
 
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 
@@ -11,7 +12,7 @@ from exfit.engine.trace import clip
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
-from exfit.models.sheet import typical
+from exfit.models.sheet import Parameter, typical
 from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.simulate import parameters_used
 
@@ -73,6 +74,12 @@ def drawn_values(
             moves_together = bare[0] in "XS" or bare in ("E1", "E2")
             values[symbol] *= together if moves_together else factor
     return values
+
+
+def leads_of(lag: str, rows: Mapping[str, Parameter]) -> list[str]:
+    """Return the leads that a lag of zero bypasses with it: what they mean says it."""
+    meaning = re.sub(r"\blag\b", "lead", rows[lag].meaning)
+    return [symbol for symbol in rows if symbol != lag and rows[symbol].meaning == meaning]
 
 
 def levels(steps: int, *changes: tuple[int, float]) -> np.ndarray:

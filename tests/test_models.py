@@ -1,6 +1,5 @@
 """What every model of the catalogue keeps to; a new model is tested unasked."""
 
-import re
 from itertools import pairwise, product
 from math import ceil
 
@@ -11,6 +10,7 @@ from oracle import (
     WITHOUT_PLANT,
     drawn_values,
     fastest_rate,
+    leads_of,
     levels,
     lively_values,
     system_of,
@@ -271,12 +271,6 @@ def test_what_acts_on_load_only_does_so_there(exciter):
 def test_all_parameters_of_an_exciter_reach_its_equations(model):
     used = parameters_used(system_of(model))
     assert {row.symbol for row in MODELS[model].sheet if ON_LOAD not in row.meaning} <= used
-
-
-def leads_of(lag, rows):
-    """Return the leads that a lag of zero bypasses with it: what they mean says it."""
-    meaning = re.sub(r"\blag\b", "lead", rows[lag].meaning)
-    return [symbol for symbol in rows if symbol != lag and rows[symbol].meaning == meaning]
 
 
 def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(model):

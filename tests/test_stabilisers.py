@@ -4,7 +4,7 @@ import cmath
 
 import numpy as np
 import pytest
-from oracle import float_run, vector
+from oracle import float_run, leads_of, vector
 
 from exfit.engine.kernel import Kernel, Span
 from exfit.engine.system import Rest, System
@@ -18,8 +18,6 @@ FREQUENCIES = np.geomspace(0.01, 10.0, 61)  # Hz: from inter-area to local modes
 SIGNALS = ("speed", "p", "vt")
 SIDES = ("vsi1", "vsi2")
 
-# the leads whose blocks are bypassed with the lag of T = 0, and are meant to be 0 with it
-LEADS = {"T2": "T1", "T4": "T3", "T11": "T10"}
 # washouts that T = 0 leaves out: there the limit is the long time constant
 LEFT_OUT = {"PSS2B": ("TW2", "TW4")}
 
@@ -162,9 +160,8 @@ def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(stabiliser):
     for row in stabiliser.sheet:
         if row.unit != "s" or row.low > 0.0 or row.symbol in LEFT_OUT.get(stabiliser.name, ()):
             continue
-        values = lively(stabiliser)
-        if row.symbol in LEADS and LEADS[row.symbol] in values:
-            values[LEADS[row.symbol]] = 0.0
+        rows = {one.symbol: one for one in stabiliser.sheet}
+        values = lively(stabiliser) | dict.fromkeys(leads_of(row.symbol, rows), 0.0)
         if row.symbol == "A1":
             values["A2"] = 0.0
         none, small, twice = (
