@@ -17,6 +17,11 @@ from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.simulate import parameters_used
 
 WITHOUT_PLANT = ("FIRST_ORDER",)
+# every machine, and every form of the exciter's saturation: neither knows of the other
+SURROUNDINGS = (
+    *((machine, "quadratic") for machine in MACHINES),
+    *(("GENROU", form) for form in SATURATION if form != "quadratic"),
+)
 MACHINE_SATURATION = {"S10": 0.12, "S12": 0.4}
 
 

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracle import WITHOUT_PLANT, drawn_values, float_run, levels, system_of, vector
+from oracle import SURROUNDINGS, WITHOUT_PLANT, drawn_values, float_run, levels, system_of, vector
 
 from exfit.engine import kernel as engine
 from exfit.engine.kernel import Kernel, LinearKernel, Span, TangentKernel
 from exfit.engine.system import Motion, Rest, System
 from exfit.engine.trace import clip, cos, exp, larger, log, sin, smaller, sqrt, where
 from exfit.models import MODELS
-from exfit.models.machines import MACHINES
 from exfit.plant import SATURATION, VT0
 
 STEP = 1e-3
@@ -66,8 +65,7 @@ def test_machine_code_gives_what_the_float_run_gives(model, seed, size):
         assert (np.abs(one - other) / size_of(expected)).max() < AS_FLOATS
 
 
-@pytest.mark.parametrize("machine", list(MACHINES))
-@pytest.mark.parametrize("saturation", list(SATURATION))
+@pytest.mark.parametrize(("machine", "saturation"), SURROUNDINGS)
 def test_so_it_does_for_every_machine_and_saturation(exciter, machine, saturation):
     system, values = system_of(exciter, machine, saturation), drawn_values(exciter, 7, machine)
     spans = [Span(levels(60, (0, 0.1)), STEP, 2)]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from oracle import (
     MACHINE_SATURATION,
+    SURROUNDINGS,
     WITHOUT_PLANT,
     drawn_values,
     fastest_rate,
@@ -106,8 +107,7 @@ def set_to(values, vt0):
     return values | {VT0: vt0}
 
 
-@pytest.mark.parametrize("saturation", list(SATURATION))
-@pytest.mark.parametrize("machine", list(MACHINES))
+@pytest.mark.parametrize(("machine", "saturation"), SURROUNDINGS)
 def test_rest_is_rest(exciter, machine, saturation):
     system = system_of(exciter, machine, saturation)
     for values in (typical_values(exciter, machine), drawn_values(exciter, 5, machine)):

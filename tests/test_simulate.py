@@ -309,8 +309,8 @@ def test_no_response_is_unstable_without_a_word(model, step):
     course = Course(0.0, 4.0, (Change(0.5, 0.05), Change(2.0, -0.05)))
     times = np.linspace(0.0, 4.0, 201)
     simulated = 0
-    for seed in range(100):
-        if simulated == 30:
+    for seed in range(40):
+        if simulated == 12:
             break
         values = stiff_values(model, seed)
         try:
@@ -325,7 +325,7 @@ def test_no_response_is_unstable_without_a_word(model, step):
             swings = np.ptp(finest[-50:]) > 0.1 * np.ptp(finest)
             assert np.abs(finer - finest).max() < 0.5 * error or swings, seed
         simulated += 1
-    assert simulated > 10
+    assert simulated > 5
 
 
 def test_sub_steps_follow_the_shortest_time_constant(exciter):
