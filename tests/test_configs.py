@@ -1,0 +1,36 @@
+"""The cases that come with exfit: each runs as it stands, and each model has one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exfit.case import load_case
+from exfit.models import MODELS
+from exfit.models.sheet import typical
+from exfit.study import simulate
+
+CONFIGS = Path(__file__).parent.parent / "configs"
+
+
+def test_a_model_has_a_case_of_its_typical_data(model):
+    """All values stand in the file, so that nobody has to look for them."""
+    case = load_case(CONFIGS / "models" / f"{model.lower()}.yaml")
+    assert case.parts.exciter is MODELS[model]
+    assert dict(case.parameters.fixed) == typical(MODELS[model].sheet)
+    signals = simulate(case, {}).response.signals
+    assert signals["vt"][0] == pytest.approx(case.test.vt0, abs=1e-9)
+    assert np.ptp(signals["vt"]) > 0.01
+    assert np.isfinite(signals["vt"]).all()
+
+
+def test_no_case_is_left_of_a_model_that_is_gone():
+    assert {path.stem.upper() for path in (CONFIGS / "models").iterdir()} == set(MODELS)
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_case_reads_and_its_records_are_there(path):
+    case = load_case(path)
+    assert case.measure(case.test, case.record).time.size > 100
+    for one in case.validations:
+        assert case.measure(one.test, one.record).time.size > 100
