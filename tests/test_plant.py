@@ -295,7 +295,8 @@ def test_saturation_of_the_machine_has_its_two_points(exciter):
     [
         ("GENROU", {"Xpd": 1.8}, "Xd"),
         ("GENROU", {"Xppd": 0.4}, "Xpd"),
-        ("GENROU", {"Xl": 0.25}, "Xppd"),
+        ("GENROU", {"Xl": 0.26}, "Xppd"),
+        ("GENSAL", {"Tppd0": 7.0}, "Tpd0"),
         ("GENROU", {"Tppd0": 7.0}, "Tpd0"),
         ("GENROU", {"S10": 0.3, "S12": 0.2}, "S12"),
         ("ONE_AXIS", {"S10": 0.3, "S12": 0.3}, "S12"),
@@ -306,3 +307,17 @@ def test_machine_data_that_contradict_each_other_are_named(machine, wrong, symbo
     (fault,) = found.faults(typical(found.sheet) | wrong)
     assert fault[0] == symbol
     assert f"{next(iter(wrong.values())):g}" in fault[1] or symbol == "S12"
+
+
+def test_a_damper_that_is_not_seen_may_have_any_time_constant():
+    """X'd = X''d, as planning files write it: the response knows nothing of T''d0."""
+    machine = MACHINES["GENROU"]
+    unseen = {"Xppd": typical(machine.sheet)["Xpd"]}
+    assert list(machine.faults(typical(machine.sheet) | unseen | {"Tppd0": 999.0})) == []
+    course = Course(0.0, 3.0, (Change(0.5, 0.01),))
+    simulator = Simulator(system_of("AC1A"), course, np.linspace(0.0, 3.0, 61), 1e-3)
+    values = typical_values("AC1A", machine_Xppd=unseen["Xppd"])
+    one, other = (
+        simulator.samples(values | {MACHINE + "Tppd0": T}, ("vt",))[0] for T in (0.05, 999.0)
+    )
+    np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-12)

@@ -310,7 +310,7 @@ FAULTS = {
     ),
     "crossed limits": ("14.5 -14.5\n", "-14.5 14.5\n", "unit.dyr:2: ESAC1A: VAMIN: 14.5 is not"),
     "a saturation that falls": (" .03 ", " .3 ", "unit.dyr:4: ESAC1A: SE2: 0.1 at 4.18"),
-    "reactances out of order": (" .55 .25 ", " .55 .35 ", "unit.dyr:1: GENROU: Xpd: 0.3 is not"),
+    "reactances out of order": (" .55 .25 ", " .55 .35 ", "unit.dyr:1: GENROU: Xpd: 0.3 is below"),
     "no end": (".4 /", ".4", "unit.dyr:1: the record that begins here has no '/' before the next"),
     "no end of the last": ("-14.5 /", "-14.5", "unit.dyr:2: the record that begins here has no"),
     "an open quote": ("ESAC1A", "'ESAC1A", "unit.dyr:2: a quote is opened and not closed"),

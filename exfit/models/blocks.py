@@ -291,7 +291,9 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
     The standard writes (VFEMAX - KD IFD) / (KE + SE(VE)); both are VE exactly where VFE = VFEMAX.
     This one is a Newton step, so that a state put back on it does not hunt around the limit.
     """
-    return ve + (p.VFEMAX - vfe) / (p.KE + p.saturation(ve).slope)
+    # inverted apart: that is done while IFD, and with it VFE, is still being computed
+    inverse = 1.0 / (p.KE + p.saturation(ve).slope)
+    return ve + (p.VFEMAX - vfe) * inverse
 
 
 def zero(x: Signal) -> Signal:

@@ -76,10 +76,30 @@ SATURATION: tuple[Row, ...] = (
 
 
 def descending(values: Mapping[str, float], *symbols: str) -> Faults:
-    """Yield a fault for each reactance that does not exceed the next one of the row."""
+    """Yield a fault for each value that does not exceed the next one of the row."""
     for larger, smaller in pairwise(symbols):
         if values[larger] <= values[smaller]:
             yield larger, f"{values[larger]:g} is not above {smaller} = {values[smaller]:g}"
+
+
+def not_rising(values: Mapping[str, float], *symbols: str) -> Faults:
+    """Yield a fault for each value that is below the next one of the row; they may be equal."""
+    for larger, smaller in pairwise(symbols):
+        if values[larger] < values[smaller]:
+            yield larger, f"{values[larger]:g} is below {smaller} = {values[smaller]:g}"
+
+
+def d_axis_order(values: Mapping[str, float]) -> Faults:
+    """Yield what contradicts itself on a d axis with a damper.
+
+    X'd = X''d is a damper that is not seen: its time constant may be anything, such as 999.
+    """
+    yield from descending(values, "Xd", "Xpd")
+    yield from not_rising(values, "Xpd", "Xppd")
+    yield from descending(values, "Xpd", "Xl")
+    yield from not_rising(values, "Xppd", "Xl")
+    if values["Xpd"] > values["Xppd"]:
+        yield from descending(values, "Tpd0", "Tppd0")
 
 
 def saturation_order(values: Mapping[str, float]) -> Faults:

@@ -23,7 +23,9 @@ from exfit.models.machines.machine import (
     Faults,
     Machine,
     Source,
+    d_axis_order,
     descending,
+    not_rising,
     power_order,
     saturation_order,
 )
@@ -31,9 +33,9 @@ from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
     ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
-    ("Tppd0", 0.06, "s", (0.0, 1.0), "d-axis subtransient time constant"),
+    ("Tppd0", 0.06, "s", (0.0, 1000.0), "d-axis subtransient time constant"),
     ("Tpq0", 0.5, "s", (0.01, 100.0), "q-axis transient time constant, on load"),
-    ("Tppq0", 0.077, "s", (0.001, 1.0), "q-axis subtransient time constant, on load"),
+    ("Tppq0", 0.077, "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
     *SWING,
     ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
     ("Xq", 1.7, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
@@ -79,9 +81,10 @@ def rest(form: Callable[..., Signal], v: Axes, i: Axes, p: Signal, x: Signal) ->
 
 def faults(order: Callable[..., Faults], values: Mapping[str, float]) -> Faults:
     """Yield what contradicts itself in a data sheet of a round-rotor machine."""
-    yield from descending(values, "Xd", "Xpd", "Xppd", "Xl")
-    yield from descending(values, "Xq", "Xpq", "Xppd")
-    yield from descending(values, "Tpd0", "Tppd0")
+    yield from d_axis_order(values)
+    yield from descending(values, "Xq", "Xpq")
+    yield from not_rising(values, "Xpq", "Xppd")
+    yield from descending(values, "Xpq", "Xl")
     yield from order(values)
 
 

@@ -27,6 +27,7 @@ from exfit.models.machines.machine import (
     Faults,
     Machine,
     Source,
+    d_axis_order,
     descending,
     power_order,
     saturation_order,
@@ -35,8 +36,8 @@ from exfit.models.sheet import record, sheet
 
 SHEET = sheet(
     ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
-    ("Tppd0", 0.06, "s", (0.0, 1.0), "d-axis subtransient time constant"),
-    ("Tppq0", 0.077, "s", (0.001, 1.0), "q-axis subtransient time constant, on load"),
+    ("Tppd0", 0.06, "s", (0.0, 1000.0), "d-axis subtransient time constant"),
+    ("Tppq0", 0.077, "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
     *SWING,
     ("Xd", 1.071, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
     ("Xq", 0.704, "pu", (0.01, 10.0), "q-axis synchronous reactance, on load"),
@@ -83,9 +84,8 @@ def rest(v: Axes, i: Axes, p: Signal, x: Signal) -> None:
 
 def faults(values: Mapping[str, float]) -> Faults:
     """Yield what contradicts itself in a data sheet of a salient-pole machine."""
-    yield from descending(values, "Xd", "Xpd", "Xppd", "Xl")
+    yield from d_axis_order(values)
     yield from descending(values, "Xq", "Xppd")
-    yield from descending(values, "Tpd0", "Tppd0")
 
 
 def gensal_faults(values: Mapping[str, float]) -> Faults:
