@@ -18,6 +18,8 @@ ORDER = (
     "exfit.engine",
     "exfit.engine.trace",
     "exfit.engine.system",
+    "exfit.engine.writer",
+    "exfit.engine.functions",
     "exfit.engine.emit",
     "exfit.engine.kernel",
     "exfit.models.sheet",

@@ -1,0 +1,166 @@
+"""Instructions of LLVM as they are written, for values of one number or several side by side."""
+
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from exfit.engine.trace import Node, in_order
+
+Values = dict[Node | tuple[Node, str], str]
+
+BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
+LOGIC = {"&": "and", "|": "or"}
+COMPARISON = {"<": "olt", "<=": "ole"}
+INTRINSICS = ("sqrt", "log")
+TRANSCENDENTAL = ("exp", "sin", "cos")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """How many numbers one value holds, and how LLVM writes that."""
+
+    lanes: int
+
+    def of(self, scalar: str) -> str:
+        """Return the type whose elements are of the scalar type."""
+        return scalar if self.lanes == 1 else f"<{self.lanes} x {scalar}>"
+
+    def number(self, value: float) -> str:
+        """Return a constant, the same in every lane."""
+        bits = f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+        return bits if self.lanes == 1 else f"splat (double {bits})"
+
+    def integer(self, value: int) -> str:
+        """Return an integer constant, the same in every lane."""
+        return str(value) if self.lanes == 1 else f"splat (i64 {value})"
+
+    @property
+    def type(self) -> str:
+        """The type of a value."""
+        return self.of("double")
+
+    @property
+    def suffix(self) -> str:
+        """How an intrinsic of this type is named."""
+        return "f64" if self.lanes == 1 else f"v{self.lanes}f64"
+
+
+class Writer:
+    """Instructions of one function, as they are written."""
+
+    def __init__(self, narrow: Shape, wide: Shape) -> None:
+        self.narrow, self.wide = narrow, wide
+        self.lines: list[str] = []
+
+    def put(self, text: str) -> None:
+        """Write an instruction without a result."""
+        self.lines.append(f"  {text}")
+
+    def label(self, name: str) -> None:
+        """Begin a basic block."""
+        self.lines.append(f"{name}:")
+
+    def let(self, text: str) -> str:
+        """Write an instruction and return the name of its result."""
+        name = f"%v{len(self.lines)}"
+        self.lines.append(f"  {name} = {text}")
+        return name
+
+    def shape(self, node: Node) -> Shape:
+        """Return the shape of a node's value."""
+        return self.wide if node.wide else self.narrow
+
+    def arithmetic(self, op: str, shape: Shape, a: str, b: str) -> str:
+        """Write a floating-point operation; products may contract into a following sum."""
+        return self.let(f"{op} nsz contract {shape.type} {a}, {b}")
+
+    def add_product(self, shape: Shape, x: str, a: str, b: str) -> str:
+        """Write x + a b."""
+        return self.arithmetic("fadd", shape, x, self.arithmetic("fmul", shape, a, b))
+
+    def spread(self, scalar: str, shape: Shape) -> str:
+        """Write a scalar into every lane."""
+        if shape.lanes == 1:
+            return scalar
+        one = self.let(f"insertelement {shape.type} poison, double {scalar}, i64 0")
+        mask = f"<{shape.lanes} x i32> zeroinitializer"
+        return self.let(f"shufflevector {shape.type} {one}, {shape.type} poison, {mask}")
+
+    def address(self, base: str, row: int | str, lanes: int = 1) -> str:
+        """Write the address of a row of an array."""
+        offset = row * lanes if isinstance(row, int) else row
+        return self.let(f"getelementptr double, ptr {base}, i64 {offset}")
+
+    def load(self, base: str, row: int | str, shape: Shape) -> str:
+        """Read a row of an array."""
+        return self.let(f"load {shape.type}, ptr {self.address(base, row, shape.lanes)}, align 8")
+
+    def store(self, value: str, base: str, row: int, shape: Shape) -> None:
+        """Write a row of an array."""
+        where = self.address(base, row, shape.lanes)
+        self.put(f"store {shape.type} {value}, ptr {where}, align 8")
+
+    def compute(self, targets: Sequence[Node], values: Values, shape: Shape) -> list[str]:
+        """Write what the targets need beyond ``values`` (which grows), and return theirs."""
+        self.prepare(targets, values)
+        return [self._operand(node, shape, values) for node in targets]
+
+    def prepare(self, targets: Sequence[Node], values: Values) -> None:
+        """Write what the targets need beyond ``values``, which grows."""
+        for node in in_order(targets):
+            if node not in values and node.constant is None:
+                values[node] = self._instruction(node, values)
+
+    def _operand(self, node: Node, shape: Shape, values: Values) -> str:
+        if node.constant is not None:
+            return shape.number(node.constant)
+        if self.shape(node) == shape:
+            return values[node]
+        key = (node, "spread")
+        if key not in values:
+            values[key] = self.spread(values[node], shape)
+        return values[key]
+
+    def _instruction(self, node: Node, values: Values) -> str:
+        shape = self.shape(node)
+        if node.op in LOGIC:
+            a, b = (values[operand] for operand in node.operands)
+            return self.let(f"{LOGIC[node.op]} {shape.of('i1')} {a}, {b}")
+        if node.op == "select":
+            condition, *branches = node.operands
+            a, b = (self._operand(branch, shape, values) for branch in branches)
+            truth = self.shape(condition).of("i1")
+            return self.let(
+                f"select {truth} {values[condition]}, {shape.type} {a}, {shape.type} {b}"
+            )
+        if node.op == "clip":
+            return self._clip(node, shape, values)
+        args = [self._operand(operand, shape, values) for operand in node.operands]
+        if node.op in BINARY:
+            return self.arithmetic(BINARY[node.op], shape, *args)
+        if node.op in COMPARISON:
+            return self.let(f"fcmp {COMPARISON[node.op]} {shape.type} {args[0]}, {args[1]}")
+        if node.op in INTRINSICS:
+            return self.let(
+                f"call {shape.type} @llvm.{node.op}.{shape.suffix}({shape.type} {args[0]})"
+            )
+        if node.op in TRANSCENDENTAL:
+            return self.let(f"call {shape.type} @{node.op}_{shape.suffix}({shape.type} {args[0]})")
+        raise KeyError(f"{node.op} {node.args}")
+
+    def _clip(self, node: Node, shape: Shape, values: Values) -> str:
+        x, *limits = node.operands
+        result = self._operand(x, shape, values)
+        for comparison, limit in zip(("olt", "ogt"), limits, strict=True):
+            if limit.constant is None or math.isfinite(limit.constant):
+                edge = self._operand(limit, shape, values)
+                result = self.held(shape, result, comparison, edge)
+        return result
+
+    def held(self, shape: Shape, x: str, comparison: str, limit: str) -> str:
+        """Write x, or the limit where x compares with it as told."""
+        outside = self.let(f"fcmp {comparison} {shape.type} {x}, {limit}")
+        return self.let(
+            f"select {shape.of('i1')} {outside}, {shape.type} {limit}, {shape.type} {x}"
+        )
