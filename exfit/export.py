@@ -49,11 +49,16 @@ def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Ex
     source = path / WHOLE_FIT if path.is_dir() else path
     result = _Result(source)
     warnings = [*result.warnings()]
-    exciter = _exciter(result, name)
-    written = [*_machine(result, warnings), exciter, *_stabiliser(result, warnings)]
+    written = [
+        *_machine(result, warnings),
+        *_exciter(result, name),
+        *_stabiliser(result, warnings),
+    ]
+    if not written:
+        raise ExfitError(f"{source}: {result.text('model')} has no PSS/E record")
     for one in written:
         warnings += _warnings(one)
-    comments = [*_origin(result, exciter), *(f"{text}." for text in result.warnings())]
+    comments = [*_origin(result), *(f"{text}." for text in result.warnings())]
     comments += [text for one in written for text in _comments(one)]
     lines = [line for text in comments for line in _wrapped(text)]
     lines += [record_text(one.definition, one.values, bus, machine_id) for one in written]
@@ -123,8 +128,12 @@ class _Result:
         return float(value)
 
 
-def _exciter(result: _Result, name: str | None) -> Written:
+def _exciter(result: _Result, name: str | None) -> Iterator[Written]:
     model_name = result.text("model") or ""
+    if model_name == result.text("machine_model"):  # it stood alone
+        if name is not None:
+            raise ExfitError(f"--model {name}: the fit is of {model_name}, without an exciter")
+        return
     model = MODELS.get(model_name)
     if model is None or "model" in result.mapping("inputs"):
         raise ExfitError(
@@ -136,7 +145,7 @@ def _exciter(result: _Result, name: str | None) -> Written:
     wanted = next(iter(known)) if name is None else name.upper()
     if wanted not in known:
         raise ExfitError(f"--model {name}: {model_name} is not written so; {near(wanted, known)}")
-    return _written(result, known[wanted], "fixed", "")
+    yield _written(result, known[wanted], "fixed", "")
 
 
 def _machine(result: _Result, warnings: list[str]) -> Iterator[Written]:
@@ -200,12 +209,12 @@ def _matters(symbol: str, value: float) -> bool:
     return value != 0.0
 
 
-def _origin(result: _Result, exciter: Written) -> Iterator[str]:
+def _origin(result: _Result) -> Iterator[str]:
     record = result.mapping("fit").get("record")
     rmse = result.content.get("rmse")
     to = f" to {record}" if isinstance(record, str) else ""
     error = f", rmse {rmse:.3g} pu" if isinstance(rmse, float) else ""
-    yield f"exfit {__version__}: {exciter.definition.model.name} fitted{to}{error}."
+    yield f"exfit {__version__}: {result.text('model')} fitted{to}{error}."
     if (case := result.text("case")) is not None:
         yield f"Case: {case}."
 

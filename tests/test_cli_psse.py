@@ -15,10 +15,12 @@ from test_psse import SAMPLE, SOUND, THREE, garbage, replaced
 
 from exfit import cli
 from exfit.case import load_case
+from exfit.files import write_fit
 from exfit.models import MODELS
 from exfit.models.sheet import record
 from exfit.plant import MACHINE
 from exfit.psse import definition_of, read_unit
+from exfit.study import fit
 
 ROOT = Path(__file__).parent.parent
 WIDTH = 80
@@ -422,3 +424,20 @@ def test_every_option_of_both_commands_is_explained_and_the_names_are_found():
             if isinstance(one, click.Option):
                 assert one.help, one.name
     assert definition_of("GENROU") is not None
+
+
+def test_a_machine_that_was_fitted_alone_is_written_alone(run, tmp_path):
+    case = load_case(ROOT / "configs" / "machine_playback.yaml")
+    write_fit(fit(case), tmp_path / "alone", figures=False)
+    code, out, _ = run("export", tmp_path / "alone")
+    unit = [line for line in out.splitlines() if line.startswith("1 ")]
+    assert code == 0
+    assert len(unit) == 1
+    assert "'GENROU'" in unit[0]
+    code, _, err = run("export", tmp_path / "alone", "--model", "ESAC1A")
+    assert (code, "the fit is of GENROU, without an exciter" in err) == (1, True)
+    told = json.loads((tmp_path / "alone" / "result.json").read_text())
+    told |= {"model": "ONE_AXIS", "machine_model": "ONE_AXIS"}
+    (tmp_path / "alone" / "result.json").write_text(json.dumps(told))
+    code, _, err = run("export", tmp_path / "alone")
+    assert (code, "ONE_AXIS has no PSS/E record" in err) == (1, True)
