@@ -29,6 +29,8 @@ from exfit.case_schema import (
     Section,
     Simulation,
     Stabiliser,
+    Step,
+    Switch,
     Text,
     Validation,
 )
@@ -45,6 +47,8 @@ __all__ = [
     "OpenCircuit",
     "Playback",
     "RecordFile",
+    "Step",
+    "Switch",
     "dotted",
     "initial_level",
     "initial_voltage",
@@ -181,6 +185,11 @@ class Case(Section):
                     f"but {self.path} has a step at {show(at)} s"
                 )
         steady = test.steady
+        if steady is not None and steady > end:
+            raise RecordError(
+                f"{path}: ends at {show(end)} s, before test.steady_until = {show(steady)} s "
+                f"of {self.path}"
+            )
         if test.vt0 is None and steady is not None and not start < steady:
             what = "the first step" if test.steady_until is None else "test.steady_until"
             raise RecordError(

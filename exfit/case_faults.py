@@ -13,7 +13,7 @@ from exfit.case_form import near, show
 from exfit.case_parts import WITHOUT_EXCITER, Part, Parts
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
-from exfit.plant import DRIVING, MACHINE
+from exfit.plant import DRIVING
 from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
@@ -34,6 +34,10 @@ SIGNALS: Mapping[str, tuple[str, ...]] = {
     "machine-playback": ("efd", "vt", "ifd"),
     "none": ("vt",),
 }
+DRIVERS: Mapping[str, tuple[str, ...]] = {
+    "playback": ("vref", *DRIVING),
+    "machine-playback": ("efd",),
+}
 NEEDED: Mapping[str, tuple[str, ...]] = {
     "playback": ("vt", "efd"),
     "machine-playback": ("efd",),
@@ -45,7 +49,7 @@ def contradictions(data: Data, parts: Parts) -> Iterator[Fault]:
     kind = str(_section(data, "plant").get("type"))
     yield from _model_faults(data, kind)
     for part in parts.all:
-        yield from _part_faults(data, part, kind)
+        yield from _part_faults(data, part)
     yield from _stabiliser_faults(data, parts, kind)
     yield from _trial_faults((), data, data, kind)
     for at, trial in enumerate(_list(data, "validate")):
@@ -65,7 +69,7 @@ def _model_faults(data: Data, kind: str) -> Iterator[Fault]:
             yield Fault((key,), f"does not go with plant {kind}: the machine stands alone")
 
 
-def _part_faults(data: Data, part: Part, kind: str) -> Iterator[Fault]:
+def _part_faults(data: Data, part: Part) -> Iterator[Fault]:
     """Yield the faults of what the file gives for one part, and of its free parameters."""
     fixed = _section(data, *part.fixed)
     free = {} if part.free is None else _section(data, *part.free)
@@ -84,9 +88,6 @@ def _part_faults(data: Data, part: Part, kind: str) -> Iterator[Fault]:
     values = _readable(part, fixed, starts)
     section = part.fixed if part.fixed[0] == "plant" else part.fixed[:1]
     yield from _placed(section, places, part.check(values))
-    if part.prefix == MACHINE and kind == "infinite-bus" and values.get("Tppd0", 1.0) < SHORTEST:
-        text = f"Tppd0: {show(values['Tppd0'])} is for open circuit; on load it must be positive"
-        yield Fault(places.get("Tppd0", part.fixed), text)
 
 
 def _stabiliser_faults(data: Data, parts: Parts, kind: str) -> Iterator[Fault]:
@@ -189,6 +190,10 @@ def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
             known = ", ".join(SIGNALS[kind])
             here = (*place, "channels", signal)
             yield Fault(here, f"does not go with plant {kind}, which has {known}")
+    for signal in DRIVERS.get(kind, ()):
+        if "weight" in _section(channels, signal):
+            here = (*place, "channels", signal, "weight")
+            yield Fault(here, "has no effect: the signal drives, and is not compared")
     for signal in NEEDED.get(kind, ()):
         if channels and signal not in channels:
             yield Fault((*place, "channels", signal), f"is missing: plant {kind} needs it")

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any
 
 from exfit.case_form import near
 from exfit.errors import ModelError
 from exfit.models import STABILISERS, find
+from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import (
     Model,
@@ -73,7 +75,7 @@ def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
         exponential = str(data.get("saturation")).startswith("exponential")
         found.append(exciter_part(exciter, exponential))
     if machine is not None:
-        found.append(machine_part(machine))
+        found.append(machine_part(machine, on_load=plant.get("type") == "infinite-bus"))
     if plant.get("type") == "infinite-bus":
         network = plant.get("network")
         found.append(network_part(network if isinstance(network, dict) else {}))
@@ -95,12 +97,14 @@ def exciter_part(model: Model, exponential: bool) -> Part:
     return Part("exciter", model.name, "", model.sheet, *places, check)
 
 
-def machine_part(machine: Machine) -> Part:
+def machine_part(machine: Machine, on_load: bool) -> Part:
     """Return the part of a machine."""
 
     def check(values: Mapping[str, float]) -> Contradictions:
         if len(values) == len(machine.sheet):
             yield from machine.faults(values)
+        if on_load and values.get("Tppd0", inf) < SHORTEST:
+            yield "Tppd0", f"{values['Tppd0']:g} is for open circuit; on load it must be positive"
 
     places: tuple[Place, Place] = ("plant", "parameters"), ("plant", "free")
     return Part("machine", machine.name, MACHINE, machine.sheet, *places, check)

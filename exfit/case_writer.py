@@ -64,7 +64,7 @@ def _values(part: Part, indent: str) -> Iterator[str]:
     values: Mapping[str, float] = part.values
     for row in rows:
         text = f"{indent}{row.symbol}: {yaml_number(values[row.symbol])}"
-        typical = "" if row.symbol in part.definition.record.cons else "; typical, not in the file"
+        typical = "" if row.symbol in part.definition.names else "; typical, not in the file"
         yield _commented(text, f"{row.unit}, {row.meaning}{typical}")
 
 

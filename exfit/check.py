@@ -63,7 +63,7 @@ def check(case: Case) -> Check:
     system = system_of(case)
     levels: Mapping[str, float]
     if case.record is None:
-        simulator, levels = plain_simulator(case)
+        simulator, levels = plain_simulator(case, case.values())
         channels: tuple[Channel, ...] = (Channel("vt", np.zeros(len(simulator.times))),)
     else:
         trial = fitted_trial(case)

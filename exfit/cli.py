@@ -148,6 +148,7 @@ def simulate(
         if simulation.comparison is not None:
             show.comparisons(console, [simulation.comparison])
         console.print(f"sub-steps {simulation.response.substeps}")
+        show.notes(console, simulation.notes)
         show.written(console, folder)
 
 

@@ -177,7 +177,7 @@ def _written(result: _Result, definition: Definition, key: str, prefix: str) -> 
         raise ExfitError(f"{result.path}: {key}: missing: {', '.join(missing)}")
     told = result.content.get("typical")
     assumed = told if isinstance(told, list) else []
-    in_record = definition.record.cons
+    in_record = definition.names
     return Written(
         definition,
         values,
@@ -191,7 +191,7 @@ def _warnings(one: Written) -> Iterator[str]:
     record = one.definition.record
     for row in one.definition.model.sheet:
         value = one.values[row.symbol]
-        if row.symbol not in record.cons and _matters(row.symbol, value):
+        if row.symbol not in one.definition.names and _matters(row.symbol, value):
             yield f"{record.name} cannot hold {row.symbol} = {show(value)}: it is lost"
     if record.doubt:
         yield f"{record.name}: {record.doubt}"

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case import Case, InfiniteBus
+from exfit.record import Record
 from exfit.residuals import Residuals
 from exfit.result import Comparison
 from exfit.simulate import parameters_used
@@ -19,6 +20,8 @@ NO_EFFECT = 1e-12  # of the largest column: rounding
 COARSE = 0.2  # of the error of the fit: what halving the step may move
 INVISIBLE = 1e-7  # pu: no recorder shows it
 FAR = 0.01  # of vt0: beyond the noise of a record
+FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
+UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 MUCH_WORSE = 3.0  # than the fit
 TAKES_PART = 0.01  # of a direction of length one
 
@@ -77,6 +80,39 @@ def match_notes(
             yield (
                 f"on {one.name} the error is {one.rmse / fitted.rmse:.1f} times that of the fit: "
                 "the fitted record leaves open what matters there"
+            )
+
+
+def level_notes(fitted: Comparison, steady: float) -> Iterator[str]:
+    """Yield the signals that start elsewhere than their record."""
+    before = fitted.time < steady
+    for signal, overlay in fitted.overlays.items():
+        if signal == "vt" or not before.any():
+            continue
+        measured = float(overlay.measured[before].mean())
+        simulated = float(overlay.simulated[before].mean())
+        if abs(measured - simulated) > FAR_FROM_BASE * max(abs(simulated), 0.1):
+            yield (
+                f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu: "
+                "check its base, and the data and the power that the case gives the machine"
+            )
+
+
+def unsteady_notes(record: Record, steady: float) -> Iterator[str]:
+    """Yield the signals that drift while the case calls the unit steady."""
+    before = record.time < steady
+    for signal, samples in record.signals.items():
+        still = samples[before]
+        half = len(still) // 2
+        if half < 4:
+            continue
+        # noise from neighbours: a drift does not pass for it
+        noise = float(np.std(np.diff(still))) / np.sqrt(2.0)
+        apart = abs(float(still[:half].mean() - still[half:].mean()))
+        if apart > max(UNSTEADY * noise * np.sqrt(2.0 / half), INVISIBLE):
+            yield (
+                f"{signal} moves by {apart:.2g} pu before {steady:g} s, where the record should be "
+                "at rest: what the fit starts from is not sure"
             )
 
 

@@ -108,6 +108,12 @@ def written(console: Console, folder: Path) -> None:
     console.print(f"written to {folder}", soft_wrap=True, markup=False)
 
 
+def notes(console: Console, texts: Iterable[str]) -> None:
+    """Show what must be known beside the numbers."""
+    for text in texts:
+        console.print(Text.assemble(("note", "yellow"), f" {text}"))
+
+
 def fit(console: Console, result: FitResult, folder: Path) -> None:
     """Show what a fit found and where its files are."""
     table = plain_table(
@@ -141,8 +147,7 @@ def fit(console: Console, result: FitResult, folder: Path) -> None:
         f"{result.simulations} simulations, {result.seconds:.2f} s"
     )
     console.print(f"sub-steps: {result.substeps}")
-    for note in result.notes:
-        console.print(f"[yellow]note[/] {note}")
+    notes(console, result.notes)
     if result.validation:
         comparisons(console, [match, *result.validation])
     console.print()

@@ -348,7 +348,11 @@ class Simulator:
 
     def _why_moving(self, values: Values, slopes: Array, moving: NDArray[np.bool_]) -> str:
         states = zip(self.system.states, slopes, moving, strict=True)
-        moved = [f"{name} moves by {slope:.3g} pu/s" for name, slope, moves in states if moves]
+        moved = [
+            f"{name} moves by {slope:.3g} pu/s"
+            for name, slope, moves in states
+            if moves and math.isfinite(slope)
+        ]
         return self._limits_passed(values) or ", ".join(moved) or "the values do not define one"
 
     def _limits_passed(self, values: Values) -> str:

@@ -2,7 +2,7 @@
 
 import sys
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 from exfit import __version__, estimate
 from exfit.case import Case
 from exfit.errors import CaseError, SimulationError
-from exfit.notes import match_notes, notes
+from exfit.notes import level_notes, match_notes, notes, typical_notes, unsteady_notes
 from exfit.plant import VT0
 from exfit.record import file_hash
 from exfit.residuals import JACOBIANS, Residuals
@@ -45,7 +45,8 @@ def fit(
     """
     began = clock.perf_counter()
     trial = fitted_trial(case).secured(values_of(case, {}))
-    validations = [trial_of(case, one.test, one.record) for one in case.validations]
+    given = case.values()
+    validations = [trial_of(case, one.test, one.record, given) for one in case.validations]
     refuse_unfit(case, residuals_of(case, trial))
     residuals = residuals_of(case, trial)
     start = residuals.start
@@ -100,11 +101,19 @@ def fit(
         notes=(
             *notes(case, residuals, found, compared),
             *match_notes(compared, tried, trial.levels.get(VT0)),
+            *record_notes(case, trial, compared),
         ),
         validation=tried,
         versions=versions(),
         inputs=inputs(case, trial, *validations),
     )
+
+
+def record_notes(case: Case, trial: Trial, compared: Comparison) -> Iterator[str]:
+    """Yield what the steady part of a record says against the case."""
+    if case.test.steady is not None and case.test.begin is None:
+        yield from unsteady_notes(trial.record, case.test.steady)
+        yield from level_notes(compared, case.test.steady)
 
 
 def refuse_unfit(case: Case, residuals: Residuals) -> None:
@@ -177,6 +186,7 @@ class Simulation:
 
     response: Response
     comparison: Comparison | None
+    notes: tuple[str, ...]
 
 
 def simulate(case: Case, changes: Values) -> Simulation:
@@ -186,13 +196,24 @@ def simulate(case: Case, changes: Values) -> Simulation:
     """
     values = values_of(case, changes)
     if case.record is not None:
-        trial = trial_of(case, case.test, case.record).secured(values)
+        trial = trial_of(case, case.test, case.record, values).secured(values)
         response = trial.simulator.response({**values, **trial.levels})
-        return Simulation(response, trial.compare("record", values))
-    simulator, levels = plain_simulator(case)
+        compared = trial.compare("record", values) if trial.channels else None
+        told = [] if compared is None else record_notes(case, trial, compared)
+        return Simulation(response, compared, (*simulation_notes(case, response), *told))
+    simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     response = secured(simulator, at, case.path).response(at)
-    return Simulation(response, None)
+    return Simulation(response, None, tuple(simulation_notes(case, response)))
+
+
+def simulation_notes(case: Case, response: Response) -> Iterator[str]:
+    """Yield which values are typical, and whether the machine falls out of step."""
+    yield from typical_notes(case)
+    delta = response.signals.get("delta")
+    if delta is not None and np.max(np.abs(delta)) > np.pi:
+        at = float(response.time[np.argmax(np.abs(delta) > np.pi)])
+        yield f"the machine falls out of step at {at:.3g} s: delta passes half a turn"
 
 
 def validate(case: Case, changes: Values, record: Path | None = None) -> list[Comparison]:
@@ -215,6 +236,6 @@ def validate(case: Case, changes: Values, record: Path | None = None) -> list[Co
         raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
     values = values_of(case, changes)
     return [
-        trial_of(case, test, file).secured(values).compare(name, values, None, most)
+        trial_of(case, test, file, values).secured(values).compare(name, values, None, most)
         for name, test, file, most in fitted + named
     ]

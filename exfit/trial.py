@@ -1,6 +1,6 @@
 """A test of a case, ready to be simulated: its system, its course, its record."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -17,6 +17,8 @@ from exfit.case import (
     OpenCircuit,
     Playback,
     RecordFile,
+    Step,
+    Switch,
     initial_level,
     initial_voltage,
 )
@@ -26,6 +28,7 @@ from exfit.features import Features, features
 from exfit.models.sheet import Model
 from exfit.plant import (
     DRIVING,
+    NETWORK,
     SATURATION,
     VREF0,
     VT0,
@@ -79,7 +82,8 @@ def _system_of(case: Case) -> System:
 
 def inputs_of(case: Case) -> tuple[str, ...]:
     """Return the inputs that the tests of a case change; the reference always is one."""
-    changed = {change.signal for test in case.tests for change in changes(case, test)}
+    values = case.values()
+    changed = {change.signal for test in case.tests for change in changes(case, test, values)}
     return tuple(name for name in ("vref", "vs", "E", "R", "X") if name in changed | {"vref"})
 
 
@@ -201,35 +205,53 @@ class Trial:
         return features(time, signal, inside[0].at, until)
 
 
-def changes(case: Case, test: BumpTest) -> Iterator[Change]:
-    """Yield what a test changes, input by input."""
-    for signal in ("vref", "vs", "E"):
-        yield from (Change(step.at, step.step, signal) for step in getattr(test, signal))
-    if isinstance(case.plant, InfiniteBus):
-        values = case.values()
-        now = {name: values.get(f"network.{name}", 0.0) for name in ("R", "X", "E")}
-        for switch in test.network:
-            for name in now:
-                then = getattr(switch, name)
-                if then is not None:
-                    yield Change(switch.at, then - now[name], name)
-                    now[name] = then
+def changes(case: Case, test: BumpTest, values: Values) -> list[Change]:
+    """Return what a test changes, in the order of time; a switch says what is from then on.
+
+    ``values`` are those of the network at the start. Raises CaseError where the source would lose
+    its voltage.
+    """
+    found = [
+        Change(step.at, step.step, signal)
+        for signal in ("vref", "vs")
+        for step in getattr(test, signal)
+    ]
+    now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
+    events: list[Step | Switch] = [*test.E, *test.network]
+    for event in sorted(events, key=lambda event: event.at):
+        for name, level in now.items():
+            step = _step_of(event, name, level)
+            if step is not None:
+                found.append(Change(event.at, step, name))
+                now[name] = None if level is None else level + step
+        if now["E"] is not None and now["E"] <= 0.0:
+            text = f"at {event.at:g} s the source falls to {now['E']:g} pu; it must stay above 0"
+            raise CaseError([f"{case.path}: test: {text}"])
+    return sorted(found, key=lambda change: change.at)
 
 
-def course_of(case: Case, test: BumpTest, span: tuple[float, float]) -> Course:
+def _step_of(event: Step | Switch, name: str, level: float | None) -> float | None:
+    """Return by how much an event changes R, X or E; None where it leaves it."""
+    if isinstance(event, Step):
+        return event.step if name == "E" else None
+    then: float | None = getattr(event, name)
+    return None if then is None or level is None else then - level
+
+
+def course_of(case: Case, test: BumpTest, span: tuple[float, float], values: Values) -> Course:
     """Return a test from start to end, s, as the simulator takes it."""
-    return Course(*span, tuple(sorted(changes(case, test), key=lambda change: change.at)))
+    return Course(*span, tuple(changes(case, test, values)))
 
 
-def trial_of(case: Case, test: BumpTest, file: RecordFile) -> Trial:
-    """Return a test of a case with its record read.
+def trial_of(case: Case, test: BumpTest, file: RecordFile, values: Values) -> Trial:
+    """Return a test of a case with its record read; ``values`` are those it begins with.
 
     Raises RecordError where the record cannot be used, CaseError where a signal is not simulated.
     """
     record = case.measure(test, file)
     system = system_of(case)
     begin = float(record.time[0]) if test.begin is None else test.begin
-    course = course_of(case, test, (begin, float(record.time[-1])))
+    course = course_of(case, test, (begin, float(record.time[-1])), values)
     levels = levels_of(case, test, record)
     driving = [signal for signal in file.channels if signal in system.inputs]
     if driving:
@@ -272,10 +294,10 @@ def fitted_trial(case: Case) -> Trial:
     """Return the test of a case with the record that it is fitted to; raises CaseError without."""
     if case.record is None:
         raise CaseError([f"{case.path}: record: missing; a fit needs a record"])
-    return trial_of(case, case.test, case.record)
+    return trial_of(case, case.test, case.record, case.values())
 
 
-def plain_simulator(case: Case) -> tuple[Simulator, dict[str, float]]:
+def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, float]]:
     """Return the simulator and the initial levels of a case without a record.
 
     Raises CaseError where the case does not say how long and from which voltage.
@@ -296,7 +318,7 @@ def plain_simulator(case: Case) -> tuple[Simulator, dict[str, float]]:
             ]
         )
     times = np.linspace(0.0, test.duration, round(count) + 1)
-    course = course_of(case, test, (0.0, test.duration))
+    course = course_of(case, test, (0.0, test.duration), values)
     return Simulator(system_of(case), course, times, case.simulation.step), {VT0: test.vt0}
 
 

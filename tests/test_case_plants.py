@@ -11,7 +11,7 @@ from exfit.errors import CaseError, SimulationError
 from exfit.files import PARAMETERS, write_fit
 from exfit.notes import typical_notes
 from exfit.study import fit, simulate
-from exfit.trial import inputs_of, system_of
+from exfit.trial import changes, inputs_of, system_of
 
 ROOT = Path(__file__).parent.parent
 ON_LOAD = """\
@@ -73,6 +73,46 @@ def test_values_of_every_part_can_be_set_by_name(tmp_path):
     assert one.signals["delta"][0] != other.signals["delta"][0]
     with pytest.raises(CaseError, match=r"--set: machine\.HH: not a parameter; did you mean"):
         changed_values(case, {"machine.HH": 5.0}, "--set")
+
+
+def test_a_switch_goes_to_its_value_from_whatever_was_set_before(tmp_path):
+    """--set changes the start, not where the switch leads to."""
+    case = load_case(written(tmp_path, (", {at: 4.0, X: 0.3}", "")))
+    one = simulate(case, {"network.X": 0.35}).response.signals["vt"]
+    case = load_case(written(tmp_path, (", {at: 4.0, X: 0.3}", ""), ("X: 0.3,", "X: 0.35,")))
+    np.testing.assert_array_equal(one, simulate(case, {}).response.signals["vt"])
+
+
+def test_steps_and_switches_of_the_source_follow_each_other(tmp_path):
+    """A sag, and a switch to a voltage: what holds then is what the switch says."""
+    source = (("Q: 0.2", "E: 1.0"), ("  vs: [{at: 2.0, step: -0.005}]\n", ""))
+    events = "  E: [{at: 1.5, step: -0.05}]\n  network: [{at: 3.0, E: 1.0}]\n"
+    steps = "  network: [{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}]\n"
+    case = load_case(written(tmp_path, *source, (steps, events)))
+    found = changes(case, case.test, case.values())
+    assert [(one.at, one.signal) for one in found] == [(1.0, "vref"), (1.5, "E"), (3.0, "E")]
+    assert found[1].step + found[2].step == pytest.approx(0.0, abs=1e-15)
+    gone = events.replace("-0.05", "-1.5")
+    with pytest.raises(CaseError, match=r"at 1\.5 s the source falls to -0\.5 pu"):
+        simulate(load_case(written(tmp_path, *source, (steps, gone))), {})
+
+
+def test_a_machine_that_falls_out_of_step_is_told(tmp_path):
+    assert not any("out of step" in n for n in simulate(load_case(written(tmp_path)), {}).notes)
+    case = load_case(written(tmp_path, ("{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}", "{at: 3, X: 5}")))
+    assert any("falls out of step at" in note for note in simulate(case, {}).notes)
+
+
+def test_a_stabiliser_hears_what_the_case_says(tmp_path):
+    """At rest it has seen the power, the voltage, or no deviation of the speed at all."""
+    most = {}
+    for heard in ("p", "vt", "speed"):
+        signals = simulate(
+            load_case(written(tmp_path, ("inputs: [p]", f"inputs: [{heard}]"))), {}
+        ).response.signals
+        own = [abs(x[0]) for name, x in signals.items() if name.startswith("stabiliser.")]
+        most[heard] = max(own)
+    assert most["vt"] > most["p"] > most["speed"] == 0.0
 
 
 def record_of(case, path):
@@ -154,7 +194,7 @@ def test_a_stabiliser_on_open_circuit_is_said_not_to_act(tmp_path):
         ("{at: 3.0, X: 0.4}", "{at: 3.0}", "test.network[0]: changes nothing"),
         ("{at: 4.0, X: 0.3}", "{at: 2.0, X: 0.3}", "2 s is not after 3 s"),
         ("{at: 4.0, X: 0.3}", "{at: 4.0, X: -0.3}", "test.network[1].X: -0.3 is below 0"),
-        ("Tppd0: 0.035", "Tppd0: 0", "0 is for open circuit; on load it must be positive"),
+        ("Tppd0: 0.035", "Tppd0: 0", "Tppd0: 0 is for open circuit; on load it must be positive"),
         ("inputs: [p]", "inputs: [p, vt]", "stabiliser.inputs: 2 given; PSS1A listens to 1"),
         ("inputs: [p]", "inputs: [f]", "stabiliser.inputs[0]: 'f' is not possible; known: speed"),
         ("PSS1A", "PSS9", "'PSS9' is not a stabiliser model; did you mean"),

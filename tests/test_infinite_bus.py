@@ -320,6 +320,35 @@ def test_a_droop_lowers_the_voltage_with_reactive_power():
         assert vc == pytest.approx(abs(values[VT0] + 1j * Xc * current), rel=1e-12)
 
 
+def test_the_resistance_of_the_compensation_acts_on_active_power():
+    made = system(MACHINES["GENROU"])
+    for Rc in (-0.05, 0.05):
+        values = values_on_load(MACHINES["GENROU"], network_Xc=0.0, network_Rc=Rc, network_Q=0.3)
+        rest = LinearKernel(made).rest(vector(made, values))
+        current = np.conj((values[NETWORK + "P"] + 0.3j) / values[VT0])
+        expected = abs(values[VT0] + Rc * current)
+        assert rest.x[made.states.index("VC")] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("exciter", ["ST2A", "ST3A", "ST4B"])
+def test_a_compound_source_rests_on_load(exciter):
+    """It sees active and reactive power: what it rests at is what it sees on its way."""
+    made = system(MACHINES["GENROU"], exciter=exciter)
+    values = values_on_load(MACHINES["GENROU"], exciter=exciter, network_Q=0.3, network_P=0.6)
+    values |= {name: 9.0 for name in ("EFDMAX", "VMMAX", "VBMAX") if name in values}
+    values |= {VT0: 1.05, "KI": 1.0}
+    p = vector(made, values)
+    rest = LinearKernel(made).rest(p)
+    slopes, _ = LinearKernel(made).motion(p, rest.r, rest.x, np.zeros(len(made.inputs)))
+    assert np.abs(slopes).max() < 1e-9
+
+
+def test_short_times_of_a_stabiliser_ask_for_sub_steps():
+    made, values = stabilised(STABILISERS["PSS1A"])
+    simulator = Simulator(made, Course(0.0, 1.0, ()), np.array([1.0]), 1e-3)
+    assert simulator.substeps(values | {STABILISER + "T6": 2.5e-4}) >= 4
+
+
 def test_exact_derivatives_on_load_equal_central_differences(machine):
     """To every parameter of machine and network, over a step of the reference and a line trip."""
     course = Course(0.0, 2.0, (Change(0.2, 0.01), Change(0.8, 0.05, "X")))

@@ -2,13 +2,15 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from exfit.case import load_case
-from exfit.errors import CaseError, SimulationError
+from exfit.errors import CaseError, RecordError, SimulationError
+from exfit.simulate import Simulator
 from exfit.study import fit, simulate
 from exfit.trial import fitted_trial
 
@@ -169,6 +171,8 @@ def test_what_drives_is_not_compared(tmp_path):
          "test.steady_until: is missing"),
         (EXCITER, "test: {", "test: {begin: -1, vt0: 1, ", "test.begin: does not go with plant"),
         (EXCITER, "test: {", "test: {steady_until: 3, ", "3 s is after the first step, at 1 s"),
+        (EXCITER, "vt: vt", "vt: {column: vt, weight: 2}", "channels.vt.weight: has no effect"),
+        (MACHINE, "efd: efd", "efd: {column: efd, weight: 5}", "channels.efd.weight: has no"),
         (MACHINE, "efd: efd, ", "", "record.channels.efd: is missing"),
         (MACHINE, "plant:", "model: AC1A\nplant:", "model: does not go with plant machine-play"),
         (MACHINE, ", vt: vt, ifd: {column: ifd, weight: 0.01}", "", "neither vt nor ifd"),
@@ -182,3 +186,42 @@ def test_what_a_playback_lacks_or_cannot_have_is_told(tmp_path, text, old, new, 
     with pytest.raises(CaseError, match=r"case\.yaml") as refused:
         case_of(exciter(text=text.replace(old, new)), tmp_path)
     assert says in str(refused.value)
+
+
+def test_a_steady_part_that_is_none_is_refused_or_told(tmp_path):
+    beyond = MACHINE.replace("steady_until: 1.0", "steady_until: 100")
+    with pytest.raises(RecordError, match=r"ends at 20 s, before test\.steady_until = 100 s"):
+        fit(case_of(beyond, tmp_path))
+    late = fit(case_of(MACHINE.replace("steady_until: 1.0", "steady_until: 5.0"), tmp_path))
+    assert any("before 5 s, where the record should be at rest" in note for note in late.notes)
+
+
+def test_a_steady_part_behind_noise_is_not_complained_of(noisy, tmp_path):
+    assert not any("at rest" in note for note in fit(case_of(MACHINE, tmp_path, noisy)).notes)
+
+
+def test_a_signal_on_another_base_is_told(noisy, tmp_path):
+    """Field current relative to rated, as recorders give it."""
+    scaled = MACHINE.replace("{column: ifd,", "{column: ifd, scale: 0.46,")
+    notes = fit(case_of(scaled, tmp_path, noisy)).notes
+    assert any(note.startswith("ifd starts from") and "check its base" in note for note in notes)
+
+
+def test_a_known_reference_far_away_is_reached_too(tmp_path):
+    """Newton's steps end where the exciter rests at that very reference."""
+    steps = "vref: [{at: 1.0, step: 0.05}, {at: 11.0, step: -0.05}]"
+    for vref in (1.004, 1.012):
+        text = exciter().replace("{type: playback}", f"{{type: playback, vref: {vref}}}")
+        case = case_of(text.replace(steps, "steady_until: 1.0"), tmp_path)
+        trial = fitted_trial(case)
+        still = replace(trial.simulator.course, played=None)
+        simulator = Simulator(trial.simulator.system, still, np.linspace(0.0, 1.0, 11), 1e-3)
+        efd = simulator.response({**case.values(), **trial.levels}).signals["efd"]
+        assert np.ptp(efd) < 1e-9 * efd[0]
+
+
+def test_short_times_of_a_played_machine_ask_for_sub_steps(tmp_path):
+    case = case_of(MACHINE, tmp_path)
+    trial = fitted_trial(case)
+    values = {**case.values(), **trial.levels, "machine.Tppd0": 5e-4}
+    assert trial.simulator.substeps(values) >= 2

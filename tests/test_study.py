@@ -176,7 +176,7 @@ def test_an_interrupted_fit_keeps_the_best_point_so_far():
 def test_the_initial_voltage_is_the_mean_before_the_step_where_the_case_gives_none():
     loaded = case("ac1a_typical")
     down = loaded.validations[0]
-    trial = trial_of(loaded, down.test, down.record)
+    trial = trial_of(loaded, down.test, down.record, loaded.values())
     before = trial.record.time < 1.0
     assert trial.levels[VT0] == pytest.approx(
         np.mean(trial.record.signals["vt"][before]), rel=1e-12
