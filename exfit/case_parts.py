@@ -14,9 +14,8 @@ from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import (
     Model,
     Sheet,
-    crossed_limits,
+    contradictions,
     exponential_faults,
-    saturation_faults,
     typical,
 )
 from exfit.plant import MACHINE, NETWORK, STABILISER, flow_sheet
@@ -88,8 +87,7 @@ def exciter_part(model: Model, exponential: bool) -> Part:
     """Return the part of an exciter, with an exponential saturation or a quadratic one."""
 
     def check(values: Mapping[str, float]) -> Contradictions:
-        yield from crossed_limits(values)
-        yield from saturation_faults(values)
+        yield from contradictions(values)
         if exponential:
             yield from exponential_faults(values)
 
@@ -119,7 +117,7 @@ def stabiliser_part(model: Model) -> Part:
         STABILISER,
         model.sheet,
         *places,
-        lambda v: iter(crossed_limits(v)),
+        lambda values: iter(contradictions(values)),
     )
 
 

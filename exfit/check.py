@@ -17,7 +17,6 @@ from exfit.trial import (
     plain_simulator,
     secured,
     system_of,
-    values_of,
 )
 
 Array = NDArray[np.float64]
@@ -68,7 +67,7 @@ def check(case: Case) -> Check:
     else:
         trial = fitted_trial(case)
         simulator, levels, channels = trial.simulator, trial.levels, trial.channels
-    values = {**values_of(case, {}), **levels}
+    values = {**case.values(), **levels}
     signals = tuple(channel.signal for channel in channels)
     free = free_of(case)
     names = [one.name for one in free]

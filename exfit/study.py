@@ -44,8 +44,8 @@ def fit(
     best point so far. Raises ExfitError for input that cannot be used.
     """
     began = clock.perf_counter()
-    trial = fitted_trial(case).secured(values_of(case, {}))
     given = case.values()
+    trial = fitted_trial(case).secured(given)
     validations = [trial_of(case, one.test, one.record, given) for one in case.validations]
     refuse_unfit(case, residuals_of(case, trial))
     residuals = residuals_of(case, trial)
@@ -84,7 +84,7 @@ def fit(
         strategy=method,
         saturation=case.saturation,
         parameters=_parameters(case, residuals, values),
-        fixed={name: v for name, v in case.values().items() if name not in case.free()},
+        fixed={name: v for name, v in given.items() if name not in case.free()},
         typical=case.typical(),
         parts=tuple(PartOf(part.kind, part.name, part.prefix) for part in case.parts.all),
         comparison=compared,

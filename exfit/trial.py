@@ -330,7 +330,7 @@ def residuals_of(case: Case, trial: Trial) -> Residuals:
     free = case.free()
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
-    fixed = {**values_of(case, {}), **trial.levels}
+    fixed = {**case.values(), **trial.levels}
     return Residuals(
         trial.simulator,
         trial.channels,

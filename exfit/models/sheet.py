@@ -166,6 +166,12 @@ def saturation_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
         yield name, f"{se_high:g} at {high:g} pu is not above {se_low:g} at {low:g} pu"
 
 
+def contradictions(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, fault) for what does not go together in any model's values."""
+    yield from crossed_limits(values)
+    yield from saturation_faults(values)
+
+
 def exponential_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) for a saturation of zero at one point: no exponential reaches it."""
     zero = [symbol for symbol in ("SE1", "SE2") if values.get(symbol) == 0.0]

@@ -31,7 +31,6 @@ from exfit.plant.parts import (
 
 SIGNALS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
 SWING = ("delta", "dw")  # the rotor's angle to the source (rad), its speed less 1 (pu)
-HEARD = ("speed", "p", "vt")  # what a stabiliser may listen to; of the speed, what it deviates
 
 FLOW: Sheet = sheet(
     ("f0", 60.0, "Hz", (1.0, 400.0), "rated frequency"),
@@ -120,8 +119,27 @@ def compensated(v: Axes, i: Axes, n: Names) -> Signal:
 
 
 def listening(stabiliser: Stabilised, heard: Names) -> Names:
-    """Return what a stabiliser sees, ``vsi1`` and ``vsi2``."""
+    """Return what a stabiliser sees, ``vsi1`` and ``vsi2``; of the speed, what it deviates."""
     return Names(**{f"vsi{k}": getattr(heard, of) for k, of in enumerate(stabiliser.inputs, 1)})
+
+
+def stabiliser_rest(stabiliser: Stabilised, heard: Names, p: Signals) -> dict[str, Signal]:
+    """Return the states of a stabiliser that waits, under their names in the system."""
+    model, x = stabiliser.model, Names()
+    values = named_parameters(p, STABILISER, model.sheet)
+    model.rest(0.0, listening(stabiliser, heard), values, x)
+    return {STABILISER + name: value for name, value in vars(x).items()}
+
+
+def stabilising(stabiliser: Stabilised, heard: Names, p: Signals, x: Signals, d: Names) -> Signal:
+    """Write the slopes of a stabiliser into ``d`` and return its signal vs."""
+    model, moved = stabiliser.model, Names()
+    states = Names(**{name: x[STABILISER + name] for name in model.states})
+    values = named_parameters(p, STABILISER, model.sheet)
+    vs = model.equations(states, listening(stabiliser, heard), values, moved)
+    for name, slope in vars(moved).items():
+        setattr(d, STABILISER + name, slope)
+    return vs
 
 
 @cache
@@ -153,20 +171,17 @@ def infinite_bus(
         n, vt = named_parameters(p, NETWORK, network), p[VT0]
         at = flow(vt, n, given)
         stator = rotor_frame(vt, at, machine, of_machine)
-        fluxes, washed = Names(), Names()
+        fluxes = Names()
         machine.rest(stator.v, stator.i, of_machine, fluxes)
         ifd = machine.field(fluxes, stator.i, of_machine)
         vc1 = compensated(stator.v, stator.i, n)
         u = exciter_inputs(vt=vt, vc1=vc1, ifd=ifd, p=n.P, q=vt * at.i_q)
         found = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
+        waiting = {**values_of(fluxes, machine.states), "delta": stator.delta, "dw": 0.0}
         if stabiliser is not None:
-            seen = listening(stabiliser, Names(speed=0.0, p=n.P, vt=vt))
-            values = named_parameters(p, STABILISER, stabiliser_sheet)
-            stabiliser.model.rest(0.0, seen, values, washed)
-        still = {"delta": stator.delta, "dw": 0.0}
-        waiting = {STABILISER + name: value for name, value in vars(washed).items()}
+            waiting |= stabiliser_rest(stabiliser, Names(speed=0.0, p=n.P, vt=vt), p)
         return Rest(
-            {**values_of(fluxes, machine.states), **still, **found.states, **waiting},
+            {**waiting, **found.states},
             {**found.setpoints, "Pm": n.P, "source": modulus(at.ex, at.ey)},
         )
 
@@ -184,12 +199,8 @@ def infinite_bus(
         ifd = machine.field(fluxes, i, of_machine)
         vs = changed.vs
         if stabiliser is not None:
-            seen = listening(stabiliser, Names(speed=x["dw"], p=power, vt=vt))
-            values, moved = named_parameters(p, STABILISER, stabiliser_sheet), Names()
-            heard = Names(**{name: x[STABILISER + name] for name in of_stabiliser})
-            vs = vs + stabiliser.model.equations(heard, seen, values, moved)
-            for name, slope in vars(moved).items():
-                setattr(d, STABILISER + name, slope)
+            heard = Names(speed=x["dw"], p=power, vt=vt)
+            vs = vs + stabilising(stabiliser, heard, p, x, d)
         vref = r["vref"] + u["vref"]
         seen = exciter_inputs(
             vref=vref, vs=vs, vt=vt, vc1=compensated(v, i, n), ifd=ifd, p=power, q=reactive

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from exfit.case_form import show
-from exfit.models import MODELS, STABILISERS
+from exfit.models import MODELS, STABILISERS, sheet
 from exfit.models.machines import MACHINES, Machine
-from exfit.models.sheet import Model, Record, Sheet, crossed_limits, saturation_faults, typical
+from exfit.models.sheet import Model, Record, Sheet, typical
 from exfit.psse.fields import Fault, Field, number, whole
 
 WIDTH = 80  # columns of a file
@@ -77,12 +77,8 @@ def alternatives(model: Model | Machine) -> list[Definition]:
 def contradictions(
     model: Model | Machine, values: Mapping[str, float]
 ) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, fault) for values of a model that do not go together."""
-    if isinstance(model, Machine):
-        yield from model.faults(values)
-    else:
-        yield from crossed_limits(values)
-        yield from saturation_faults(values)
+    """Return (symbol, fault) for values of a model that do not go together."""
+    return model.faults(values) if isinstance(model, Machine) else sheet.contradictions(values)
 
 
 def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) -> Reading:
