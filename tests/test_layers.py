@@ -41,6 +41,7 @@ ORDER = (
     "exfit.plant",
     "exfit.record",
     "exfit.yaml_lines",
+    "exfit.ties",
     "exfit.case_form",
     "exfit.case_parts",
     "exfit.psse.fields",
