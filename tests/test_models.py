@@ -1,7 +1,11 @@
 """What every model of the catalogue keeps to; a new model is tested unasked."""
 
+import os
+import subprocess
+import sys
 from itertools import pairwise, product
 from math import ceil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,11 +23,12 @@ from oracle import (
     vector,
 )
 
+from exfit import models
 from exfit.engine.kernel import Kernel, LinearKernel, Span
 from exfit.engine.system import trace
 from exfit.engine.trace import in_order
 from exfit.errors import ModelError, SimulationError
-from exfit.models import MODELS, find, from_file
+from exfit.models import MODELS, STABILISERS, find, from_file
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, saturation_faults, typical
@@ -40,6 +45,7 @@ from exfit.plant import (
 from exfit.simulate import Change, Course, Simulator, parameters_used
 
 SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}
+FILES = Path(models.__file__).parent
 ON_LOAD = "on load"
 VOLTAGES = (0.8, 0.95, 1.0, 1.05, 1.2)
 
@@ -355,6 +361,41 @@ def test_a_state_stays_at_a_limit_only_while_pushed_against_it(exciter):
 def test_a_model_is_found_by_its_name_and_aliases_in_any_case(model, tmp_path):
     for name in (model, model.lower(), *MODELS[model].aliases):
         assert find(name, tmp_path) is MODELS[model]
+
+
+def test_the_catalogue_lists_every_file_of_a_model():
+    files = {path.stem for path in FILES.glob("*.py") if "\ndef equations(" in path.read_text()}
+    assert files == {name.lower() for name in (*MODELS, *STABILISERS)}
+
+
+def test_no_two_models_share_a_name():
+    names = [name for found in MODELS.values() for name in (found.name, *found.aliases)]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("name", ["AC1A", "ac1a", "ESAC1A", "esst4b", "FIRST_ORDER"])
+def test_finding_a_model_loads_its_file_alone(name):
+    code = (
+        "import sys; from pathlib import Path; from exfit.models import MODELS, STABILISERS, find;"
+        f"print(find({name!r}, Path()).name, 'PSS1A' in STABILISERS, len(MODELS));"
+        "print(*(file for file in sys.argv[1:] if 'exfit.models.' + file in sys.modules))"
+    )
+    files = [known.lower() for known in (*MODELS, *STABILISERS)]
+    environment = {**os.environ, "PYTHONPATH": str(FILES.parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", code, *files],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+    )
+    found, loaded = done.stdout.splitlines()
+    assert found == f"{loaded.upper()} True {len(MODELS)}"
+
+
+def test_a_name_that_is_not_in_the_catalogue_is_no_key():
+    assert "XYZ" not in MODELS
+    assert MODELS.get("sheet") is None  # a file beside the models
 
 
 def test_an_unknown_name_is_answered_with_the_nearest(tmp_path):

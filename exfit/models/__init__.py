@@ -1,91 +1,79 @@
 """The catalogue of exciters and stabilisers, by the names of IEEE 421.5 and PSS/E."""
 
-import difflib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import (
-    ac1a,
-    ac2a,
-    ac3a,
-    ac4a,
-    ac5a,
-    ac6a,
-    ac7b,
-    ac8b,
-    dc1a,
-    dc2a,
-    dc3a,
-    dc4b,
-    esac8b,
-    exac1,
-    exac2,
-    exac4,
-    exdc2,
-    exst1,
-    first_order,
-    ieeet1,
-    ieeex1,
-    pss1a,
-    pss2b,
-    scrx,
-    sexs,
-    st1a,
-    st2a,
-    st3a,
-    st4b,
-    st5b,
-    st6b,
-    st7b,
-    stab1,
-)
 from exfit.models.sheet import Model, model
 
-MODELS: dict[str, Model] = {
-    name: model(name, vars(module))
-    for name, module in (
-        ("DC1A", dc1a),
-        ("DC2A", dc2a),
-        ("DC3A", dc3a),
-        ("DC4B", dc4b),
-        ("AC1A", ac1a),
-        ("AC2A", ac2a),
-        ("AC3A", ac3a),
-        ("AC4A", ac4a),
-        ("AC5A", ac5a),
-        ("AC6A", ac6a),
-        ("AC7B", ac7b),
-        ("AC8B", ac8b),
-        ("ST1A", st1a),
-        ("ST2A", st2a),
-        ("ST3A", st3a),
-        ("ST4B", st4b),
-        ("ST5B", st5b),
-        ("ST6B", st6b),
-        ("ST7B", st7b),
-        ("IEEET1", ieeet1),
-        ("IEEEX1", ieeex1),
-        ("EXDC2", exdc2),
-        ("EXAC1", exac1),
-        ("EXAC2", exac2),
-        ("EXAC4", exac4),
-        ("ESAC8B", esac8b),
-        ("EXST1", exst1),
-        ("SEXS", sexs),
-        ("SCRX", scrx),
-        ("FIRST_ORDER", first_order),
-    )
-}
 
-STABILISERS: dict[str, Model] = {
-    name: model(name, vars(module))
-    for name, module in (
-        ("PSS1A", pss1a),
-        ("PSS2B", pss2b),
-        ("STAB1", stab1),
-    )
-}
+class Catalogue(Mapping[str, Model]):
+    """Models by name; the file of each, named after it, is loaded when it is first asked for."""
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+
+    def __getitem__(self, name: str) -> Model:
+        if name not in self.names:
+            raise KeyError(name)
+        return _loaded(name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+@cache
+def _loaded(name: str) -> Model:
+    return model(name, vars(import_module(f"exfit.models.{name.lower()}")))
+
+
+MODELS = Catalogue(
+    "DC1A",
+    "DC2A",
+    "DC3A",
+    "DC4B",
+    "AC1A",
+    "AC2A",
+    "AC3A",
+    "AC4A",
+    "AC5A",
+    "AC6A",
+    "AC7B",
+    "AC8B",
+    "ST1A",
+    "ST2A",
+    "ST3A",
+    "ST4B",
+    "ST5B",
+    "ST6B",
+    "ST7B",
+    "IEEET1",
+    "IEEEX1",
+    "EXDC2",
+    "EXAC1",
+    "EXAC2",
+    "EXAC4",
+    "ESAC8B",
+    "EXST1",
+    "SEXS",
+    "SCRX",
+    "FIRST_ORDER",
+)
+
+STABILISERS = Catalogue(
+    "PSS1A",
+    "PSS2B",
+    "STAB1",
+)
 
 
 def find(name: str, folder: Path) -> Model:
@@ -95,11 +83,17 @@ def find(name: str, folder: Path) -> Model:
     """
     if name.endswith(".py"):
         return from_file(folder / name)
-    for found in MODELS.values():
-        if name.upper() in (found.name, *found.aliases):
-            return found
+    wanted = name.upper()
+    if wanted in MODELS:
+        return MODELS[wanted]
+    # an alias mostly ends with the name, as ESAC1A does: the fewest files are loaded
+    for known in sorted(MODELS, key=lambda known: not wanted.endswith(known)):
+        if wanted in MODELS[known].aliases:
+            return MODELS[known]
+    import difflib
+
     names = [known for found in MODELS.values() for known in (found.name, *found.aliases)]
-    near = difflib.get_close_matches(name.upper(), names, n=1)
+    near = difflib.get_close_matches(wanted, names, n=1)
     hint = f"; did you mean {near[0]}?" if near else ""
     raise ModelError(f"{name} is not in the catalogue ({', '.join(names)}){hint}")
 
