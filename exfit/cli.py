@@ -3,6 +3,7 @@
 Everything but click is imported in the command that needs it, so that help appears at once.
 """
 
+import gc
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# else pydantic searches all packages that are installed, and runs what they plug into it
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+# a look for circles of dead objects at every 700 new ones takes a twentieth of a short fit
+gc.set_threshold(100_000)
 
 NOT_CONVERGED = 3
 STRATEGIES = ("gn", "dgn", "lm", "lm-then-dgn", "auto", "robust")
