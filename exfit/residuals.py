@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.simulate import Simulator
+from exfit.simulate import Simulator, each
 
 Array = NDArray[np.float64]
 
@@ -110,8 +110,8 @@ class Residuals:
     def exact(self, theta: Array) -> Array:
         """Return the exact Jacobian (M * channels, N)."""
         self.simulations += 1
-        names = tuple(one.name for one in self.free)
-        _, slopes = self.simulator.tangents(self.values(theta), self.signals, names)
+        directions = each(one.name for one in self.free)
+        _, slopes = self.simulator.tangents(self.values(theta), self.signals, directions)
         chain = np.array([one.slope(float(x)) for one, x in zip(self.free, theta, strict=True)])
         weighted = slopes * self.weights[:, None] * chain
         return np.asarray(weighted.transpose(1, 0, 2).reshape(-1, len(self.free)))

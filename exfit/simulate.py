@@ -1,8 +1,9 @@
 """From parameter values to a response: the start at rest, the grid, the sub-steps, the samples."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -36,12 +37,55 @@ ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
 NEIGHBOURS = 4  # grid points of the interpolation: its error is then of Runge-Kutta's order
 
 
+class Stretch(NamedTuple):
+    """Equal steps of the grid between two changes of the inputs."""
+
+    start: float
+    step: float
+    steps: int
+
+    @property
+    def end(self) -> float:
+        """Where it ends, s."""
+        return self.start + self.step * self.steps
+
+    @property
+    def times(self) -> Array:
+        """Its grid points (n + 1,), s."""
+        return np.linspace(self.start, self.end, self.steps + 1)
+
+
 class Change(NamedTuple):
-    """A step of an input, by default of the reference: when (s) and by how much (pu)."""
+    """A step of an input, by default of the reference: when (s) and by how much (pu).
+
+    It falls on the grid exactly, and divides it; or, ``smooth``, it leaves the grid as it is, and
+    is averaged over it with a linear B-spline. A fit may move the instant of a smooth one: the area
+    under the input, which an exact step between grid points would lose or gain, stays that of the
+    step wherever its instant lies, and follows it with a continuous derivative; so does the cost.
+    """
 
     at: float
     step: float
     signal: str = "vref"
+    smooth: bool = False
+
+    def share(self, part: Stretch) -> Array:
+        """Return how much of the step the grid points (n + 1,) of a stretch have seen."""
+        if not self.smooth:
+            return np.full(part.steps + 1, 1.0 if self.at <= part.start else 0.0)
+        x = self._beyond(part)
+        return np.asarray(0.5 + x - 0.5 * x * np.abs(x))
+
+    def share_slope(self, part: Stretch) -> Array:
+        """Return the derivative of ``share`` to the instant, 1/s; only a smooth step has it."""
+        if not self.smooth:
+            raise ValueError(f"the step of {self.signal} at {self.at:g} s is not smooth: it stays")
+        return np.asarray((np.abs(self._beyond(part)) - 1.0) / part.step)
+
+    def _beyond(self, part: Stretch) -> Array:
+        """Return how far the grid points lie beyond the instant, in steps, at most one."""
+        first = (part.start - self.at) / part.step
+        return np.clip(np.arange(part.steps + 1) + first, -1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,14 +106,37 @@ class Course:
     played: Played | None = None
 
     def level(self, signal: str, at: float) -> float:
-        """Return the sum of an input's steps at an instant; a step counts from its own on."""
-        return sum((c.step for c in self.steps if c.signal == signal and c.at <= at), start=0.0)
+        """Return the sum of an input's exact steps at an instant; each counts from its own on."""
+        made = (c.step for c in self.steps if c.signal == signal and not c.smooth and c.at <= at)
+        return sum(made, start=0.0)
 
-    def input(self, signal: str, times: Array, level: float) -> Array:
-        """Return an input at times between which it makes no step; ``level`` is that of steps."""
-        if self.played is None or signal not in self.played.signals:
-            return np.full(len(times), level)
-        return level + np.interp(times, self.played.time, self.played.signals[signal])
+    def input(self, signal: str, part: Stretch) -> Array:
+        """Return an input at the grid points (n + 1,) of a stretch."""
+        u = np.full(part.steps + 1, self.level(signal, part.start))
+        if self.played is not None and signal in self.played.signals:
+            u += np.interp(part.times, self.played.time, self.played.signals[signal])
+        for change in self.steps:
+            if change.smooth and change.signal == signal:
+                u += change.step * change.share(part)
+        return u
+
+
+@dataclass(frozen=True)
+class Direction:
+    """What moves together in one derivative, and how fast each.
+
+    System parameters by name; steps of the course by their index, as (d at, d step) in s and pu,
+    where only a smooth one has an instant that moves; the recorder's delay in s.
+    """
+
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    steps: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    delay: float = 0.0
+
+
+def each(names: Iterable[str]) -> tuple[Direction, ...]:
+    """Return a direction for each parameter, which moves alone."""
+    return tuple(Direction({name: 1.0}) for name in names)
 
 
 @dataclass(frozen=True)
@@ -81,27 +148,15 @@ class Response:
     substeps: int
 
 
-class Stretch(NamedTuple):
-    """Equal steps of the grid between two changes of the inputs."""
-
-    start: float
-    step: float
-    steps: int
-
-    @property
-    def end(self) -> float:
-        """Where it ends, s."""
-        return self.start + self.step * self.steps
-
-
 def stretches(course: Course, step: float) -> list[Stretch]:
-    """Divide a course at its changes, so that they fall on the grid, into steps of ``step``."""
+    """Divide a course at its exact changes, which so fall on the grid, into steps of ``step``."""
     if (course.end - course.start) / step > MOST_STEPS:
         raise SimulationError(
             f"simulation.step: {step:g} s divides {course.end - course.start:g} s into more than "
             f"{MOST_STEPS:.0e} steps"
         )
-    instants = {change.at for change in course.steps if course.start < change.at < course.end}
+    exact = (change.at for change in course.steps if not change.smooth)
+    instants = {at for at in exact if course.start < at < course.end}
     result = []
     for start, end in pairwise([course.start, *sorted(instants), course.end]):
         count = max(1, math.ceil((end - start) / step - ON_GRID))
@@ -109,50 +164,77 @@ def stretches(course: Course, step: float) -> list[Stretch]:
     return result
 
 
-class Sampling:
-    """Reads a run, whose stretches lie one behind the other, at given times.
+@cache
+def lagrange(points: int) -> tuple[Array, Array]:
+    """Return the polynomials that are one at one of the points 0, 1, 2 ... and zero at the others.
 
-    Between grid points it interpolates with a cubic that never reaches across a step of the
-    inputs; at the instant of a step it gives the values before the step.
+    A column holds the coefficients of one from the highest power down; then those of its slope.
+    """
+    coefficients = np.linalg.inv(np.vander(np.arange(points)))
+    powers = np.arange(points - 1, 0, -1)
+    return coefficients, powers[:, None] * coefficients[:-1]
+
+
+class Sampling:
+    """Reads a run, whose stretches lie one behind the other, at given times less a delay (s).
+
+    Between grid points it interpolates with a cubic that never reaches across an exact step of the
+    inputs; at the instant of such a step it gives the values before the step. Before the start and
+    after the end it gives the values there.
     """
 
-    def __init__(self, grid: Sequence[Stretch], times: Array) -> None:
-        rows = np.zeros((len(times), NEIGHBOURS), dtype=np.int64)
-        weights = np.zeros((len(times), NEIGHBOURS))
+    def __init__(self, grid: Sequence[Stretch], times: Array, delay: float = 0.0) -> None:
+        # with a delay no sample is moved to the grid: what is read must follow it without a jump
+        near = ON_GRID if delay == 0.0 else 0.0
+        wanted = times - delay
+        read = np.clip(wanted, grid[0].start, grid[-1].end)
+        still = np.abs(wanted - read) > near * grid[0].step
         ends = np.array([part.end for part in grid])
-        owner = np.minimum(np.searchsorted(ends, times - ON_GRID * grid[0].step), len(grid) - 1)
+        owner = np.minimum(np.searchsorted(ends, read - near * grid[0].step), len(grid) - 1)
+        self._rows = np.zeros((len(times), NEIGHBOURS), dtype=np.int64)
+        self._weights, self._slopes = np.zeros((2, len(times), NEIGHBOURS))
+        nearest, on_grid = np.zeros(len(times), dtype=np.int64), np.zeros(len(times), dtype=bool)
         offset = 0
         for number, part in enumerate(grid):
-            mine = owner == number
-            near, weight = self._cubic((times[mine] - part.start) / part.step, part.steps)
-            rows[mine, : near.shape[1]] = near + offset
-            weights[mine, : near.shape[1]] = weight
+            mine = np.flatnonzero(owner == number)
+            position = (read[mine] - part.start) / part.step
+            rows, weights, slopes = self._cubic(position, part.steps)
+            columns = np.s_[mine, : rows.shape[1]]
+            self._rows[columns] = rows + offset
+            self._weights[columns], self._slopes[columns] = weights, slopes / part.step
+            rounded = np.clip(np.rint(position), 0, part.steps)
+            nearest[mine] = rounded.astype(np.int64) + offset
+            on_grid[mine] = np.abs(position - rounded) < near
             offset += part.steps + 1
-        self._rows, self._weights = rows, weights
-        self._exact = bool(np.all(weights[:, 0] == 1.0))
+        self._weights[on_grid] = self._rows[on_grid] == nearest[on_grid, None]
+        self._slopes[still] = 0.0
+        self._exact = nearest if np.all(on_grid) else None
 
     @staticmethod
-    def _cubic(position: Array, count: int) -> tuple[NDArray[np.int64], Array]:
-        """Return neighbours and Lagrange weights, a row per position on ``count`` steps."""
+    def _cubic(position: Array, count: int) -> tuple[NDArray[np.int64], Array, Array]:
+        """Return neighbours of positions on ``count`` steps, their weights and those of slopes."""
         points = min(NEIGHBOURS, count + 1)
         first = np.clip(np.floor(position).astype(np.int64) - 1, 0, count + 1 - points)
-        near = first[:, None] + np.arange(points)
-        weights = np.ones(near.shape)
-        for one in range(points):
-            for other in range(points):
-                if one != other:
-                    weights[:, one] *= (position - near[:, other]) / (one - other)
-        nearest = np.clip(np.rint(position), 0, count).astype(np.int64)
-        on_grid = np.abs(position - nearest) < ON_GRID
-        near[on_grid], weights[on_grid] = nearest[on_grid, None], np.arange(points) == 0
-        return near, weights
+        values, slopes = lagrange(points)
+        powers = np.vander(position - first, points)
+        return first[:, None] + np.arange(points), powers @ values, powers[:, 1:] @ slopes
 
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
-        rows = np.concatenate(run) if len(run) > 1 else run[0]
-        if self._exact:
-            return np.asarray(rows[self._rows[:, 0]])
-        return np.asarray(np.einsum("mk,mk...->m...", self._weights, rows[self._rows]))
+        if self._exact is not None:
+            return np.asarray(_rows(run)[self._exact])
+        return self._combined(run, self._weights)
+
+    def slope(self, run: Sequence[Array]) -> Array:
+        """Return the time derivatives (M, ...), per s, of what a run gives as samples."""
+        return self._combined(run, self._slopes)
+
+    def _combined(self, run: Sequence[Array], weights: Array) -> Array:
+        return np.asarray(np.einsum("mk,mk...->m...", weights, _rows(run)[self._rows]))
+
+
+def _rows(run: Sequence[Array]) -> Array:
+    return np.concatenate(run) if len(run) > 1 else run[0]
 
 
 @cache
@@ -163,10 +245,10 @@ def kernel(system: System, outputs: tuple[str, ...], lanes: int) -> Kernel:
 
 @cache
 def tangent_kernel(
-    system: System, outputs: tuple[str, ...], free: tuple[str, ...]
+    system: System, outputs: tuple[str, ...], free: tuple[str, ...], moving: tuple[str, ...]
 ) -> TangentKernel:
     """Return the machine code that simulates a system with its derivatives."""
-    return TangentKernel(system, outputs, free)
+    return TangentKernel(system, outputs, free, moving)
 
 
 @cache
@@ -189,18 +271,44 @@ class Simulator:
     """Simulates one system through one course, sampled at ``times`` (M,) in s.
 
     ``step`` (s) is the largest step; where the system is faster, every step is divided, into no
-    fewer than ``least`` parts.
+    fewer than ``least`` parts. A recorder's ``delay`` (s) makes it show at ``times`` the response
+    at ``times - delay``: before the start, where all is at rest, and after the end that there.
     """
 
     def __init__(
-        self, system: System, course: Course, times: Array, step: float, least: int = 1
+        self,
+        system: System,
+        course: Course,
+        times: Array,
+        step: float,
+        least: int = 1,
+        delay: float = 0.0,
     ) -> None:
         self.system, self.course, self.times = system, course, times
-        self.step, self.least = step, least
+        self.step, self.least, self.delay = step, least, delay
         self._grid = stretches(course, step)
         self._inputs = [self._inputs_of(part) for part in self._grid]
-        self._sampling = Sampling(self._grid, times)
-        self._last = b"", 0  # the sub-steps of the last values asked for
+        self._sampling = Sampling(self._grid, times, delay)
+        self._last = [(b"", 0)]  # the sub-steps of the last values asked for
+
+    def moved(self, steps: tuple[Change, ...], delay: float) -> "Simulator":
+        """Return the simulator of the same course, whose steps and delay (s) are others.
+
+        The instant of a smooth step may be another, and the size of any. It costs little: the grid
+        and what is known of the sub-steps are shared. Raises ValueError where a step is another.
+        """
+        if [_fixed(change) for change in steps] != [_fixed(change) for change in self.course.steps]:
+            raise ValueError("only sizes, and the instants of smooth steps, can be moved")
+        pairs = zip(steps, self.course.steps, strict=True)
+        others = {new.signal for new, old in pairs if new != old}
+        result = copy(self)
+        result.course, result.delay = replace(self.course, steps=steps), delay
+        if others:
+            known = zip(self._inputs, self._grid, strict=True)
+            result._inputs = [result._inputs_with(others, u, part) for u, part in known]
+        if delay != self.delay:
+            result._sampling = Sampling(self._grid, self.times, delay)
+        return result
 
     @cached_property
     def time_constants(self) -> tuple[str, ...]:
@@ -220,10 +328,10 @@ class Simulator:
         Raises SimulationError where the start is no rest, or beyond ``MOST_SUBSTEPS``.
         """
         p = self._vector(values)
-        known, parts = self._last
+        known, parts = self._last[0]
         if known != p.tobytes():
             parts = max(self.least, self._parts(values, self._rate_at_rest(values, p)))
-            self._last = p.tobytes(), parts
+            self._last[0] = p.tobytes(), parts
         return parts
 
     def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
@@ -248,13 +356,13 @@ class Simulator:
             wanted = simulator.substeps_along(values, response)
             if wanted <= response.substeps:
                 break
-            simulator = Simulator(self.system, self.course, self.times, self.step, wanted)
+            simulator = self._with(self.step, wanted)
         return simulator
 
     def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
         """Return by how much, at most and per unit, halving every step moves the outputs."""
         samples, parts = self.samples(values, outputs)
-        finer = Simulator(self.system, self.course, self.times, self.step / 2.0, parts)
+        finer = self._with(self.step / 2.0, parts)
         return float(np.max(np.abs(samples - finer.samples(values, outputs)[0])))
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
@@ -287,19 +395,76 @@ class Simulator:
         return np.concatenate(list(in_threads(block, firsts)), axis=2)[:, :, : len(sets)]
 
     def tangents(
-        self, values: Values, outputs: tuple[str, ...], free: tuple[str, ...]
+        self, values: Values, outputs: tuple[str, ...], directions: Sequence[Direction]
     ) -> tuple[Array, Array]:
-        """Return outputs (M, ny) and their exact derivatives (M, ny, free)."""
-        code = tangent_kernel(self.system, outputs, free)
-        run, slopes = code.run(self._vector(values), self._spans(self.substeps(values)))
-        return self._sampling(run), self._sampling(slopes)
+        """Return outputs (M, ny) and their exact derivatives (M, ny, directions).
+
+        A direction costs the same whatever moves in it; one of the delay alone costs nothing.
+        Raises ValueError where one moves the instant of a step that is not smooth.
+        """
+        columns = [k for k, one in enumerate(directions) if one.parameters or one.steps]
+        driving = [directions[k] for k in columns]
+        free = {name for one in driving for name in one.parameters}
+        inputs = {self.course.steps[k].signal for one in driving for k in one.steps}
+        code = tangent_kernel(
+            self.system,
+            outputs,
+            tuple(name for name in self.system.parameters if name in free),
+            tuple(name for name in self.system.inputs if name in inputs),
+        )
+        spans = self._spans(self.substeps(values))
+        if code.moving:
+            spans = [
+                span._replace(du=self._moving(part, code.moving, driving))
+                for span, part in zip(spans, self._grid, strict=True)
+            ]
+        run, derived = code.run(self._vector(values), self._seeds(driving), spans)
+        slopes = np.zeros((len(self.times), len(outputs), len(directions)))
+        slopes[:, :, columns] = self._sampling(derived)
+        delays = np.array([one.delay for one in directions])
+        if np.any(delays):
+            slopes -= self._sampling.slope(run)[:, :, None] * delays
+        return self._sampling(run), slopes
+
+    def _seeds(self, directions: Sequence[Direction]) -> Array:
+        """Return how each parameter moves in each direction, (np, N)."""
+        seeds = np.zeros((len(self.system.parameters), len(directions)))
+        for column, direction in enumerate(directions):
+            for name, rate in direction.parameters.items():
+                seeds[self.system.parameters.index(name), column] = rate
+        return seeds
+
+    def _moving(
+        self, part: Stretch, inputs: Sequence[str], directions: Sequence[Direction]
+    ) -> Array:
+        """Return how inputs move in each direction at a stretch's grid points, (n + 1, nu, N)."""
+        du = np.zeros((part.steps + 1, len(inputs), len(directions)))
+        for column, direction in enumerate(directions):
+            for index, (at, step) in direction.steps.items():
+                change = self.course.steps[index]
+                if change.signal in inputs:
+                    row = du[:, inputs.index(change.signal), column]
+                    if at:
+                        row += at * change.step * change.share_slope(part)
+                    if step:
+                        row += step * change.share(part)
+        return du
+
+    def _with(self, step: float, least: int) -> "Simulator":
+        return Simulator(self.system, self.course, self.times, step, least, self.delay)
 
     def _inputs_of(self, part: Stretch) -> Array:
         """Return the inputs at the grid points of a stretch, (n + 1, nu)."""
-        times = np.linspace(part.start, part.end, part.steps + 1)
-        names, course = self.system.inputs, self.course
-        inputs = [course.input(name, times, course.level(name, part.start)) for name in names]
+        inputs = [self.course.input(name, part) for name in self.system.inputs]
         return np.ascontiguousarray(np.stack(inputs, axis=1))
+
+    def _inputs_with(self, others: Container[str], known: Array, part: Stretch) -> Array:
+        """Return known inputs with the others of them computed anew."""
+        u = known.copy()
+        for column, name in enumerate(self.system.inputs):
+            if name in others:
+                u[:, column] = self.course.input(name, part)
+        return u
 
     def _vector(self, values: Values) -> Array:
         return np.array([values[name] for name in self.system.parameters], dtype=np.float64)
@@ -374,6 +539,11 @@ class Simulator:
                         f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
                     )
         return "; ".join(dict.fromkeys(found))
+
+
+def _fixed(change: Change) -> Change:
+    """Return what of a step cannot be moved."""
+    return change._replace(at=0.0 if change.smooth else change.at, step=0.0)
 
 
 def _limit_name(node: Node) -> str:

@@ -26,7 +26,7 @@ from exfit.plant import (
     infinite_bus,
     open_circuit,
 )
-from exfit.simulate import Change, Course, Simulator, parameters_used
+from exfit.simulate import Change, Course, Simulator, each, parameters_used
 
 REFERENCE = Path(__file__).parent / "reference"
 QUADRATIC = SATURATION["quadratic"]
@@ -355,7 +355,7 @@ def test_exact_derivatives_on_load_equal_central_differences(machine):
     simulator = Simulator(system(machine), course, np.linspace(0.0, 2.0, 41), 1e-3)
     values = values_on_load(machine, network_Q=0.2, machine_D=0.5)
     free = tuple(name for name in values if name.startswith((MACHINE, NETWORK)))
-    _, slopes = simulator.tangents(values, ("vt", "p"), free)
+    _, slopes = simulator.tangents(values, ("vt", "p"), each(free))
     for column, name in enumerate(free):
         h = 1e-5 * max(abs(values[name]), 0.1)
         sets = [values | {name: values[name] + side * h} for side in (1, -1)]
@@ -449,7 +449,7 @@ def test_exact_derivatives_reach_through_a_stabiliser(stabiliser):
     free = tuple(
         STABILISER + row.symbol for row in stabiliser.sheet if row.unit == "s" and row.typical > 0.0
     )
-    _, slopes = simulator.tangents(values, ("vt",), free)
+    _, slopes = simulator.tangents(values, ("vt",), each(free))
     for column, name in enumerate(free):
         h = 1e-4 * values[name]
         sets = [values | {name: values[name] + side * h} for side in (1, -1)]

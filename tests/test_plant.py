@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plant import MACHINE, VT0
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Change, Course, Simulator, each
 
 
 @pytest.mark.parametrize("name", ["ac1a", "ac8b_unit1", "ac8b_unit2"])
@@ -61,7 +61,7 @@ def test_the_check_system_has_its_closed_form(k, a):
     # Runge-Kutta errs by (a step)^4 / 120 relative
     assert np.abs(samples[:, 0] - expected).max() < 1e-7 * expected.max()
     for column, slope in enumerate(closed_slopes(k, a)):
-        _, exact = simulator.tangents(values, ("vt",), ("k", "a"))
+        _, exact = simulator.tangents(values, ("vt",), each(("k", "a")))
         assert np.abs(exact[:, 0, column] - slope).max() < 1e-7 * np.abs(slope).max()
 
 
@@ -79,7 +79,7 @@ def test_central_differences_of_the_check_system_reach_its_closed_form(name, col
 def test_the_derivatives_of_the_check_system_are_those_printed(printed, column):
     """Lai, NC State University, 3.3: k = 4, a = 2, to four decimals."""
     simulator, values = check_system()
-    _, slopes = simulator.tangents(values, ("vt",), ("k", "a"))
+    _, slopes = simulator.tangents(values, ("vt",), each(("k", "a")))
     expected = np.array(printed.split(), dtype=float)
     assert np.abs(slopes[:, 0, column] - expected).max() <= 0.5e-4 + 1e-9
 
@@ -88,7 +88,7 @@ def test_the_check_system_starts_at_rest_anywhere():
     simulator, values = check_system(vt0=3.0)
     (samples, _), (_, slopes) = (
         simulator.samples(values, ("vt",)),
-        simulator.tangents(values, ("vt",), (VT0,)),
+        simulator.tangents(values, ("vt",), each((VT0,))),
     )
     assert samples[:, 0] == pytest.approx(3.0 + closed_form(K, A), abs=1e-12)
     assert slopes[:, 0, 0] == pytest.approx(np.ones(16), abs=1e-12)

@@ -18,7 +18,7 @@ from exfit.residuals import (
     Free,
     Residuals,
 )
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Change, Course, Simulator, each
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
@@ -31,7 +31,8 @@ def free_names(exciter):
     values = lively_values(exciter)
     rows = [row.symbol for row in MODELS[exciter].sheet if values[row.symbol] > 0.0]
     names = tuple(symbol for symbol in rows if not symbol.endswith(("MAX", "MIN")))
-    slopes = Simulator(system_of(exciter), COURSE, TIMES, 1e-3).tangents(values, ("vt",), names)[1]
+    simulator = Simulator(system_of(exciter), COURSE, TIMES, 1e-3)
+    slopes = simulator.tangents(values, ("vt",), each(names))[1]
     moved = dict(zip(names, np.abs(slopes[:, 0]).max(axis=0), strict=True))
     return sorted(names, key=lambda name: values[name] * moved[name])[-5:]
 

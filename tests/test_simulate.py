@@ -25,6 +25,7 @@ from exfit.simulate import (
     Change,
     Course,
     Simulator,
+    each,
     parameters_used,
     stretches,
 )
@@ -157,7 +158,7 @@ def test_tangents_are_the_slopes_of_the_samples(model):
     times = np.linspace(0.0, 2.0, 77)
     simulator = Simulator(system, Course(0.0, 2.0, (Change(0.20037, 0.002),)), times, 1e-3)
     free = (system.parameters[-1], *sorted(parameters_used(system))[:4])
-    got, slopes = simulator.tangents(values, ("vt",), free)
+    got, slopes = simulator.tangents(values, ("vt",), each(free))
     assert got == pytest.approx(simulator.samples(values, ("vt",))[0], abs=1e-12)
     for column, name in enumerate(free):
         h = 1e-4 * max(values[name], 0.1)

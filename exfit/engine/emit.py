@@ -5,7 +5,7 @@ one set, and a wide node holds one number per direction of differentiation. All 
 functions take are rows of such values; ``run`` is the classical Runge-Kutta method of order four.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from exfit.engine.functions import functions as inlined
@@ -23,39 +23,46 @@ class Part:
     p: tuple[Node | None, ...]
     r: tuple[Node, ...]
     x: tuple[Node, ...]
+    u: tuple[Node | None, ...]
     rest: tuple[Node, ...]
     slopes: tuple[Node, ...]
     outputs: tuple[Node, ...]
     clamped: tuple[Node, ...]
 
+    @property
+    def inputs(self) -> tuple[Node, ...]:
+        """The inputs that the arrays of a run hold: of tangents, those that move."""
+        return tuple(node for node in self.u if node is not None)
+
+    @property
+    def input_shape(self) -> Shape:
+        """The shape of an input: all parameter sets have the same, each direction its own."""
+        return self.shape if self.mark else Shape(1)
+
 
 def simulation(traced: Trace, lanes: int) -> str:
     """Return the IR of ``rest`` and ``run`` for parameter sets side by side."""
     parts = [Part(Shape(lanes), "", *_fields(traced))]
-    return _module(parts, {"rest": _rest(parts), "run": _run(parts, traced.u)})
+    return _module(parts, {"rest": _rest(parts), "run": _run(parts)})
 
 
 def simulation_with_tangents(traced: Trace, derived: Tangents, directions: int) -> str:
     """Return the IR of ``rest`` and ``run`` for one parameter set and its derivatives."""
     parts = _with_tangents(traced, derived, directions)
-    return _module(parts, {"rest": _rest(parts), "run": _run(parts, traced.u)})
+    return _module(parts, {"rest": _rest(parts), "run": _run(parts)})
 
 
 def linearisation(traced: Trace, derived: Tangents, directions: int) -> str:
     """Return the IR of ``rest`` and ``motion``, the slopes at given states, with derivatives."""
     parts = _with_tangents(traced, derived, directions)
-    return _module(parts, {"rest": _rest(parts), "motion": _motion(parts, traced.u)})
+    return _module(parts, {"rest": _rest(parts), "motion": _motion(parts)})
 
 
 def _with_tangents(traced: Trace, derived: Tangents, directions: int) -> list[Part]:
     return [Part(Shape(1), "", *_fields(traced)), Part(Shape(directions), "d", *_fields(derived))]
 
 
-EXTRA = {
-    "rest": [],
-    "motion": ["ptr noalias %u"],
-    "run": ["ptr noalias %u", "double %h", "i64 %n", "i64 %m"],
-}
+STEPS = {"rest": [], "motion": [], "run": ["double %h", "i64 %n", "i64 %m"]}
 
 
 def _module(parts: Sequence[Part], functions: Mapping[str, Writer]) -> str:
@@ -73,7 +80,7 @@ def _module(parts: Sequence[Part], functions: Mapping[str, Writer]) -> str:
 
 
 def _fields(source: Trace | Tangents) -> tuple[tuple[Node, ...], ...]:
-    names = ("p", "r", "x", "rest", "slopes", "outputs", "clamped")
+    names = ("p", "r", "x", "u", "rest", "slopes", "outputs", "clamped")
     return tuple(getattr(source, name) for name in names)
 
 
@@ -81,7 +88,9 @@ def _function(name: str, body: Writer, parts: Sequence[Part]) -> str:
     arrays = [
         f"ptr noalias %{part.mark}{array}" for part in parts for array in ("p", "r", "x", "out")
     ]
-    arguments = ", ".join([*arrays, *EXTRA[name]])
+    driven = [part for part in parts if name != "rest" and (part.inputs or not part.mark)]
+    inputs = [f"ptr noalias %{part.mark}u" for part in driven]
+    arguments = ", ".join([*arrays, *inputs, *STEPS[name]])
     head = f'define void @{name}({arguments}) "prefer-vector-width"="512" {{'
     return "\n".join([head, "entry:", *body.lines, "  ret void", "}", ""])
 
@@ -104,13 +113,13 @@ def _rest(parts: Sequence[Part]) -> Writer:
     return w
 
 
-def _motion(parts: Sequence[Part], inputs: Sequence[Node]) -> Writer:
+def _motion(parts: Sequence[Part]) -> Writer:
     w = _writer(parts)
     values: Values = {}
     for part in parts:
         for array, nodes in (("p", part.p), ("r", part.r), ("x", part.x)):
             values.update(_read(w, part, array, nodes))
-    values.update(_read(w, parts[0], "u", inputs))
+    values.update(_read(w, parts[0], "u", parts[0].u))
     for part in parts:
         for row, slope in enumerate(w.compute(part.slopes, values, part.shape)):
             w.store(slope, f"%{part.mark}out", row, part.shape)
@@ -125,7 +134,7 @@ def _read(w: Writer, part: Part, array: str, nodes: Sequence[Node | None]) -> Va
     }
 
 
-def _run(parts: Sequence[Part], inputs: Sequence[Node]) -> Writer:
+def _run(parts: Sequence[Part]) -> Writer:
     w = _writer(parts)
     fixed: Values = {}
     for part in parts:
@@ -144,7 +153,7 @@ def _run(parts: Sequence[Part], inputs: Sequence[Node]) -> Writer:
 
     w.label("outer")
     w.put("%k = phi i64 [0, %entry], [%k.next, %next]")
-    now, change = _inputs(w, "%k", len(inputs), share)
+    inputs = [_inputs(w, part, "%k", share) for part in parts]
     w.put("br label %inner")
 
     w.label("inner")
@@ -153,13 +162,8 @@ def _run(parts: Sequence[Part], inputs: Sequence[Node]) -> Writer:
     later = w.let("icmp sgt i64 %j, 0")
     # what a later sub-step writes, the next step writes over: no branch is needed
     row = w.let(f"add i64 %k, {w.let(f'zext i1 {later} to i64')}")
-    begin = [w.add_product(Shape(1), u, du, at) for u, du in zip(now, change, strict=True)]
-    half = [
-        w.add_product(Shape(1), u, du, Shape(1).number(0.5))
-        for u, du in zip(begin, change, strict=True)
-    ]
-    end = [w.arithmetic("fadd", Shape(1), u, du) for u, du in zip(begin, change, strict=True)]
-    levels = [_spread_inputs(w, inputs, u) for u in (begin, half, end)]
+    driving = [_levels(w, part, *read, at) for part, read in zip(parts, inputs, strict=True)]
+    levels = [_merged(at_once) for at_once in zip(*driving, strict=True)]
     x = _states(w, parts, slots)
     moved = _runge_kutta(w, parts, fixed, levels, x, fractions, row)
     clamped = {**fixed, **levels[2], **moved}
@@ -174,9 +178,10 @@ def _run(parts: Sequence[Part], inputs: Sequence[Node]) -> Writer:
     w.put(f"br i1 {w.let('icmp slt i64 %k.next, %n')}, label %outer, label %done")
 
     w.label("done")
-    last, _ = _inputs(w, "%n", len(inputs), None)
+    last = [_inputs(w, part, "%n", None)[0] for part in parts]
     final = _states(w, parts, slots)
-    values = {**fixed, **_spread_inputs(w, inputs, last), **final}
+    levels = [_in_every_lane(w, part, u) for part, u in zip(parts, last, strict=True)]
+    values = {**fixed, **_merged(levels), **final}
     for part in parts:
         _write_outputs(w, part, values, "%n")
         for row_, node in enumerate(part.x):
@@ -207,20 +212,43 @@ def _states(w: Writer, parts: Sequence[Part], slots: Mapping[Node, str]) -> Valu
     }
 
 
-def _inputs(w: Writer, step: str, count: int, share: str | None) -> tuple[list[str], list[str]]:
+def _inputs(w: Writer, part: Part, step: str, share: str | None) -> tuple[list[str], list[str]]:
     """Read the inputs at a step, and by how much they change over one of its sub-steps."""
-    one = Shape(1)
-    base = w.address("%u", w.let(f"mul i64 {step}, {count}"))
-    now = [w.load(base, row, one) for row in range(count)]
+    shape, count = part.input_shape, len(part.inputs)
+    if not count:
+        return [], []
+    base = w.address(f"%{part.mark}u", w.let(f"mul i64 {step}, {count * shape.lanes}"))
+    now = [w.load(base, row, shape) for row in range(count)]
     if share is None:
         return now, []
-    then = [w.load(base, count + row, one) for row in range(count)]
-    differences = [w.arithmetic("fsub", one, b, a) for a, b in zip(now, then, strict=True)]
-    return now, [w.arithmetic("fmul", one, difference, share) for difference in differences]
+    then = [w.load(base, count + row, shape) for row in range(count)]
+    differences = [w.arithmetic("fsub", shape, b, a) for a, b in zip(now, then, strict=True)]
+    shares = w.spread(share, shape)
+    return now, [w.arithmetic("fmul", shape, difference, shares) for difference in differences]
 
 
-def _spread_inputs(w: Writer, inputs: Sequence[Node], scalars: Sequence[str]) -> Values:
-    return {node: w.spread(u, w.narrow) for node, u in zip(inputs, scalars, strict=True)}
+def _levels(
+    w: Writer, part: Part, now: Sequence[str], change: Sequence[str], at: str
+) -> list[Values]:
+    """Write the inputs where a sub-step begins, in its middle and where it ends."""
+    shape = part.input_shape
+    count, middle = w.spread(at, shape) if now else at, shape.number(0.5)
+    begin = [w.add_product(shape, u, du, count) for u, du in zip(now, change, strict=True)]
+    half = [w.add_product(shape, u, du, middle) for u, du in zip(begin, change, strict=True)]
+    end = [w.arithmetic("fadd", shape, u, du) for u, du in zip(begin, change, strict=True)]
+    return [_in_every_lane(w, part, u) for u in (begin, half, end)]
+
+
+def _in_every_lane(w: Writer, part: Part, inputs: Sequence[str]) -> Values:
+    one_for_all = part.input_shape != part.shape
+    return {
+        node: w.spread(u, part.shape) if one_for_all else u
+        for node, u in zip(part.inputs, inputs, strict=True)
+    }
+
+
+def _merged(parts: Iterable[Values]) -> Values:
+    return {node: name for values in parts for node, name in values.items()}
 
 
 def _write_outputs(w: Writer, part: Part, values: Values, row: str) -> None:

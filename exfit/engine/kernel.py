@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -43,12 +43,14 @@ class Start(NamedTuple):
 class Span(NamedTuple):
     """A stretch of a run: inputs u (n + 1, nu) at its grid points, linear between, and the step.
 
-    ``step`` is in seconds; each of the n steps is taken in ``parts`` equal sub-steps.
+    ``step`` is in seconds; each of the n steps is taken in ``parts`` equal sub-steps. ``du``
+    (n + 1, moving, N) are the tangents of the inputs that move, linear between as well.
     """
 
     u: Array
     step: float
     parts: int
+    du: Array | None = None
 
 
 def cache_folder() -> Path:
@@ -177,42 +179,56 @@ class Kernel:
         return results
 
 
+def _block(tangents: Array, first: int) -> Array:
+    """Return DIRECTIONS of the tangents (..., N) from the first on; what is missing is zero."""
+    given = tangents[..., first : first + DIRECTIONS]
+    block = np.zeros((*tangents.shape[:-1], DIRECTIONS))
+    block[..., : given.shape[-1]] = given
+    return block
+
+
 class TangentKernel:
-    """Simulates one parameter set with its exact derivatives to some of the parameters."""
+    """Simulates one parameter set with its exact derivatives in any directions.
 
-    def __init__(self, system: System, outputs: Sequence[str], free: Sequence[str]) -> None:
-        self.system, self.outputs, self.free = system, tuple(outputs), tuple(free)
+    A direction may move the parameters that are ``free`` and the inputs that are ``moving``.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        outputs: Sequence[str],
+        free: Sequence[str],
+        moving: Sequence[str] = (),
+    ) -> None:
+        self.system, self.outputs = system, tuple(outputs)
+        self.free, self.moving = tuple(free), tuple(moving)
         traced = trace(system, outputs)
-        derived = differentiate(traced, system, free)
+        derived = differentiate(traced, system, free, moving)
         engine = compiled(simulation_with_tangents(traced, derived, DIRECTIONS), long_vectors=True)
+        inputs = (ctypes.c_void_p,) if self.moving else ()
         self._rest = _function(engine, "rest", 8)
-        self._run = _function(engine, "run", 8, RUN_ARGUMENTS)
+        self._run = _function(engine, "run", 8, (*inputs, *RUN_ARGUMENTS))
 
-    @cached_property
-    def seeds(self) -> list[Array]:
-        """The directions, one per free parameter, in blocks (np, DIRECTIONS)."""
-        parameters = self.system.parameters
-        whole = -(-len(self.free) // DIRECTIONS) * DIRECTIONS
-        seeds = np.zeros((len(parameters), whole))
-        for column, name in enumerate(self.free):
-            seeds[parameters.index(name), column] = 1.0
-        return [
-            np.ascontiguousarray(block) for block in np.split(seeds, whole // DIRECTIONS, axis=1)
-        ]
+    def run(self, p: Array, dp: Array, spans: Sequence[Span]) -> tuple[list[Array], list[Array]]:
+        """Return, for each span, outputs (n + 1, ny) and their derivatives (n + 1, ny, N).
 
-    def run(self, p: Array, spans: Sequence[Span]) -> tuple[list[Array], list[Array]]:
-        """Return, for each span, outputs (n + 1, ny) and their derivatives (n + 1, ny, free).
-
-        ``p`` is (np,); the derivative of the starting state is part of theirs.
+        ``p`` is (np,), and ``dp`` (np, N) its tangents in N directions, zero but where parameters
+        are free; inputs that move have theirs in the spans. The derivative of the starting state
+        is part of the result.
         """
-        blocks = list(in_threads(lambda seed: self._block(p, seed, spans), self.seeds))
+        directions = dp.shape[1]
+        firsts = range(0, max(directions, 1), DIRECTIONS)
+        blocks = list(in_threads(lambda first: self._directions(p, dp, spans, first), firsts))
         values = blocks[0][0]
         slopes = [
             np.concatenate(parts, axis=2) for parts in zip(*(b[1] for b in blocks), strict=True)
         ]
-        return values, [slope[:, :, : len(self.free)] for slope in slopes]
+        return values, [slope[:, :, :directions] for slope in slopes]
 
-    def _block(self, p: Array, dp: Array, spans: Sequence[Span]) -> tuple[list[Array], list[Array]]:
+    def _directions(
+        self, p: Array, tangents: Array, spans: Sequence[Span], first: int
+    ) -> tuple[list[Array], list[Array]]:
+        dp = _block(tangents, first)
         shapes = (len(self.system.setpoints), len(self.system.states))
         r, x = (np.empty(rows) for rows in shapes)
         dr, dx = (np.empty((rows, DIRECTIONS)) for rows in shapes)
@@ -222,7 +238,8 @@ class TangentKernel:
         for span in spans:
             out = np.empty((len(span.u), len(self.outputs)))
             dout = np.empty((*out.shape, DIRECTIONS))
-            arrays = (p, r, x, out, dp, dr, dx, dout, span.u)
+            du = () if span.du is None else (_block(span.du, first),)
+            arrays = (p, r, x, out, dp, dr, dx, dout, span.u, *du)
             self._run(*map(_address, arrays), span.step / span.parts, len(span.u) - 1, span.parts)
             values.append(out)
             slopes.append(dout)

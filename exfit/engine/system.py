@@ -63,6 +63,7 @@ class Tangents:
     p: tuple[Node | None, ...]  # the tangent of each parameter; None where it is not free
     r: tuple[Node, ...]
     x: tuple[Node, ...]
+    u: tuple[Node | None, ...]  # the tangent of each input; None where it does not move
     rest: tuple[Node, ...]
     slopes: tuple[Node, ...]
     outputs: tuple[Node, ...]
@@ -97,26 +98,35 @@ def trace(system: System, outputs: Sequence[str]) -> Trace:
     )
 
 
-def differentiate(traced: Trace, system: System, free: Sequence[str]) -> Tangents:
-    """Return the derivatives of a trace with respect to the free parameters."""
+def differentiate(
+    traced: Trace, system: System, free: Sequence[str], moving: Sequence[str] = ()
+) -> Tangents:
+    """Return the derivatives of a trace where the free parameters and the moving inputs move."""
     graph = traced.x[0].graph
 
     def symbols(nodes: Sequence[Node], varies: bool) -> tuple[Node, ...]:
         return tuple(graph.symbol(f"d{n.args[0]}", varies=varies, wide=True) for n in nodes)
 
-    p = tuple(
-        graph.symbol(f"dp.{name}", varies=False, wide=True) if name in free else None
-        for name in system.parameters
-    )
+    def some(
+        nodes: Sequence[Node], names: Sequence[str], chosen: Sequence[str], varies: bool
+    ) -> tuple[Node | None, ...]:
+        pairs = zip(nodes, names, strict=True)
+        return tuple(symbols([n], varies)[0] if name in chosen else None for n, name in pairs)
+
+    p = some(traced.p, system.parameters, free, False)
     r, x = symbols(traced.r, False), symbols(traced.x, True)
+    u = some(traced.u, system.inputs, moving, True)
     seeds = {node: dp for node, dp in zip(traced.p, p, strict=True) if dp is not None}
-    moving = {**seeds, **dict(zip(traced.r, r, strict=True)), **dict(zip(traced.x, x, strict=True))}
+    nodes, derived = (*traced.r, *traced.x, *traced.u), (*r, *x, *u)
+    pairs = zip(nodes, derived, strict=True)
+    every = {**seeds, **{node: symbol for node, symbol in pairs if symbol is not None}}
     return Tangents(
         p=p,
         r=r,
         x=x,
+        u=u,
         rest=tuple(tangents(traced.rest, seeds)),
-        slopes=tuple(tangents(traced.slopes, moving)),
-        outputs=tuple(tangents(traced.outputs, moving)),
-        clamped=tuple(tangents(traced.clamped, moving)),
+        slopes=tuple(tangents(traced.slopes, every)),
+        outputs=tuple(tangents(traced.outputs, every)),
+        clamped=tuple(tangents(traced.clamped, every)),
     )

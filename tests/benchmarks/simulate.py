@@ -26,7 +26,7 @@ from fit import ByHand
 from oracle import system_of, typical_values, vector
 
 from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Change, Course, Simulator, each
 
 HERE = Path(__file__).parent
 STEP, STEPS, AT, RISE = 1e-3, 10_000, 1_000, 0.05
@@ -77,7 +77,8 @@ def bump():
 def tangents():
     """Return the bare machine code of exfit with its exact derivatives."""
     code, p, spans = TangentKernel(SYSTEM, ("vt",), FREE), vector(SYSTEM, VALUES), bump()
-    return lambda: code.run(p, spans)
+    seeds = np.eye(len(p))[:, [SYSTEM.parameters.index(name) for name in FREE]]
+    return lambda: code.run(p, seeds, spans)
 
 
 def simulator():
@@ -128,7 +129,9 @@ def main():
         "exfit, bare machine code": one,
         "exfit, sub-steps and samples": lambda: study.samples(next(ever_new), ("vt",)),
         "exfit, bare Jacobian of 7": tangents(),
-        "exfit, Jacobian of 7 and samples": lambda: study.tangents(next(ever_new), ("vt",), FREE),
+        "exfit, Jacobian of 7 and samples": lambda: study.tangents(
+            next(ever_new), ("vt",), each(FREE)
+        ),
         f"exfit, {SIDE_BY_SIDE} sets side by side": kernel(SIDE_BY_SIDE),
     }
     timed(list(ways.values()), 5)
