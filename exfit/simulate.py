@@ -73,19 +73,23 @@ class Change(NamedTuple):
         """Return how much of the step the grid points (n + 1,) of a stretch have seen."""
         if not self.smooth:
             return np.full(part.steps + 1, 1.0 if self.at <= part.start else 0.0)
-        x = self._beyond(part)
-        return np.asarray(0.5 + x - 0.5 * x * np.abs(x))
+        seen, (near, x) = np.zeros(part.steps + 1), self._near(part)
+        seen[near], seen[near.stop :] = 0.5 + x - 0.5 * x * np.abs(x), 1.0
+        return seen
 
     def share_slope(self, part: Stretch) -> Array:
         """Return the derivative of ``share`` to the instant, 1/s; only a smooth step has it."""
         if not self.smooth:
             raise ValueError(f"the step of {self.signal} at {self.at:g} s is not smooth: it stays")
-        return np.asarray((np.abs(self._beyond(part)) - 1.0) / part.step)
+        slope, (near, x) = np.zeros(part.steps + 1), self._near(part)
+        slope[near] = (np.abs(x) - 1.0) / part.step
+        return slope
 
-    def _beyond(self, part: Stretch) -> Array:
-        """Return how far the grid points lie beyond the instant, in steps, at most one."""
-        first = (part.start - self.at) / part.step
-        return np.clip(np.arange(part.steps + 1) + first, -1.0, 1.0)
+    def _near(self, part: Stretch) -> tuple[slice, Array]:
+        """Return the grid points less than a step from the instant, and how far beyond it."""
+        position = (self.at - part.start) / part.step
+        first, stop = np.clip(math.floor(position) + np.array([0, 2]), 0, part.steps + 1)
+        return slice(first, stop), np.arange(first, stop) - position
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,14 +169,16 @@ def stretches(course: Course, step: float) -> list[Stretch]:
 
 
 @cache
-def lagrange(points: int) -> tuple[Array, Array]:
-    """Return the polynomials that are one at one of the points 0, 1, 2 ... and zero at the others.
+def lagrange(points: int) -> Array:
+    """Return the polynomials that are one at one of 0 ... points - 1 and zero at the others.
 
-    A column holds the coefficients of one from the highest power down; then those of its slope.
+    A row of coefficients each, from the lowest power up, and below them those of their slopes:
+    zero where there are fewer points than NEIGHBOURS, (2 NEIGHBOURS, NEIGHBOURS).
     """
-    coefficients = np.linalg.inv(np.vander(np.arange(points)))
-    powers = np.arange(points - 1, 0, -1)
-    return coefficients, powers[:, None] * coefficients[:-1]
+    values = np.zeros((NEIGHBOURS, NEIGHBOURS))
+    values[:points, :points] = np.linalg.inv(np.vander(np.arange(points), increasing=True)).T
+    slopes = np.roll(values * np.arange(NEIGHBOURS), -1, axis=1)
+    return np.vstack([values, slopes])
 
 
 class Sampling:
@@ -189,35 +195,28 @@ class Sampling:
         wanted = times - delay
         read = np.clip(wanted, grid[0].start, grid[-1].end)
         still = np.abs(wanted - read) > near * grid[0].step
-        ends = np.array([part.end for part in grid])
-        owner = np.minimum(np.searchsorted(ends, read - near * grid[0].step), len(grid) - 1)
-        self._rows = np.zeros((len(times), NEIGHBOURS), dtype=np.int64)
-        self._weights, self._slopes = np.zeros((2, len(times), NEIGHBOURS))
-        nearest, on_grid = np.zeros(len(times), dtype=np.int64), np.zeros(len(times), dtype=bool)
-        offset = 0
-        for number, part in enumerate(grid):
-            mine = np.flatnonzero(owner == number)
-            position = (read[mine] - part.start) / part.step
-            rows, weights, slopes = self._cubic(position, part.steps)
-            columns = np.s_[mine, : rows.shape[1]]
-            self._rows[columns] = rows + offset
-            self._weights[columns], self._slopes[columns] = weights, slopes / part.step
-            rounded = np.clip(np.rint(position), 0, part.steps)
-            nearest[mine] = rounded.astype(np.int64) + offset
-            on_grid[mine] = np.abs(position - rounded) < near
-            offset += part.steps + 1
-        self._weights[on_grid] = self._rows[on_grid] == nearest[on_grid, None]
-        self._slopes[still] = 0.0
-        self._exact = nearest if np.all(on_grid) else None
-
-    @staticmethod
-    def _cubic(position: Array, count: int) -> tuple[NDArray[np.int64], Array, Array]:
-        """Return neighbours of positions on ``count`` steps, their weights and those of slopes."""
-        points = min(NEIGHBOURS, count + 1)
-        first = np.clip(np.floor(position).astype(np.int64) - 1, 0, count + 1 - points)
-        values, slopes = lagrange(points)
-        powers = np.vander(position - first, points)
-        return first[:, None] + np.arange(points), powers @ values, powers[:, 1:] @ slopes
+        start, step, count, end = np.array([(*part, part.end) for part in grid]).T
+        owner = np.minimum(np.searchsorted(end, read - near * step[0]), len(grid) - 1)
+        position, last = (read - start[owner]) / step[owner], count[owner]
+        points = np.minimum(NEIGHBOURS, last + 1.0)  # a short stretch has fewer
+        first = np.clip(np.floor(position) - 1.0, 0.0, last + 1.0 - points)
+        powers = np.ones((NEIGHBOURS, len(times)))
+        for k in range(1, NEIGHBOURS):
+            powers[k] = powers[k - 1] * (position - first)
+        weights = np.zeros((2 * NEIGHBOURS, len(times)))
+        for n in {min(NEIGHBOURS, part.steps + 1) for part in grid}:
+            weights += lagrange(n) @ (powers * (points == n))
+        self._weights, self._slopes = weights[:NEIGHBOURS], weights[NEIGHBOURS:] / step[owner]
+        self._slopes[:, still] = 0.0
+        before = np.cumsum(count + 1.0) - count - 1.0
+        rows = before[owner] + first + np.arange(NEIGHBOURS)[:, None]
+        self._rows = np.minimum(rows, before[-1] + count[-1]).astype(np.int64)
+        nearest = np.clip(np.rint(position), 0.0, last)
+        on_grid = np.abs(position - nearest) < near
+        exact = (before[owner] + nearest).astype(np.int64)
+        if np.any(on_grid):
+            self._weights[:, on_grid] = (self._rows == exact)[:, on_grid]
+        self._exact = exact if np.all(on_grid) else None
 
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
@@ -230,7 +229,7 @@ class Sampling:
         return self._combined(run, self._slopes)
 
     def _combined(self, run: Sequence[Array], weights: Array) -> Array:
-        return np.asarray(np.einsum("mk,mk...->m...", weights, _rows(run)[self._rows]))
+        return np.asarray(np.einsum("km,km...->m...", weights, _rows(run)[self._rows]))
 
 
 def _rows(run: Sequence[Array]) -> Array:
