@@ -19,11 +19,14 @@ from exfit.engine.system import Motion, Rest, System, trace
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
-from exfit.plant import VT0
+from exfit.models.machines import MACHINES
+from exfit.plant import SATURATION, VT0, open_circuit
 from exfit.simulate import (
     MOST_SUBSTEPS,
     Change,
     Course,
+    Direction,
+    Played,
     Simulator,
     each,
     parameters_used,
@@ -152,21 +155,230 @@ def test_many_sets_give_what_each_gives(model):
         assert np.abs(together[:, :, lane] - expected).max() < 1e-7
 
 
+# --- what a fit may move --------------------------------------------------------------------------
+
+SMOOTH = Change(0.50037, 3e-4, smooth=True)
+BETWEEN = (np.arange(75) * 26 + 0.5) * 1e-3  # s, in the middle of steps of 1 ms
+FIVE_POINTS = {1: 8.0, -1: -8.0, 2: -1.0, -2: 1.0}  # the difference that is exact up to quartics
+MOVED = 1e-4  # of a direction; of an instant or a delay, in s, within its step
+# of a difference of two runs, pu: some dozen units in the last place of vt
+DIFFERENCE_ROUNDING = 2e-14
+
+
+def along(simulator, values, direction, far, outputs=("vt",)):
+    """Return the samples when what a direction names has moved ``far`` along it."""
+    steps = list(simulator.course.steps)
+    for index, (at, step) in direction.steps.items():
+        old = steps[index]
+        steps[index] = old._replace(at=old.at + far * at, step=old.step + far * step)
+    values = values | {name: values[name] + far * v for name, v in direction.parameters.items()}
+    moved = simulator.moved(tuple(steps), simulator.delay + far * direction.delay)
+    return moved.samples(values, outputs)[0]
+
+
+def assert_exact(simulator, values, directions, outputs=("vt",), h=MOVED):
+    """Assert that tangents equal differences, to 1e-7 of the largest and to rounding."""
+    got, slopes = simulator.tangents(values, outputs, directions)
+    assert got == pytest.approx(simulator.samples(values, outputs)[0], abs=1e-12)
+    for column, direction in enumerate(directions):
+        ends = {k: along(simulator, values, direction, k * h, outputs) for k in FIVE_POINTS}
+        expected = sum(weight * ends[k] for k, weight in FIVE_POINTS.items()) / (12.0 * h)
+        error = np.abs(slopes[:, :, column] - expected).max(axis=0)
+        size = np.abs(slopes[:, :, column]).max(axis=0)
+        rounding = DIFFERENCE_ROUNDING * np.maximum(1.0, np.abs(got).max(axis=0)) / h
+        assert (error <= 1e-7 * size + rounding).all(), direction
+
+
 def test_tangents_are_the_slopes_of_the_samples(model):
-    """By differences at the times of the samples, off the grid and past a step."""
+    """Of parameters, a tie of two, instant and size of a smooth step, another's size, a delay."""
     system, values = system_of(model), lively_values(model)
-    times = np.linspace(0.0, 2.0, 77)
-    simulator = Simulator(system, Course(0.0, 2.0, (Change(0.20037, 0.002),)), times, 1e-3)
+    course = Course(0.0, 2.0, (SMOOTH._replace(at=0.20037), Change(0.9, -3e-4)))
+    simulator = Simulator(system, course, BETWEEN, 1e-3)
     free = (system.parameters[-1], *sorted(parameters_used(system))[:4])
-    got, slopes = simulator.tangents(values, ("vt",), each(free))
-    assert got == pytest.approx(simulator.samples(values, ("vt",))[0], abs=1e-12)
-    for column, name in enumerate(free):
-        h = 1e-4 * max(values[name], 0.1)
-        sets = [values | {name: values[name] + side * h} for side in (1, -1)]
-        ends = simulator.samples_of_many(sets, ("vt",))
-        expected = (ends[:, :, 0] - ends[:, :, 1]) / (2 * h)
-        size = np.abs(slopes[:, :, column]).max()
-        assert np.abs(slopes[:, :, column] - expected).max() < 1e-6 * size + 1e-8, name
+    rates = {name: max(values[name], 0.1) for name in free}
+    directions = (
+        *(Direction({name: rate}) for name, rate in rates.items()),
+        Direction({free[0]: 0.1 * rates[free[0]], free[1]: -rates[free[1]]}),
+        Direction(steps={0: (1.0, 0.0)}),
+        Direction(steps={0: (0.0, 0.1)}),
+        Direction(steps={1: (0.0, 0.1)}),
+        Direction(delay=1.0),
+    )
+    assert_exact(simulator, values, directions)
+
+
+def test_tangents_are_exact_with_sub_steps_two_smooth_steps_and_two_inputs():
+    """All of it moving at once, too; what one direction moves, others leave."""
+    system = open_circuit(
+        MODELS["AC8B"], MACHINES["GENROU"], SATURATION["quadratic"], ("vref", "vs")
+    )
+    values = lively_values("AC8B")
+    steps = (
+        SMOOTH,
+        Change(0.8, -2e-4, "vs"),
+        Change(0.80052, 1e-4, smooth=True),
+        Change(1.2, 1e-4, "vs", smooth=True),
+    )
+    simulator = Simulator(system, Course(0.0, 2.0, steps), BETWEEN, 1e-3, least=3)
+    assert simulator.substeps(values) == 3
+    directions = (
+        *(Direction(steps={k: (1.0, 0.0)}) for k in (0, 2, 3)),
+        *(Direction(steps={k: (0.0, 0.1)}) for k in range(4)),
+        Direction({"TE": 0.5}, {0: (0.5, 0.01), 1: (0.0, 0.02), 3: (-1.0, 0.01)}, delay=-0.7),
+        Direction(delay=1.0),
+    )
+    # the third one's instant lies on the grid, where only the first derivative is continuous
+    off_grid = simulator.moved((*steps[:3], steps[3]._replace(at=1.20037)), 0.00113)
+    assert_exact(off_grid, values, directions, ("vt", "efd", "vref"))
+
+
+def test_a_direction_that_moves_several_parameters_is_the_sum_of_theirs():
+    values, names = lively_values("AC1A"), ("KA", "TE", "machine.Tpd0")
+    simulator = Simulator(system_of("AC1A"), UP, CLOCK, 1e-3)
+    rates = dict(zip(names, (3.0, -0.1, 2.0), strict=True))
+    _, slopes = simulator.tangents(values, ("vt",), (*each(names), Direction(rates)))
+    expected = slopes[:, :, :3] @ list(rates.values())
+    assert slopes[:, :, 3] == pytest.approx(expected, rel=1e-12, abs=1e-15)
+
+
+def test_the_derivative_to_an_instant_adds_up_across_grid_points():
+    """By Gauss's rule on each side: the derivative is continuous, and all but linear there."""
+    values, course = lively_values("AC1A"), Course(0.0, 2.0, (SMOOTH,))
+    simulator = Simulator(system_of("AC1A"), course, CLOCK, 1e-3)
+
+    def at(instant):
+        return simulator.moved((SMOOTH._replace(at=instant),), 0.0)
+
+    total = 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    for low, high in ((0.4994, 0.5), (0.5, 0.501), (0.501, 0.5017)):
+        for node, weight in zip(nodes, weights, strict=True):
+            here = at((low + high + (high - low) * node) / 2.0)
+            _, slopes = here.tangents(values, ("vt",), (Direction(steps={0: (1.0, 0.0)}),))
+            total = total + slopes[:, :, 0] * weight * (high - low) / 2.0
+    moved = at(0.5017).samples(values, ("vt",))[0] - at(0.4994).samples(values, ("vt",))[0]
+    assert np.abs(moved).max() > 1e-6
+    assert np.abs(total - moved).max() < 1e-7 * np.abs(moved).max() + DIFFERENCE_ROUNDING
+
+
+@laws
+@given(st.floats(0.1, 2.9), st.floats(-0.1, 0.1), st.sampled_from([0.05, 0.01, 1e-3]))
+def test_the_area_under_a_smooth_step_is_that_of_the_exact_one(at, size, step):
+    course = Course(0.0, 3.0, (Change(at, size, smooth=True),))
+    (part,) = stretches(course, step)
+    u = course.input("vref", part)
+    area = part.step * (u.sum() - (u[0] + u[-1]) / 2.0)
+    assert area == pytest.approx(size * (3.0 - at), abs=1e-13)
+    away = np.abs(part.times - at) >= 1.001 * part.step
+    assert (u[away] == np.where(part.times > at, size, 0.0)[away]).all()
+    assert (np.diff(u) * size >= 0.0).all()
+
+
+@pytest.mark.parametrize("at", [-5.0, -0.01, 3.01, 9.0])
+def test_a_smooth_step_outside_a_course_is_over_or_never_comes(at):
+    change = Change(at, 0.05, smooth=True)
+    course = Course(0.0, 3.0, (change,))
+    (part,) = stretches(course, 1e-3)
+    assert (course.input("vref", part) == (0.05 if at < 0.0 else 0.0)).all()
+    assert (change.share_slope(part) == 0.0).all()
+    assert course.level("vref", 10.0) == 0.0
+
+
+def test_a_smooth_step_nears_the_exact_one_with_the_square_of_the_step(model):
+    values, clock = lively_values(model), CLOCK[np.abs(CLOCK - SMOOTH.at) > 0.01]
+    errors = []
+    for step in (2e-3, 1e-3):
+        smooth, exact = (
+            samples(model, values, Course(0.0, 2.0, (change,)), clock, step)
+            for change in (SMOOTH, SMOOTH._replace(smooth=False))
+        )
+        errors.append(np.abs(smooth - exact).max())
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+    assert errors[1] < 1e-4 * SMOOTH.step
+
+
+def test_a_later_instant_is_a_later_recorder_for_a_plant_at_rest(model):
+    """To rounding by whole steps; else by what the step's second moment moves within a step."""
+    values, course = lively_values(model), Course(0.0, 2.0, (SMOOTH,))
+    simulator = Simulator(system_of(model), course, CLOCK[CLOCK < 1.9], 1e-3)
+    late, early = SMOOTH.at + 0.013, SMOOTH.at - 0.02
+    for at, least in ((late, 1e-13), (early, 1e-13), (late + 0.0004, 2e-5 * SMOOTH.step)):
+        delay = at - SMOOTH.at
+        moved = simulator.moved((SMOOTH._replace(at=at),), 0.0).samples(values, ("vt",))[0]
+        delayed = simulator.moved((SMOOTH,), delay).samples(values, ("vt",))[0]
+        # around the bend at the step itself a cubic cannot follow
+        away = np.abs(simulator.times - at) > 0.005
+        assert np.abs(moved - delayed)[away].max() < least + 1e-11
+
+
+def test_a_recorder_with_a_delay_shows_what_was(model):
+    """Before the start it shows the start, after the end the end, and neither has a slope."""
+    values = lively_values(model)
+    simulator = Simulator(system_of(model), Course(0.0, 2.0, (SMOOTH,)), CLOCK, 1e-3)
+    undelayed = simulator.samples(values, ("vt",))[0]
+    delay = Direction(delay=1.0)
+    late, slopes = simulator.moved((SMOOTH,), 0.25).tangents(values, ("vt",), (delay,))
+    assert np.abs(late[25:] - undelayed[:-25]).max() < 1e-13
+    assert (late[:25] == undelayed[0]).all()
+    assert (slopes[:25] == 0.0).all()
+    early, slopes = simulator.moved((SMOOTH,), -0.25).tangents(values, ("vt",), (delay,))
+    assert np.abs(early[:-25] - undelayed[25:]).max() < 1e-13
+    assert early[-25:] == pytest.approx(np.full((25, 1), undelayed[-1, 0]), abs=1e-15)
+    assert (slopes[-24:] == 0.0).all()
+    assert (slopes[60:-26] != 0.0).all()
+
+
+def test_a_moved_simulator_is_the_one_built_so():
+    values, played = lively_values("AC1A"), Played(CLOCK, {"vref": 1e-3 * np.sin(CLOCK)})
+    steps = (SMOOTH, Change(0.7, 1e-4), Change(1.3, 2e-4, smooth=True))
+    course = Course(0.0, 2.0, steps, played)
+    simulator = Simulator(system_of("AC1A"), course, BETWEEN, 1e-3)
+    before = simulator.samples(values, ("vt",))[0]
+    others = (steps[0]._replace(at=0.9), Change(0.7, 0.0), steps[2])
+    moved = simulator.moved(others, 0.0123)
+    new = Simulator(
+        system_of("AC1A"), Course(0.0, 2.0, others, played), BETWEEN, 1e-3, delay=0.0123
+    )
+    expected = new.samples(values, ("vt",))[0]
+    np.testing.assert_array_equal(moved.samples(values, ("vt",))[0], expected)
+    np.testing.assert_array_equal(simulator.samples(values, ("vt",))[0], before)
+    back = moved.moved(steps, 0.0)
+    np.testing.assert_array_equal(back.samples(values, ("vt",))[0], before)
+
+
+def test_only_what_is_smooth_may_change_its_instant():
+    exact, smooth = UP.steps[0], SMOOTH
+    simulator = Simulator(system_of("AC1A"), Course(0.0, 2.0, (exact, smooth)), CLOCK, 1e-3)
+    wrong = (
+        (exact._replace(at=0.6), smooth),
+        (exact, smooth._replace(smooth=False)),
+        (exact, smooth._replace(signal="vs")),
+        (exact,),
+    )
+    for steps in wrong:
+        with pytest.raises(ValueError, match="instants of smooth steps"):
+            simulator.moved(steps, 0.0)
+    values, moving = lively_values("AC1A"), Direction(steps={0: (1.0, 0.0)})
+    with pytest.raises(ValueError, match=r"the step of vref at 0\.5 s is not smooth"):
+        simulator.tangents(values, ("vt",), (moving,))
+
+
+def test_a_simulator_made_from_another_keeps_its_steps_and_its_delay():
+    """With finer steps a smooth step is sharper: the step error tells of it."""
+    end = 33.0**0.5
+    course = Course(0.0, 1.0, (Change(0.3, end + end**3, smooth=True),))
+    times, values = np.linspace(0.0, 1.0, 51), {VT0: 0.0}
+    start = Simulator(STIFFENING, course, times, 0.02)
+    moved = start.moved((course.steps[0]._replace(at=0.1),), 0.11)
+    secured = moved.secured(values)
+    assert secured is not moved
+    assert (secured.delay, secured.course) == (0.11, moved.course)
+    parts = moved.substeps(values)
+    coarse, fine = (
+        Simulator(STIFFENING, moved.course, times, 0.02 / n, parts, 0.11).samples(values, ("x",))[0]
+        for n in (1, 2)
+    )
+    assert moved.step_error(values, ("x",)) == np.abs(coarse - fine).max() > 0.0
 
 
 # --- limits ---------------------------------------------------------------------------------------
