@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from oracle import SURROUNDINGS, WITHOUT_PLANT, drawn_values, float_run, levels, system_of, vector
 
 from exfit.engine import kernel as engine
+from exfit.engine.emit import simulation_with_tangents
 from exfit.engine.kernel import Kernel, LinearKernel, Span, TangentKernel
-from exfit.engine.system import Motion, Rest, System
+from exfit.engine.system import Motion, Rest, System, differentiate, trace
 from exfit.engine.trace import clip, cos, exp, larger, log, sin, smaller, sqrt, where
 from exfit.models import MODELS
 from exfit.plant import SATURATION, VT0
@@ -386,6 +387,62 @@ def test_the_linearisation_equals_differences_of_the_float_slopes(model):
         expected = (up - down) / (2 * h)
         error = np.abs(jacobian[:, column] - expected).max()
         assert error < 1e-6 * np.abs(jacobian).max()  # rounding of slopes, 1e-12 over 1e-6
+
+
+DRIVEN = System(
+    parameters=("a", "b"),
+    setpoints=("r",),
+    states=("x", "y"),
+    inputs=("u", "v", "w"),
+    outputs=("x", "y", "uw"),
+    time_constants=(),
+    rest=lambda p: Rest({"x": p["a"], "y": p["b"]}, {"r": p["a"] * p["b"]}),
+    motion=lambda p, r, x, u: Motion(
+        {
+            "x": r["r"] + u["u"] * u["v"] - p["a"] * x["x"],
+            "y": sin(u["w"] * x["x"]) - p["b"] * x["y"] + u["u"],
+        },
+        {},
+        {"x": x["x"], "y": x["y"], "uw": u["u"] * u["w"]},
+    ),
+)
+
+
+@pytest.mark.parametrize("count", [1, 8, 19])
+def test_tangents_of_moving_inputs_equal_differences_in_every_direction(count):
+    """Of drawn courses of two of three inputs, beside a parameter, over spans with sub-steps."""
+    rng, h, p = np.random.default_rng(8), 1e-4, np.array([0.7, 1.3])
+    code = TangentKernel(DRIVEN, DRIVEN.outputs, ("b",), ("u", "w"))
+    dp = seeds(DRIVEN, ("b",)) @ rng.normal(size=(1, count))
+    spans = [
+        Span(rng.normal(size=(n + 1, 3)), 0.05, parts, rng.normal(size=(n + 1, 2, count)))
+        for n, parts in ((30, 1), (45, 3))
+    ]
+    samples, slopes = (np.concatenate(one) for one in code.run(p, dp, spans))
+    assert slopes.shape == (*samples.shape, count)
+
+    def moved(column, side):
+        there = (p + side * h * dp[:, column])[:, None]
+        ends = [span._replace(u=span.u.copy(), du=None) for span in spans]
+        for end, span in zip(ends, spans, strict=True):
+            end.u[:, [0, 2]] += side * h * span.du[:, :, column]
+        plain = compiled(DRIVEN, DRIVEN.outputs)
+        return np.concatenate(plain.run(there, plain.start(there), ends))[:, :, 0]
+
+    assert samples == pytest.approx(moved(0, 0.0), abs=1e-12)
+    for column in range(count):
+        expected = (moved(column, 1) - moved(column, -1)) / (2.0 * h)
+        assert slopes[:, :, column] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+def test_code_that_moves_no_input_takes_no_array_of_them():
+    system = system_of("AC8B")
+    codes = []
+    for moving in ((), ("vref",)):
+        traced = trace(system, ("vt",))
+        derived = differentiate(traced, system, ("TE",), moving)
+        codes.append(simulation_with_tangents(traced, derived, engine.DIRECTIONS))
+    assert ["%du" in code for code in codes] == [False, True]
 
 
 # --- threads --------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from fit import ByHand
 from oracle import system_of, typical_values, vector
 
 from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
-from exfit.simulate import Change, Course, Simulator, each
+from exfit.simulate import Change, Course, Direction, Simulator, each
 
 HERE = Path(__file__).parent
 STEP, STEPS, AT, RISE = 1e-3, 10_000, 1_000, 0.05
@@ -81,10 +81,29 @@ def tangents():
     return lambda: code.run(p, seeds, spans)
 
 
-def simulator():
+def simulator(smooth=False):
     """Return exfit's own way of a fit: sub-steps found, samples at the times of a recorder."""
-    times = np.arange(1001) / 100.0
-    return Simulator(SYSTEM, Course(0.0, STEPS * STEP, (Change(AT * STEP, RISE),)), times, STEP)
+    times, change = np.arange(1001) / 100.0, Change(AT * STEP, RISE, smooth=smooth)
+    return Simulator(SYSTEM, Course(0.0, STEPS * STEP, (change,)), times, STEP)
+
+
+def fitted_step(values):
+    """Return a function for the Jacobian of a fit of the step's instant and size as well."""
+    study = simulator(smooth=True)
+    (change,) = study.course.steps
+    directions = (
+        *each(FREE),
+        Direction(steps={0: (1.0, 0.0)}),
+        Direction(steps={0: (0.0, 1.0)}),
+        Direction(delay=1.0),
+    )
+
+    def run():
+        now = next(values)
+        moved = change._replace(at=change.at + now["KA"] - VALUES["KA"])
+        return study.moved((moved,), 0.0123).tangents(now, ("vt",), directions)
+
+    return run
 
 
 def lsoda():
@@ -132,6 +151,7 @@ def main():
         "exfit, Jacobian of 7 and samples": lambda: study.tangents(
             next(ever_new), ("vt",), each(FREE)
         ),
+        "exfit, of 7, a step and the delay": fitted_step(ever_new),
         f"exfit, {SIDE_BY_SIDE} sets side by side": kernel(SIDE_BY_SIDE),
     }
     timed(list(ways.values()), 5)
