@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 FEWEST_SAMPLES = 2
 COLUMNS_SHOWN = 30
 CELL_SHOWN = 40
+NONE: frozenset[str] = frozenset()
 
 
 class ChannelLike(Protocol):
@@ -39,7 +40,10 @@ class ChannelLike(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Signals in per unit, each (M,) like ``time`` in s, which increases; arrays are read-only."""
+    """Signals in per unit, each (M,) like ``time`` in s, which increases; arrays are read-only.
+
+    A sample that is missing is nan, in a signal and only where ``read_record`` was told so.
+    """
 
     time: Array
     signals: Mapping[str, Array]
@@ -79,6 +83,7 @@ def read_record(
     time_column: str,
     channels: Mapping[str, ChannelLike],
     window: tuple[float, float] | None = None,
+    missing: bool = False,
 ) -> Record:
     """Return the record of a CSV file: each signal is ``column * scale + offset``.
 
@@ -87,18 +92,20 @@ def read_record(
         time_column: name of the column with the time in s.
         channels: signal name -> column, scale and offset.
         window: first and last instant kept, both included; what lies outside it may hold gaps.
+        missing: whether a sample may be missing from a signal: an empty cell or nan becomes nan.
 
     Raises:
         RecordError: a file that cannot be read, a column that is missing, a cell that is no finite
-            number, time that does not increase, or fewer than two samples.
+            number, time that does not increase, fewer than two samples, or a signal without any.
     """
     table = _read_table(path)
-    columns = _columns(table, [time_column, *(channel.column for channel in channels.values())])
+    names = [time_column, *(channel.column for channel in channels.values())]
+    columns = _columns(table, names, frozenset(names[1:]) - {time_column} if missing else NONE)
     time = columns[time_column]
     _check_time(table, time_column, time)
     kept = _kept(path, time, window)
     signals = {
-        name: _signal(table, channel, columns[channel.column], kept)
+        name: _signal(table, channel, columns[channel.column], kept, missing)
         for name, channel in channels.items()
     }
     return Record(_frozen(time[kept]), MappingProxyType(signals), path, table.sha256)
@@ -157,24 +164,44 @@ def _decode(path: Path, data: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
-def _columns(table: _Table, names: Iterable[str]) -> dict[str, Array]:
-    """Return the columns as NumPy's C reader reads them; where it stumbles, say where and why."""
+def _columns(table: _Table, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
+    """Return the columns by name; cells of the ``gappy`` ones may be empty."""
     places = {name: _place(table, name) for name in names}
     if _uneven(table):
-        _find_fault(table, places)
+        _find_fault(table, places, gappy)
+    data = _load(table, places, gappy)
+    return {name: data[:, at] for at, name in enumerate(places)}
+
+
+def _load(
+    table: _Table,
+    places: Mapping[str, int],
+    gappy: frozenset[str],
+    cell_by_cell: frozenset[str] = NONE,
+) -> Array:
+    """Return the columns as NumPy's C reader reads them; where it stumbles, say where and why.
+
+    Where only empty cells of the ``gappy`` columns stopped it, these are read cell by cell: slow.
+    """
     try:
-        data = np.loadtxt(
+        return np.loadtxt(
             io.StringIO(table.body),
             delimiter=",",
             quotechar='"',
             comments=None,
             usecols=tuple(places.values()),
             ndmin=2,
+            converters={places[name]: _number_or_nan for name in cell_by_cell},
         )
     except ValueError as error:
-        _find_fault(table, places)
+        _find_fault(table, places, gappy)
+        if cell_by_cell != gappy:
+            return _load(table, places, gappy, gappy)
         raise RecordError(f"{table.path}: {error}") from None
-    return {name: data[:, at] for at, name in enumerate(places)}
+
+
+def _number_or_nan(cell: str) -> float:
+    return float(cell) if cell.strip() else np.nan
 
 
 def _place(table: _Table, name: str) -> int:
@@ -201,7 +228,7 @@ def _uneven(table: _Table) -> bool:
     return bool(np.any(per_line != len(table.names) - 1))
 
 
-def _find_fault(table: _Table, places: Mapping[str, int]) -> None:
+def _find_fault(table: _Table, places: Mapping[str, int], gappy: frozenset[str]) -> None:
     """Raise a RecordError for the first row that is ragged or holds text in a number, if any."""
     for line, row in table.rows():
         if len(row) != len(table.names):
@@ -209,8 +236,8 @@ def _find_fault(table: _Table, places: Mapping[str, int]) -> None:
                 f"{table.path}:{line}: cells in this row: {len(row)}, columns: {len(table.names)}"
             )
         for name, place in places.items():
-            if not _is_number(row[place]):
-                cell = row[place].strip()
+            cell = row[place].strip()
+            if not _is_number(row[place]) and (cell or name not in gappy):
                 what = f"{cell[:CELL_SHOWN]!r} is not a number" if cell else "an empty cell"
                 raise RecordError(f"{table.path}:{line}: column {name!r}: {what}")
 
@@ -251,11 +278,16 @@ def _kept(path: Path, time: Array, window: tuple[float, float] | None) -> NDArra
     return kept
 
 
-def _signal(table: _Table, channel: ChannelLike, column: Array, kept: NDArray[np.intp]) -> Array:
-    """Return a channel in per unit; raises RecordError where it is not finite."""
+def _signal(
+    table: _Table, channel: ChannelLike, column: Array, kept: NDArray[np.intp], missing: bool
+) -> Array:
+    """Return a channel in per unit; raises RecordError where it is not finite, nor missing."""
     with np.errstate(over="ignore", invalid="ignore"):
         signal = column[kept] * channel.scale + channel.offset
-    lost = np.flatnonzero(~np.isfinite(signal))
+    gaps = np.isnan(column[kept]) & missing
+    if gaps.all():
+        raise RecordError(f"{table.path}: column {channel.column!r}: every sample is missing")
+    lost = np.flatnonzero(~np.isfinite(signal) & ~gaps)
     if lost.size:
         row = int(kept[lost[0]])
         scaled = "" if not np.isfinite(column[row]) else f" * {channel.scale:g}"

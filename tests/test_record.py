@@ -210,6 +210,95 @@ def test_a_sound_file_is_not_read_cell_by_cell(csv, monkeypatch):
     assert read_record(path, "t", VT).time.size == 1000
 
 
+# how a recorder writes that a sample is missing -> the column with one in the third row
+GAPS = ["", "  ", '""', "nan", "NaN", " NAN "]
+
+
+@pytest.mark.parametrize("gap", GAPS)
+def test_a_missing_sample_is_nan_where_it_may_be_missing_and_refused_elsewhere(csv, gap):
+    path = csv(GOOD.replace("1.02", gap))
+    channels = {"vt": Channel("vt", 2.0, -1.0), "ifd": Channel("ifd")}
+    record = read_record(path, "t", channels, missing=True)
+    assert record.time.tolist() == [0.0, 0.1, 0.2, 0.3]
+    assert np.isnan(record.signals["vt"]).tolist() == [False, False, True, False]
+    assert record.signals["vt"][[0, 1, 3]].tolist() == [1.0, 2 * 1.01 - 1, 2 * 1.03 - 1]
+    assert record.signals["ifd"].tolist() == [1.1, 1.2, 1.3, 1.4]
+    assert "bump.csv:4: column 'vt'" in refusal(path, channels)
+
+
+def test_allowing_for_missing_samples_changes_nothing_where_none_is(csv):
+    path = csv(GOOD)
+    plain, allowed = (read_record(path, "t", VT, missing=missing) for missing in (False, True))
+    assert np.array_equal(plain.time, allowed.time)
+    assert np.array_equal(plain.signals["vt"], allowed.signals["vt"])
+    assert plain.sha256 == allowed.sha256
+
+
+def test_samples_missing_at_both_ends_and_in_every_signal_stay_apart(csv):
+    path = csv("t,vt,ifd\n0,,1\n1,2,\n2,3,nan\n3,NaN,4\n")
+    record = read_record(path, "t", {"vt": Channel("vt"), "ifd": Channel("ifd")}, missing=True)
+    assert record.signals["vt"].tolist() == pytest.approx([np.nan, 2, 3, np.nan], nan_ok=True)
+    assert record.signals["ifd"].tolist() == pytest.approx([1, np.nan, np.nan, 4], nan_ok=True)
+
+
+# what is wrong, though samples may be missing -> content, then all that the message must name
+FAULTS_BESIDE_GAPS = {
+    "text": (GOOD.replace("1.02", "1.0.2"), ["bump.csv:4", "'vt'", "'1.0.2'"]),
+    "text behind a gap": (
+        GOOD.replace("1.01", "").replace("1.02", "bad"),
+        ["bump.csv:4", "'vt'", "'bad'"],
+    ),
+    "underscore behind a gap": (
+        GOOD.replace("1.01", "").replace("1.02", "1_02"),
+        ["bump.csv:4", "'vt'", "'1_02'"],
+    ),
+    "empty time": (GOOD.replace("0.2,", ","), ["bump.csv:4", "'t'", "empty cell"]),
+    "empty time beside a gap": (
+        GOOD.replace("0.2,1.02", ","),
+        ["bump.csv:4", "'t'", "empty cell"],
+    ),
+    "nan in time": (GOOD.replace("0.2,", "nan,"), ["bump.csv:4", "'t'", "nan is not a finite"]),
+    "inf": (GOOD.replace("1.02", "inf"), ["bump.csv:4", "'vt'", "inf is not a finite"]),
+    "inf behind a gap": (
+        GOOD.replace("1.01", "").replace("1.02", "-inf"),
+        ["bump.csv:4", "'vt'", "-inf is not a finite"],
+    ),
+    "short row behind a gap": (
+        GOOD.replace("1.01", "").replace("1.02,1.3", "1.02"),
+        ["bump.csv:4", "row: 2", "columns: 3"],
+    ),
+    "nothing but gaps": (
+        "t,vt\n0,\n1,nan\n2,\n",
+        ["bump.csv", "'vt'", "every sample is missing"],
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS_BESIDE_GAPS)
+def test_only_samples_may_be_missing(csv, fault):
+    content, named = FAULTS_BESIDE_GAPS[fault]
+    with pytest.raises(RecordError) as caught:
+        read_record(csv(content), "t", VT, missing=True)
+    for part in named:
+        assert part in str(caught.value)
+
+
+def test_a_signal_missing_from_the_whole_window_is_refused(csv):
+    path = csv(GOOD.replace("1.02", "").replace("1.03", ""))
+    with pytest.raises(RecordError, match="'vt': every sample is missing"):
+        read_record(path, "t", VT, (0.2, 0.3), missing=True)
+
+
+def test_a_scale_of_zero_makes_no_number_of_an_infinite_one(csv):
+    with pytest.raises(RecordError, match="inf is not a finite"):
+        read_record(csv(GOOD.replace("1.02", "inf")), "t", {"vt": Channel("vt", 0.0)}, missing=True)
+
+
+def test_the_column_of_time_cannot_have_gaps_as_a_signal_either(csv):
+    with pytest.raises(RecordError, match=r"bump\.csv:4: column 't': an empty cell"):
+        read_record(csv(GOOD.replace("0.2,", ",")), "t", {"x": Channel("t")}, missing=True)
+
+
 @settings(max_examples=200, deadline=None)
 @given(
     at=st.integers(0, len(GOOD)),
@@ -219,14 +308,20 @@ def test_a_sound_file_is_not_read_cell_by_cell(csv, monkeypatch):
         st.text(max_size=6).map(lambda text: text.encode("utf-8", "replace").decode()),
         st.binary(max_size=4),
     ),
+    missing=st.booleans(),
 )
-def test_no_damage_gives_anything_but_a_record_or_its_refusal(tmp_path_factory, at, cut, junk):
+def test_no_damage_gives_anything_but_a_record_or_its_refusal(
+    tmp_path_factory, at, cut, junk, missing
+):
     path = tmp_path_factory.getbasetemp() / "damaged.csv"
     data = junk if isinstance(junk, bytes) else junk.encode()
     path.write_bytes(GOOD.encode()[:at] + data + GOOD.encode()[at + cut :])
     try:
-        record = read_record(path, "t", {"vt": Channel("vt"), "ifd": Channel("ifd")})
+        channels = {"vt": Channel("vt"), "ifd": Channel("ifd")}
+        record = read_record(path, "t", channels, missing=missing)
     except RecordError:
         return
     assert np.all(np.diff(record.time) > 0)
-    assert np.all(np.isfinite([record.time, *record.signals.values()]))
+    finite = np.isfinite([*record.signals.values()])
+    assert np.all(finite | missing)
+    assert np.all(finite.any(axis=1))
