@@ -1,0 +1,46 @@
+"""The noise of a record, told from the course of its signal."""
+
+from math import sqrt
+from statistics import NormalDist
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+NEIGHBOURS = 3  # samples of a second difference; their median is free of a lone spike
+SECOND_DIFFERENCE = sqrt(6.0)  # spread of x[k-1] - 2 x[k] + x[k+1] over that of white x
+MEDIAN_DEVIATION = NormalDist().inv_cdf(0.75)  # median of |x|, over the spread of a normal x
+ROUNDING = 1.0 / sqrt(12.0)  # spread of what rounding leaves, over the step it rounds to
+
+
+def noise(samples: Array) -> float:
+    """Return the standard deviation of the white noise on a slow signal (M,), in its unit.
+
+    It is the median absolute deviation of the second differences, which neither the course of the
+    signal nor rare spikes move, and no less than what rounding to the recorder's steps leaves.
+    Uneven sampling passes where the signal is slow against its longest step.
+
+    Source: Rousseeuw and Croux 1993 (median absolute deviation).
+
+    Raises:
+        ValueError: fewer than three samples.
+    """
+    if len(samples) < NEIGHBOURS:
+        raise ValueError(f"{len(samples)} samples: noise shows from {NEIGHBOURS} on")
+    scatter = spread(np.diff(samples, 2)) / SECOND_DIFFERENCE
+    return max(float(scatter), ROUNDING * _quantum(samples))
+
+
+def spread(values: Array, axis: int = -1) -> Array:
+    """Return the median absolute deviation along an axis, scaled to the normal law's spread."""
+    away = np.abs(values - np.median(values, axis=axis, keepdims=True))
+    return np.asarray(np.median(away, axis=axis) / MEDIAN_DEVIATION)
+
+
+def _quantum(samples: Array) -> float:
+    """Return the smallest step between two values that last longer than a spike, or 0."""
+    lasting = np.median(sliding_window_view(samples, NEIGHBOURS), axis=-1)
+    steps = np.diff(np.unique(lasting))
+    return float(np.min(steps)) if len(steps) else 0.0
