@@ -17,7 +17,6 @@ ORDER = 2  # of the Butterworth filter, which runs twice
 FEWEST_FILTERED = 10  # samples: the filter starts on a mirror of three times its length
 UNEVEN = 0.01  # of a sampling step
 WINDOW = 7  # samples around one that is held against its neighbours; 3 may be spikes
-ROUNDING = 16 * float(np.finfo(np.float64).eps)  # of the signal's size, left by lines through it
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,6 @@ class Conditioning:
         right = np.searchsorted(kept, lost)
         before = kept[np.maximum(right - 1, 0)]
         after = kept[np.minimum(right, len(kept) - 1)]
-        before = np.where(right == 0, after, before)
         gap = np.where(before == after, 1.0, self.time[after] - self.time[before])
         return lost, before, after, (self.time[lost] - self.time[before]) / gap
 
@@ -149,8 +147,7 @@ def outliers(time: Array, samples: Array, limit: float) -> Mask:
     place = np.arange(len(samples))
     window = np.clip(place - WINDOW // 2, 0, len(samples) - WINDOW)
     away = np.abs(from_line[window, place - window])
-    rounding = ROUNDING * float(np.max(np.abs(samples)))
-    scale = np.maximum(spread(from_line), max(noise(samples), rounding))
+    scale = np.maximum(spread(from_line), noise(samples))
     return np.asarray(away > limit * scale[window])
 
 

@@ -185,6 +185,7 @@ COURSES = {
     "swing": 1.0 + np.where(TIME < 1, 0, 0.05 * np.exp(-TIME) * np.sin(9 * (TIME - 1))),
     "wave": 1.0 + 0.05 * np.sin(12.0 * TIME),
     "constant": np.full(TIME.size, 0.1),
+    "line and curve": np.where(TIME < 5.0, 1.0 + TIME / 30, RESPONSE + 4.0 / 30),
     "rounded": 5.5e-5 * np.round(RESPONSE / 5.5e-5),
 }
 LIMITS = [3.5, 5.0, 8.0]

@@ -8,7 +8,8 @@ from exfit.loss import LOSSES
 
 SCIPY = {"least-squares": "linear", "huber": "huber", "soft-l1": "soft_l1"}
 DECADES = np.logspace(-12, 12, 97)
-ERRORS = np.concatenate([-DECADES[::-1], [0.0], DECADES])
+NEAR = np.array([0.95, 1.05])  # of the scale, where Huber's loss bends
+ERRORS = np.sort(np.concatenate([-DECADES, -NEAR, [0.0], NEAR, DECADES]))
 SCALES = [1e-4, 1.0, 30.0]
 
 every_loss = pytest.mark.parametrize("loss", LOSSES.values(), ids=LOSSES)

@@ -174,6 +174,26 @@ def test_a_slow_drift_before_the_step_is_not_the_step():
 
 
 TIME = np.arange(0.0, 10.0, 0.01)
+
+
+def test_a_jump_between_two_samples_is_placed_between_them():
+    jump = np.where(TIME < 3.0, 1.0, 1.05) + np.random.default_rng(7).normal(0.0, 1e-4, TIME.size)
+    fast = 1.05 - 0.05 * np.exp(-np.maximum(TIME - 3.0, 0.0) / 0.02)
+    for vt in (jump, fast, fast + np.random.default_rng(8).normal(0.0, 1e-4, TIME.size)):
+        onset = find_step(TIME, vt)
+        assert onset.at == pytest.approx(3.0, abs=0.015)
+        assert onset.spread <= 0.015
+
+
+def test_spikes_at_the_ends_are_no_step():
+    vt = 1.0 + response(TIME, "reference_ac1a")
+    spiky = vt.copy()
+    spiky[[0, -1]] += 0.2
+    dirty, clean = find_step(TIME, spiky), find_step(TIME, vt)
+    assert dirty.at == pytest.approx(clean.at, abs=1e-3)
+    assert dirty.size == pytest.approx(clean.size, rel=1e-5)
+
+
 NO_STEPS = {
     "constant": (np.ones(TIME.size), "no step stands out"),
     "noise": (np.random.default_rng(1).normal(1.0, 1e-3, TIME.size), "no step stands out"),
