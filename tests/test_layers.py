@@ -70,6 +70,13 @@ ORDER = (
     "exfit.estimate.run",
     "exfit.estimate.strategies",
     "exfit.estimate",
+    "exfit.inference.linear",
+    "exfit.inference.wording",
+    "exfit.inference.factors",
+    "exfit.inference.noise",
+    "exfit.inference.confidence",
+    "exfit.inference.identifiability",
+    "exfit.inference",
     "exfit.features",
     "exfit.result",
     "exfit.plots",
@@ -173,7 +180,11 @@ def test_the_command_starts_without_the_heavy_packages():
     assert not AT_ONCE & set(done.stdout.split())
 
 
-@pytest.mark.parametrize("name", [m for m in MODULES if m.startswith("exfit.estimate")])
-def test_the_estimator_can_be_used_without_the_rest(name):
+ALONE = ("exfit.estimate", "exfit.inference")
+
+
+@pytest.mark.parametrize("name", [m for m in MODULES if m.startswith(ALONE)])
+def test_the_estimator_and_the_inference_can_be_used_without_the_rest(name):
     own = [m for m in imports(MODULES[name], True) if m.split(".")[0] == "exfit"]
-    assert [m for m in own if not m.startswith("exfit.estimate.")] == []
+    home = ".".join(name.split(".")[:2]) + "."
+    assert [m for m in own if not m.startswith(home)] == []

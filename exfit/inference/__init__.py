@@ -1,0 +1,37 @@
+"""What a least-squares fit knows about its parameters, and what it does not.
+
+Arrays in, results out: a `Linearisation` of the fit at its minimum gives `confidence` (standard
+errors, intervals) and `identifiability` (what can move together unseen, and what to fix).
+"""
+
+from exfit.inference.confidence import LEVEL, UNDETERMINED, Confidence, Uncertainty, confidence
+from exfit.inference.identifiability import (
+    WEAK,
+    Change,
+    Combination,
+    Fixing,
+    Identifiability,
+    identifiability,
+    sensitivity,
+)
+from exfit.inference.linear import Channel, Linearisation, Prior
+from exfit.inference.noise import Noise
+
+__all__ = [
+    "LEVEL",
+    "UNDETERMINED",
+    "WEAK",
+    "Change",
+    "Channel",
+    "Combination",
+    "Confidence",
+    "Fixing",
+    "Identifiability",
+    "Linearisation",
+    "Noise",
+    "Prior",
+    "Uncertainty",
+    "confidence",
+    "identifiability",
+    "sensitivity",
+]

@@ -1,0 +1,149 @@
+"""How well a fit knows each of its parameters."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from math import exp, inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from exfit.inference.factors import Factors, factored
+from exfit.inference.linear import Array, Linearisation
+from exfit.inference.noise import Noise, noise_of
+from exfit.inference.wording import error, listed
+
+LEVEL = 0.95
+UNDETERMINED = 0.3  # relative standard error: the response is no longer linear over the interval
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How well one parameter is known.
+
+    std_error       in its own unit; None where nothing determines it
+    relative_error  std_error / |value|; None also where the value is 0
+    interval        that holds the true value with the level of the confidence
+    why             the reason where there is no interval
+    """
+
+    std_error: float | None
+    relative_error: float | None
+    interval: tuple[float, float] | None
+    why: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class Confidence:
+    """What linear theory says of all parameters together.
+
+    covariance   (N, N) in their own units, correlation (N, N): nan without a standard error
+    dof          degrees of freedom behind the noise; infinite if all of it was given
+    sentences    what is remarkable about the noise
+    """
+
+    names: tuple[str, ...]
+    parameters: Mapping[str, Uncertainty]
+    covariance: Array
+    correlation: Array
+    noise: tuple[Noise, ...]
+    sentences: tuple[str, ...]
+    dof: float
+    level: float = LEVEL
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the content as JSON takes it: None for what is not a finite number."""
+        return {
+            "level": self.level,
+            "dof": finite(self.dof),
+            "parameters": {name: asdict(one) for name, one in self.parameters.items()},
+            "correlation": {
+                "names": list(self.names),
+                "matrix": [[finite(x) for x in row] for row in self.correlation.tolist()],
+            },
+            "noise": [
+                {name: finite(value) for name, value in asdict(one).items()} for one in self.noise
+            ],
+            "sentences": list(self.sentences),
+        }
+
+
+def finite(value: Any) -> Any:
+    """Return a value, None for a number that is not finite."""
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def confidence(lin: Linearisation) -> Confidence:
+    """Return standard errors and 95 % intervals of the parameters of a fit, by linear theory.
+
+    The covariance is that of `Factors.covariance`, the noise that of `noise_of`. Parameters on a
+    bound are held there: what is said of the others holds for that value. Intervals are those of
+    Student's t, for the logarithm where the fit moved it: value * exp(-+ t s); else value -+ t s,
+    which may pass a bound: it tells of the record alone.
+
+    There is none where the standard error exceeds UNDETERMINED of what counts as 100 %
+    (`Linearisation.size`): of the value on the logarithmic scale. On the linear one it is the
+    value too, but at least a tenth of the interval between the bounds, so that a value near zero
+    is not called undetermined for being small; for a nuisance it is that interval.
+    """
+    factors = factored(lin, lin.free)
+    noise = noise_of(factors)
+    relative = factors.covariance(tuple(one.spread for one in noise))
+    errors = np.sqrt(np.diag(relative))
+    dof = degrees_of_freedom(factors, noise)
+    with np.errstate(invalid="ignore"):
+        correlation = relative / np.outer(errors, errors)  # nan for errors of 0
+    return Confidence(
+        names=lin.names,
+        parameters={
+            name: uncertainty(factors, k, float(errors[k]), dof) for k, name in enumerate(lin.names)
+        },
+        covariance=relative * np.outer(lin.size, lin.size),
+        correlation=correlation,
+        noise=noise,
+        sentences=tuple(text for one in noise for text in one.sentences(len(noise) == 1)),
+        dof=dof,
+    )
+
+
+def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
+    """Return the effective samples less the parameters that they determine, at least 1."""
+    if all(one.given is not None and one.accepted and one.inflation == 1.0 for one in noise):
+        return inf
+    return max(sum(one.effective for one in noise) - factors.leverage, 1.0)
+
+
+def uncertainty(factors: Factors, k: int, share: float, dof: float) -> Uncertainty:
+    """Return what is known of parameter k; ``share``: its standard error, of 100 %."""
+    from scipy.special import stdtrit
+
+    lin = factors.lin
+    why = reason(factors, k, share)
+    if not isfinite(share):
+        return Uncertainty(None, None, None, why)
+    value, std = float(lin.values[k]), share * float(lin.size[k])
+    relative = std / abs(value) if value else None
+    if why is not None:
+        return Uncertainty(std, relative, None, why)
+    t = float(stdtrit(dof, 0.5 * (1.0 + LEVEL)))
+    if lin.logarithmic[k]:
+        interval = (value * exp(-t * share), value * exp(t * share))
+    else:
+        interval = (value - t * std, value + t * std)
+    return Uncertainty(std, relative, interval, None)
+
+
+def reason(factors: Factors, k: int, share: float) -> str | None:
+    """Return why a parameter has no interval."""
+    lin = factors.lin
+    if lin.held[k] is not None:
+        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: the bound decides, not the record"
+    if not factors.seen[k]:
+        return "has no effect on the record"
+    if not factors.determined[k]:
+        return f"cannot be told apart from {listed(factors.others(k))}"
+    if not isfinite(share):
+        return "the record has no more samples than the fit has parameters"
+    if share > UNDETERMINED:
+        told = error(lin, k, share)
+        return f"the record does not determine it: standard error {told}; see `exfit profile`"
+    return None

@@ -1,0 +1,113 @@
+"""The normal equations of a fit, factored: what it knows, and what nothing in it tells apart."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from exfit.inference.linear import Array, Linearisation, Mask
+
+EXACTLY_REDUNDANT = 1e-9  # of the largest singular value: rounding, not a weak influence
+NO_EFFECT = 1e-12  # of the largest column: rounding
+TAKES_PART = 0.01  # of the largest component of a direction
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """The rows of a fit, errors and priors, over relative changes of k parameters: rank r.
+
+    seen    (N,) which parameters these are: those asked for that have an effect
+    left    (R, r) and spread (k, r): the pseudo-inverse of the rows is spread left'
+    null    (d, k) relative changes without any effect, largest component 1, sparse
+    joined  (d, k) which parameters take part in them
+    """
+
+    lin: Linearisation
+    seen: Mask
+    left: Array
+    spread: Array
+    null: Array
+    joined: Mask
+
+    @property
+    def leverage(self) -> float:
+        """How many parameters the errors determine; what the priors determine does not count."""
+        return float(np.sum(self.left[: len(self.lin.errors)] ** 2))
+
+    @cached_property
+    def determined(self) -> Mask:
+        """Which of all parameters (N,) are determined at all."""
+        found = np.zeros(len(self.seen), dtype=np.bool_)
+        found[self.seen] = ~self.joined.any(axis=0)
+        return found
+
+    def covariance(self, noise: tuple[float, ...]) -> Array:
+        """Return the covariance of relative changes (N, N), nan where nothing is determined.
+
+        noise: the standard deviation of the weighted errors of each channel. It is A^-1 B A^-1,
+        A = sum of w J'J over the channels, w the mean psi', and B = sum of (noise w)^2 J'J (Huber
+        1981, section 7.6; White 1980); a prior adds its own row to both. For one channel without
+        priors it is noise^2 (J'J)^-1.
+        """
+        lin = self.lin
+        curvature = lin.by_row([lin.mean_curvature(channel) for channel in lin.channels])
+        rows = np.append(lin.by_row(noise) * np.sqrt(curvature), lin.prior_noise)
+        root = self.spread @ (self.left[: len(rows)] * rows[:, None]).T
+        whole = np.full((len(lin.names), len(lin.names)), np.nan)
+        whole[np.ix_(self.seen, self.seen)] = root @ root.T
+        whole[~self.determined, :] = whole[:, ~self.determined] = np.nan
+        return whole
+
+    def others(self, index: int) -> list[str]:
+        """Return the names of the parameters that one cannot be told apart from."""
+        at = int(np.count_nonzero(self.seen[:index]))
+        together: Mask = np.any(self.joined[self.joined[:, at]], axis=0, keepdims=True)[0]
+        together[at] = False
+        return [self.lin.names[k] for k in np.flatnonzero(self.seen)[together]]
+
+
+def factored(lin: Linearisation, kept: Mask) -> Factors:
+    """Factor the rows of a fit over the parameters that are kept (N,); the others stay put.
+
+    Singular values of columns of length one, never of J'J; those below EXACTLY_REDUNDANT do not
+    count (pseudo-inverse: right for every parameter that takes no part in such a direction).
+    """
+    weight = lin.by_row([np.sqrt(lin.mean_curvature(channel)) for channel in lin.channels])
+    rows = np.vstack([lin.relative * weight[:, None], lin.prior_rows * lin.prior_noise[:, None]])
+    lengths = np.linalg.norm(rows, axis=0)
+    seen = kept & (lengths > NO_EFFECT * np.max(lengths, initial=0.0))
+    left, singular, directions = tall_svd(rows[:, seen] / lengths[seen])
+    some = singular > EXACTLY_REDUNDANT * np.max(singular, initial=0.0)
+    null = sparse(directions[~some] / lengths[seen])
+    joined = takes_part(null) | takes_part(null * lengths[seen])
+    spread = directions[some].T / singular[some] / lengths[seen][:, None]
+    return Factors(lin, seen, left[:, some], spread, null, joined)
+
+
+def tall_svd(rows: Array) -> tuple[Array, Array, Array]:
+    """Return the singular values of a matrix with as many directions as it has columns."""
+    missing = max(rows.shape[1] - rows.shape[0], 0)
+    left, singular, right = np.linalg.svd(np.pad(rows, ((0, missing), (0, 0))), False)
+    return left, singular, right
+
+
+def sparse(basis: Array) -> Array:
+    """Return vectors (d, k) of the same span of which each has a component of its own.
+
+    So redundancies that have nothing to do with each other come apart. The largest component is 1.
+    """
+    from scipy.linalg import qr
+
+    count = len(basis)
+    if not count:
+        return basis
+    own = qr(basis, mode="r", pivoting=True)[1][:count]
+    reduced = np.linalg.solve(basis[:, own], basis)
+    largest = np.take_along_axis(reduced, np.abs(reduced).argmax(axis=1)[:, None], axis=1)
+    return np.asarray(reduced / largest)
+
+
+def takes_part(directions: Array) -> Mask:
+    """Return which components of each direction (d, k) count."""
+    size = np.abs(directions)
+    return np.asarray(size > TAKES_PART * np.max(size, axis=1, keepdims=True, initial=0.0))

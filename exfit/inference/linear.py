@@ -1,0 +1,140 @@
+"""A least-squares fit as its linearisation sees it: errors, slopes, and what is held."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SMALL = 0.1  # of the interval: bounds usually lie a decade off what a linear parameter may be
+LEAST_CURVATURE = 1e-3  # of least squares: a loss that takes nearly every sample for an outlier
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """The errors of one signal in one record, on one clock, in the order of time.
+
+    label   "vt", or "up vt" where there are several records
+    rows    which of the errors, contiguous
+    noise   standard deviation of its weighted errors as the user gave it
+    weight  of its errors: weighted error = weight * (simulated - measured)
+    """
+
+    label: str
+    rows: slice
+    noise: float | None = None
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What was known of a parameter: it adds the residual noise * (x - mean) / std to the fit.
+
+    noise is what the fit took as the standard deviation of a weighted error.
+    """
+
+    index: int
+    mean: float
+    std: float
+    noise: float
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """A fit of N parameters to M weighted errors at its minimum.
+
+    names, units   of the parameters
+    values         (N,) in their own units
+    logarithmic    (N,) whether the fit moved the logarithm
+    width          (N,) high - low of the bounds
+    held           "min" or "max" for a parameter on that bound
+    errors         (M,) simulated minus measured, weighted, no robust loss applied
+    jacobian       (M, N) d errors / d values
+    influence      (M,) psi(e) of the loss; least squares: the errors
+    curvature      (M,) psi'(e) of the loss; least squares: ones
+    channels       covering all rows
+    nuisances      True for what belongs to the record, as the instant of a step, not to the model
+
+    Raises ValueError for shapes that do not agree and for numbers that are not finite.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    logarithmic: Mask
+    width: Array
+    held: tuple[str | None, ...]
+    errors: Array
+    jacobian: Array
+    influence: Array
+    curvature: Array
+    channels: tuple[Channel, ...]
+    priors: tuple[Prior, ...] = ()
+    nuisances: tuple[bool, ...] = ()
+
+    def __post_init__(self) -> None:
+        rows, count = len(self.errors), len(self.names)
+        if not self.nuisances:
+            object.__setattr__(self, "nuisances", (False,) * count)
+        for name in ("units", "values", "logarithmic", "width", "held", "nuisances"):
+            if len(getattr(self, name)) != count:
+                raise ValueError(f"{name}: {len(getattr(self, name))} for {count} parameters")
+        for name in ("errors", "jacobian", "influence", "curvature"):
+            shape = (rows, count) if name == "jacobian" else (rows,)
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"{name}: shape {getattr(self, name).shape}, not {shape}")
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"{name}: not finite")
+        if sum(len(self.errors[one.rows]) for one in self.channels) != rows:
+            raise ValueError(f"channels: must cover the {rows} errors")
+
+    @cached_property
+    def size(self) -> Array:
+        """The change of each parameter that counts as 100 %, (N,) in its own unit.
+
+        Its value, where the fit moves the logarithm. The value of a parameter on the linear scale
+        may be zero by chance and is then no measure of itself: it counts no less than a tenth of
+        the interval between its bounds. The zero of a nuisance, as of an instant, has no meaning
+        at all: the interval counts.
+        """
+        value = np.abs(self.values)
+        linear = np.where(self.nuisances, self.width, np.maximum(value, SMALL * self.width))
+        return np.asarray(np.where(self.logarithmic, value, linear))
+
+    @property
+    def free(self) -> Mask:
+        """Which parameters lie on no bound (N,)."""
+        return np.array([side is None for side in self.held], dtype=bool)
+
+    @cached_property
+    def relative(self) -> Array:
+        """The derivative of the errors to relative changes, (M, N)."""
+        return np.asarray(self.jacobian * self.size)
+
+    def mean_curvature(self, channel: Channel) -> float:
+        """Return psi' of the loss over a channel, on average: 1 for least squares."""
+        return max(float(np.mean(self.curvature[channel.rows])), LEAST_CURVATURE)
+
+    def by_row(self, values: Sequence[float]) -> Array:
+        """Return a number for each channel as one for each error, (M,)."""
+        rows = np.empty(len(self.errors))
+        for channel, value in zip(self.channels, values, strict=True):
+            rows[channel.rows] = value
+        return rows
+
+    @cached_property
+    def prior_rows(self) -> Array:
+        """The derivatives of what the priors say to relative changes, in their std, (P, N)."""
+        rows = np.zeros((len(self.priors), len(self.names)))
+        for row, prior in zip(rows, self.priors, strict=True):
+            row[prior.index] = self.size[prior.index] / prior.std
+        return rows
+
+    @property
+    def prior_noise(self) -> Array:
+        """What the fit took as the standard deviation of an error, for each prior (P,)."""
+        return np.array([prior.noise for prior in self.priors])

@@ -1,0 +1,162 @@
+"""The noise of each channel of a fit: how large, and how much of it is the same again."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import nan, sqrt
+
+import numpy as np
+
+from exfit.inference.factors import Factors
+from exfit.inference.linear import Array, Channel
+from exfit.inference.wording import digits
+
+SURPRISING = 0.01  # of tests of what is true reject it
+LAGS = 20  # the most that a test of whiteness takes (Box, Jenkins & Reinsel 1994, section 8.2.2)
+SAMPLES_PER_LAG = 5
+SURE = 1e-10  # a probability below it is not worth its digits
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of a channel, of its weighted errors.
+
+    std        standard deviation that counts: the one given, or the estimated one
+    estimated  standard deviation of the residuals; nan without more samples than parameters
+    given      what the user gave
+    accepted   whether the one given agrees with the residuals
+    p_value    of the test of whiteness; None if there are too few samples, or no errors at all
+    effective  how many independent samples they are worth
+    inflation  samples / effective: the factor on the variance
+    """
+
+    label: str
+    samples: int
+    std: float
+    estimated: float
+    given: float | None
+    accepted: bool
+    p_value: float | None
+    effective: float
+    inflation: float
+
+    @property
+    def spread(self) -> float:
+        """The standard deviation, widened for what is not white."""
+        return self.std * sqrt(self.inflation)
+
+    def sentences(self, alone: bool) -> Iterator[str]:
+        """Yield what is remarkable; ``alone``: there is no other channel."""
+        if self.given is not None and not self.accepted:
+            used = "the larger one" if self.std != self.given else "the one given"
+            yield (
+                f"the residuals of {self.label} are {digits(self.estimated / self.given)} times "
+                f"the noise given: {used} counts"
+            )
+        if self.p_value is not None and self.p_value < SURPRISING:
+            p = f"p {digits(self.p_value)}" if self.p_value > SURE else f"p below {SURE:.0e}"
+            told = f"the residuals of {self.label} are not white (Ljung-Box {p})"
+            if self.inflation == 1.0:
+                yield f"{told}, but alternate: the intervals are no wider for it"
+                return
+            wider = "the intervals are" if alone else "its noise counts"
+            more = " wider" if alone else ""
+            yield (
+                f"{told}: {self.samples} samples count as {self.effective:.0f}, "
+                f"{wider} {digits(sqrt(self.inflation))} times{more}"
+            )
+
+
+def noise_of(factors: Factors) -> tuple[Noise, ...]:
+    """Return the noise of each channel.
+
+    The standard deviation is that of the residuals, tau^2 = sum psi^2 / dof / mean(psi')^2 (Huber
+    1981, section 7.6; the root of the mean square for least squares), the degrees of freedom
+    shared out by samples. One that was given counts instead, unless a chi-square test rejects it
+    at 1 %: then the larger counts.
+    """
+    lin = factors.lin
+    share = 1.0 - factors.leverage / max(len(lin.errors), 1)
+    return tuple(_noise(factors, channel, share) for channel in lin.channels)
+
+
+def _noise(factors: Factors, channel: Channel, share: float) -> Noise:
+    lin = factors.lin
+    influence = lin.influence[channel.rows]
+    samples = len(influence)
+    # a share of the order of rounding: as many parameters as samples
+    dof = samples * share if share > samples * np.finfo(float).eps else 0.0
+    square = float(influence @ influence)
+    estimated = sqrt(square / dof) / lin.mean_curvature(channel) if dof else nan
+    p_value = whiteness(influence)
+    white = p_value is None or p_value >= SURPRISING
+    effective = float(samples) if white else effective_samples(influence)
+    accepted = agrees(estimated, channel.noise, dof * effective / samples)
+    return Noise(
+        label=channel.label,
+        samples=samples,
+        std=_chosen(estimated, channel.noise, accepted),
+        estimated=estimated,
+        given=channel.noise,
+        accepted=accepted,
+        p_value=p_value,
+        effective=effective,
+        inflation=samples / effective,
+    )
+
+
+def _chosen(estimated: float, given: float | None, accepted: bool) -> float:
+    if given is None:
+        return estimated
+    return given if accepted else max(given, estimated)
+
+
+def agrees(estimated: float, given: float | None, dof: float) -> bool:
+    """Return whether a given standard deviation passes the chi-square test at 1 %, two-sided."""
+    from scipy.special import chdtr, chdtrc
+
+    if given is None or not dof:
+        return given is not None
+    ratio = dof * (estimated / given) ** 2
+    return bool(min(chdtr(dof, ratio), chdtrc(dof, ratio)) >= SURPRISING / 2.0)
+
+
+def autocorrelations(errors: Array) -> Array:
+    """Return the autocorrelations of errors (M,) from lag 0 on, (M,), about the mean zero.
+
+    Zero, not their own mean: a lasting error of the model is the same error over and over.
+    """
+    count = len(errors)
+    spectrum = np.fft.rfft(errors, 2 * count)
+    products = np.fft.irfft(np.abs(spectrum) ** 2, 2 * count)[:count]
+    return np.asarray(products / products[0])
+
+
+def whiteness(errors: Array) -> float | None:
+    """Return the probability that white noise is as correlated as this (Ljung & Box 1978).
+
+    Over min(20, M / 5) lags. The loss of degrees of freedom to the parameters of a fit, few beside
+    its samples, is left out.
+    """
+    from scipy.special import chdtrc
+
+    count = len(errors)
+    lags = min(LAGS, count // SAMPLES_PER_LAG)
+    if not lags or not np.any(errors):
+        return None
+    later = np.arange(1, lags + 1)
+    statistic = count * (count + 2) * np.sum(autocorrelations(errors)[later] ** 2 / (count - later))
+    return float(chdtrc(lags, statistic))
+
+
+def effective_samples(errors: Array) -> float:
+    """Return how many independent errors are worth as much for a mean: n / (1 + 2 sum rho).
+
+    The sum ends where a pair of neighbours, lags 2k and 2k + 1, no longer adds to it: the initial
+    positive sequence (Geyer 1992, section 3.3). Never more than there are.
+    """
+    rho = autocorrelations(errors)
+    pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
+    ended = np.flatnonzero(pairs <= 0.0)
+    until = ended[0] if len(ended) else len(pairs)
+    times = max(2.0 * float(np.sum(pairs[:until])) - 1.0, 1.0)
+    return len(errors) / times
