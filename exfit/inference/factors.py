@@ -61,7 +61,7 @@ class Factors:
     def others(self, index: int) -> list[str]:
         """Return the names of the parameters that one cannot be told apart from."""
         at = int(np.count_nonzero(self.seen[:index]))
-        together: Mask = np.any(self.joined[self.joined[:, at]], axis=0, keepdims=True)[0]
+        together = np.asarray(self.joined[self.joined[:, at]].any(axis=0))
         together[at] = False
         return [self.lin.names[k] for k in np.flatnonzero(self.seen)[together]]
 

@@ -1,0 +1,422 @@
+"""Standard errors and intervals against certified values, SciPy, and what repetition shows."""
+
+import json
+
+import numpy as np
+import pytest
+from known_minima import CERTIFIED, random_problem
+from linearised import autoregressive, decay, linearised, std_errors
+from scipy.optimize import curve_fit, least_squares
+from scipy.stats import chi2, kstest
+
+from exfit.inference import Channel, Prior, confidence, sensitivity
+from exfit.inference.noise import LAGS, effective_samples, whiteness
+
+# NIST Statistical Reference Datasets: certified standard deviations of the estimates
+CERTIFIED_STD = {
+    "Misra1a": (2.7070075241e00, 7.2668688436e-06),
+    "MGH09": (1.1435312227e-02, 1.9633220911e-01, 8.0842031232e-02, 9.0025542308e-02),
+    "MGH10": (1.5687892471e-04, 2.3309021107e01, 7.8486103508e-01),
+    "BoxBOD": (1.2354515176e01, 1.0455993237e-01),
+    "Eckerle4": (1.5408051163e-02, 4.6803020753e-02, 4.6800518816e-02),
+    "Thurber": (
+        4.6647963344e00,
+        3.9571156086e01,
+        2.8698696102e01,
+        5.5675370270e00,
+        3.1333340687e-02,
+        1.4984928198e-02,
+        6.5842344623e-03,
+    ),
+    "Lanczos3": (
+        1.7197908859e-02,
+        9.7041624475e-02,
+        4.1488663282e-02,
+        1.0766312506e-01,
+        5.8371576281e-02,
+        3.4436403035e-02,
+    ),
+}
+PROBLEMS = 400
+# three standard deviations of a binomial count
+LIKELY = 0.95 + 3.0 * np.sqrt(0.95 * 0.05 / PROBLEMS) * np.array([-1.0, 1.0])
+T = np.linspace(0.0, 1.0, 200)
+LINE = np.column_stack([np.ones_like(T), T])
+TRUTH = np.array([2.0, 5.0])
+
+
+def is_covered(known, truth=TRUTH, wider=1.0):
+    """Return for each parameter whether its interval, made wider, holds the truth."""
+    intervals = np.array([one.interval for one in known.parameters.values()])
+    middle, half = intervals.mean(axis=1), 0.5 * np.diff(intervals, axis=1)[:, 0]
+    return np.abs(truth - middle) <= wider * half
+
+
+def lines(noise):
+    """Yield the linearised fit of a straight line to each series of noise (K, M)."""
+    for one in noise:
+        fitted = np.linalg.lstsq(LINE, LINE @ TRUTH + one, rcond=None)[0]
+        yield linearised(fitted, LINE @ (fitted - TRUTH) - one, LINE)
+
+
+@pytest.mark.parametrize("logarithmic", [True, False])
+@pytest.mark.parametrize("name", CERTIFIED_STD)
+def test_standard_errors_are_those_that_nist_certifies(name, logarithmic):
+    case = CERTIFIED[name]
+    x = np.array(case.minimum)
+    scale = np.full(len(x), logarithmic)
+    known = confidence(linearised(x, case.fun(x), case.jac(x), logarithmic=scale))
+    # NIST takes all residuals for white; eleven digits of the minimum leave about five
+    got = std_errors(known) / np.sqrt(known.noise[0].inflation)
+    assert got == pytest.approx(CERTIFIED_STD[name], rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("absolute", [True, False])
+def test_the_covariance_is_that_of_curve_fit(seed, absolute):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 4.0, 80)
+    truth = rng.uniform([1.0, 0.2], [2.0, 1.0])
+    sigma = 0.01 * rng.uniform(0.5, 2.0, len(t))
+    measured = decay(t, *truth)[0] + sigma * rng.standard_normal(len(t))
+    found, covariance = curve_fit(
+        lambda t, a, c: decay(t, a, c)[0],
+        t,
+        measured,
+        p0=truth,
+        sigma=sigma,
+        absolute_sigma=absolute,
+        jac=lambda t, a, c: decay(t, a, c)[1],
+        xtol=1e-12,
+        ftol=1e-12,
+    )
+    response, slopes = decay(t, *found)
+    channel = Channel("vt", slice(0, len(t)), noise=1.0 if absolute else None)
+    lin = linearised(
+        found, (response - measured) / sigma, slopes / sigma[:, None], channels=(channel,)
+    )
+    assert confidence(lin).covariance == pytest.approx(covariance, rel=1e-6)
+
+
+def test_the_interval_holds_the_truth_in_nineteen_of_twenty_records_with_white_noise():
+    rng = np.random.default_rng(1)
+    covered = [is_covered(confidence(lin)) for lin in lines(rng.standard_normal((PROBLEMS, 200)))]
+    share = np.mean(covered, axis=0)
+    assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
+
+
+def test_few_samples_ask_for_students_t():
+    rng = np.random.default_rng(2)
+    covered = []
+    for noise in rng.standard_normal((PROBLEMS, 4)):
+        rows = LINE[::60]
+        fitted = np.linalg.lstsq(rows, rows @ TRUTH + noise, rcond=None)[0]
+        lin = linearised(fitted, rows @ (fitted - TRUTH) - noise, rows, width=np.full(2, 1e4))
+        covered.append(is_covered(confidence(lin)))
+    share = np.mean(covered, axis=0)
+    assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
+
+
+def test_a_logarithmic_interval_holds_the_truth_as_often():
+    rng = np.random.default_rng(3)
+    t = np.linspace(0.0, 3.0, 60)
+    truth = np.array([2.0, 0.7])
+    covered = []
+    for noise in 0.1 * rng.standard_normal((PROBLEMS, len(t))):
+        measured = decay(t, *truth)[0] + noise
+        fun = lambda x, measured=measured: decay(t, *x)[0] - measured  # noqa: E731
+        found = least_squares(fun, truth, jac=lambda x: decay(t, *x)[1], method="lm")
+        lin = linearised(found.x, found.fun, found.jac, logarithmic=np.ones(2, dtype=bool))
+        low, high = np.array([one.interval for one in confidence(lin).parameters.values()]).T
+        assert np.sqrt(low * high) == pytest.approx(found.x)
+        covered.append((low <= truth) & (truth <= high))
+    share = np.mean(covered, axis=0)
+    assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
+
+
+def test_intervals_are_widened_for_noise_that_is_not_white():
+    noise = 0.3 * autoregressive(np.random.default_rng(4), 0.7, (PROBLEMS, 200))
+    known = [confidence(lin) for lin in lines(noise)]
+    widened = np.mean([is_covered(one) for one in known], axis=0)
+    # the fit takes some of the slow noise for itself: the widening is a little too small
+    assert np.all((widened > 0.90) & (widened < LIKELY[1]))
+    plain = [is_covered(one, wider=one.noise[0].inflation ** -0.5) for one in known]
+    assert np.all(np.mean(plain, axis=0) < 0.75)
+    text = known[0].sentences[0]
+    assert text.startswith("the residuals of vt are not white (Ljung-Box p")
+    assert f"200 samples count as {known[0].noise[0].effective:.0f}, the intervals are" in text
+
+
+def test_a_prior_that_is_right_narrows_the_interval_and_keeps_its_promise():
+    rng = np.random.default_rng(5)
+    sigma, std = 0.5, 0.05
+    taken = 2.0 * sigma  # the fit thinks that the noise is larger than it is
+    covered, errors = [], []
+    for noise in sigma * rng.standard_normal((PROBLEMS, 200)):
+        mean = TRUTH[1] + std * rng.standard_normal()
+        rows = np.vstack([LINE, [0.0, taken / std]])
+        goal = np.append(LINE @ TRUTH + noise, taken * mean / std)
+        fitted = np.linalg.lstsq(rows, goal, rcond=None)[0]
+        known = confidence(
+            linearised(
+                fitted,
+                LINE @ (fitted - TRUTH) - noise,
+                LINE,
+                priors=(Prior(1, mean, std, taken),),
+            )
+        )
+        covered.append(is_covered(known))
+        errors.append((fitted - TRUTH, std_errors(known)))
+    share = np.mean(covered, axis=0)
+    assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
+    missed, told = np.array(errors).transpose(1, 0, 2)
+    # the spread of 400 is known to 3.5 %
+    assert np.sqrt(np.mean(missed**2, axis=0)) == pytest.approx(told.mean(axis=0), rel=0.11)
+    alone = confidence(next(lines(sigma * rng.standard_normal((1, 200)))))
+    assert np.all(told.mean(axis=0) < 0.9 * std_errors(alone))
+
+
+def test_where_the_record_is_silent_the_prior_speaks():
+    rows = np.column_stack([np.ones(50), np.zeros(50)])
+    errors = np.random.default_rng(6).standard_normal(50)
+    known = confidence(linearised(TRUTH, errors, rows, priors=(Prior(1, 5.0, 0.3, 1.0),)))
+    assert std_errors(known)[1] == pytest.approx(0.3)
+
+
+def test_each_channel_brings_its_own_noise():
+    rng = np.random.default_rng(7)
+    levels = np.repeat([1.0, 0.05], 100)
+    rows = np.column_stack([np.ones(200), np.concatenate([T[:100], 3.0 - T[:100]])])
+    channels = (Channel("vt", slice(0, 100)), Channel("efd", slice(100, 200)))
+    missed, told = [], []
+    for noise in levels * rng.standard_normal((PROBLEMS, 200)):
+        fitted = np.linalg.lstsq(rows, rows @ TRUTH + noise, rcond=None)[0]
+        errors = rows @ (fitted - TRUTH) - noise
+        known = confidence(linearised(fitted, errors, rows, channels=channels))
+        missed.append(fitted - TRUTH)
+        told.append(std_errors(known))
+    spread = np.std(missed, axis=0)
+    # the spread of 400 is known to 3.5 %; the exact one is of White 1980
+    assert np.mean(told, axis=0) == pytest.approx(spread, rel=0.11)
+    inverse = np.linalg.inv(rows.T @ rows)
+    exact = inverse @ (rows.T * levels**2) @ rows @ inverse
+    assert np.mean(told, axis=0) == pytest.approx(np.sqrt(np.diag(exact)), rel=0.03)
+    assert [one.std for one in known.noise] == pytest.approx([1.0, 0.05], rel=0.3)
+
+
+def test_a_robust_fit_knows_how_well_it_does_on_outliers():
+    rng = np.random.default_rng(8)
+    limit = 1.345
+    rows = LINE[::2]
+    noise = rng.standard_normal((PROBLEMS, 100))
+    noise *= np.where(rng.random(noise.shape) < 0.1, 10.0, 1.0)
+    missed, told = [], []
+    for one in noise:
+        goal = rows @ TRUTH + one
+        fitted = least_squares(
+            lambda x, goal=goal: rows @ x - goal,
+            TRUTH,
+            jac=lambda x: rows,
+            loss="huber",
+            f_scale=limit,
+        ).x
+        errors = rows @ fitted - goal
+        lin = linearised(
+            fitted,
+            errors,
+            rows,
+            influence=np.clip(errors, -limit, limit),
+            curvature=(np.abs(errors) <= limit).astype(float),
+        )
+        missed.append(fitted - TRUTH)
+        told.append(std_errors(confidence(lin)))
+    assert np.mean(told, axis=0) == pytest.approx(np.std(missed, axis=0), rel=0.15)
+    least = std_errors(confidence(next(lines(np.repeat(noise[:1], 2, axis=1)))))
+    assert np.all(np.mean(told, axis=0) < least)
+
+
+def test_the_probability_of_whiteness_is_uniform_for_white_noise():
+    rng = np.random.default_rng(9)
+    found = [whiteness(errors) for errors in rng.standard_normal((PROBLEMS, 500))]
+    assert kstest(found, "uniform").pvalue > 0.01
+
+
+def test_whiteness_is_the_statistic_of_ljung_and_box():
+    errors = autoregressive(np.random.default_rng(10), 0.1, 300)
+    rho = [errors[:-k] @ errors[k:] / (errors @ errors) for k in range(1, LAGS + 1)]
+    terms = [one**2 / (300 - k) for k, one in enumerate(rho, start=1)]
+    assert whiteness(errors) == pytest.approx(chi2.sf(300 * 302 * sum(terms), LAGS), rel=1e-9)
+
+
+@pytest.mark.parametrize("phi", [0.3, 0.6, 0.9])
+def test_correlated_samples_count_as_so_many_independent_ones(phi):
+    counts = [
+        effective_samples(errors)
+        for errors in autoregressive(np.random.default_rng(11), phi, (20, 4000))
+    ]
+    assert np.mean(counts) == pytest.approx(4000 * (1.0 - phi) / (1.0 + phi), rel=0.2)
+
+
+def test_alternating_samples_count_as_no_more_than_there_are():
+    errors = autoregressive(np.random.default_rng(12), -0.8, 1000)
+    assert effective_samples(errors) == 1000
+    known = confidence(linearised([1.0], errors, np.ones((1000, 1))))
+    assert known.noise[0].inflation == 1.0
+    assert known.sentences[0].endswith("but alternate: the intervals are no wider for it")
+
+
+def test_an_offset_that_no_parameter_takes_up_is_not_noise():
+    errors = 0.5 + 0.1 * np.random.default_rng(13).standard_normal(400)
+    assert confidence(linearised([1.0], errors, T[:1] + np.ones((400, 1)))).noise[0].effective < 4
+
+
+@pytest.mark.parametrize(
+    ("given", "counts", "times"), [(1.0, 1.0, None), (0.5, 1.0, "2"), (3.0, 3.0, "0.33")]
+)
+def test_a_given_noise_counts_unless_the_residuals_speak_against_it(given, counts, times):
+    errors = np.random.default_rng(14).standard_normal(2000)
+    errors /= np.sqrt(np.mean(errors**2))
+    channel = Channel("vt", slice(0, 2000), noise=given)
+    known = confidence(linearised([5.0], errors, np.ones((2000, 1)), channels=(channel,)))
+    assert known.noise[0].std == pytest.approx(counts, rel=1e-3)
+    assert bool(known.sentences) == (times is not None)
+    if times is None:
+        assert np.isinf(known.dof)
+        low, high = known.parameters["a"].interval
+        assert high - low == pytest.approx(2 * 1.959963985 / np.sqrt(2000))
+    else:
+        assert known.sentences[0].startswith(
+            f"the residuals of vt are {times} times the noise given"
+        )
+
+
+def test_what_is_exactly_redundant_has_no_standard_error_and_spoils_no_other():
+    response, slopes = decay(T, 6.0, 0.8)
+    errors = 0.1 * np.random.default_rng(15).standard_normal(len(T))
+    rows = np.column_stack([slopes[:, 0] * 3.0, slopes[:, 0] * 2.0, slopes[:, 1]])
+    known = confidence(linearised([2.0, 3.0, 0.8], errors, rows))
+    held = confidence(linearised([2.0, 3.0, 0.8], errors, rows, held=("min", None, None)))
+    assert known.parameters["a"].std_error is None
+    assert known.parameters["a"].why == "cannot be told apart from b"
+    assert known.parameters["b"].why == "cannot be told apart from a"
+    assert known.parameters["c"].interval == pytest.approx(held.parameters["c"].interval)
+    assert known.dof == len(T) - 2 == pytest.approx(held.dof)
+    assert np.isnan(known.correlation[0]).all()
+    assert response == pytest.approx(rows[:, 0] * 2.0)
+
+
+def test_who_moves_little_in_a_redundancy_takes_part_in_it_too():
+    first, second, third = np.random.default_rng(21).standard_normal((3, 80, 1))
+    weak = 1e-3 * second
+    for rows in (
+        np.hstack([first, 1e-3 * first, third]),  # b has little influence
+        np.hstack([first, weak, first + weak, third]),  # b and the share of c that it makes up for
+    ):
+        known = confidence(linearised(np.ones(rows.shape[1]), 1e-3 * third[:, 0], rows))
+        *joined, last = known.parameters.values()
+        assert all(one.why.startswith("cannot be told apart from") for one in joined)
+        assert last.std_error is not None
+
+
+def test_redundancies_that_have_nothing_to_do_with_each_other_are_told_apart():
+    rng = np.random.default_rng(16)
+    first, second = rng.standard_normal((2, 50, 1))
+    rows = np.hstack([first, second, 3.0 * first, -second, rng.standard_normal((50, 1))])
+    known = confidence(linearised(np.ones(5), rng.standard_normal(50), rows))
+    why = [one.why for one in known.parameters.values()]
+    assert why[:2] == ["cannot be told apart from c", "cannot be told apart from d"]
+    assert known.parameters["e"].std_error is not None
+
+
+def test_on_a_bound_the_bound_decides_and_the_others_hold_for_it():
+    rng = np.random.default_rng(17)
+    rows, errors = rng.standard_normal((60, 3)), 0.1 * rng.standard_normal(60)
+    known = confidence(linearised([0.0356, 2.0, 3.0], errors, rows, held=("min", None, None)))
+    without = confidence(linearised([2.0, 3.0], errors, rows[:, 1:]))
+    assert known.parameters["a"].interval is None
+    assert known.parameters["a"].why == "lies on its min 0.0356: the bound decides, not the record"
+    assert std_errors(known)[1:] == pytest.approx(std_errors(without))
+    assert known.dof == pytest.approx(58)
+
+
+def test_what_has_no_effect_is_said_to_have_none():
+    rows = np.column_stack([np.ones(40), 1e-14 * T[:40]])
+    known = confidence(linearised(TRUTH, np.random.default_rng(18).standard_normal(40), rows))
+    assert known.parameters["b"].why == "has no effect on the record"
+    assert known.parameters["b"].std_error is None
+
+
+def test_a_wide_standard_error_is_told_but_no_interval():
+    errors = np.random.default_rng(19).standard_normal(400)
+    known = confidence(linearised([1.0], 8.0 * errors, np.ones((400, 1))))
+    one = known.parameters["a"]
+    assert one.interval is None
+    assert one.relative_error == pytest.approx(8.0 / 20.0, rel=0.1)
+    told = f"standard error {100 * one.relative_error:.0f} %; see `exfit profile`"
+    assert one.why == f"the record does not determine it: {told}"
+
+
+@pytest.mark.parametrize("nuisance", [True, False])
+def test_near_zero_the_interval_between_the_bounds_is_the_measure(nuisance):
+    errors = np.random.default_rng(20).standard_normal(400)
+    known = confidence(
+        linearised([1e-9], errors, np.ones((400, 1)), width=np.array([2.0]), nuisances=(nuisance,))
+    )
+    assert known.parameters["a"].interval is not None
+    small = confidence(linearised([0.0], errors, np.ones((400, 1)), width=np.array([0.1])))
+    assert small.parameters["a"].relative_error is None
+    assert small.parameters["a"].why == (
+        f"the record does not determine it: standard error "
+        f"{small.parameters['a'].std_error:.2g} pu; see `exfit profile`"
+    )
+
+
+def test_a_fit_without_any_error_is_certain():
+    known = confidence(linearised(TRUTH, np.zeros(200), LINE))
+    assert np.all(std_errors(known) == 0.0)
+    assert known.parameters["a"].interval == (2.0, 2.0)
+    assert known.noise[0].p_value is None
+
+
+def test_as_many_samples_as_parameters_leave_nothing_to_judge_by():
+    rows = LINE[[0, 100]]
+    known = confidence(linearised(TRUTH, np.zeros(2), rows))
+    why = "the record has no more samples than the fit has parameters"
+    assert {one.why for one in known.parameters.values()} == {why}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_units_and_weights_do_not_change_what_is_known(seed):
+    fun, jac, x, _ = random_problem(seed)
+    plain = confidence(linearised(x, fun(x), jac(x)))
+    other = confidence(linearised(1e3 * x, 7.0 * fun(x), 7.0 * jac(x) / 1e3))
+    assert std_errors(other) == pytest.approx(1e3 * std_errors(plain), rel=1e-9)
+    assert other.correlation == pytest.approx(plain.correlation, abs=1e-9)
+
+
+def test_the_content_survives_json():
+    fun, jac, x, _ = random_problem(0)
+    known = confidence(linearised(x, fun(x), jac(x), held=("min", None, None, None)))
+    content = json.loads(json.dumps(known.as_json(), allow_nan=False))
+    assert content["parameters"]["a"]["std_error"] is None
+    assert content["parameters"]["b"]["std_error"] == known.parameters["b"].std_error
+    assert content["correlation"]["matrix"][0] == [None] * 4
+    assert content["noise"][0]["label"] == "vt"
+
+
+def test_the_sensitivity_is_what_a_change_by_all_of_the_value_does():
+    channel = Channel("vt", slice(0, len(T)), weight=4.0)
+    response, slopes = decay(T, 2.0, 0.5)
+    lin = linearised([2.0, 0.5], response, 4.0 * slopes, channels=(channel,))
+    assert sensitivity(lin)[:, 0] == pytest.approx(response)
+
+
+def test_arrays_that_cannot_be_are_refused():
+    with pytest.raises(ValueError, match=r"jacobian: shape \(200, 2\), not \(199, 2\)"):
+        linearised(TRUTH, np.zeros(199), LINE)
+    with pytest.raises(ValueError, match="jacobian: not finite"):
+        linearised(TRUTH, np.zeros(200), LINE * np.nan)
+    with pytest.raises(ValueError, match="channels: must cover the 200 errors"):
+        linearised(TRUTH, np.zeros(200), LINE, channels=(Channel("vt", slice(0, 100)),))
+    with pytest.raises(ValueError, match="held: 1 for 2 parameters"):
+        linearised(TRUTH, np.zeros(200), LINE, held=(None,))
