@@ -204,11 +204,19 @@ def test_scipy_is_not_imported():
 def test_the_package_offers_what_its_users_name():
     assert set(estimate.__all__) == {
         "STATUS",
+        "End",
         "Iteration",
         "Method",
+        "Minima",
+        "Minimum",
+        "Profile",
+        "Progress",
         "Result",
         "Stop",
         "least_squares",
+        "multistart",
+        "profile",
+        "profiles",
     }
     assert all(hasattr(estimate, name) for name in estimate.__all__)
     assert list(signature(least_squares).parameters)[:5] == ["fun", "x0", "jac", "bounds", "method"]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Literal
 
 from exfit.estimate.arrays import Array
 
@@ -95,3 +96,13 @@ class Result:
     success: bool
     history: tuple[Iteration, ...]
     stop: Stop
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far many searches side by side are; ``best`` is the lowest cost so far."""
+
+    stage: Literal["screening", "refining", "profiling"]
+    done: int
+    total: int
+    best: float

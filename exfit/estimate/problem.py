@@ -54,14 +54,7 @@ class Problem:
     def residuals(self, x: Array) -> Array:
         """Return fun(x), shape (M,), or one nan where arithmetic fails."""
         self.nfev += 1
-        try:
-            with np.errstate(all="ignore"):
-                r = np.array(self.fun(x.copy()), dtype=np.float64, ndmin=1)
-        except ArithmeticError:
-            return np.full(1, nan)
-        if r.ndim != 1:
-            raise ValueError(f"fun must return residuals in one dimension, not {r.shape}")
-        return r
+        return residuals_at(self.fun, x)
 
     def jacobian(self, point: Point) -> Array:
         """Return J, shape (M, N); not finite where fun or jac fail."""
@@ -110,6 +103,18 @@ class Problem:
         x = x.copy()
         x[j] += h
         return self.residuals(self.box.inside(x))
+
+
+def residuals_at(fun: Function, x: Array) -> Array:
+    """Return fun(x), shape (M,), or one nan where arithmetic fails."""
+    try:
+        with np.errstate(all="ignore"):
+            r = np.array(fun(x.copy()), dtype=np.float64, ndmin=1)
+    except ArithmeticError:
+        return np.full(1, nan)
+    if r.ndim != 1:
+        raise ValueError(f"fun must return residuals in one dimension, not {r.shape}")
+    return r
 
 
 def exact(jac: Function, x: Array) -> Array:

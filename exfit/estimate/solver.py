@@ -1,0 +1,71 @@
+"""Nonlinear least squares within bounds: the one function that chooses and runs a method."""
+
+from collections.abc import Callable
+from math import inf
+
+from numpy.typing import ArrayLike
+
+from exfit.estimate.answer import Iteration, Result
+from exfit.estimate.box import checked
+from exfit.estimate.problem import RELATIVE_STEP, Differences, Function, Problem
+from exfit.estimate.run import Run
+from exfit.estimate.stopping import Rules
+from exfit.estimate.strategies import STRATEGIES, Method
+
+
+def least_squares(
+    fun: Function,
+    x0: ArrayLike,
+    jac: Differences | Function = "2-point",
+    bounds: tuple[ArrayLike, ArrayLike] = (-inf, inf),
+    method: Method = "auto",
+    *,
+    max_iterations: int = 100,
+    gtol: float = 1e-8,
+    ftol: float = 1e-10,
+    xtol: float = 1e-10,
+    x_scale: ArrayLike | None = None,
+    good_enough: float | None = None,
+    callback: Callable[[Iteration], object] | None = None,
+) -> Result:
+    """Minimise f(x) = 1/2 sum(fun(x)^2) within bounds, from x0 (N,).
+
+    fun(x) gives the residuals (M,), jac(x) their derivatives (M, N); "2-point" and "3-point"
+    take differences, inside the bounds, and count them in nfev. A trial that is not finite, or
+    whose fun raises ArithmeticError, is rejected. fun is never called outside the bounds.
+
+    method    gn           full Gauss-Newton steps, or nothing
+              dgn          the same direction, shortened until Armijo's rule holds
+              lm           Levenberg-Marquardt within a trust region
+              lm-then-dgn  lm until a full Gauss-Newton step proves good, then dgn
+              auto         dgn; if that is not good enough, lm-then-dgn from x0; the better one
+              robust       gn while it works, then lm
+
+    x_scale      what counts as one unit of each variable; None takes it from the columns of J.
+                 Use 1 for logarithms
+    good_enough  root mean square of residuals that counts as a match (auto); None: convergence
+    callback     is told every Iteration; KeyboardInterrupt, raised anywhere, ends the search
+                 with the best point seen
+
+    It stops when (GRADIENT) the projected gradient is below gtol times its norm at x0 and either
+    the full step promises less than ftol f(x) (the gradient alone hardly sees badly determined
+    directions) or f(x) is below gtol^2 f(x0); (FLOOR) an iteration neither promised nor brought
+    ftol f(x); (STEP) the full step is below xtol; (KINK) no trial is better and the full step
+    promises less than a thousandth of f(x), as at a minimum where the derivative jumps; (CREEPING)
+    ten iterations, each with rejected trials, gained less than a millionth of f(x); or after
+    max_iterations, in each phase anew.
+
+    Raises ValueError for bounds that cross, x0 outside them or residuals not finite there.
+    """
+    start, box = checked(x0, bounds, x_scale)
+    if method not in STRATEGIES:
+        raise ValueError(f"method: {method!r} is none of {', '.join(STRATEGIES)}")
+    if not callable(jac) and jac not in RELATIVE_STEP:
+        raise ValueError(f"jac: {jac!r} is neither callable nor one of {', '.join(RELATIVE_STEP)}")
+    problem = Problem(fun, jac, box, x_scale is not None)
+    run = Run(problem, Rules(max_iterations, gtol, ftol, xtol), callback)
+    try:
+        outcome = run.best_of(STRATEGIES[method](run, run.begin(start), good_enough))
+    except KeyboardInterrupt:
+        outcome = run.interrupted()
+    return run.result(outcome)

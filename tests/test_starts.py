@@ -1,0 +1,278 @@
+"""The search from many starts, on problems whose minima are known."""
+
+import signal
+from threading import Event
+from time import sleep
+
+import numpy as np
+import pytest
+from known_minima import CERTIFIED
+
+from exfit.estimate import least_squares, multistart
+
+# the four zeros of Himmelblau's function (Himmelblau 1972), to the digits that are known
+ZEROS = [(3.0, 2.0), (-2.805118, 3.131312), (-3.779310, -3.283186), (3.584428, -1.848126)]
+BOX = (np.full(2, -6.0), np.full(2, 6.0))
+COUNT = 40
+STAGES = ("screening", "refining")
+
+
+def himmelblau(x):
+    return np.array([x[0] ** 2 + x[1] - 11.0, x[0] + x[1] ** 2 - 7.0])
+
+
+def himmelblau_slopes(x):
+    return np.array([[2.0 * x[0], 1.0], [1.0, 2.0 * x[1]]])
+
+
+HIMMELBLAU = (himmelblau, himmelblau_slopes, BOX)
+
+
+def two_valleys(x):
+    """A minimum near 1 and a higher one near -1, of a curved record."""
+    t = np.linspace(0.0, 1.0, 40)
+    return np.concatenate([(x[0] ** 2 - 1.0) * t, 0.3 * (x[0] - 1.0) * np.ones(40) + 0.01 * t])
+
+
+def two_valleys_slopes(x):
+    t = np.linspace(0.0, 1.0, 40)
+    return np.concatenate([2.0 * x[0] * t, np.full(40, 0.3)])[:, None]
+
+
+def cost_of(fun, x):
+    return 0.5 * float(np.sum(fun(x) ** 2))
+
+
+def points_of(minima):
+    return np.array([one.x for one in minima.minima])
+
+
+def test_finds_every_minimum_and_counts_who_led_there():
+    found = multistart(*HIMMELBLAU, COUNT)
+    assert sum(one.starts for one in found.minima) == COUNT
+    zeros = [one for one in found.minima if one.cost < 1e-12]
+    assert sorted(one.x.round(3).tolist() for one in zeros) == sorted(np.round(ZEROS, 3).tolist())
+    assert (found.failed, found.unrefined, found.interrupted) == (0, 0, False)
+
+
+def test_the_lowest_minimum_comes_first():
+    found = multistart(two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
+    assert [round(one.x[0]) for one in found.minima] == [1, -1]
+    costs = [one.cost for one in found.minima]
+    assert costs == sorted(costs)
+
+
+def test_every_minimum_is_the_result_that_its_best_start_led_to():
+    found = multistart(two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
+    for one in found.minima:
+        assert one.x.tolist() == one.result.x.tolist()
+        assert one.result.fun.tolist() == two_valleys(one.x).tolist()
+        assert one.result.jac.tolist() == two_valleys_slopes(one.x).tolist()
+        assert cost_of(two_valleys, one.x) == pytest.approx(one.cost, rel=1e-12)
+        again = least_squares(
+            two_valleys, one.result.history[0].x, two_valleys_slopes, ([-3.0], [3.0]), "lm-then-dgn"
+        )
+        assert again.x.tolist() == one.x.tolist()
+
+
+def test_no_end_is_above_its_start():
+    found = multistart(*HIMMELBLAU, COUNT)
+    assert (found.end_costs <= found.start_costs).all()
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_a_run_repeats_whatever_the_threads(workers):
+    first, again = multistart(*HIMMELBLAU, COUNT), multistart(*HIMMELBLAU, COUNT, workers=workers)
+    assert points_of(first).tolist() == points_of(again).tolist()
+    assert [one.starts for one in first.minima] == [one.starts for one in again.minima]
+    assert first.end_costs.tolist() == again.end_costs.tolist()
+
+
+def test_another_seed_gives_other_starts():
+    first, other = multistart(*HIMMELBLAU, COUNT), multistart(*HIMMELBLAU, COUNT, seed=2)
+    assert not np.isin(first.start_costs, other.start_costs).any()
+
+
+@pytest.mark.parametrize("count", [16, 50])
+def test_the_starts_are_spread_evenly_over_the_bounds(count):
+    seen = []
+    screen = lambda points: seen.extend(points) or [1.0] * len(points)  # noqa: E731
+    multistart(*HIMMELBLAU, count, screen=screen, refine=0)
+    seen = np.array(seen)
+    assert seen.shape == (count, 2)
+    assert ((seen >= BOX[0]) & (seen <= BOX[1])).all()
+    # a Sobol sequence puts one of sixteen points into each sixteenth of every side
+    for side in seen[:16].T:
+        assert sorted(np.floor((side + 6.0) / 0.75)) == list(range(16))
+
+
+def test_the_users_own_start_is_the_first_and_always_refined():
+    start = [0.1, 0.0]  # near a summit: among the worst
+    found = multistart(*HIMMELBLAU, COUNT, x0=start, refine=1)
+    assert found.start_costs[0] == pytest.approx(cost_of(himmelblau, start))
+    assert np.isfinite(found.end_costs[0])
+    assert found.minima[0].result.history[0].x.tolist() == start
+    assert found.unrefined == COUNT - 1
+
+
+def test_the_best_starts_are_refined():
+    found = multistart(*HIMMELBLAU, COUNT, refine=10)
+    refined = np.isfinite(found.end_costs)
+    assert np.count_nonzero(refined) == 10
+    assert found.start_costs[refined].max() <= found.start_costs[~refined].min()
+    assert found.unrefined == COUNT - 10
+
+
+@pytest.mark.parametrize("kind", ["nan", "infinite", "fails"])
+def test_starts_that_are_not_finite_are_dropped_and_counted(kind):
+    def fun(x):
+        if x[0] < 0.0:
+            if kind == "fails":
+                raise ZeroDivisionError
+            return np.full(2, np.nan if kind == "nan" else np.inf)
+        return himmelblau(x)
+
+    found = multistart(fun, himmelblau_slopes, BOX, 64)
+    assert found.failed == 32  # the sequence is balanced
+    assert np.count_nonzero(np.isinf(found.start_costs)) == 32
+    assert np.count_nonzero(np.isnan(found.end_costs)) == 32
+    assert sum(one.starts for one in found.minima) == 32
+    assert all(one.x[0] >= 0.0 for one in found.minima)
+
+
+def test_where_nothing_is_finite_there_are_no_minima():
+    found = multistart(lambda x: x * np.nan, himmelblau_slopes, BOX, 8)
+    assert (found.minima, found.failed, found.unrefined) == ((), 8, 0)
+
+
+def test_a_screen_that_takes_many_points_changes_nothing():
+    sizes = []
+
+    def screen(points):
+        sizes.append(len(points))
+        return [cost_of(himmelblau, x) for x in points]
+
+    one, other = multistart(*HIMMELBLAU, 200), multistart(*HIMMELBLAU, 200, screen=screen)
+    assert one.start_costs == pytest.approx(other.start_costs, rel=1e-12)
+    assert points_of(one).tolist() == points_of(other).tolist()
+    assert sum(sizes) == 200
+    assert max(sizes) >= 16  # enough for the vectors of a processor
+
+
+def test_ends_along_a_flat_valley_are_one_minimum():
+    # the product of the first two is all that is seen
+    case = CERTIFIED["Misra1a"]
+    center = np.log([25.0, 10.0, 5e-4])
+
+    def fun(z):
+        return case.fun(np.array([np.exp(z[0] + z[1]), np.exp(z[2])]))
+
+    def jac(z):
+        J = case.jac(np.array([np.exp(z[0] + z[1]), np.exp(z[2])]))
+        first, second = J[:, 0] * np.exp(z[0] + z[1]), J[:, 1] * np.exp(z[2])
+        return np.column_stack([first, first, second])
+
+    found = multistart(fun, jac, (center - 1.0, center + 1.0), 30, x_scale=1.0)
+    best = found.minima[0]
+    assert best.starts == 30
+    assert 2.0 * best.cost == pytest.approx(case.squares, rel=1e-7)
+
+
+def test_minima_of_equal_cost_at_other_places_are_two():
+    t = np.linspace(0.0, 1.0, 30)
+    fun = lambda x: (x[0] ** 2 - 1.0) * (1.0 + t) + 0.1 * np.sin(40.0 * t)  # noqa: E731
+    jac = lambda x: (2.0 * x[0] * (1.0 + t))[:, None]  # noqa: E731
+    found = multistart(fun, jac, ([-3.0], [3.0]), 20)
+    assert len(found.minima) == 2
+    assert found.minima[0].x == pytest.approx(-found.minima[1].x, rel=1e-6)
+    assert found.minima[0].cost == pytest.approx(found.minima[1].cost, rel=1e-9)
+
+
+def test_watch_is_told_of_both_stages():
+    told = []
+    found = multistart(*HIMMELBLAU, COUNT, refine=10, watch=told.append)
+    for stage, total in zip(STAGES, (COUNT, 10), strict=True):
+        lines = [one for one in told if one.stage == stage]
+        assert [one.done for one in lines] == sorted(one.done for one in lines)
+        assert lines[-1].done == total
+        assert {one.total for one in lines} == {total}
+        assert [one.best for one in lines] == sorted((one.best for one in lines), reverse=True)
+    assert told[-1].best == found.minima[0].cost
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+@pytest.mark.parametrize("stage", STAGES)
+def test_an_interruption_from_watch_keeps_what_is_done(stage, workers):
+    def watch(progress):
+        if progress.stage == stage and progress.done >= 5:
+            raise KeyboardInterrupt
+
+    found = multistart(*HIMMELBLAU, 500, workers=workers, watch=watch)
+    assert found.interrupted
+    refined = np.count_nonzero(np.isfinite(found.end_costs))
+    assert sum(one.starts for one in found.minima) == refined
+    assert found.unrefined == 500 - refined
+    assert (refined >= 5) if stage == "refining" else (refined == 0)
+    assert refined < 500
+
+
+@pytest.mark.parametrize("place", [10, 700])
+def test_a_signal_ends_the_threads_at_once(place):
+    """What Ctrl-C does: the main thread is interrupted while others are in the middle of fun."""
+    calls, released = [], Event()
+
+    def fun(x):
+        calls.append(x)
+        if len(calls) == place:
+            signal.raise_signal(signal.SIGINT)
+        if len(calls) >= place:
+            released.wait(0.05)
+        return himmelblau(x)
+
+    found = multistart(fun, himmelblau_slopes, BOX, 500, workers=3)
+    assert found.interrupted
+    after = len(calls)
+    assert after < place + 60  # those in the middle, and few more
+    sleep(0.1)
+    assert len(calls) == after  # no thread goes on
+
+
+@pytest.mark.parametrize("place", [10, 700])
+def test_a_mistake_in_fun_is_raised_and_ends_the_threads(place):
+    calls = []
+
+    def fun(x):
+        calls.append(x)
+        if len(calls) == place:
+            raise LookupError("a mistake")
+        return himmelblau(x)
+
+    with pytest.raises(LookupError, match="a mistake"):
+        multistart(fun, himmelblau_slopes, BOX, 500, workers=3)
+    after = len(calls)
+    sleep(0.1)
+    assert len(calls) == after
+
+
+def test_the_tolerances_reach_the_refinements():
+    loose = multistart(*HIMMELBLAU, 8, max_iterations=1, method="lm")
+    assert all(one.result.nit <= 1 for one in loose.minima)
+    assert loose.end_costs.min() > 1e-12
+
+
+def test_what_cannot_be_searched_is_refused():
+    given = (himmelblau, himmelblau_slopes)
+    with pytest.raises(ValueError, match="finite"):
+        multistart(*given, (np.full(2, -6.0), np.full(2, np.inf)), 8)
+    with pytest.raises(ValueError, match="count"):
+        multistart(*given, BOX, 0)
+    with pytest.raises(ValueError, match="outside"):
+        multistart(*given, BOX, 8, x0=[7.0, 0.0])
+    with pytest.raises(ValueError, match="exceeds"):
+        multistart(*given, (BOX[1], BOX[0]), 8)
+
+
+def test_an_end_that_did_not_converge_says_so():
+    found = multistart(*HIMMELBLAU, 1, max_iterations=0)
+    assert [one.result.success for one in found.minima] == [False]
+    assert found.end_costs.tolist() == found.start_costs.tolist()
