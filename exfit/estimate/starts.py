@@ -87,7 +87,8 @@ def multistart(
 
     Two ends are one minimum where half a standard error, in cost f / 4 (M - N), exceeds both the
     difference of their costs and what the linear model at the better one makes of their distance:
-    then no record tells them apart, however flat the valley.
+    then no record tells them apart, however flat the valley. Costs below gtol^2 times the starts'
+    median are all nothing.
 
     Raises ValueError for bounds that are not finite or cross, x0 outside them, or count < 1.
 
@@ -100,6 +101,7 @@ def multistart(
     if x0 is not None and np.isfinite(costs[0]):
         order = np.append(0, order[order != 0])
     chosen = [] if stop.is_set() else [int(k) for k in order[:refine]]
+    nothing = gtol**2 * float(np.median(costs[chosen])) if chosen else 0.0
 
     def descend(k: int) -> None:
         found = least_squares(
@@ -117,7 +119,7 @@ def multistart(
         )
         if found.stop is Stop.INTERRUPTED:
             raise KeyboardInterrupt
-        ends[k] = end_of(found, gtol)
+        ends[k] = end_of(found, nothing)
 
     def tell(_: None) -> None:
         lowest = min(end.result.cost for end in tuple(ends.values()))
@@ -198,10 +200,10 @@ class End:
     step: float
 
 
-def end_of(found: Result, gtol: float) -> End:
-    """Return the end that a refinement came to."""
+def end_of(found: Result, nothing: float) -> End:
+    """Return the end that a refinement came to; ``nothing`` is what a perfect match may cost."""
     freedom = max(1, len(found.fun) - len(found.x))
-    step = UNTOLD**2 * found.cost / freedom + gtol**2 * found.history[0].cost
+    step = UNTOLD**2 * found.cost / freedom + nothing
     triangle = np.asarray(np.linalg.qr(found.jac, mode="r"), dtype=np.float64)
     return End(replace(found, fun=np.zeros(0), jac=np.zeros((0, len(found.x)))), triangle, step)
 
