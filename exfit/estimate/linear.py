@@ -140,9 +140,11 @@ def solve(linear: Linear, nu: float = 0.0, reach: float = inf) -> Step:
     limit = reach * linear.scale * linear.box.unit
     low, high = np.maximum(linear.low, -limit), np.minimum(linear.high, limit)
     y = -V.T @ (s * b / (s**2 + nu))
-    if np.any(y < low) or np.any(y > high):
-        rows = np.vstack([s[:, None] * V, sqrt(nu) * np.eye(len(y))])
-        y = bounded_minimum(rows, np.append(b, np.zeros(len(y))), low, high)
+    if (y < low).any() or (y > high).any():
+        rows = s[:, None] * V
+        if nu > 0.0:
+            rows, b = np.vstack([rows, sqrt(nu) * np.eye(len(y))]), np.append(b, np.zeros(len(y)))
+        y = bounded_minimum(rows, b, low, high)
     return step_to(linear, y)
 
 

@@ -69,7 +69,7 @@ def multistart(
     method: Method = "lm-then-dgn",
     max_iterations: int = 100,
     gtol: float = 1e-8,
-    ftol: float = 1e-10,
+    ftol: float = 1e-8,
     xtol: float = 1e-10,
     x_scale: ArrayLike | None = None,
     good_enough: float | None = None,
@@ -78,8 +78,9 @@ def multistart(
 
     The starts are x0, if there is one, and points of a scrambled Sobol sequence. The ``refine``
     best of them (all by default), x0 always among them, are refined by `least_squares`, whose
-    method and tolerances these are, in ``workers`` threads (as many as there are processors by
-    default); fun and jac must bear being called from several at a time.
+    method and tolerances these are (the cost's is wider: to tell minima apart needs less), in
+    ``workers`` threads (as many as there are processors by default); fun and jac must bear being
+    called from several at a time.
 
     screen  gives the costs (K,) of many points (K, N) at once; without it fun is called for each
     watch   is told every Progress; KeyboardInterrupt, raised there or anywhere, ends the search

@@ -113,6 +113,8 @@ def damping(linear: Linear, radius: float) -> float:
 def free_part(linear: Linear) -> tuple[Array, Array]:
     """Return singular values and amounts of the variables that no bound holds; both (K,)."""
     free, k = linear.projected != 0.0, linear.rank
+    if free.all():
+        return linear.singular[:k], linear.amounts[:k]
     A = linear.singular[:k, None] * linear.directions[:k, free]
     left, s, _ = np.linalg.svd(A, full_matrices=False)
     seen = s > linear.unseen * max(np.max(s, initial=0.0), TINY)
