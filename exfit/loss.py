@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-OfError = Callable[[Array, float], Array]
+Scale = float | Array  # one for all errors, or each its own
+OfError = Callable[[Array, Scale], Array]
 
 
 @dataclass(frozen=True)
 class Loss:
-    """Functions of the errors e (M,) and of the scale C > 0, in the unit of e, beyond which they
-    count less.
+    """Functions of the errors e (M,) and of the scale C > 0, a number or (M,), in the unit of e,
+    beyond which they count less.
 
     The loss of an error is C^2 rho((e / C)^2) / 2. ``residual`` is the r of e's sign with r^2 / 2
     equal to it: least squares of r minimise the loss. ``slope`` is dr/de, ``influence`` the psi of
@@ -30,47 +31,47 @@ class Loss:
     curvature: OfError
 
 
-def _square_residual(e: Array, scale: float) -> Array:
+def _square_residual(e: Array, scale: Scale) -> Array:
     return e
 
 
-def _square_slope(e: Array, scale: float) -> Array:
+def _square_slope(e: Array, scale: Scale) -> Array:
     return np.ones_like(e)
 
 
-def _huber_residual(e: Array, scale: float) -> Array:
+def _huber_residual(e: Array, scale: Scale) -> Array:
     size = np.abs(e)
     far = np.sqrt(scale) * np.sqrt(2.0 * np.maximum(size, scale) - scale)
     return np.copysign(np.where(size <= scale, size, far), e)
 
 
-def _huber_slope(e: Array, scale: float) -> Array:
+def _huber_slope(e: Array, scale: Scale) -> Array:
     return scale / np.maximum(np.abs(_huber_residual(e, scale)), scale)
 
 
-def _huber_influence(e: Array, scale: float) -> Array:
+def _huber_influence(e: Array, scale: Scale) -> Array:
     return np.clip(e, -scale, scale)
 
 
-def _huber_curvature(e: Array, scale: float) -> Array:
+def _huber_curvature(e: Array, scale: Scale) -> Array:
     return np.asarray(np.abs(e) <= scale, dtype=np.float64)
 
 
 # with e = C sinh(u), C^2 (sqrt(1 + (e / C)^2) - 1) is 2 C^2 sinh(u / 2)^2: nothing cancels at 0
-def _soft_residual(e: Array, scale: float) -> Array:
+def _soft_residual(e: Array, scale: Scale) -> Array:
     return np.asarray(2.0 * scale * np.sinh(np.arcsinh(e / scale) / 2.0))
 
 
-def _soft_slope(e: Array, scale: float) -> Array:
+def _soft_slope(e: Array, scale: Scale) -> Array:
     half = np.cosh(np.arcsinh(e / scale) / 2.0)
     return np.asarray(1.0 / (2.0 * half - 1.0 / half))
 
 
-def _soft_influence(e: Array, scale: float) -> Array:
+def _soft_influence(e: Array, scale: Scale) -> Array:
     return np.asarray(scale * np.tanh(np.arcsinh(e / scale)))
 
 
-def _soft_curvature(e: Array, scale: float) -> Array:
+def _soft_curvature(e: Array, scale: Scale) -> Array:
     return np.asarray((1.0 / np.cosh(np.arcsinh(e / scale))) ** 3)
 
 

@@ -353,7 +353,7 @@ def test_a_wide_standard_error_is_told_but_no_interval():
     assert one.interval is None
     assert one.relative_error == pytest.approx(8.0 / 20.0, rel=0.1)
     told = f"standard error {100 * one.relative_error:.0f} %; see `exfit profile`"
-    assert one.why == f"the record does not determine it: {told}"
+    assert one.why == f"is not determined by the record: {told}"
 
 
 @pytest.mark.parametrize("nuisance", [True, False])
@@ -366,7 +366,7 @@ def test_near_zero_the_interval_between_the_bounds_is_the_measure(nuisance):
     small = confidence(linearised([0.0], errors, np.ones((400, 1)), width=np.array([0.1])))
     assert small.parameters["a"].relative_error is None
     assert small.parameters["a"].why == (
-        f"the record does not determine it: standard error "
+        f"is not determined by the record: standard error "
         f"{small.parameters['a'].std_error:.2g} pu; see `exfit profile`"
     )
 

@@ -145,5 +145,5 @@ def reason(factors: Factors, k: int, share: float) -> str | None:
         return "the record has no more samples than the fit has parameters"
     if share > UNDETERMINED:
         told = error(lin, k, share)
-        return f"the record does not determine it: standard error {told}; see `exfit profile`"
+        return f"is not determined by the record: standard error {told}; see `exfit profile`"
     return None
