@@ -5,14 +5,14 @@ pydantic lives only here and in case_schema.
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError
 
 from exfit.case_faults import contradictions
 from exfit.case_form import form_faults, show
-from exfit.case_parts import Part, Parts, parts_of
+from exfit.case_parts import Part, Parts, parts_of, ties_of, with_network
 from exfit.case_schema import (
     BumpTest,
     Channel,
@@ -22,20 +22,25 @@ from exfit.case_schema import (
     Limit,
     MachinePlayback,
     NoPlant,
+    OnLine,
     OpenCircuit,
     Parameters,
     Playback,
     RecordFile,
+    Recording,
     Section,
     Simulation,
     Stabiliser,
     Step,
     Switch,
     Text,
-    Validation,
+    Unknown,
+    Value,
+    known,
 )
 from exfit.errors import CaseError, RecordError
 from exfit.record import Record, read_record
+from exfit.ties import Ties
 from exfit.yaml_lines import Fault, Place, read_text, read_yaml
 
 __all__ = [
@@ -47,16 +52,20 @@ __all__ = [
     "OpenCircuit",
     "Playback",
     "RecordFile",
+    "Recording",
     "Step",
     "Switch",
+    "Unknown",
     "dotted",
     "initial_level",
     "initial_voltage",
     "json_schema",
+    "known",
     "load_case",
     "parse_case",
 ]
 
+SINGLE = "fit"  # name of a record that stands alone
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -78,9 +87,16 @@ class Case(Section):
     stabiliser: Stabiliser | None = Field(
         default=None, description="A power system stabiliser; on open circuit it does not act."
     )
-    test: BumpTest = Field(description="What was done to the unit.")
+    test: BumpTest | None = Field(
+        default=None, description="What was done to the unit; each of the records has its own."
+    )
     record: RecordFile | None = Field(
         default=None, description="What was measured; a simulation does without."
+    )
+    records: tuple[Recording, ...] = Field(
+        default=(),
+        min_length=1,
+        description="In place of test and record: several tests with their records, fitted as one.",
     )
     parameters: Parameters = Field(
         default_factory=Parameters, description="What is known and what is to be found."
@@ -91,7 +107,7 @@ class Case(Section):
     simulation: Simulation = Field(
         default_factory=Simulation, description="The grid of the simulation."
     )
-    validations: tuple[Validation, ...] = Field(
+    validations: tuple[Recording, ...] = Field(
         default=(), alias="validate", description="Records on which the result is tried."
     )
     accept: Limit | None = Field(
@@ -100,6 +116,7 @@ class Case(Section):
 
     _path: Path = PrivateAttr()
     _parts: Parts = PrivateAttr()
+    _ties: Ties = PrivateAttr()
 
     @property
     def path(self) -> Path:
@@ -122,26 +139,63 @@ class Case(Section):
         return self._parts.all[0].name
 
     @property
+    def ties(self) -> Ties:
+        """The parameters that follow others, as the system names them."""
+        return self._ties
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """The records that are fitted; a single one is named fit."""
+        if self.records or self.record is None or self.test is None:
+            return self.records
+        return (Recording.model_construct(name=SINGLE, test=self.test, record=self.record),)
+
+    @property
     def tests(self) -> tuple[BumpTest, ...]:
-        """The test of the fit, then those of the validations."""
-        return (self.test, *(one.test for one in self.validations))
+        """The tests of the fit, then those of the validations."""
+        alone = () if self.test is None else (self.test,)
+        return (*alone, *(one.test for one in (*self.records, *self.validations)))
+
+    @property
+    def on_load(self) -> bool:
+        """Whether the breaker is closed in any of the tests."""
+        plants = (self.plant, *(one.plant for one in (*self.records, *self.validations)))
+        return any(isinstance(plant, InfiniteBus | OnLine) for plant in plants)
+
+    def seen_from(self, recording: Recording) -> "Case":
+        """Return the case as one record sees it: in the plant of that record."""
+        if recording.plant is None or not isinstance(self.plant, OpenCircuit | InfiniteBus):
+            return self
+        own = {key: getattr(self.plant, key) for key in ("machine", "parameters", "free")}
+        kind = InfiniteBus if isinstance(recording.plant, OnLine) else OpenCircuit
+        plant = kind.model_construct(**own, **dict(recording.plant))
+        view = self.model_copy(update={"plant": plant})
+        network = recording.plant.network if isinstance(recording.plant, OnLine) else None
+        view._parts = with_network(self._parts, network)
+        return view
 
     def values(self) -> dict[str, float]:
-        """Return every parameter of the parts, as the system names them: typical, fixed, start."""
+        """Return every parameter of the parts, as the system names them: typical, fixed, start.
+
+        What follows others comes out of them; helpers that only such arithmetic uses stand last.
+        """
         values: dict[str, float] = {}
         for part in self._parts.all:
             starts = {symbol: free.start for symbol, free in self._free(part).items()}
-            resolved = part.resolved(self._fixed(part), starts)
+            resolved = part.resolved(numbers_of(self._fixed(part)), starts)
             values |= {part.prefix + symbol: value for symbol, value in resolved.items()}
-        return values
+        helpers = {name: one.start for name, one in self._helpers(self.parameters.free).items()}
+        helpers |= numbers_of(self._helpers(self.parameters.fixed))
+        return self._ties.apply({**values, **helpers})
 
     def free(self) -> dict[str, Free]:
         """Return the free parameters, as the system names them."""
-        return {
+        own = {
             part.prefix + symbol: free
             for part in self._parts.all
             for symbol, free in self._free(part).items()
         }
+        return {**own, **self._helpers(self.parameters.free)}
 
     def typical(self) -> tuple[str, ...]:
         """Return the parameters that the file does not give, as the system names them."""
@@ -158,18 +212,27 @@ class Case(Section):
             part.prefix + row.symbol: row.unit for part in self._parts.all for row in part.sheet
         }
 
-    def _fixed(self, part: Part) -> Mapping[str, float]:
-        found: Mapping[str, float] = _at(self, part.fixed)
-        return found
+    def _fixed(self, part: Part) -> Mapping[str, float | str]:
+        found: Mapping[str, float | str] = _at(self, part.fixed)
+        return {symbol: found[symbol] for symbol in found if symbol in part.symbols}
 
     def _free(self, part: Part) -> Mapping[str, Free]:
-        return {} if part.free is None else _at(self, part.free)
+        found: Mapping[str, Free] = {} if part.free is None else _at(self, part.free)
+        return {symbol: found[symbol] for symbol in found if symbol in part.symbols}
+
+    def _helpers(self, given: Mapping[str, Value]) -> dict[str, Value]:
+        """Return what stands among the exciter's parameters and is none of them."""
+        own = next((part.symbols for part in self._parts.all if part.kind == "exciter"), ())
+        return {name: value for name, value in given.items() if name not in own}
 
     def measure(self, test: BumpTest, record: RecordFile) -> Record:
         """Return the record of a test; raises RecordError where its steps lie outside it."""
-        channels: dict[str, Channel] = dict(record.channels.items())
+        channels: dict[str, Column] = {
+            signal: column_of(channel) for signal, channel in record.channels.items()
+        }
         path = self.folder / record.file
-        read = read_record(path, record.time, channels, record.window)
+        missing = record.gaps == "skip"
+        read = read_record(path, record.time, channels, record.window, missing)
         start, end = read.time[0], read.time[-1]
         if test.begin is not None:
             if test.begin > start:
@@ -199,6 +262,11 @@ class Case(Section):
         return read
 
 
+def numbers_of(given: Mapping[str, float | str]) -> dict[str, float]:
+    """Return those values that are numbers of their own."""
+    return {name: value for name, value in given.items() if not isinstance(value, str)}
+
+
 def _at(section: Any, place: Place) -> Any:
     """Return what stands at a place of the case."""
     for key in place:
@@ -206,15 +274,30 @@ def _at(section: Any, place: Place) -> Any:
     return section
 
 
+class Column(NamedTuple):
+    """Where a signal stands in a file and how it becomes per unit."""
+
+    column: str
+    scale: float
+    offset: float
+
+
+def column_of(channel: Channel) -> Column:
+    """Return the column of a channel; where a fit finds scale or offset, with their starts."""
+    scale, offset = known(channel.scale), known(channel.offset)
+    return Column(channel.column, 1.0 if scale is None else scale, offset or 0.0)
+
+
 def initial_level(test: BumpTest, record: Record, signal: str) -> float:
     """Return the mean of a recorded signal while the unit is still at rest."""
     until = np.inf if test.steady is None else test.steady
-    return float(record.signals[signal][record.time < until].mean())
+    return float(np.nanmean(record.signals[signal][record.time < until]))
 
 
 def initial_voltage(test: BumpTest, record: Record) -> float:
     """Return the voltage before the first step: as the test gives it, else the record's mean."""
-    return initial_level(test, record, "vt") if test.vt0 is None else test.vt0
+    vt0 = known(test.vt0)
+    return initial_level(test, record, "vt") if vt0 is None else vt0
 
 
 def load_case(path: Path) -> Case:
@@ -229,16 +312,18 @@ def parse_case(text: str, path: Path) -> Case:
     """Return the case of a YAML text, as if it stood in the file ``path``; raises CaseError."""
     top, faults = read_yaml(text, path)
     parts = parts_of(top.value, path.parent, faults)
+    ties = ties_of(top.value, parts, faults)
     case = _checked(top.value, faults)
     taken = {fault.place for fault in faults}
-    faults += [fault for fault in contradictions(top.value, parts) if fault.place not in taken]
+    found = contradictions(top.value, parts, ties)
+    faults += [fault for fault in found if fault.place not in taken]
     if faults or case is None:
         lines = [(fault.line or top.line_of(fault.place), fault) for fault in faults]
         raise CaseError(
             f"{path}:{line}: {dotted(fault.place)}: {fault.text}"
             for line, fault in sorted(lines, key=lambda found: found[0])
         )
-    case._path, case._parts = path, parts
+    case._path, case._parts, case._ties = path, parts, ties
     return case
 
 

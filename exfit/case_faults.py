@@ -5,21 +5,42 @@ of the others: a value that has the wrong form is left to the schema and skipped
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import inf, isfinite
-from typing import Any
+from typing import Any, TypeGuard
 
 from exfit.case_form import near, show
-from exfit.case_parts import WITHOUT_EXCITER, Part, Parts
+from exfit.case_parts import (
+    TIE,
+    WITHOUT_EXCITER,
+    Part,
+    Parts,
+    helpers_of,
+    network_part,
+    plants_of_records,
+)
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
 from exfit.plant import DRIVING
+from exfit.ties import TieError, Ties
 from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
 Contradictions = Iterable[tuple[str, str]]
 
-TAKEN = ("fit", "response", "history", "overlay", "convergence", "trajectories")
+TAKEN = (
+    "fit",
+    "response",
+    "history",
+    "overlay",
+    "convergence",
+    "trajectories",
+    "sensitivity",
+    "correlation",
+    "profile",
+    "starts",
+)
+PREFIXES = ("machine", "network", "stabiliser")
 EVENTS: Mapping[str, tuple[str, ...]] = {
     "open-circuit": ("vref", "vs"),
     "infinite-bus": ("vref", "vs", "E", "network"),
@@ -44,19 +65,82 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def contradictions(data: Data, parts: Parts) -> Iterator[Fault]:
+def contradictions(data: Data, parts: Parts, ties: Ties) -> Iterator[Fault]:
     """Yield the faults of a case file's data beyond its form."""
     kind = str(_section(data, "plant").get("type"))
     yield from _model_faults(data, kind)
+    tied, faults = _tied_values(data, parts, ties)
+    yield from faults
+    helpers = _helper_places(data, parts, ties)
     for part in parts.all:
-        yield from _part_faults(data, part)
+        yield from _part_faults(data, part, tied, helpers)
     yield from _stabiliser_faults(data, parts, kind)
-    yield from _trial_faults((), data, data, kind)
-    for at, trial in enumerate(_list(data, "validate")):
-        yield from _trial_faults(("validate", at), trial, data, kind)
-    yield from _repeated_names(_list(data, "validate"))
+    yield from _records_faults(data, kind)
+    recorded = [
+        ((key, at), one)
+        for key in ("records", "validate")
+        for at, one in enumerate(_list(data, key))
+    ]
+    for place, plant in plants_of_records(data).items():
+        yield from _plant_of_record_faults(data, place, plant, kind)
+    if "records" not in data:
+        yield from _trial_faults((), data, data, kind)
+    for place, trial in recorded:
+        own = _section(trial, "plant").get("type", kind)
+        yield from _trial_faults(place, trial, data, str(own))
+    yield from _noise_faults(data, [((), data), *recorded], kind)
+    yield from _repeated_names(recorded)
     if "accept" in data and not _list(data, "validate"):
         yield Fault(("accept",), "there is no validation that it could judge")
+    estimate = _section(data, "estimate")
+    if "refine" in estimate and _numbers(estimate).get("starts", 1.0) <= 1.0:
+        yield Fault(("estimate", "refine"), "only with more than one of estimate.starts")
+
+
+def _records_faults(data: Data, kind: str) -> Iterator[Fault]:
+    """Yield what does not fit together where there are several records, or one, or none."""
+    if "records" not in data:
+        if "test" not in data:
+            yield Fault(("test",), "is missing")
+        return
+    for key in ("test", "record"):
+        if key in data:
+            yield Fault((key,), "does not go with records: each of them has its own")
+
+
+def _plant_of_record_faults(data: Data, place: Place, plant: Data, kind: str) -> Iterator[Fault]:
+    """Yield the faults of the plant that a record has in place of the case's."""
+    if kind not in ("open-circuit", "infinite-bus"):
+        yield Fault(place, f"does not go with plant {kind}")
+    elif plant.get("type") == "infinite-bus" and isinstance(plant.get("network"), dict):
+        yield from _part_faults(data, network_part(plant["network"], (*place, "network")), {}, {})
+
+
+def _tied_values(data: Data, parts: Parts, ties: Ties) -> tuple[dict[str, float], list[Fault]]:
+    """Return the start values of what follows other parameters, and what is wrong with them."""
+    known: dict[str, float] = {}
+    for part in parts.all:
+        fixed, free = _given_of(data, part)
+        starts = {symbol: _section(free, symbol).get("start") for symbol in free}
+        values = part.resolved(_numbers(fixed), _numbers(starts))
+        known |= {part.prefix + symbol: value for symbol, value in values.items()}
+    for name, place in helpers_of(data, parts).items():
+        value = _section(data, *place[:-1]).get(name)
+        start = _numbers({name: value.get("start") if isinstance(value, dict) else value})
+        known |= start
+    try:
+        values = ties.apply(known)
+    except TieError as error:
+        return {}, [Fault(("parameters",), str(error))]
+    except KeyError:
+        return {}, []  # of a value that has no readable form, which is told
+    return {name: values[name] for name in ties.by_name}, []
+
+
+def _helper_places(data: Data, parts: Parts, ties: Ties) -> dict[str, Place]:
+    """Return the helpers that some tie uses: they may stand among the exciter's parameters."""
+    used = {name for tie in ties.by_name.values() for name in tie.names}
+    return {name: place for name, place in helpers_of(data, parts).items() if name in used}
 
 
 def _model_faults(data: Data, kind: str) -> Iterator[Fault]:
@@ -69,16 +153,28 @@ def _model_faults(data: Data, kind: str) -> Iterator[Fault]:
             yield Fault((key,), f"does not go with plant {kind}: the machine stands alone")
 
 
-def _part_faults(data: Data, part: Part) -> Iterator[Fault]:
+def _given_of(data: Data, part: Part) -> tuple[Data, Data]:
+    """Return what the file gives for one part: fixed and free."""
+    return _section(data, *part.fixed), {} if part.free is None else _section(data, *part.free)
+
+
+def _part_faults(
+    data: Data, part: Part, tied: Mapping[str, float], helpers: Mapping[str, Place]
+) -> Iterator[Fault]:
     """Yield the faults of what the file gives for one part, and of its free parameters."""
-    fixed = _section(data, *part.fixed)
-    free = {} if part.free is None else _section(data, *part.free)
+    fixed, free = _given_of(data, part)
+    tied = {name.removeprefix(part.prefix): value for name, value in tied.items()}
+    fixed = {
+        symbol: tied.get(symbol, value) if _is_tie(value) else value
+        for symbol, value in fixed.items()
+    }
     places = {symbol: (*part.fixed, symbol) for symbol in fixed}
     rows = {row.symbol: row for row in part.sheet}
-    yield from _unknown_symbols(part.fixed, fixed, rows, part.name)
+    allowed = {*rows, *helpers} if part.kind == "exciter" else {*rows}
+    yield from _unknown_symbols(part.fixed, fixed, allowed, part.name)
     yield from _outside_sheet(part.fixed, fixed, rows)
     if part.free is not None:
-        yield from _unknown_symbols(part.free, free, rows, part.name)
+        yield from _unknown_symbols(part.free, free, allowed, part.name)
         for symbol in free:
             if symbol in fixed:
                 yield Fault((*part.free, symbol), "both fixed and free")
@@ -86,7 +182,7 @@ def _part_faults(data: Data, part: Part) -> Iterator[Fault]:
             places[symbol] = (*part.free, symbol, "start")
     starts = {symbol: _section(free, symbol).get("start") for symbol in free}
     values = _readable(part, fixed, starts)
-    section = part.fixed if part.fixed[0] == "plant" else part.fixed[:1]
+    section = part.fixed[:1] if part.kind == "exciter" else part.fixed
     yield from _placed(section, places, part.check(values))
 
 
@@ -96,7 +192,8 @@ def _stabiliser_faults(data: Data, parts: Parts, kind: str) -> Iterator[Fault]:
         return
     if kind in ("playback", "none"):
         yield Fault(("stabiliser",), f"does not go with plant {kind}: nothing feeds it")
-    if kind == "open-circuit" and _section(section, "free"):
+    kinds = {kind, *(str(plant.get("type")) for plant in plants_of_records(data).values())}
+    if kind == "open-circuit" and "infinite-bus" not in kinds and _section(section, "free"):
         yield Fault(("stabiliser", "free"), "on open circuit a stabiliser does not act")
     inputs = section.get("inputs")
     if parts.stabiliser is not None and isinstance(inputs, list):
@@ -107,11 +204,11 @@ def _stabiliser_faults(data: Data, parts: Parts, kind: str) -> Iterator[Fault]:
 
 
 def _unknown_symbols(
-    place: Place, given: Data, rows: Mapping[str, Parameter], owner: str
+    place: Place, given: Data, known: Collection[str], owner: str
 ) -> Iterator[Fault]:
     for symbol in given:
-        if symbol not in rows:
-            yield Fault((*place, symbol), f"not a parameter of {owner}; {near(symbol, rows)}")
+        if symbol not in known:
+            yield Fault((*place, symbol), f"not a parameter of {owner}; {near(symbol, known)}")
 
 
 def _outside_sheet(place: Place, given: Data, rows: Mapping[str, Parameter]) -> Iterator[Fault]:
@@ -137,6 +234,9 @@ def _bound_faults(place: Place, entry: Data, row: Parameter | None) -> Iterator[
         yield Fault(
             (*place, "min"), f"{show(low)} is not above 0, as scale: log needs; or scale: linear"
         )
+    prior = _section(entry, "prior")
+    if _numbers(prior).get("mean") == 0.0 and isinstance(prior.get("std"), str):
+        yield Fault((*place, "prior", "std"), "a share of mean = 0 is nothing: give a number")
     if row is None:
         return
     yield from _outside_sheet(place, numbers, dict.fromkeys(("start", "min", "max"), row))
@@ -168,18 +268,20 @@ def _trial_faults(place: Place, trial: Any, data: Data, kind: str) -> Iterator[F
     test, record = _section(trial, "test"), _section(trial, "record")
     yield from _event_faults((*place, "test"), test, kind)
     for index, switch in enumerate(_list(test, "network")):
-        if "E" in _numbers(switch) and "E" not in _section(data, "plant", "network"):
+        network = _section(trial, "plant", "network") or _section(data, "plant", "network")
+        if "E" in _numbers(switch) and "E" not in network:
             here = (*place, "test", "network", index, "E")
             yield Fault(here, "only where plant.network gives E; test.E changes it by steps")
     has_record = isinstance(trial, dict) and "record" in trial
     if has_record:
         yield from _record_faults(place, test, record)
         yield from _channel_faults((*place, "record"), _section(record, "channels"), kind)
+        yield from _unknown_faults(place, test, record, kind)
     elif kind in NEEDED:
         yield Fault((*place, "record"), f"is missing: plant {kind} plays it back")
     elif not place:
         yield from _missing_without_record((*place, "test"), test)
-    vt0 = _numbers(test).get("vt0")
+    vt0 = _starts(test).get("vt0")
     if kind in SIGNALS and kind != "none" and vt0 is not None and vt0 <= 0:
         yield Fault((*place, "test", "vt0"), f"{show(vt0)} is not above 0")
 
@@ -224,10 +326,10 @@ def _event_faults(place: Place, test: Data, kind: str) -> Iterator[Fault]:
 def _instants(test: Data) -> list[float]:
     """Return the readable instants of all events of a test."""
     return [
-        numbers["at"]
+        starts["at"]
         for name in ("vref", "vs", "E", "network")
-        for numbers in map(_numbers, _list(test, name))
-        if "at" in numbers
+        for starts in map(_starts, _list(test, name))
+        if "at" in starts
     ]
 
 
@@ -235,7 +337,7 @@ def _step_faults(place: Place, test: Data, name: str) -> Iterator[Fault]:
     before: float | None = None
     end = _numbers(test).get("duration")
     for index, step in enumerate(_list(test, name)):
-        here, numbers = (*place, index), _numbers(step)
+        here, numbers = (*place, index), _starts(step)
         if numbers.get("step") == 0:
             yield Fault((*here, "step"), "0 is no step")
         if name == "network" and isinstance(step, dict) and not {"R", "X", "E"} & step.keys():
@@ -260,11 +362,15 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
     begin = _numbers(test).get("begin")
     if begin is not None and "vt0" not in test:
         yield Fault((*place, "test", "vt0"), "is missing: with begin it says where to start")
+    for index, stretch in enumerate(_list(record, "mask")):
+        if _is_pair(stretch) and stretch[0] >= stretch[1]:
+            text = f"start {show(stretch[0])} is not below end {show(stretch[1])}"
+            yield Fault((*place, "record", "mask", index), text)
     channels = _section(record, "channels")
     if channels and "begin" not in test and "vt" not in channels and "vt0" not in test:
         yield Fault((*place, "test", "vt0"), "is missing, and the record has no vt to take it from")
     window = record.get("window")
-    if not (isinstance(window, list) and len(window) == 2 and all(map(_is_number, window))):
+    if not _is_pair(window):
         return
     start, end = window
     if start >= end:
@@ -280,7 +386,7 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
     start = start if begin is None else begin
     for name in ("vref", "vs", "E", "network"):
         for index, step in enumerate(_list(test, name)):
-            at = _numbers(step).get("at")
+            at = _starts(step).get("at")
             if at is not None and not start <= at < end:
                 limits = f"{show(start)} ... {show(end)} s"
                 here = (*place, "test", name, index, "at")
@@ -298,15 +404,82 @@ def _missing_without_record(place: Place, test: Data) -> Iterator[Fault]:
         yield Fault((*place, "vt0"), "is missing: without a record it says where to start")
 
 
-def _repeated_names(trials: list[Any]) -> Iterator[Fault]:
+def _unknown_faults(place: Place, test: Data, record: Data, kind: str) -> Iterator[Fault]:
+    """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
+    found: list[tuple[Place, Any]] = [((*place, "test", "vt0"), test.get("vt0"))]
+    for name in ("vref", "vs"):
+        for at in range(len(_list(test, name))):
+            for key in ("at", "step"):
+                found.append(((*place, "test", name, at, key), _section(test, name, at).get(key)))
+    found.append(((*place, "record", "delay"), record.get("delay")))
+    for signal, channel in _section(record, "channels").items():
+        for key in ("scale", "offset"):
+            here = (*place, "record", "channels", signal, key)
+            found.append((here, channel.get(key) if isinstance(channel, dict) else None))
+    for here, value in found:
+        if isinstance(value, dict):
+            yield from _unknown_value_faults(here, value)
+            if kind in NEEDED:
+                yield Fault(here, f"does not go with plant {kind}: the record drives it")
+    vt = _section(record, "channels", "vt")
+    for key in ("scale", "offset"):
+        if isinstance(vt.get(key), dict) and "vt0" not in test:
+            here = (*place, "test", "vt0")
+            yield Fault(here, f"is missing: the record cannot tell it where {key} of vt is found")
+            break
+    if kind in NEEDED and record.get("delay", 0) != 0:
+        yield Fault((*place, "record", "delay"), f"does not go with plant {kind}")
+
+
+def _unknown_value_faults(place: Place, value: Data) -> Iterator[Fault]:
+    """Yield the faults of one value that the fit shall find: its bounds and its start."""
+    numbers = _numbers(value)
+    start, low, high = (numbers.get(key) for key in ("start", "min", "max"))
+    auto = value.get("start") == "auto"
+    if auto and (place[-1] not in ("at", "step") or place[-3:-1] != ("vref", 0)):
+        yield Fault((*place, "start"), "auto finds the first step of vref: its at and its step")
+    for key in ("min", "max"):
+        if key not in value and not auto:
+            yield Fault((*place, key), "is missing")
+    if low is not None and high is not None and low >= high:
+        yield Fault((*place, "min"), f"{show(low)} is not below max = {show(high)}")
+    elif _outside(start, low, high):
+        limits = " ... ".join("?" if limit is None else show(limit) for limit in (low, high))
+        yield Fault((*place, "start"), f"{show(start or 0.0)} lies outside its bounds {limits}")
+    if place[-1] in ("step", "scale") and low is not None and high is not None and low <= 0 <= high:
+        yield Fault((*place, "min"), f"{show(low)} ... {show(high)} holds 0")
+
+
+def _noise_faults(data: Data, trials: list[tuple[Place, Any]], kind: str) -> Iterator[Fault]:
+    """Yield channels without noise where another has it, and channels with weight and noise."""
+    channels = {
+        (*place, "record", "channels", signal): channel if isinstance(channel, dict) else {}
+        for place, trial in trials
+        if not place or place[0] == "records"
+        for signal, channel in _section(trial, "record", "channels").items()
+        if signal not in DRIVERS.get(kind, ())
+    }
+    given = [place for place, channel in channels.items() if "noise" in channel]
+    for place, channel in channels.items():
+        if "noise" in channel and "weight" in channel:
+            yield Fault((*place, "weight"), "does not go with noise: it is one over the noise")
+        if given and "noise" not in channel:
+            yield Fault((*place, "noise"), "is missing: other channels have it")
+        median = _numbers(_section(channel, "filter")).get("median")
+        if median is not None and median % 2 == 0:
+            yield Fault((*place, "filter", "median"), f"{show(median)} is not an odd number")
+
+
+def _repeated_names(trials: Sequence[tuple[Place, Any]]) -> Iterator[Fault]:
     seen = dict.fromkeys(TAKEN, "a file of every run")
-    for at, trial in enumerate(trials):
+    seen |= dict.fromkeys(PREFIXES, "parts of the plant")
+    for place, trial in trials:
         name = trial.get("name") if isinstance(trial, dict) else None
         if not isinstance(name, str):
             continue
         if name.casefold() in seen:
             text = f"{name!r} is taken by {seen[name.casefold()]}: files are named after it"
-            yield Fault(("validate", at, "name"), text)
+            yield Fault((*place, "name"), text)
         seen.setdefault(name.casefold(), repr(name))
 
 
@@ -330,10 +503,32 @@ def _numbers(entries: Any) -> dict[str, float]:
     return {key: float(value) for key, value in entries.items() if _is_number(value)}
 
 
+def _starts(entries: Any) -> dict[str, float]:
+    """Return those entries that are numbers, or are found by the fit from a start that is one."""
+    if not isinstance(entries, dict):
+        return {}
+    known = {
+        key: value.get("start") if isinstance(value, dict) else value
+        for key, value in entries.items()
+    }
+    return _numbers(known)
+
+
+def _is_tie(value: Any) -> bool:
+    return isinstance(value, str) and value.startswith(TIE)
+
+
+def _is_pair(value: Any) -> TypeGuard[list[float]]:
+    return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
+
+
 def _section(data: Any, *place: str | int) -> dict[str, Any]:
     """Return the mapping at a place, an empty one where there is none."""
     for key in place:
-        data = data.get(key) if isinstance(data, dict) else None
+        if isinstance(data, list) and isinstance(key, int) and key < len(data):
+            data = data[key]
+        else:
+            data = data.get(key) if isinstance(data, dict) else None
     return data if isinstance(data, dict) else {}
 
 

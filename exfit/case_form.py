@@ -110,10 +110,11 @@ def _entries(count: int) -> str:
 
 
 def _place_in_file(location: Place) -> Place:
-    """Return a place without what pydantic adds: the kind of plant, and the mark of a key."""
-    place = tuple(part for part in location if part != "[key]")
-    chosen = place[:1] == ("plant",) and len(place) > 1
-    return (*place[:1], *place[2:]) if chosen else place
+    """Return a place without what pydantic adds: the kind of plant, and marks in brackets."""
+    place = [part for part in location if not str(part).startswith("[")]
+    if "plant" in place[:-1]:
+        del place[place.index("plant") + 1]
+    return tuple(place)
 
 
 def _known_keys(schema: Data, place: Place) -> list[str]:

@@ -1,7 +1,7 @@
 """The parts of a case that have a data sheet: exciter, machine, network, stabiliser."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from exfit.models.sheet import (
     typical,
 )
 from exfit.plant import MACHINE, NETWORK, STABILISER, flow_sheet
+from exfit.ties import Tie, Ties, parse
 from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
@@ -26,6 +27,7 @@ Contradictions = Iterator[tuple[str, str]]
 
 WITH_MACHINE = ("open-circuit", "infinite-bus", "machine-playback")
 WITHOUT_EXCITER = ("machine-playback",)
+TIE = "="  # what the arithmetic of other parameters begins with
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,11 @@ class Part:
     fixed: Place
     free: Place | None
     check: Callable[[Mapping[str, float]], Contradictions] = field(compare=False)
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Its parameters by symbol."""
+        return tuple(row.symbol for row in self.sheet)
 
     def resolved(self, *given: Mapping[str, float]) -> dict[str, float]:
         """Return a value for each parameter: typical unless given, the last one wins."""
@@ -64,8 +71,7 @@ class Parts:
 
 def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
     """Return the parts of a case file's data; add a fault for a name that stands for none."""
-    plant = data.get("plant")
-    plant = plant if isinstance(plant, dict) else {}
+    plant = _mapping(data.get("plant"))
     exciter = None if plant.get("type") in WITHOUT_EXCITER else _exciter(data, folder, faults)
     machine = _machine(plant, faults) if plant.get("type") in WITH_MACHINE else None
     stabiliser = _stabiliser(data, faults)
@@ -74,13 +80,80 @@ def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
         exponential = str(data.get("saturation")).startswith("exponential")
         found.append(exciter_part(exciter, exponential))
     if machine is not None:
-        found.append(machine_part(machine, on_load=plant.get("type") == "infinite-bus"))
+        kinds = {str(one.get("type")) for one in (plant, *plants_of_records(data).values())}
+        found.append(machine_part(machine, on_load="infinite-bus" in kinds))
     if plant.get("type") == "infinite-bus":
-        network = plant.get("network")
-        found.append(network_part(network if isinstance(network, dict) else {}))
+        found.append(network_part(_mapping(plant.get("network"))))
     if stabiliser is not None:
         found.append(stabiliser_part(stabiliser))
     return Parts(exciter, machine, stabiliser, tuple(found))
+
+
+def with_network(parts: Parts, given: Data | None) -> Parts:
+    """Return the parts with another network, or with none where the breaker is open."""
+    others = tuple(part for part in parts.all if part.kind != "network")
+    network = () if given is None else (network_part(given),)
+    return replace(parts, all=(*others, *network))
+
+
+def plants_of_records(data: Data) -> dict[Place, Data]:
+    """Return the plants that records have in place of the case's, by their place in the file."""
+    return {
+        (key, at, "plant"): _mapping(entry["plant"])
+        for key in ("records", "validate")
+        for at, entry in enumerate(_entries(data.get(key)))
+        if isinstance(entry, dict) and "plant" in entry
+    }
+
+
+def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
+    """Return the ties of a case file's data; add a fault for each that cannot be used."""
+    found: dict[str, Tie] = {}
+    places: dict[str, Place] = {}
+    for name, place, text in _tied(data, parts):
+        places[name] = place
+        try:
+            found[name] = parse(text)
+        except ValueError as error:
+            faults.append(Fault(place, str(error)))
+    known = {*helpers_of(data, parts)}
+    known |= {part.prefix + symbol for part in parts.all for symbol in part.symbols}
+    for name, tie in list(found.items()):
+        for used in tie.names:
+            if used not in known:
+                faults.append(Fault(places[name], f"{used} is no parameter; {near(used, known)}"))
+                found.pop(name, None)
+    try:
+        return Ties(found)
+    except ValueError as error:
+        faults.append(Fault(next(iter(places.values())), str(error)))
+        return Ties({})
+
+
+def helpers_of(data: Data, parts: Parts) -> dict[str, Place]:
+    """Return the names among the exciter's parameters that are none of them, with their places."""
+    own = next((part.symbols for part in parts.all if part.kind == "exciter"), ())
+    section = _mapping(data.get("parameters"))
+    return {
+        name: ("parameters", key, name)
+        for key in ("fixed", "free")
+        for name in _mapping(section.get(key))
+        if name not in own
+    }
+
+
+def _tied(data: Data, parts: Parts) -> Iterator[tuple[str, Place, str]]:
+    """Yield name, place and text of every value that is the arithmetic of others."""
+    sections: list[tuple[str, Place]] = [
+        (part.prefix, part.fixed) for part in parts.all if part.kind != "network"
+    ]
+    for prefix, place in sections:
+        section = data
+        for key in place:
+            section = _mapping(section.get(str(key)))
+        for symbol, value in section.items():
+            if isinstance(value, str) and value.startswith(TIE):
+                yield prefix + symbol, (*place, symbol), value
 
 
 def exciter_part(model: Model, exponential: bool) -> Part:
@@ -121,7 +194,7 @@ def stabiliser_part(model: Model) -> Part:
     )
 
 
-def network_part(given: Data) -> Part:
+def network_part(given: Data, place: Place = ("plant", "network")) -> Part:
     """Return the part of a network, whose start is given by E where the file has E."""
 
     def check(values: Mapping[str, float]) -> Contradictions:
@@ -138,7 +211,7 @@ def network_part(given: Data) -> Part:
     sheet = flow_sheet("E" if "E" in given else "Q")
     if "Q" in given and "E" in given:
         sheet = (*sheet, *(row for row in flow_sheet("Q") if row.symbol == "Q"))
-    return Part("network", "the network", NETWORK, sheet, ("plant", "network"), None, check)
+    return Part("network", "the network", NETWORK, sheet, place, None, check)
 
 
 def _exciter(data: Data, folder: Path, faults: list[Fault]) -> Model | None:
@@ -158,8 +231,7 @@ def _machine(plant: Data, faults: list[Fault]) -> Machine | None:
 
 
 def _stabiliser(data: Data, faults: list[Fault]) -> Model | None:
-    section = data.get("stabiliser")
-    section = section if isinstance(section, dict) else {}
+    section = _mapping(data.get("stabiliser"))
     name = _known(section, ("stabiliser", "model"), STABILISERS, "stabiliser", faults)
     return None if name is None else STABILISERS[name]
 
@@ -175,3 +247,13 @@ def _known(
         return name.upper()
     faults.append(Fault(place, f"{name!r} is not a {kind} model; {near(name, catalogue)}"))
     return None
+
+
+def _entries(value: Any) -> list[Any]:
+    """Return a list of the file, an empty one where there is none."""
+    return value if isinstance(value, list) else []
+
+
+def _mapping(value: Any) -> dict[str, Any]:
+    """Return a mapping of the file, an empty one where there is none."""
+    return value if isinstance(value, dict) else {}

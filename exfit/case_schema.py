@@ -12,12 +12,17 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     Strict,
+    Tag,
     WrapSerializer,
 )
 
+from exfit.case_parts import TIE
+
 FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
 Value = TypeVar("Value")
 Signal = Literal["vt", "efd", "ifd", "p", "q", "vref"]
@@ -44,6 +49,29 @@ Text = Annotated[str, Strict(), Field(min_length=1)]
 Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSerializer(_thawed)]
 
 
+def _is_tie(value: Any) -> str:
+    return "[tie]" if isinstance(value, str) and value.startswith(TIE) else "[number]"
+
+
+def _is_percent(value: Any) -> str:
+    return "[percent]" if isinstance(value, str) else "[number]"
+
+
+def _is_unknown(value: Any) -> str:
+    return "[unknown]" if isinstance(value, dict | BaseModel) else "[number]"
+
+
+# marks in brackets stand in no file: case_form takes them out of the place of a fault
+Given = Annotated[
+    Annotated[Number, Tag("[number]")] | Annotated[str, Field(pattern="^="), Tag("[tie]")],
+    Discriminator(_is_tie),
+]
+Spread = Annotated[
+    Annotated[Positive, Tag("[number]")] | Annotated[str, Field(pattern=PERCENT), Tag("[percent]")],
+    Discriminator(_is_percent),
+]
+
+
 class Section(BaseModel):
     """A part of the case file: unknown keys are refused, values never change."""
 
@@ -55,6 +83,20 @@ class Section(BaseModel):
     )
 
 
+class Prior(Section):
+    """What is known of a parameter beside the record: a value with its standard deviation."""
+
+    mean: Number = Field(description="Value, as a data sheet has it.")
+    std: Spread = Field(description="Standard deviation, a number or a share such as 20 %.")
+
+    @property
+    def sigma(self) -> float:
+        """The standard deviation in the parameter's own unit."""
+        if isinstance(self.std, str):
+            return abs(self.mean) * float(self.std.rstrip("% ")) / 100.0
+        return self.std
+
+
 class Free(Section):
     """A parameter that the fit may change."""
 
@@ -64,6 +106,29 @@ class Free(Section):
     scale: Literal["log", "linear"] = Field(
         default="log", description="Scale on which the fit moves it; log needs min > 0."
     )
+    prior: Prior | None = Field(default=None, description="What is known of it beforehand.")
+
+
+class Unknown(Section):
+    """A value of a record or its test that the fit finds, on a linear scale."""
+
+    start: Number | Literal["auto"] = Field(
+        description="Value from which the fit starts; auto: as the record shows the first step."
+    )
+    min: Number | None = Field(default=None, description="Lower bound; auto needs none.")
+    max: Number | None = Field(default=None, description="Upper bound; auto needs none.")
+
+
+Findable = Annotated[
+    Annotated[Number, Tag("[number]")] | Annotated[Unknown, Tag("[unknown]")],
+    Discriminator(_is_unknown),
+]
+
+
+def known(value: "float | Unknown | None") -> float | None:
+    """Return a value where it is a number: given, or the start of one that is found."""
+    start = value.start if isinstance(value, Unknown) else value
+    return None if start == "auto" else start
 
 
 MACHINE = Field(description="Machine model: GENROU, GENROE, GENSAL, GENSAE or ONE_AXIS.")
@@ -81,7 +146,7 @@ class OpenCircuit(Section):
 
     type: Literal["open-circuit"] = Field(description="What surrounds the exciter.")
     machine: Text = MACHINE
-    parameters: Frozen[Number] = MACHINE_DATA
+    parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[Free] = MACHINE_FREE
 
 
@@ -90,7 +155,7 @@ class InfiniteBus(Section):
 
     type: Literal["infinite-bus"] = Field(description="What surrounds the exciter.")
     machine: Text = MACHINE
-    parameters: Frozen[Number] = MACHINE_DATA
+    parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[Free] = MACHINE_FREE
     network: Frozen[Number] = Field(
         description="f0 (Hz); R and X to the source; P and Q, or P and E (the source's voltage) at "
@@ -114,7 +179,7 @@ class MachinePlayback(Section):
 
     type: Literal["machine-playback"] = Field(description="The machine alone; there is no model.")
     machine: Text = MACHINE
-    parameters: Frozen[Number] = MACHINE_DATA
+    parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[Free] = MACHINE_FREE
 
 
@@ -133,7 +198,7 @@ class Stabiliser(Section):
         min_length=1,
         description="What it listens to, one or two of speed, p, vt; default: as its model says.",
     )
-    parameters: Frozen[Number] = Field(
+    parameters: Frozen[Given] = Field(
         default_factory=_nothing,
         description="Its data; what is missing takes its typical value.",
     )
@@ -145,6 +210,15 @@ class Step(Section):
 
     at: Number = Field(description="Instant, s.")
     step: Number = Field(description="Change, pu; not zero.")
+
+
+class FindableStep(Section):
+    """A step of a signal, whose instant and size the fit may find."""
+
+    at: Findable = Field(description="Instant, s; or {start, min, max}, and the fit finds it.")
+    step: Findable = Field(
+        description="Change, pu, not zero; or {start, min, max}, and the fit finds it."
+    )
 
 
 class Switch(Section):
@@ -161,9 +235,10 @@ class Switch(Section):
 class BumpTest(Section):
     """What was done to the unit."""
 
-    vt0: Number | None = Field(
+    vt0: Findable | None = Field(
         default=None,
-        description="Voltage before the first step, pu; default: mean of the record there.",
+        description="Voltage before the first step, pu; default: mean of the record there; or "
+        "{start, min, max}, and the fit finds it.",
     )
     begin: Number | None = Field(
         default=None,
@@ -174,10 +249,10 @@ class BumpTest(Section):
         default=None,
         description="Until when the record is at rest, s; default: the first step.",
     )
-    vref: tuple[Step, ...] = Field(
+    vref: tuple[FindableStep, ...] = Field(
         default=(), min_length=1, description="Steps of the reference, in the order of time."
     )
-    vs: tuple[Step, ...] = Field(
+    vs: tuple[FindableStep, ...] = Field(
         default=(), min_length=1, description="Steps of the stabiliser's signal, in its place."
     )
     E: tuple[Step, ...] = Field(
@@ -192,9 +267,10 @@ class BumpTest(Section):
 
     @property
     def instants(self) -> tuple[float, ...]:
-        """When something is done, s, in the order of time."""
-        steps = {step.at for step in (*self.vref, *self.vs, *self.E)}
-        return tuple(sorted(steps | {switch.at for switch in self.network}))
+        """When something is done, as far as it is known, s, in the order of time."""
+        instants = {known(step.at) for step in (*self.vref, *self.vs)}
+        instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
+        return tuple(sorted(at for at in instants if at is not None))
 
     @property
     def steady(self) -> float | None:
@@ -204,13 +280,55 @@ class BumpTest(Section):
         return self.instants[0] if self.instants else None
 
 
+class LowPass(Section):
+    """A low-pass filter, run forwards and backwards."""
+
+    lowpass: Positive = Field(description="Cut-off frequency, Hz.")
+
+
+class Median(Section):
+    """A running median."""
+
+    median: Count = Field(description="Samples, an odd number.")
+
+
+def _is_median(value: Any) -> str:
+    median = isinstance(value, Median) or (isinstance(value, dict) and "median" in value)
+    return "[median]" if median else "[lowpass]"
+
+
+Filter = Annotated[
+    Annotated[LowPass, Tag("[lowpass]")] | Annotated[Median, Tag("[median]")],
+    Discriminator(_is_median),
+]
+
+
 class Channel(Section):
     """Where a signal stands and how it becomes per unit: column * scale + offset."""
 
     column: Text = Field(description="Name of the column.")
-    scale: Number = Field(default=1.0, description="Factor on the column's numbers.")
-    offset: Number = Field(default=0.0, description="What is added after scaling, pu.")
+    scale: Findable = Field(
+        default=1.0,
+        description="Factor on the column's numbers; or {start, min, max}, and the fit finds it.",
+    )
+    offset: Findable = Field(
+        default=0.0,
+        description="What is added after scaling, pu; or {start, min, max}, and the fit finds it.",
+    )
     weight: Positive = Field(default=1.0, description="Weight of the signal in the fit.")
+    noise: Positive | None = Field(
+        default=None,
+        description="Standard deviation of its noise, pu, in place of a weight; all channels that "
+        "are compared, or none.",
+    )
+    filter: Filter | None = Field(
+        default=None, description="{lowpass: Hz} or {median: samples}; simulation and record alike."
+    )
+    outliers: Positive | None = Field(
+        default=None,
+        description="Leave out samples farther from the running median than so many standard "
+        "deviations of the noise.",
+    )
 
 
 class RecordFile(Section):
@@ -230,12 +348,26 @@ class RecordFile(Section):
     window: tuple[Number, Number] | None = Field(
         default=None, description="First and last instant used, s; default: the whole record."
     )
+    mask: tuple[tuple[Number, Number], ...] = Field(
+        default=(), description="Stretches that are not compared, each its first and last instant."
+    )
+    gaps: Literal["refuse", "skip"] = Field(
+        default="refuse", description="What to do where a channel has no number."
+    )
+    delay: Findable = Field(
+        default=0.0,
+        description="By how much the recorder is late, s; or {start, min, max}, and the fit finds "
+        "it.",
+    )
 
 
 class Parameters(Section):
     """The exciter's parameters; what is neither fixed nor free takes its typical value."""
 
-    fixed: Frozen[Number] = Field(default_factory=_nothing, description="Values that stay.")
+    fixed: Frozen[Given] = Field(
+        default_factory=_nothing,
+        description="Values that stay, or follow others: numbers, or arithmetic such as =-VAMAX.",
+    )
     free: Frozen[Free] = Field(default_factory=_nothing, description="Values that are fitted.")
 
 
@@ -270,6 +402,20 @@ class Estimate(Section):
         default_factory=lambda: Limit(rmse=2e-4),
         description="What strategy auto calls a match; default: rmse 2e-4.",
     )
+    loss: Literal["least-squares", "huber", "soft-l1"] = Field(
+        default="least-squares", description="What an error costs; huber and soft-l1 bear spikes."
+    )
+    loss_scale: Positive = Field(
+        default=1.345,
+        description="From how many standard deviations of the noise on an error costs less than "
+        "its square.",
+    )
+    starts: Count = Field(
+        default=1, description="Starts spread over the bounds, beside the case's own."
+    )
+    refine: Count | None = Field(
+        default=None, description="How many of the best starts are fitted; default: all."
+    )
 
 
 class Simulation(Section):
@@ -281,13 +427,31 @@ class Simulation(Section):
     )
 
 
-class Validation(Section):
-    """A record the fit never sees, on which its result is tried."""
+class OffLine(Section):
+    """The case's machine with its breaker open."""
+
+    type: Literal["open-circuit"] = Field(description="What surrounds the exciter.")
+
+
+class OnLine(Section):
+    """The case's machine behind R + jX to a source."""
+
+    type: Literal["infinite-bus"] = Field(description="What surrounds the exciter.")
+    network: Frozen[Number] = Field(
+        description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
+    )
+
+
+class Recording(Section):
+    """A test and what was measured at it."""
 
     name: str = Field(
         pattern=FILE_NAME,
         max_length=100,
         description="Name, of letters, digits, - _ and .; files are named after it.",
+    )
+    plant: Annotated[OffLine | OnLine, Field(discriminator="type")] | None = Field(
+        default=None, description="What surrounds the exciter, where that is not the case's plant."
     )
     test: BumpTest = Field(description="What was done to the unit.")
     record: RecordFile = Field(description="What was measured.")

@@ -9,15 +9,9 @@ from numpy.typing import NDArray
 from exfit.case import Case
 from exfit.models.blocks import SHORTEST
 from exfit.notes import typical_notes
-from exfit.residuals import Channel, Residuals
+from exfit.residuals import Residuals
 from exfit.simulate import Course, Simulator
-from exfit.trial import (
-    fitted_trial,
-    free_of,
-    plain_simulator,
-    secured,
-    system_of,
-)
+from exfit.trial import fitted_trials, free_of, planned
 
 Array = NDArray[np.float64]
 
@@ -26,6 +20,7 @@ AGREEMENT = 1e-5  # relative to a column's largest element: what central differe
 ROUNDING = 1e-12  # of the largest column
 TINY = float(np.finfo(float).tiny)
 FLAT_SECONDS = 60.0
+FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
 FLAT_DRIFT = 1e-9  # pu
 
 
@@ -59,33 +54,33 @@ class Check:
 
 def check(case: Case) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
-    system = system_of(case)
-    levels: Mapping[str, float]
-    if case.record is None:
-        simulator, levels = plain_simulator(case, case.values())
-        channels: tuple[Channel, ...] = (Channel("vt", np.zeros(len(simulator.times))),)
+    if case.recordings:
+        trials = fitted_trials(case)
+        experiments = [trial.secured(trial.known(case.values())).experiment for trial in trials]
     else:
-        trial = fitted_trial(case)
-        simulator, levels, channels = trial.simulator, trial.levels, trial.channels
-    values = {**case.values(), **levels}
-    signals = tuple(channel.signal for channel in channels)
-    free = free_of(case)
-    names = [one.name for one in free]
+        trials, experiments = (), [planned(case)]
+    free = free_of(case, trials)
+    names = {one.name for one in free}
+    values = {**{one.name: one.start for one in free}, **case.values()}
     fixed = {name: value for name, value in values.items() if name not in names}
-    simulator = secured(simulator, values, case.path)
-    substeps = simulator.substeps(values)
-    lags = [name for name in simulator.time_constants if values[name] < SHORTEST]
-    still = Simulator(
-        system, Course(0.0, FLAT_SECONDS, ()), np.linspace(0.0, FLAT_SECONDS, 601), simulator.step
-    )
-    flat, _ = still.samples(values, signals)
+    drift, error = 0.0, 0.0
+    for one in experiments:
+        simulator, at = one.moved(values), one.parameters(values)
+        still = Simulator(
+            simulator.system, Course(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step
+        )
+        flat, _ = still.samples(at, one.signals)
+        drift = max(drift, float(np.max(np.abs(flat - flat[0]))))
+        error = max(error, simulator.step_error(at, one.signals))
+    first = experiments[0].simulator
+    at = experiments[0].parameters(values)
     return Check(
-        deviations=deviations(Residuals(simulator, channels, free, fixed)),
-        bypassed=tuple(lags),
-        substeps=substeps,
-        step=simulator.step,
-        step_error=simulator.step_error(values, signals),
-        drift=float(np.max(np.abs(flat - flat[0]))),
+        deviations=deviations(Residuals(experiments, free, fixed, case.ties)),
+        bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
+        substeps=max(one.simulator.substeps(one.parameters(values)) for one in experiments),
+        step=first.step,
+        step_error=error,
+        drift=drift,
         notes=tuple(typical_notes(case)),
     )
 

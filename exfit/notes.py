@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.case import Case, InfiniteBus
+from exfit.case import Case
 from exfit.record import Record
 from exfit.residuals import Residuals
 from exfit.result import Comparison
@@ -15,54 +15,41 @@ from exfit.trial import system_of
 
 Array = NDArray[np.float64]
 
-EXACTLY_REDUNDANT = 1e-9  # of the largest singular value: rounding, not a weak influence
-NO_EFFECT = 1e-12  # of the largest column: rounding
 COARSE = 0.2  # of the error of the fit: what halving the step may move
 INVISIBLE = 1e-7  # pu: no recorder shows it
 FAR = 0.01  # of vt0: beyond the noise of a record
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
 UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 MUCH_WORSE = 3.0  # than the fit
-TAKES_PART = 0.01  # of a direction of length one
 
 
 def notes(
-    case: Case, residuals: Residuals, found: estimate.Result, compared: Comparison
+    case: Case, residuals: Residuals, found: estimate.Result, compared: Sequence[Comparison]
 ) -> Iterator[str]:
     """Yield the notes on what a fit found; ``compared`` has sub-steps enough for its response."""
     values = residuals.values(found.x)
     yield from typical_notes(case)
-    for one in residuals.free:
-        side = one.bound(values[one.name])
-        if side:
-            value = f"{values[one.name]:.6g}"
-            yield f"{one.name} lies on its {side} {value}: it is the bound's, not the record's"
-    for group in redundant(found.jac, [one.name for one in residuals.free]):
-        if len(group) == 1:
-            yield f"{group[0]} has no effect on the record: its value says nothing"
-        else:
-            names = ", ".join(group)
-            yield f"{names} can move together without any effect on the record: fix one of them"
-    moved = residuals.simulator.step_error(values, residuals.signals)
     rmse = float(np.sqrt(np.mean(found.fun**2)))
-    if moved > max(COARSE * rmse, INVISIBLE):
-        yield (
-            f"halving the step of {case.simulation.step:g} s moves the response by {moved:.1e} pu, "
-            f"the error of the fit is {rmse:.1e} pu: give a smaller simulation.step"
-        )
-    taken = residuals.simulator.substeps(values)
-    if compared.substeps > 2 * taken:
-        step = case.simulation.step * taken / compared.substeps
-        yield (
-            f"the response asks for {compared.substeps} sub-steps on its way, {taken} were taken: "
-            f"give simulation.step = {step:.2g}"
-        )
+    for one, match in zip(residuals.experiments, compared, strict=True):
+        simulator, at = one.moved(values), one.parameters(values)
+        moved = simulator.step_error(at, one.signals)
+        if moved > max(COARSE * rmse, INVISIBLE):
+            yield (
+                f"halving the step of {case.simulation.step:g} s moves the response by "
+                f"{moved:.1e} pu, the error of the fit is {rmse:.1e} pu: give a smaller "
+                "simulation.step"
+            )
+        taken = simulator.substeps(at)
+        if match.substeps > 2 * taken:
+            step = case.simulation.step * taken / match.substeps
+            yield (
+                f"the response asks for {match.substeps} sub-steps on its way, {taken} were "
+                f"taken: give simulation.step = {step:.2g}"
+            )
 
 
-def match_notes(
-    fitted: Comparison, tried: Sequence[Comparison], vt0: float | None
-) -> Iterator[str]:
-    """Yield where the response does not describe the record, or does not hold on another one."""
+def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:
+    """Yield where the response does not describe the record."""
     if not fitted.fit_percent > 0.0:
         yield (
             "the response matches the record no better than a constant would: "
@@ -75,10 +62,15 @@ def match_notes(
             yield f"the record moves by {way:+.3g} pu, the response the other way"
         if vt0 is not None and abs(measured.initial_value - vt0) > FAR * abs(vt0):
             yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
+
+
+def validation_notes(fitted: Sequence[Comparison], tried: Sequence[Comparison]) -> Iterator[str]:
+    """Yield on which records the response does not hold."""
+    worst = max(one.rmse for one in fitted)
     for one in tried:
-        if one.rmse > MUCH_WORSE * fitted.rmse:
+        if one.rmse > MUCH_WORSE * worst:
             yield (
-                f"on {one.name} the error is {one.rmse / fitted.rmse:.1f} times that of the fit: "
+                f"on {one.name} the error is {one.rmse / worst:.1f} times that of the fit: "
                 "the fitted record leaves open what matters there"
             )
 
@@ -89,8 +81,8 @@ def level_notes(fitted: Comparison, steady: float) -> Iterator[str]:
     for signal, overlay in fitted.overlays.items():
         if signal == "vt" or not before.any():
             continue
-        measured = float(overlay.measured[before].mean())
-        simulated = float(overlay.simulated[before].mean())
+        measured = float(np.nanmean(overlay.measured[before]))
+        simulated = float(np.nanmean(overlay.simulated[before]))
         if abs(measured - simulated) > FAR_FROM_BASE * max(abs(simulated), 0.1):
             yield (
                 f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu: "
@@ -102,7 +94,7 @@ def unsteady_notes(record: Record, steady: float) -> Iterator[str]:
     """Yield the signals that drift while the case calls the unit steady."""
     before = record.time < steady
     for signal, samples in record.signals.items():
-        still = samples[before]
+        still = samples[before & np.isfinite(samples)]
         half = len(still) // 2
         if half < 4:
             continue
@@ -118,7 +110,9 @@ def unsteady_notes(record: Record, steady: float) -> Iterator[str]:
 
 def typical_notes(case: Case) -> Iterator[str]:
     """Yield which values were taken from the data sheet, because the case does not give them."""
-    used, values, typical = parameters_used(system_of(case)), case.values(), case.typical()
+    views = (case, *(case.seen_from(one) for one in case.recordings))
+    used = {name for view in views for name in parameters_used(system_of(view))}
+    values, typical = case.values(), case.typical()
     for part in [part for part in case.parts.all if part.kind != "network"]:
         names = [part.prefix + row.symbol for row in part.sheet]
         taken = [name for name in names if name in typical and name in used]
@@ -127,19 +121,5 @@ def typical_notes(case: Case) -> Iterator[str]:
                 f"{name.removeprefix(part.prefix)} {values[name]:g}" for name in taken
             )
             yield f"typical values taken for {part.name}: {listed}"
-    if case.parts.stabiliser is not None and not isinstance(case.plant, InfiniteBus):
+    if case.parts.stabiliser is not None and not case.on_load:
         yield f"{case.parts.stabiliser.name} does not act: the breaker is open"
-
-
-def redundant(jacobian: Array, names: Sequence[str]) -> Iterator[list[str]]:
-    """Yield groups of parameters that the residuals cannot tell apart at all."""
-    if not np.all(np.isfinite(jacobian)):
-        return  # interrupted before it was known
-    sizes = np.linalg.norm(jacobian, axis=0)
-    seen = sizes > NO_EFFECT * np.max(sizes, initial=0.0)
-    yield from ([name] for name, visible in zip(names, seen, strict=True) if not visible)
-    _, singular, directions = np.linalg.svd(jacobian[:, seen] / sizes[seen], full_matrices=False)
-    kept = np.array(names)[seen]
-    for value, direction in zip(singular, directions, strict=True):
-        if value < EXACTLY_REDUNDANT * singular[0]:
-            yield [str(name) for name in kept[np.abs(direction) > TAKES_PART]]

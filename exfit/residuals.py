@@ -1,19 +1,37 @@
-"""Simulated minus measured, weighted, with its Jacobian, over the scaled free parameters."""
+"""What a fit makes small: errors of all records, weighted, with their exact Jacobian.
+
+They are functions of the scaled free parameters; what is known beforehand adds one each.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.engine.kernel import SIDE_BY_SIDE, in_threads
 from exfit.errors import SimulationError
-from exfit.simulate import Simulator, each
+from exfit.experiment import Channel, Experiment
+from exfit.loss import Loss
+from exfit.noise import noise
+from exfit.ties import TieError, Ties
 
 Array = NDArray[np.float64]
 
 CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
+UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
+FINEST = 1e-7  # pu: no recorder's noise is less
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a parameter beforehand: its mean and standard deviation."""
+
+    mean: float
+    std: float
 
 
 @dataclass(frozen=True)
@@ -28,6 +46,7 @@ class Free:
     low: float
     high: float
     logarithmic: bool
+    prior: Known | None = None
 
     def scaled(self, value: float) -> float:
         """Return the number that the estimator moves."""
@@ -52,34 +71,45 @@ class Free:
 
 
 @dataclass(frozen=True)
-class Channel:
-    """A measured signal (M,) per unit, and the weight of its residuals."""
+class Robust:
+    """A loss that bears spikes, from ``scale`` standard deviations of a channel's noise on."""
 
-    signal: str
-    measured: Array
-    weight: float = 1.0
+    loss: Loss
+    scale: float
 
 
 class Residuals:
-    """Residuals of all channels, one behind the other, as functions of the scaled parameters (N,).
+    """Residuals of all records, one behind the other, over the scaled parameters (N,).
 
-    ``fixed`` holds every parameter of the system that is not free. A set that cannot be simulated
-    has infinite residuals. ``simulations`` counts runs of the equations, and ``substeps`` is the
-    largest number of sub-steps that any of them took.
+    ``fixed`` holds every value that is neither free nor follows others by ``ties``. A set that
+    cannot be simulated has infinite residuals. ``simulations`` counts runs of the equations, and
+    ``substeps`` is the largest number of sub-steps that any of them took.
     """
 
     def __init__(
         self,
-        simulator: Simulator,
-        channels: Sequence[Channel],
+        experiments: Sequence[Experiment],
         free: Sequence[Free],
         fixed: Mapping[str, float],
+        ties: Ties | None = None,
+        robust: Robust | None = None,
     ) -> None:
-        self.simulator, self.channels, self.free, self.fixed = simulator, channels, free, fixed
-        self.signals = tuple(channel.signal for channel in channels)
-        self.measured = np.stack([channel.measured for channel in channels], axis=1)
-        self.weights = np.array([channel.weight for channel in channels])
+        self.experiments, self.free, self.fixed = tuple(experiments), tuple(free), fixed
+        self.ties = Ties({}) if ties is None else ties
+        self.sizes = tuple(size for one in experiments for size in one.sizes)
         self.simulations, self.substeps = 0, 1
+        self._robust = robust
+        self._scales = self._loss_scales() if robust else np.zeros(0)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels of all records."""
+        return tuple(channel for one in self.experiments for channel in one.channels)
+
+    @property
+    def count(self) -> int:
+        """How many samples are compared."""
+        return sum(self.sizes)
 
     @property
     def start(self) -> Array:
@@ -92,29 +122,61 @@ class Residuals:
         low = np.array([one.scaled(one.low) for one in self.free])
         return low, np.array([one.scaled(one.high) for one in self.free])
 
+    @cached_property
+    def noise(self) -> float:
+        """The standard deviation of a weighted error, by the noise of the records."""
+        deviations = [channel.weight * noise_of(channel) for channel in self.channels]
+        return float(np.sqrt(np.mean(np.square(deviations))))
+
     def values(self, theta: Array) -> dict[str, float]:
-        """Return every parameter of the system by name."""
+        """Return every value by name."""
         moved = {one.name: one.value(float(x)) for one, x in zip(self.free, theta, strict=True)}
-        return {**self.fixed, **moved}
+        return self.ties.apply({**self.fixed, **moved})
 
     def __call__(self, theta: Array) -> Array:
-        """Return the residuals (M * channels,)."""
-        self.simulations += 1
+        """Return the residuals (samples + priors,)."""
+        self.simulations += len(self.experiments)
         try:
-            samples, parts = self.simulator.samples(self.values(theta), self.signals)
-        except SimulationError:
-            return np.full(self.measured.size, np.inf)
-        self.substeps = max(self.substeps, parts)
-        return self._residuals(samples)
+            values = self.values(theta)
+            found = [one.errors(values) for one in self.experiments]
+        except UNREACHABLE:
+            return np.full(self.count + len(self.priors), np.inf)
+        self.substeps = max(self.substeps, *(parts for _, parts in found))
+        return self._residuals(np.concatenate([errors for errors, _ in found]), values)
+
+    def errors(self, theta: Array) -> tuple[Array, Array]:
+        """Return the weighted errors (samples,) and their exact derivatives (samples, N).
+
+        No loss is applied, and no prior is among them.
+        """
+        self.simulations += len(self.experiments)
+        values, moves = self.values(theta), self._moves(theta)
+        found = [one.tangents(values, moves) for one in self.experiments]
+        return np.concatenate([e for e, _ in found]), np.concatenate([s for _, s in found])
 
     def exact(self, theta: Array) -> Array:
-        """Return the exact Jacobian (M * channels, N)."""
-        self.simulations += 1
-        directions = each(one.name for one in self.free)
-        _, slopes = self.simulator.tangents(self.values(theta), self.signals, directions)
-        chain = np.array([one.slope(float(x)) for one, x in zip(self.free, theta, strict=True)])
-        weighted = slopes * self.weights[:, None] * chain
-        return np.asarray(weighted.transpose(1, 0, 2).reshape(-1, len(self.free)))
+        """Return the exact Jacobian (samples + priors, N)."""
+        errors, slopes = self.errors(theta)
+        if self._robust:
+            slopes *= self._robust.loss.slope(errors, self._scales)[:, None]
+        if not self.priors:
+            return slopes
+        known = np.zeros((len(self.priors), len(theta)))
+        for row, (k, prior) in enumerate(self.priors.items()):
+            known[row, k] = self.noise * self.free[k].slope(float(theta[k])) / prior.std
+        return np.vstack([slopes, known])
+
+    def influence(self, errors: Array) -> tuple[Array, Array]:
+        """Return how far each weighted error pulls, and the derivative of that; (samples,)."""
+        if self._robust is None:
+            return errors, np.ones_like(errors)
+        loss = self._robust.loss
+        return loss.influence(errors, self._scales), loss.curvature(errors, self._scales)
+
+    @property
+    def priors(self) -> dict[int, Known]:
+        """What is known beforehand, by the place of the parameter among the free ones."""
+        return {k: one.prior for k, one in enumerate(self.free) if one.prior is not None}
 
     def central(self, theta: Array) -> Array:
         """Return the Jacobian by central differences, all 2 N runs side by side."""
@@ -135,19 +197,73 @@ class Residuals:
         stuck = down == up  # a one-sided difference at the bound that it points to
         down, up = np.where(stuck, theta - above, down), np.where(stuck, theta - below, up)
         sets = [*self._moved(theta, down), *self._moved(theta, up)]
-        self.simulations += len(sets)
-        samples = self.simulator.samples_of_many(
-            [self.values(point) for point in sets], self.signals
-        )
-        columns = np.stack([self._residuals(samples[:, :, k]) for k in range(len(sets))], axis=1)
+        columns = np.stack(self._of_many(sets), axis=1)
         count = len(theta)
         return np.asarray((columns[:, count:] - columns[:, :count]) / (up - down))
+
+    def costs(self, points: Array) -> Array:
+        """Return half the sum of squares at each of points (K, N), inf where there is none."""
+        blocks = [points[k : k + SIDE_BY_SIDE] for k in range(0, len(points), SIDE_BY_SIDE)]
+        return np.concatenate(list(in_threads(self._costs, blocks)))
+
+    def _costs(self, points: Array) -> Array:
+        try:
+            found = self._of_many(points)
+        except UNREACHABLE:
+            if len(points) == 1:
+                return np.full(1, np.inf)
+            return np.concatenate([self._costs(point[None, :]) for point in points])
+        with np.errstate(all="ignore"):
+            costs = np.array([0.5 * float(r @ r) for r in found])
+        return np.where(np.isfinite(costs), costs, np.inf)
+
+    def _of_many(self, points: Array | Sequence[Array]) -> list[Array]:
+        """Return the residuals of several points, simulated side by side where that is possible."""
+        self.simulations += len(points) * len(self.experiments)
+        sets = [self.values(point) for point in points]
+        parts = [one.errors_of_many(sets) for one in self.experiments]
+        return [
+            self._residuals(np.concatenate([part[k] for part in parts]), values)
+            for k, values in enumerate(sets)
+        ]
 
     def _moved(self, theta: Array, to: Array) -> list[Array]:
         return [np.where(np.arange(len(theta)) == k, to, theta) for k in range(len(theta))]
 
-    def _residuals(self, samples: Array) -> Array:
-        return np.asarray(((samples - self.measured) * self.weights).T.ravel())
+    def _moves(self, theta: Array) -> list[dict[str, float]]:
+        """Return which values each scaled parameter moves, and how fast."""
+        values = self.values(theta)
+        tied = self.ties.slopes(values, [one.name for one in self.free])
+        moves = []
+        for one, x in zip(self.free, theta, strict=True):
+            slope = one.slope(float(x))
+            followers = {name: slope * by[one.name] for name, by in tied.items() if one.name in by}
+            moves.append({one.name: slope, **followers})
+        return moves
+
+    def _residuals(self, errors: Array, values: Mapping[str, float]) -> Array:
+        if self._robust:
+            errors = self._robust.loss.residual(errors, self._scales)
+        if not self.priors:
+            return errors
+        known = [
+            self.noise * (values[self.free[k].name] - prior.mean) / prior.std
+            for k, prior in self.priors.items()
+        ]
+        return np.concatenate([errors, known])
+
+    def _loss_scales(self) -> Array:
+        """Return the error of each sample from which on it costs less than its square."""
+        share = 1.0 if self._robust is None else self._robust.scale
+        scales = [share * channel.weight * noise_of(channel) for channel in self.channels]
+        return np.repeat(scales, self.sizes)
+
+
+def noise_of(channel: Channel) -> float:
+    """Return the standard deviation of a channel's noise, per unit: given, or estimated."""
+    if channel.noise is not None:
+        return channel.noise
+    return max(noise(channel.measured[channel.kept]), FINEST)
 
 
 JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {

@@ -1,6 +1,6 @@
 """A test of a case, ready to be simulated: its system, its course, its record."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -9,7 +9,9 @@ from traceback import extract_tb
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit import case_schema
 from exfit.case import (
+    SINGLE,
     BumpTest,
     Case,
     InfiniteBus,
@@ -17,14 +19,22 @@ from exfit.case import (
     OpenCircuit,
     Playback,
     RecordFile,
+    Recording,
     Step,
     Switch,
+    Unknown,
+    column_of,
     initial_level,
     initial_voltage,
+    known,
 )
+from exfit.case_schema import Filter, Signal
+from exfit.conditioning import Conditioning, LowPass, Median, outliers
 from exfit.engine.system import System, trace
-from exfit.errors import CaseError, ModelError, SimulationError
+from exfit.errors import CaseError, ModelError, RecordError, SimulationError
+from exfit.experiment import Channel, Experiment
 from exfit.features import Features, features
+from exfit.loss import LOSSES
 from exfit.models.sheet import Model
 from exfit.plant import (
     DRIVING,
@@ -42,12 +52,23 @@ from exfit.plant import (
     playback,
 )
 from exfit.record import Record
-from exfit.residuals import Channel, Free, Residuals
+from exfit.residuals import Free, Known, Residuals, Robust
 from exfit.result import Comparison, Overlay
-from exfit.simulate import MOST_STEPS, Change, Course, Played, Simulator, parameters_used
+from exfit.simulate import (
+    MOST_STEPS,
+    Change,
+    Course,
+    Played,
+    Response,
+    Simulator,
+    parameters_used,
+)
+from exfit.unknowns import started, unknowns
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+
+FEWEST = 2  # samples of a channel
 
 
 def system_of(case: Case) -> System:
@@ -82,9 +103,12 @@ def _system_of(case: Case) -> System:
 
 def inputs_of(case: Case) -> tuple[str, ...]:
     """Return the inputs that the tests of a case change; the reference always is one."""
-    values = case.values()
-    changed = {change.signal for test in case.tests for change in changes(case, test, values)}
-    return tuple(name for name in ("vref", "vs", "E", "R", "X") if name in changed | {"vref"})
+    changed = {"vref"}
+    for test in case.tests:
+        changed |= {name for name in ("vs", "E") if getattr(test, name)}
+        for switch in test.network:
+            changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
+    return tuple(name for name in ("vref", "vs", "E", "R", "X") if name in changed)
 
 
 def stabilised(case: Case) -> Stabilised | None:
@@ -100,12 +124,12 @@ def driving_signals(case: Case, exciter: Model, saturation: SaturationForm) -> t
 
     Raises CaseError where the exciter needs the field current and a record lacks it.
     """
-    files = {"record": case.record}
+    files = {"record" if one.name == SINGLE else one.name: one.record for one in case.recordings}
     files |= {f"validate.{one.name}": one.record for one in case.validations}
-    given = [set(file.channels) for file in files.values() if file is not None]
+    given = [set(file.channels) for file in files.values()]
     needs = driven_by(exciter, saturation)
     for place, file in files.items():
-        if file is not None and "ifd" in needs and "ifd" not in file.channels:
+        if "ifd" in needs and "ifd" not in file.channels:
             text = f"channels.ifd: is missing: it drives {exciter.name}"
             raise CaseError([f"{case.path}: {place}: {text}"])
     return tuple(signal for signal in DRIVING if all(signal in signals for signals in given))
@@ -130,8 +154,9 @@ def _refuse_untraceable(system: System, path: Path) -> None:
 
 
 def values_of(case: Case, changed: Values) -> dict[str, float]:
-    """Return every parameter of the parts of a case: as it has them, with changes upon them."""
-    return {**case.values(), **changed}
+    """Return every value of a case: as it has them, with changes upon them, and what follows."""
+    values = {**case.values(), **changed}
+    return {**case.ties.apply(values), **changed}
 
 
 def secured(simulator: Simulator, values: Values, case: Path) -> Simulator:
@@ -147,62 +172,93 @@ def secured(simulator: Simulator, values: Values, case: Path) -> Simulator:
 
 @dataclass(frozen=True)
 class Trial:
-    """A test of a case and its record, ready to be simulated.
+    """A test of a case beside its record, ready to be simulated.
 
-    ``levels`` are the parameters that the record gives: where the signals stand at the start.
+    ``test`` has a number for everything; ``free`` are those of its values that a fit finds.
     """
 
     case: Path
-    simulator: Simulator
+    test: BumpTest
     record: Record
-    levels: Mapping[str, float]
-    channels: tuple[Channel, ...]
+    experiment: Experiment
+    free: tuple[Free, ...]
+
+    @property
+    def name(self) -> str:
+        """The name of the record."""
+        return self.experiment.name
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The signals that are compared."""
+        return self.experiment.channels
+
+    def known(self, values: Values) -> dict[str, float]:
+        """Return the values with a start for what the fit finds about this record."""
+        return {**{one.name: one.start for one in self.free}, **values}
 
     def secured(self, values: Values) -> "Trial":
         """Return the trial with sub-steps enough all along the response to the values."""
-        at = {**values, **self.levels}
-        return replace(self, simulator=secured(self.simulator, at, self.case))
+        try:
+            return replace(self, experiment=self.experiment.secured(self.known(values)))
+        except SimulationError as fault:
+            raise SimulationError(f"{self.case}: {fault}") from fault
+
+    def response(self, values: Values) -> Response:
+        """Return everything that the simulation gives, on the clock of the record."""
+        at = self.known(values)
+        return self.experiment.moved(at).response(self.experiment.parameters(at))
 
     def compare(
         self, name: str, values: Values, start: Values | None = None, limit: float | None = None
     ) -> Comparison:
         """Return the response to the values beside the record; secure it first."""
-        samples, substeps = self._samples(values)
-        first = None if start is None else self._samples(start)[0]
+        at = self.known(values)
+        samples, substeps = self.experiment.samples(at)
+        first = None if start is None else self.experiment.samples(self.known(start))[0]
         overlays = {
             channel.signal: Overlay(
-                channel.measured, samples[:, k], None if first is None else first[:, k]
+                _compared(channel, self.experiment.measured(channel, at)),
+                _compared(channel, samples[:, k]),
+                None if first is None else _compared(channel, first[:, k]),
             )
             for k, channel in enumerate(self.channels)
         }
-        errors = [channel.weight * overlays[channel.signal].error for channel in self.channels]
+        errors = self.experiment.compared(samples, at)
         vt = overlays.get("vt")
         return Comparison(
             name=name,
             time=self.record.time,
             overlays=overlays,
-            cost=0.5 * sum(float(error @ error) for error in errors),
-            measured=None if vt is None else self._features(vt.measured),
-            simulated=None if vt is None else self._features(vt.simulated),
+            cost=0.5 * float(errors @ errors),
+            measured=None if vt is None else self._features(vt.measured, at),
+            simulated=None if vt is None else self._features(vt.simulated, at),
             record=self.record.source,
             sha256=self.record.sha256,
             substeps=substeps,
             rmse_limit=limit,
         )
 
-    def _samples(self, values: Values) -> tuple[Array, int]:
-        signals = tuple(channel.signal for channel in self.channels)
-        return self.simulator.samples({**values, **self.levels}, signals)
-
-    def _features(self, signal: Array) -> Features | None:
+    def _features(self, signal: Array, values: Values) -> Features | None:
         """Read off the first step of the reference that the record shows."""
-        time = self.record.time
-        inside = [change for change in self.simulator.course.steps if change.at >= time[0]]
+        kept = np.isfinite(signal)
+        time = self.record.time[kept]
+        steps = self.experiment.moved(values).course.steps
+        inside = [change for change in steps if change.at >= time[0]]
         if not inside or inside[0].signal != "vref":
             return None
         later = [change.at for change in inside if change.at > inside[0].at]
         until = later[0] if later else float(time[-1])
-        return features(time, signal, inside[0].at, until)
+        return features(time, signal[kept], inside[0].at, until)
+
+
+def _compared(channel: Channel, samples: Array) -> Array:
+    """Return samples (M,) as they are compared, nan where they are left out."""
+    if channel.conditioning is None:
+        return samples
+    found = np.full(len(samples), np.nan)
+    found[channel.kept] = channel.conditioned(samples)
+    return found
 
 
 def changes(case: Case, test: BumpTest, values: Values) -> list[Change]:
@@ -212,7 +268,7 @@ def changes(case: Case, test: BumpTest, values: Values) -> list[Change]:
     its voltage.
     """
     found = [
-        Change(step.at, step.step, signal)
+        Change(known(step.at) or 0.0, known(step.step) or 0.0, signal, isinstance(step.at, Unknown))
         for signal in ("vref", "vs")
         for step in getattr(test, signal)
     ]
@@ -243,31 +299,79 @@ def course_of(case: Case, test: BumpTest, span: tuple[float, float], values: Val
     return Course(*span, tuple(changes(case, test, values)))
 
 
-def trial_of(case: Case, test: BumpTest, file: RecordFile, values: Values) -> Trial:
+def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
     """Return a test of a case with its record read; ``values`` are those it begins with.
 
     Raises RecordError where the record cannot be used, CaseError where a signal is not simulated.
     """
-    record = case.measure(test, file)
-    system = system_of(case)
+    view, file = case.seen_from(recording), recording.record
+    record = case.measure(recording.test, file)
+    test = started(case, recording, record)
+    system = system_of(view)
+    if view is not case:
+        own = {name: v for name, v in view.values().items() if name.startswith(NETWORK)}
+        values = {**values, **own}
+    else:
+        own = {}
+    prefix = "" if recording.name == SINGLE else f"{recording.name}."
     begin = float(record.time[0]) if test.begin is None else test.begin
-    course = course_of(case, test, (begin, float(record.time[-1])), values)
-    levels = levels_of(case, test, record)
+    steps = tuple(changes(view, test, values))
+    nuisances, free = unknowns(prefix, test, file, steps)
+    delay = known(file.delay) or 0.0
+    earliest = min([delay, *(one.low for one in free if one.name == f"{prefix}delay")])
+    course = Course(begin, float(record.time[-1]) - min(0.0, earliest), steps)
     driving = [signal for signal in file.channels if signal in system.inputs]
     if driving:
         heard: dict[str, Array] = {signal: _moved(test, record, signal) for signal in driving}
         course = replace(course, played=Played(record.time, heard))
-    return Trial(
-        case.path,
-        Simulator(system, course, record.time, case.simulation.step),
-        record,
-        levels,
+    simulator = Simulator(system, course, record.time, case.simulation.step)
+    experiment = Experiment(
+        simulator.moved(steps, delay) if delay else simulator,
         tuple(
-            Channel(signal, record.signals[signal], channel.weight)
-            for signal, channel in file.channels.items()
+            channel_of(case, file, record, signal)
+            for signal in file.channels
             if signal not in driving and signal in system.outputs
         ),
+        {**own, **levels_of(case, test, record)},
+        nuisances,
+        recording.name,
     )
+    return Trial(case.path, test, record, experiment, free)
+
+
+def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> Channel:
+    """Return a channel of a record, with what is done to it before it is compared."""
+    entry, samples = file.channels[signal], record.signals[signal]
+    kept = np.isfinite(samples)
+    for first, last in file.mask:
+        kept &= ~((record.time >= first) & (record.time <= last))
+    if entry.outliers is not None:
+        kept[kept] = ~outliers(record.time[kept], samples[kept], entry.outliers)
+    if np.count_nonzero(kept) < FEWEST:
+        raise RecordError(f"{record.source}: {signal}: fewer than {FEWEST} samples are left")
+    conditioning = None
+    if entry.filter is not None or not kept.all():
+        try:
+            conditioning = Conditioning(record.time, kept, _filter(entry.filter))
+        except ValueError as fault:
+            raise RecordError(f"{record.source}: {signal}: filter: {fault}") from fault
+    weight = entry.weight if entry.noise is None else finest_noise(case) / entry.noise
+    column = column_of(entry)
+    return Channel(signal, samples, weight, conditioning, entry.noise, column.scale, column.offset)
+
+
+def _filter(chosen: Filter | None) -> LowPass | Median | None:
+    if chosen is None:
+        return None
+    if isinstance(chosen, case_schema.Median):
+        return Median(chosen.median)
+    return LowPass(chosen.lowpass)
+
+
+def finest_noise(case: Case) -> float:
+    """Return the least noise that a case gives for a channel: by it the others are weighted."""
+    channels = [entry for one in case.recordings for entry in one.record.channels.values()]
+    return min(entry.noise for entry in channels if entry.noise is not None)
 
 
 def _moved(test: BumpTest, record: Record, signal: str) -> Array:
@@ -286,15 +390,16 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
         for signal in (*DRIVING, "efd")
         if signal in record.signals
     }
-    known = {} if case.plant.vref is None else {VREF0: case.plant.vref}
-    return {**levels, VT0: initial_voltage(test, record), **known}
+    given = {} if case.plant.vref is None else {VREF0: case.plant.vref}
+    return {**levels, VT0: initial_voltage(test, record), **given}
 
 
-def fitted_trial(case: Case) -> Trial:
-    """Return the test of a case with the record that it is fitted to; raises CaseError without."""
-    if case.record is None:
+def fitted_trials(case: Case) -> tuple[Trial, ...]:
+    """Return the tests of a case with the records that it is fitted to; CaseError without any."""
+    if not case.recordings:
         raise CaseError([f"{case.path}: record: missing; a fit needs a record"])
-    return trial_of(case, case.test, case.record, case.values())
+    values = case.values()
+    return tuple(trial_of(case, one, values) for one in case.recordings)
 
 
 def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, float]]:
@@ -302,9 +407,10 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
 
     Raises CaseError where the case does not say how long and from which voltage.
     """
-    test = case.test
+    test = case.test or BumpTest()
+    vt0 = known(test.vt0)
     missing = [name for name in ("vt0", "duration") if getattr(test, name) is None]
-    if test.vt0 is None or test.duration is None:
+    if vt0 is None or test.duration is None:
         raise CaseError(
             f"{case.path}: test.{name}: missing; there is no record to take it from"
             for name in missing
@@ -319,29 +425,46 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
         )
     times = np.linspace(0.0, test.duration, round(count) + 1)
     course = course_of(case, test, (0.0, test.duration), values)
-    return Simulator(system_of(case), course, times, case.simulation.step), {VT0: test.vt0}
+    return Simulator(system_of(case), course, times, case.simulation.step), {VT0: vt0}
 
 
-def residuals_of(case: Case, trial: Trial) -> Residuals:
+def planned(case: Case, signals: Sequence[str] = ("vt",)) -> Experiment:
+    """Return the test of a case without a record, of which some signals are seen."""
+    values = case.values()
+    simulator, levels = plain_simulator(case, values)
+    simulator = secured(simulator, {**values, **levels}, case.path)
+    still = np.zeros(len(simulator.times))
+    seen = tuple(Channel(signal, still) for signal in signals)
+    return Experiment(simulator, seen, levels)
+
+
+def residuals_of(case: Case, trials: Sequence[Trial]) -> Residuals:
     """Return the residuals of a case as functions of its free parameters.
 
-    Raises CaseError where no parameter is free, or none of the signals depends on one that is.
+    Raises CaseError where nothing is free.
     """
-    free = case.free()
+    free = free_of(case, trials)
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
-    fixed = {**case.values(), **trial.levels}
-    return Residuals(
-        trial.simulator,
-        trial.channels,
-        free_of(case),
-        {name: value for name, value in fixed.items() if name not in free},
-    )
+    names = {one.name for one in free}
+    fixed = {name: value for name, value in case.values().items() if name not in names}
+    robust = None
+    if case.estimate.loss != "least-squares":
+        robust = Robust(LOSSES[case.estimate.loss], case.estimate.loss_scale)
+    return Residuals([one.experiment for one in trials], free, fixed, case.ties, robust)
 
 
-def free_of(case: Case) -> list[Free]:
-    """Return the free parameters of a case."""
-    return [
-        Free(name, one.start, one.min, one.max, one.scale == "log")
+def free_of(case: Case, trials: Sequence[Trial] = ()) -> list[Free]:
+    """Return the free parameters of a case, then what is found about its records."""
+    shared = [
+        Free(
+            name,
+            one.start,
+            one.min,
+            one.max,
+            one.scale == "log",
+            None if one.prior is None else Known(one.prior.mean, one.prior.sigma),
+        )
         for name, one in case.free().items()
     ]
+    return [*shared, *(one for trial in trials for one in trial.free)]

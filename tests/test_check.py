@@ -8,7 +8,7 @@ import pytest
 from exfit.case import load_case, parse_case
 from exfit.check import AGREEMENT, STEPS, check, deviations
 from exfit.residuals import Residuals
-from exfit.trial import fitted_trial, residuals_of
+from exfit.trial import fitted_trials, residuals_of
 
 ROOT = Path(__file__).parent.parent
 
@@ -60,7 +60,7 @@ def test_a_derivative_that_is_lost_is_found(first_order, monkeypatch):
 
 
 def test_central_differences_gain_two_digits_for_each_smaller_step(first_order):
-    rows = deviations(residuals_of(first_order, fitted_trial(first_order)))
+    rows = deviations(residuals_of(first_order, fitted_trials(first_order)))
     for row in rows.values():
         # the error is of second order in the step, until rounding takes over
         assert np.array(row[1:3]) == pytest.approx(np.array(row[:2]) / 100.0, rel=0.2)

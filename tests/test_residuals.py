@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import lively_values, system_of
 
+from exfit.experiment import Channel, Experiment
 from exfit.models import MODELS
 from exfit.plant import VT0
 from exfit.residuals import (
     CENTRAL_STEP,
     JACOBIANS,
     ONE_SIDED_STEP,
-    Channel,
     Free,
     Residuals,
 )
@@ -54,7 +54,7 @@ def problem(exciter, logarithmic=True, signals=("vt",), offset=0.01, **bounds):
         )
         for name in free_names(exciter)
     ]
-    return Residuals(simulator, channels, free, values)
+    return Residuals([Experiment(simulator, tuple(channels))], free, values)
 
 
 @pytest.mark.parametrize("logarithmic", [True, False])
@@ -94,8 +94,9 @@ def test_a_jacobian_at_a_bound_stays_within(exciter):
     for bounds in ((values[name], values[name] * 5), (values[name] / 5, values[name])):
         residuals = problem(exciter, **{name: bounds})
         seen = []
-        run = residuals.simulator.samples_of_many
-        residuals.simulator.samples_of_many = lambda sets, out, run=run, seen=seen: (
+        simulator = residuals.experiments[0].simulator
+        run = simulator.samples_of_many
+        simulator.samples_of_many = lambda sets, out, run=run, seen=seen: (
             seen.extend(one[name] for one in sets) or run(sets, out)
         )
         exact = residuals.exact(residuals.start)

@@ -13,7 +13,7 @@ from exfit.case import load_case
 from exfit.plant import SATURATION, VT0
 from exfit.simulate import Simulator
 from exfit.study import fit, simulate
-from exfit.trial import fitted_trial, values_of
+from exfit.trial import fitted_trials, values_of
 
 ROOT = Path(__file__).parent.parent
 
@@ -72,7 +72,7 @@ def test_the_cost_is_half_the_sum_of_the_weighted_errors_squared(load):
     rng = np.random.default_rng(1)
     signals = {"vt": rng.normal(1.0, 0.01, 61), "efd": rng.normal(1.1, 0.5, 61)}
     case = load(changed(MACHINE_CASE, "record", channels=channels), **signals)
-    compared = fitted_trial(case).compare("fit", values_of(case, {}))
+    compared = fitted_trials(case)[0].compare("fit", values_of(case, {}))
     assert compared.overlays.keys() == weights.keys()
     expected = sum(
         0.5 * np.sum((weights[name] * one.error) ** 2) for name, one in compared.overlays.items()
@@ -84,12 +84,12 @@ def test_the_cost_is_half_the_sum_of_the_weighted_errors_squared(load):
 def test_the_saturation_that_a_case_names_is_the_one_simulated(load, form):
     case = load({**MACHINE_CASE, "saturation": form}, vt=1.0 + 0.025 * TRUTH)
     got = simulate(case, {}).response.signals["vt"]
-    trial = fitted_trial(case)
+    trial = fitted_trials(case)[0]
     values = {**values_of(case, {}), VT0: 1.0}
 
     def response(name):
         system = oracle.system_of("AC1A", "GENROU", name)
-        simulator = Simulator(system, trial.simulator.course, TIME, case.simulation.step)
+        simulator = Simulator(system, trial.experiment.simulator.course, TIME, case.simulation.step)
         return simulator.secured(values).samples(values, ("vt",))[0][:, 0]
 
     assert got == pytest.approx(response(form), abs=1e-12)

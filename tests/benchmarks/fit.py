@@ -25,7 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from oracle import system_of, typical_values
 
 from exfit.estimate import least_squares
-from exfit.residuals import Channel, Free, Residuals
+from exfit.experiment import Channel, Experiment
+from exfit.residuals import Free, Residuals
 from exfit.simulate import Change, Course, Simulator
 from exfit.study import UNIT
 
@@ -63,7 +64,7 @@ def problem(start):
     course = Course(times[0], times[-1], (Change(STEP_AT, RISE),))
     simulator = Simulator(SYSTEM, course, times, 1e-3)
     free = [Free(name, v, 0.1 * v, 10.0 * v, True) for name, v in start.items()]
-    return Residuals(simulator, [Channel("vt", measured)], free, FIXED)
+    return Residuals([Experiment(simulator, (Channel("vt", measured),))], free, FIXED)
 
 
 @dataclass

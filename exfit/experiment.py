@@ -1,0 +1,214 @@
+"""A test beside its record: what is simulated, conditioned, and compared with what was measured."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.conditioning import Conditioning
+from exfit.plant import VT0
+from exfit.simulate import Change, Direction, Simulator
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """What a fit finds about a record, under ``name``: it is no parameter of the unit.
+
+    ``step`` is the place in the course of a step whose instant or size it is, ``signal`` the
+    channel whose scale or offset it is.
+    """
+
+    name: str
+    kind: Literal["at", "step", "vt0", "delay", "scale", "offset"]
+    step: int = 0
+    signal: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A measured signal (M,) per unit, and the weight of its errors.
+
+    ``noise`` is the standard deviation of its noise, per unit, where that is given; ``scale`` and
+    ``offset`` are those that made it per unit.
+    """
+
+    signal: str
+    measured: Array
+    weight: float = 1.0
+    conditioning: Conditioning | None = None
+    noise: float | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def conditioned(self, samples: Array) -> Array:
+        """Return samples (M,) as they are compared: filtered, without those left out."""
+        return samples if self.conditioning is None else self.conditioning.apply(samples)
+
+    def slopes(self, samples: Array, slopes: Array) -> Array:
+        """Return the derivatives of conditioned samples, given those (M, N) of the samples."""
+        if self.conditioning is None:
+            return slopes
+        return self.conditioning.tangents(samples, slopes)
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Which samples are compared, (M,)."""
+        if self.conditioning is None:
+            return np.ones(len(self.measured), dtype=bool)
+        return self.conditioning.kept
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A simulated test and the channels that it is compared with.
+
+    ``own`` holds the parameters of the system that this test alone has: where its signals start,
+    its network.
+    """
+
+    simulator: Simulator
+    channels: tuple[Channel, ...]
+    own: Values = field(default_factory=dict)
+    nuisances: tuple[Nuisance, ...] = ()
+    name: str = ""
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The signals that are compared."""
+        return tuple(channel.signal for channel in self.channels)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the fit moves what its simulations do not have side by side."""
+        return any(one.kind in ("at", "step", "delay") for one in self.nuisances)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """How many samples of each channel are compared."""
+        return tuple(int(np.count_nonzero(channel.kept)) for channel in self.channels)
+
+    def parameters(self, values: Values) -> dict[str, float]:
+        """Return the parameters of the system."""
+        found = {**values, **self.own}
+        for one in self.nuisances:
+            if one.kind == "vt0":
+                found[VT0] = values[one.name]
+        return found
+
+    def moved(self, values: Values) -> Simulator:
+        """Return the simulator with the steps and the delay that the values give."""
+        if not self.moves:
+            return self.simulator
+        steps: list[Change] = list(self.simulator.course.steps)
+        delay = self.simulator.delay
+        for one in self.nuisances:
+            if one.kind == "at":
+                steps[one.step] = steps[one.step]._replace(at=values[one.name])
+            elif one.kind == "step":
+                steps[one.step] = steps[one.step]._replace(step=values[one.name])
+            elif one.kind == "delay":
+                delay = values[one.name]
+        return self.simulator.moved(tuple(steps), delay)
+
+    def measured(self, channel: Channel, values: Values) -> Array:
+        """Return a record (M,) in per unit, by the scale and offset that the values give."""
+        found = {
+            one.kind: values[one.name] for one in self.nuisances if one.signal == channel.signal
+        }
+        if not found:
+            return channel.measured
+        raw = (channel.measured - channel.offset) / channel.scale
+        return raw * found.get("scale", channel.scale) + found.get("offset", channel.offset)
+
+    def samples(self, values: Values) -> tuple[Array, int]:
+        """Return the simulated signals (M, channels), and the number of sub-steps."""
+        return self.moved(values).samples(self.parameters(values), self.signals)
+
+    def errors(self, values: Values) -> tuple[Array, int]:
+        """Return the weighted errors, one channel behind the other, and the sub-steps."""
+        samples, parts = self.samples(values)
+        return self.compared(samples, values), parts
+
+    def errors_of_many(self, sets: Sequence[Values]) -> list[Array]:
+        """Return the weighted errors of several sets of values."""
+        if self.moves:
+            return [self.errors(values)[0] for values in sets]
+        systems = [self.parameters(values) for values in sets]
+        samples = self.simulator.samples_of_many(systems, self.signals)
+        return [self.compared(samples[:, :, k], values) for k, values in enumerate(sets)]
+
+    def compared(self, samples: Array, values: Values) -> Array:
+        """Return the weighted errors of simulated signals (M, channels)."""
+        return np.concatenate(
+            [
+                channel.weight * channel.conditioned(samples[:, k])
+                - channel.weight * channel.conditioned(self.measured(channel, values))
+                for k, channel in enumerate(self.channels)
+            ]
+        )
+
+    def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
+        """Return the weighted errors and their derivatives (errors, N).
+
+        Each of ``moves`` (N) is a direction: by how much it changes which value.
+        """
+        directions = [self._direction(move) for move in moves]
+        moving = [k for k, direction in enumerate(directions) if direction != Direction()]
+        samples, found = self.moved(values).tangents(
+            self.parameters(values), self.signals, [directions[k] for k in moving]
+        )
+        slopes = np.zeros((*samples.shape, len(moves)))
+        slopes[:, :, moving] = found
+        blocks = []
+        for k, channel in enumerate(self.channels):
+            ours = channel.slopes(samples[:, k], slopes[:, k])
+            theirs = self._measured_slopes(channel, values, moves)
+            blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
+        return self.compared(samples, values), np.concatenate(blocks)
+
+    def _direction(self, move: Values) -> Direction:
+        """Return a direction as the simulator takes it."""
+        own = self.own.keys()
+        known = self.simulator.system.parameters
+        parameters = {name: d for name, d in move.items() if name in known and name not in own}
+        steps: dict[int, tuple[float, float]] = {}
+        delay = 0.0
+        for one in self.nuisances:
+            d = move.get(one.name, 0.0)
+            if d == 0.0:
+                continue
+            at, step = steps.get(one.step, (0.0, 0.0))
+            if one.kind == "at":
+                steps[one.step] = (at + d, step)
+            elif one.kind == "step":
+                steps[one.step] = (at, step + d)
+            elif one.kind == "delay":
+                delay += d
+            elif one.kind == "vt0":
+                parameters = {**parameters, VT0: d}
+        return Direction(parameters, steps, delay)
+
+    def _measured_slopes(
+        self, channel: Channel, values: Values, moves: Sequence[Values]
+    ) -> Array | None:
+        """Return the derivatives of what was measured, if its scale or offset is found."""
+        found = [one for one in self.nuisances if one.signal == channel.signal]
+        if not found:
+            return None
+        raw = (channel.measured - channel.offset) / channel.scale
+        columns = np.zeros((len(raw), len(moves)))
+        for one in found:
+            for k, move in enumerate(moves):
+                by = raw if one.kind == "scale" else np.ones_like(raw)
+                columns[:, k] += by * move.get(one.name, 0.0)
+        return channel.slopes(self.measured(channel, values), columns)
+
+    def secured(self, values: Values) -> "Experiment":
+        """Return the experiment with sub-steps enough all along the response to the values."""
+        simulator = self.moved(values).secured(self.parameters(values))
+        return replace(self, simulator=simulator)
