@@ -7,7 +7,7 @@ import gc
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -107,8 +107,12 @@ def fit(
         from exfit import show
 
         console = show.console()
-        with show.Watch(console, show.task(loaded, strategy)).running() as watch:
-            result = study.fit(loaded, strategy, watch)
+        if loaded.estimate.starts > 1:
+            with show.Bar(console).running() as progress:
+                result = study.fit(loaded, strategy, progress=progress)
+        else:
+            with show.Watch(console, show.task(loaded, strategy)).running() as watch:
+                result = study.fit(loaded, strategy, watch)
         files.write_fit(result, folder, plots)
         show.fit(console, result, folder)
     if not (result.success and result.accepted and result.describes):
@@ -143,7 +147,7 @@ def simulate(
     folder = output or _folder(case, "simulate")
     files.refuse_unwritable(folder)
     values = read_parameters(loaded, parameters) if parameters else {}
-    values |= changed_values(loaded, _assignments(changes), "--set")
+    values |= changed_values(loaded, _assignments(changes, "--set"), "--set")
     simulation = study.simulate(loaded, values)
     files.write_simulation(simulation, case.stem, folder, plots)
     if not quiet:
@@ -219,6 +223,94 @@ def check(case: Path) -> None:
     show.check(show.console(), found)
     if not (found.agrees and found.flat):
         raise SystemExit(NOT_CONVERGED)
+
+
+@main.command(short_help="Show how far each parameter can move with the others following.")
+@case_argument
+@click.argument("parameters", nargs=-1, metavar="[PARAM]...")
+@output_option
+@plots_option
+@quiet_option
+@json_option
+def profile(
+    case: Path,
+    parameters: tuple[str, ...],
+    output: Path | None,
+    plots: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Fit CASE, then find the 95 % interval of each PARAM from its profile likelihood.
+
+    A parameter moves away from its fitted value, and the others are fitted anew, until the cost
+    shows that the record refutes it. This serves where the linear theory of `exfit fit` does not.
+    Without PARAM all free parameters are profiled. Writes profile.json, profile.csv and profile.png
+    to runs/CASE-profile, or to DIR. Ctrl-C keeps what is done.
+    """
+    from exfit import files
+    from exfit.profiles import profile as profiled
+    from exfit.result import to_json
+
+    loaded = _load(case)
+    folder = output or _folder(case, "profile")
+    files.refuse_unwritable(folder)
+    if quiet or as_json:
+        found = profiled(loaded, parameters)
+    else:
+        from exfit import show
+
+        console = show.console()
+        with show.Bar(console).running() as watch:
+            found = profiled(loaded, parameters, watch)
+    files.write_profiles(found, folder, plots)
+    if as_json:
+        click.echo(to_json(found.as_json()), nl=False)
+    elif not quiet:
+        show.profiles(console, found)
+        show.written(console, folder)
+    if found.interrupted:
+        raise SystemExit(NOT_CONVERGED)
+
+
+@main.command(short_help="Show what a planned test would tell of the parameters.")
+@case_argument
+@click.option(
+    "--noise", multiple=True, metavar="vt=1e-4", help="Noise of a signal, pu; may be repeated."
+)
+@output_option
+@plots_option
+@quiet_option
+@json_option
+def identify(
+    case: Path,
+    noise: tuple[str, ...],
+    output: Path | None,
+    plots: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Show which free parameters of CASE a test would determine, and how well; no record is needed.
+
+    At the start values: the test of CASE, steps of 2, 5 and 10 %, a test twice as long, further
+    channels. Writes identify.json and figures to runs/CASE-identify, or to DIR.
+    """
+    from exfit import files
+    from exfit.design import identify as identified
+    from exfit.result import to_json
+
+    loaded = _load(case)
+    folder = output or _folder(case, "identify")
+    files.refuse_unwritable(folder)
+    found = identified(loaded, _assignments(noise, "--noise"))
+    files.write_design(found, folder, plots)
+    if as_json:
+        click.echo(to_json(found.as_json()), nl=False)
+    elif not quiet:
+        from exfit import show
+
+        console = show.console()
+        show.design(console, found)
+        show.written(console, folder)
 
 
 file_option = click.option(
@@ -380,16 +472,13 @@ def _folder(case: Path, command: str) -> Path:
     return Path("runs") / f"{case.stem}-{command}"
 
 
-def _assignments(texts: tuple[str, ...]) -> dict[str, float]:
+def _assignments(texts: tuple[str, ...], option: str) -> dict[str, float]:
     values = {}
     for text in texts:
         name, _, value = text.partition("=")
         try:
             values[name.strip()] = float(value)
         except ValueError:
-            _bad_assignment(text)
+            example = "KA=400" if option == "--set" else "vt=1e-4"
+            raise ExfitError(f"{option} {text}: not of the form {example}") from None
     return values
-
-
-def _bad_assignment(text: str) -> NoReturn:
-    raise ExfitError(f"--set {text}: not of the form KA=400")

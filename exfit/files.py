@@ -7,9 +7,17 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case import SINGLE
+from exfit.design import Design
 from exfit.engine.kernel import cache_folder
 from exfit.errors import CaseError, ExfitError
+from exfit.knowledge import Knowledge
+from exfit.profiles import Profiles
 from exfit.result import (
+    DIGITS,
     Comparison,
     FitResult,
     comparison_table,
@@ -21,7 +29,17 @@ from exfit.result import (
 )
 from exfit.study import Simulation
 
+Array = NDArray[np.float64]
+
 PARAMETERS = "parameters.yaml"
+FIGURES = (
+    "overlay.png",
+    "convergence.png",
+    "trajectories.png",
+    "sensitivity.png",
+    "correlation.png",
+    "starts.png",
+)
 
 
 def refuse_unwritable(folder: Path) -> None:
@@ -38,24 +56,43 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
 
     Raises ExfitError where the folder cannot be written.
     """
-    for old in ("result.json", "overlay.png", "convergence.png", "trajectories.png"):
+    for old in ("result.json", *FIGURES):
         (folder / old).unlink(missing_ok=True)  # of a former fit: it would stand beside new numbers
     history = [asdict(line) for line in result.history]
     write(folder / PARAMETERS, parameter_file(result))
     write(folder / "history.csv", history_table(result))
-    write(folder / "response.csv", comparison_table(result.comparison))
+    if result.comparison.name == SINGLE:
+        write(folder / "response.csv", comparison_table(result.comparison))
+    else:
+        write_comparisons(result.comparisons, folder, figures)
     write_comparisons(result.validation, folder, figures)
     if figures:
         from exfit import plots
 
-        title = f"{result.name}: {result.model} fitted to {result.comparison.record.name}"
-        write(folder / "overlay.png", plots.png(plots.overlay(result.comparison, title)))
+        if result.comparison.name == SINGLE:
+            title = f"{result.name}: {result.model} fitted to {result.comparison.record.name}"
+            write(folder / "overlay.png", plots.png(plots.overlay(result.comparison, title)))
         write(folder / "convergence.png", plots.png(plots.convergence(result)))
         write(folder / "trajectories.png", plots.png(plots.trajectories(result)))
+        if result.knowledge is not None:
+            times = [one.time for one in result.comparisons for _ in one.overlays]
+            write_knowledge_figures(result.knowledge, times, result.name, folder)
+        if result.minima is not None:
+            write(folder / "starts.png", plots.png(plots.waterfall(result.minima, result.name)))
     # last: where it stands, everything else does
     write(folder / "result.json", to_json({**result.as_json(), "history": history}))
     with suppress(ExfitError):  # a cache that cannot be written keeps nothing
         write(_kept(result.case), parameter_file(result))
+
+
+def write_knowledge_figures(
+    known: Knowledge, times: Sequence[Array], name: str, folder: Path
+) -> None:
+    """Write what each parameter does to each signal over time, and how they are correlated."""
+    from exfit import plots
+
+    write(folder / "sensitivity.png", plots.png(plots.sensitivity(known, times, name)))
+    write(folder / "correlation.png", plots.png(plots.correlation(known, name)))
 
 
 def write_comparisons(comparisons: Sequence[Comparison], folder: Path, figures: bool) -> None:
@@ -74,6 +111,28 @@ def write_validation(comparisons: Sequence[Comparison], folder: Path, figures: b
     write_comparisons(comparisons, folder, figures)
     content = {"validation": [one.as_json() for one in comparisons]}
     write(folder / "validation.json", to_json(content))
+
+
+def write_profiles(found: Profiles, folder: Path, figures: bool) -> None:
+    """Write the profiles of parameters as JSON, as a table and as a figure."""
+    rows = [
+        f"{one.name},{value:.{DIGITS}g},{cost:.{DIGITS}g}\n"
+        for one in found.profiles
+        for value, cost in zip(one.at, one.costs, strict=True)
+    ]
+    write(folder / "profile.csv", "".join(["parameter,value,cost\n", *rows]))
+    if figures:
+        from exfit import plots
+
+        write(folder / "profile.png", plots.png(plots.profiles(found)))
+    write(folder / "profile.json", to_json(found.as_json()))
+
+
+def write_design(found: Design, folder: Path, figures: bool) -> None:
+    """Write what a planned test would tell as JSON and as figures."""
+    if figures:
+        write_knowledge_figures(found.own, found.times, found.name, folder)
+    write(folder / "identify.json", to_json(found.as_json()))
 
 
 def write_simulation(simulation: Simulation, name: str, folder: Path, figures: bool) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from exfit.atomic import write_whole
 from exfit.errors import ExfitError
 from exfit.features import Features
+from exfit.knowledge import Knowledge
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ class Iteration:
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A free parameter after a fit."""
+    """A free parameter after a fit; ``of_record`` where it belongs to a record, not to the unit."""
 
     value: float
     start: float
@@ -53,11 +54,15 @@ class FittedParameter:
     max: float
     at_bound: Literal["min", "max"] | None
     unit: str
+    of_record: bool = False
 
 
 @dataclass(frozen=True)
 class Overlay:
-    """Measured and simulated samples (M,) of one signal, per unit; ``start`` after a fit."""
+    """Measured and simulated samples (M,) of one signal, per unit; ``start`` after a fit.
+
+    What is left out of the comparison is nan.
+    """
 
     measured: Array
     simulated: Array
@@ -71,20 +76,20 @@ class Overlay:
     @property
     def rmse(self) -> float:
         """Root mean square of the error, per unit."""
-        return float(np.sqrt(np.mean(self.error**2)))
+        return float(np.sqrt(np.nanmean(self.error**2)))
 
     @property
     def max_error(self) -> float:
         """Largest magnitude of the error, per unit."""
-        return float(np.max(np.abs(self.error)))
+        return float(np.nanmax(np.abs(self.error)))
 
     @property
     def fit_percent(self) -> float:
         """100 (1 - |error| / |measured - its mean|), norms of the whole signal: 100 is perfect."""
-        spread = float(np.linalg.norm(self.measured - np.mean(self.measured)))
-        return (
-            100.0 * (1.0 - float(np.linalg.norm(self.error)) / spread) if spread else float("nan")
-        )
+        kept = np.isfinite(self.error)
+        measured, error = self.measured[kept], self.error[kept]
+        spread = float(np.linalg.norm(measured - np.mean(measured)))
+        return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread else float("nan")
 
 
 @dataclass(frozen=True)
@@ -153,6 +158,43 @@ class Comparison:
         }
 
 
+class Minimum(NamedTuple):
+    """A minimum of the cost: the values there, and how many starts led to it."""
+
+    values: Mapping[str, float]
+    cost: float
+    starts: int
+
+
+@dataclass(frozen=True, eq=False)
+class Minima:
+    """What a search from many starts found: the distinct minima, the lowest first.
+
+    ``start_costs`` (starts,) are inf where there is no response, ``end_costs`` (starts,) nan where
+    a start was not refined.
+    """
+
+    minima: tuple[Minimum, ...]
+    start_costs: Array
+    end_costs: Array
+
+    @property
+    def failed(self) -> int:
+        """How many starts have no response."""
+        return int(np.count_nonzero(np.isinf(self.start_costs)))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures."""
+        return {
+            "starts": len(self.start_costs),
+            "refined": int(np.count_nonzero(np.isfinite(self.end_costs))),
+            "failed": self.failed,
+            "minima": [one._asdict() for one in self.minima],
+            "start_costs": self.start_costs.tolist(),
+            "end_costs": self.end_costs.tolist(),
+        }
+
+
 class PartOf(NamedTuple):
     """A part of what was fitted: its kind, its model, how its parameters' names begin."""
 
@@ -166,7 +208,8 @@ class FitResult:
     """A fit: what was found, how, and how well it matches.
 
     ``parameters`` holds the fitted ones, ``fixed`` all others, of every part, under their names in
-    the system: KA, machine.Tpd0.
+    the system: KA, machine.Tpd0. ``cost`` is what the fit made small, ``comparisons`` are with each
+    record, ``knowledge`` is what they tell of the parameters, None where that is not known.
     """
 
     case: Path
@@ -178,7 +221,10 @@ class FitResult:
     fixed: Mapping[str, float]
     typical: tuple[str, ...]
     parts: tuple[PartOf, ...]
-    comparison: Comparison
+    cost: float
+    comparisons: tuple[Comparison, ...]
+    knowledge: Knowledge | None
+    minima: Minima | None
     status: int
     message: str
     success: bool
@@ -193,6 +239,11 @@ class FitResult:
     validation: tuple[Comparison, ...]
     versions: Mapping[str, str]
     inputs: Mapping[str, str]
+
+    @property
+    def comparison(self) -> Comparison:
+        """The comparison with the first record."""
+        return self.comparisons[0]
 
     @property
     def nit(self) -> int:
@@ -224,8 +275,8 @@ class FitResult:
 
     @property
     def describes(self) -> bool:
-        """Whether the response matches its record better than a constant would."""
-        return self.comparison.fit_percent > 0.0
+        """Whether the response matches every record better than a constant would."""
+        return all(one.fit_percent > 0.0 for one in self.comparisons)
 
     def as_json(self) -> dict[str, Any]:
         """Return what ``--json`` prints: everything but history and samples."""
@@ -241,6 +292,7 @@ class FitResult:
                     "min": one.min,
                     "max": one.max,
                     "at_bound": one.at_bound,
+                    **self._confidence_as_json(name),
                 }
                 for name, one in self.parameters.items()
             },
@@ -251,7 +303,7 @@ class FitResult:
             },
             "typical": list(self.typical),
             **self._parts_as_json(),
-            "cost": self.comparison.cost,
+            "cost": self.cost,
             "start_cost": self.start_cost,
             "rmse": self.comparison.rmse,
             "status": self.status,
@@ -266,10 +318,20 @@ class FitResult:
             "seconds": self.seconds,
             "notes": list(self.notes),
             "fit": self.comparison.as_json(),
+            "records": [one.as_json() for one in self.comparisons],
+            "minima": None if self.minima is None else self.minima.as_json(),
+            "knowledge": None if self.knowledge is None else self.knowledge.as_json(),
             "validation": [one.as_json() for one in self.validation],
             "versions": dict(self.versions),
             "inputs": dict(self.inputs),
         }
+
+    def _confidence_as_json(self, name: str) -> dict[str, Any]:
+        """Return how well a parameter is known."""
+        if self.knowledge is None:
+            return {"std_error": None, "interval": None, "why": "the search was interrupted"}
+        one = self.knowledge.confidence.parameters[name]
+        return {"std_error": one.std_error, "interval": one.interval, "why": one.why}
 
     def _parts_as_json(self) -> dict[str, Any]:
         """Return the values of machine, network and stabiliser, and the names of their models."""

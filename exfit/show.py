@@ -1,24 +1,30 @@
 """What the terminal shows: tables and lines, with rich."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
+from rich.progress import TaskID
 from rich.table import Table
 from rich.text import Text
 
 from exfit.case import Case
 from exfit.check import STEPS, Check
+from exfit.design import Design
+from exfit.estimate import Progress
 from exfit.features import Features
+from exfit.inference import Confidence
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Sheet
-from exfit.result import Comparison, FitResult, Iteration
+from exfit.profiles import Profiles
+from exfit.result import Comparison, FitResult, Iteration, Minima
 
 LINES = 12  # of the history that stay in sight
 NARROW = 80  # columns where the width is unknown
 GAP = 2  # between columns
+MINIMA = 5  # columns of minima that fit beside each other
 LABELLED = 25  # columns that the names and units of the features take
 
 HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "inner", "nfev")
@@ -108,50 +114,172 @@ def written(console: Console, folder: Path) -> None:
     console.print(f"written to {folder}", soft_wrap=True, markup=False)
 
 
-def notes(console: Console, texts: Iterable[str]) -> None:
-    """Show what must be known beside the numbers."""
-    for text in texts:
-        console.print(Text.assemble(("note", "yellow"), f" {text}"))
+class Bar:
+    """Shows how far many searches are, with the time left; in a file or pipe a line at the end."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+
+    @contextmanager
+    def running(self) -> Iterator[Callable[[Progress], None]]:
+        """Return what is to be told the progress."""
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bars
+
+        columns = (
+            TextColumn("{task.description:<10}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            TextColumn("best cost {task.fields[best]:.4e}"),
+        )
+        with Bars(*columns, console=self.console) as bars:
+            tasks: dict[str, TaskID] = {}
+
+            def tell(now: Progress) -> None:
+                if now.stage not in tasks:
+                    tasks[now.stage] = bars.add_task(now.stage, total=now.total, best=now.best)
+                bars.update(tasks[now.stage], completed=now.done, best=now.best)
+
+            yield tell
 
 
-def fit(console: Console, result: FitResult, folder: Path) -> None:
-    """Show what a fit found and where its files are."""
-    table = plain_table(
-        "parameter",
-        "start",
-        "fitted",
-        "min",
-        "max",
-        "unit",
-        "",
-        numbers=("start", "fitted", "min", "max"),
-    )
-    for name, one in result.parameters.items():
-        style = "yellow" if one.at_bound else ""
-        mark = f"on its {one.at_bound}" if one.at_bound else ""
-        cells = (number(v) for v in (one.start, one.value, one.min, one.max))
-        table.add_row(name, *cells, one.unit, mark, style=style)
+def profiles(console: Console, found: Profiles) -> None:
+    """Show the intervals that profiles give, beside those of the linear theory."""
+    numbers = ("fitted", "min 95 %", "max 95 %", "linear min", "linear max")
+    table = plain_table("parameter", *numbers, "unit", numbers=numbers)
+    for one in found.profiles:
+        linear = (None, None) if one.linear is None else one.linear
+        cells = (number(value) for value in (one.value, one.low, one.high, *linear))
+        table.add_row(one.name, *cells, one.unit, style="yellow" if any(one.ends) else "")
     console.print()
     console.print(table)
     console.print()
-    match = result.comparison
+    open_ = [
+        f"{one.name} is open {side}: {end}"
+        for one in found.profiles
+        for side, end in zip(("below", "above"), one.ends, strict=True)
+        if end
+    ]
+    remarks(console, "open", open_)
+    remarks(console, "note", found.notes)
+
+
+def design(console: Console, found: Design) -> None:
+    """Show what planned tests would tell of each parameter: standard errors in percent."""
+    listed = ", ".join(f"{signal} {level:.2g}" for signal, level in found.noise.items())
+    console.print(f"standard errors, with noise (pu): {listed}")
+    console.print()
+    heads = ["this test", *(plan.label for plan in found.plans)]
+    table = plain_table("parameter", *heads, numbers=heads)
+    known = [found.own.confidence, *(plan.confidence for plan in found.plans)]
+    for name in found.own.linear.names:
+        table.add_row(name, *(_error(one, name) for one in known))
+    console.print(table)
+    console.print()
+    remarks(console, "open", found.sentences)
+
+
+def _error(known: Confidence, name: str) -> str:
+    """Return the standard error of a parameter as it is shown."""
+    one = known.parameters[name]
+    if one.relative_error is not None:
+        return percent(one.relative_error)
+    return "-" if one.std_error is None else f"{one.std_error:.1e}"
+
+
+def notes(console: Console, texts: Iterable[str]) -> None:
+    """Show what must be known beside the numbers."""
+    remarks(console, "note", texts)
+
+
+def fit(console: Console, result: FitResult, folder: Path) -> None:
+    """Show what a fit found, how well it is known, and where its files are."""
+    console.print()
+    console.print(fitted_table(result))
+    console.print()
     outcome = "converged" if result.success else "NOT CONVERGED"
     style = "green" if result.success else "bold red"
     console.print(Text.assemble((outcome, style), f": {result.message}"))
-    console.print(
-        f"cost {result.start_cost:.4e} -> {match.cost:.4e}   rmse {match.rmse:.3e} pu   "
-        f"fit {match.fit_percent:.2f} %"
-    )
+    match = result.comparison
+    several = len(result.comparisons) > 1
+    figures = f"cost {result.start_cost:.4e} -> {result.cost:.4e}"
+    if not several:
+        figures += f"   rmse {match.rmse:.3e} pu   fit {match.fit_percent:.2f} %"
+    console.print(figures)
     console.print(
         f"{result.nit} iterations, {result.nfev} residuals, {result.njev} Jacobians, "
         f"{result.simulations} simulations, {result.seconds:.2f} s"
     )
     console.print(f"sub-steps: {result.substeps}")
+    if result.minima is not None:
+        console.print()
+        minima(console, result.minima, result.parameters)
+    if result.knowledge is not None:
+        console.print()
+        remarks(console, "open", result.knowledge.sentences)
     notes(console, result.notes)
-    if result.validation:
-        comparisons(console, [match, *result.validation])
+    if result.validation or several:
+        comparisons(console, [*result.comparisons, *result.validation])
     console.print()
     written(console, folder)
+
+
+def fitted_table(result: FitResult) -> Table:
+    """Return the fitted values with their intervals; what belongs to a record stands last."""
+    numbers = ("start", "fitted", "95 % interval", "error")
+    table = plain_table("parameter", *numbers, "unit", "", numbers=numbers)
+    for name, one in result.parameters.items():
+        style = "yellow" if one.at_bound else ""
+        mark = f"on its {one.at_bound}" if one.at_bound else ""
+        interval, error = "-", "-"
+        if result.knowledge is not None:
+            known = result.knowledge.confidence.parameters[name]
+            style = style or ("yellow" if known.why else "")
+            if known.interval is not None:
+                interval = " ... ".join(number(limit) for limit in known.interval)
+            if known.relative_error is not None and not one.of_record:
+                error = percent(known.relative_error)
+            elif known.std_error is not None:
+                error = f"{known.std_error:.1e}"
+        cells = (number(one.start), number(one.value), interval, error, one.unit, mark)
+        table.add_row(name, *cells, style=style)
+    return table
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, two digits of it."""
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
+
+
+def remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
+    """Show sentences one below the other, each behind its kind."""
+    table = Table.grid(padding=(0, 1))
+    table.add_column(style="yellow", no_wrap=True)
+    table.add_column()
+    for text in texts:
+        table.add_row(kind, Text(text))
+    if table.row_count:
+        console.print(table)
+
+
+def minima(console: Console, found: Minima, parameters: Iterable[str]) -> None:
+    """Show the distinct minima of a search from many starts, the lowest first."""
+    refined = sum(one.starts for one in found.minima)
+    console.print(
+        f"{len(found.start_costs)} starts, {refined} refined, {found.failed} without a response; "
+        f"distinct minima: {len(found.minima)}"
+    )
+    ranks = [str(rank + 1) for rank in range(min(len(found.minima), MINIMA))]
+    table = plain_table("minimum", *ranks, numbers=ranks)
+    shown = found.minima[:MINIMA]
+    table.add_row("cost", *(f"{one.cost:.3e}" for one in shown))
+    table.add_row("starts", *(str(one.starts) for one in shown))
+    for name in parameters:
+        table.add_row(name, *(number(one.values[name], 4) for one in shown))
+    console.print(table)
+    if len(found.minima) > MINIMA:
+        console.print(f"and {len(found.minima) - MINIMA} more, all in result.json")
 
 
 FEATURES = (

@@ -2,24 +2,39 @@
 
 import sys
 import time as clock
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from exfit import __version__, estimate
-from exfit.case import Case
+from exfit.case import SINGLE, Case, known
 from exfit.errors import CaseError, SimulationError
-from exfit.notes import level_notes, match_notes, notes, typical_notes, unsteady_notes
-from exfit.plant import VT0
+from exfit.knowledge import knowledge
+from exfit.notes import (
+    level_notes,
+    match_notes,
+    notes,
+    typical_notes,
+    unsteady_notes,
+    validation_notes,
+)
 from exfit.record import file_hash
 from exfit.residuals import JACOBIANS, Residuals
-from exfit.result import Comparison, FitResult, FittedParameter, Iteration, PartOf
+from exfit.result import (
+    Comparison,
+    FitResult,
+    FittedParameter,
+    Iteration,
+    Minima,
+    Minimum,
+    PartOf,
+)
 from exfit.simulate import Response
 from exfit.trial import (
     Trial,
-    fitted_trial,
+    fitted_trials,
     plain_simulator,
     residuals_of,
     secured,
@@ -30,6 +45,7 @@ from exfit.trial import (
 Values = Mapping[str, float]
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
+UNITS: Mapping[str, str] = {"at": "s", "step": "pu", "vt0": "pu", "delay": "s", "offset": "pu"}
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
@@ -37,19 +53,19 @@ def fit(
     case: Case,
     strategy: estimate.Method | None = None,
     watch: Callable[[Iteration], None] = lambda _: None,
+    progress: Callable[[estimate.Progress], None] = lambda _: None,
 ) -> FitResult:
-    """Fit the free parameters of a case to its record, and try the result on its other records.
+    """Fit the free parameters of a case to its records, and try the result on its other records.
 
-    ``watch`` is told every iteration. An interruption (KeyboardInterrupt) ends the search with the
-    best point so far. Raises ExfitError for input that cannot be used.
+    ``watch`` is told every iteration, ``progress`` how far a search from many starts is. An
+    interruption (KeyboardInterrupt) ends the search with the best point so far. Raises ExfitError
+    for input that cannot be used.
     """
     began = clock.perf_counter()
     given = case.values()
-    trial = fitted_trial(case).secured(given)
-    validations = [trial_of(case, one.test, one.record, given) for one in case.validations]
-    refuse_unfit(case, residuals_of(case, trial))
-    residuals = residuals_of(case, trial)
-    start = residuals.start
+    trials = fitted(case)
+    validations = tuple(trial_of(case, one, given) for one in case.validations)
+    residuals = residuals_of(case, trials)
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
@@ -57,26 +73,10 @@ def fit(
         history.append(_iteration(line, residuals))
         watch(history[-1])
 
-    found = estimate.least_squares(
-        residuals,
-        start,
-        jac=JACOBIANS[case.estimate.jacobian](residuals),
-        bounds=residuals.bounds,
-        method=method,
-        max_iterations=case.estimate.iterations,
-        gtol=case.estimate.tolerance.gradient,
-        xtol=case.estimate.tolerance.step,
-        x_scale=UNIT,
-        good_enough=case.estimate.good_enough.rmse,
-        callback=announce,
-    )
-    values, begin = residuals.values(found.x), residuals.values(start)
-    limit = None if case.accept is None else case.accept.rmse
-    compared = trial.secured(values).compare("fit", values, begin)
-    tried = tuple(
-        other.secured(values).compare(one.name, values, None, limit)
-        for one, other in zip(case.validations, validations, strict=True)
-    )
+    found, minima = search(case, residuals, method, announce, progress)
+    values, begin = residuals.values(found.x), residuals.values(residuals.start)
+    compared = tuple(one.secured(values).compare(one.name, values, begin) for one in trials)
+    tried = tuple(tried_on(case, one, values) for one in validations)
     return FitResult(
         case=case.path,
         name=case.path.stem,
@@ -84,41 +84,157 @@ def fit(
         strategy=method,
         saturation=case.saturation,
         parameters=_parameters(case, residuals, values),
-        fixed={name: v for name, v in given.items() if name not in case.free()},
+        fixed={name: values[name] for name in given if name not in case.free()},
         typical=case.typical(),
         parts=tuple(PartOf(part.kind, part.name, part.prefix) for part in case.parts.all),
-        comparison=compared,
+        cost=found.cost,
+        comparisons=compared,
+        knowledge=knowledge(residuals, found.x, names_of_records(trials)),
+        minima=None if minima is None else minima_of(residuals, minima),
         status=found.status,
         message=found.message,
         success=found.success,
-        interrupted=found.status == estimate.STATUS[estimate.Stop.INTERRUPTED],
+        interrupted=found.stop is estimate.Stop.INTERRUPTED
+        or (minima is not None and minima.interrupted),
         history=tuple(history),
         nfev=found.nfev,
         njev=found.njev,
         simulations=residuals.simulations,
         substeps=residuals.substeps,
         seconds=clock.perf_counter() - began,
-        notes=(
-            *notes(case, residuals, found, compared),
-            *match_notes(compared, tried, trial.levels.get(VT0)),
-            *record_notes(case, trial, compared),
-        ),
+        notes=tuple(_notes(case, residuals, found, trials, compared, tried)),
         validation=tried,
         versions=versions(),
-        inputs=inputs(case, trial, *validations),
+        inputs=inputs(case, *trials, *validations),
     )
 
 
-def record_notes(case: Case, trial: Trial, compared: Comparison) -> Iterator[str]:
+def fitted(case: Case) -> tuple[Trial, ...]:
+    """Return the tests of a case with the records that it is fitted to, ready to be fitted.
+
+    Raises ExfitError where there is none, or one that cannot be fitted.
+    """
+    given = case.values()
+    trials = tuple(trial.secured(given) for trial in fitted_trials(case))
+    refuse_unfit(case, residuals_of(case, trials))
+    return trials
+
+
+def names_of_records(trials: Iterable[Trial]) -> tuple[str, ...]:
+    """Return the names of all that is found about the records themselves."""
+    return tuple(one.name for trial in trials for one in trial.free)
+
+
+def search(
+    case: Case,
+    residuals: Residuals,
+    method: estimate.Method,
+    announce: Callable[[estimate.Iteration], None],
+    progress: Callable[[estimate.Progress], None],
+) -> tuple[estimate.Result, estimate.Minima | None]:
+    """Return the best point found from the start of a case, or from all its starts."""
+    asked = case.estimate
+    jacobian = JACOBIANS[asked.jacobian](residuals)
+    if asked.starts == 1:
+        found = estimate.least_squares(
+            residuals,
+            residuals.start,
+            jac=jacobian,
+            bounds=residuals.bounds,
+            method=method,
+            max_iterations=asked.iterations,
+            gtol=asked.tolerance.gradient,
+            xtol=asked.tolerance.step,
+            x_scale=UNIT,
+            good_enough=asked.good_enough.rmse,
+            callback=announce,
+        )
+        return found, None
+    minima = estimate.multistart(
+        residuals,
+        jacobian,
+        residuals.bounds,
+        asked.starts,
+        x0=residuals.start,
+        screen=residuals.costs,
+        refine=asked.refine,
+        watch=progress,
+        method=method,
+        max_iterations=asked.iterations,
+        gtol=asked.tolerance.gradient,
+        xtol=asked.tolerance.step,
+        x_scale=UNIT,
+        good_enough=asked.good_enough.rmse,
+    )
+    if not minima.minima:
+        raise KeyboardInterrupt
+    best = minima.minima[0].result
+    for line in best.history:
+        announce(line)
+    return best, minima
+
+
+def minima_of(residuals: Residuals, found: estimate.Minima) -> Minima:
+    """Return the minima that were found, in the parameters' own values."""
+    names = [one.name for one in residuals.free]
+
+    def minimum(one: estimate.Minimum) -> Minimum:
+        values = residuals.values(one.x)
+        return Minimum({name: values[name] for name in names}, one.cost, one.starts)
+
+    each = tuple(minimum(one) for one in found.minima)
+    return Minima(each, found.start_costs, found.end_costs)
+
+
+def _notes(
+    case: Case,
+    residuals: Residuals,
+    found: estimate.Result,
+    trials: Sequence[Trial],
+    compared: Sequence[Comparison],
+    tried: Sequence[Comparison],
+) -> Iterator[str]:
+    """Yield what must be known beside the numbers of a fit."""
+    yield from notes(case, residuals, found, compared)
+    for trial, one in zip(trials, compared, strict=True):
+        yield from match_notes(one, known(trial.test.vt0))
+        yield from record_notes(trial, one)
+    yield from validation_notes(compared, tried)
+
+
+def tried_on(case: Case, trial: Trial, values: Values, name: str | None = None) -> Comparison:
+    """Return how fitted values do on a record that the fit never saw.
+
+    What that record leaves open about itself (its instants, its levels) is found on it, with the
+    parameters of the unit as they are.
+    """
+    limit = None if case.accept is None else case.accept.rmse
+    secured = trial.secured(values)
+    if trial.free:
+        residuals = Residuals([secured.experiment], trial.free, values)
+        aligned = estimate.least_squares(
+            residuals,
+            residuals.start,
+            jac=residuals.exact,
+            bounds=residuals.bounds,
+            method="lm-then-dgn",
+            x_scale=UNIT,
+        )
+        values = residuals.values(aligned.x)
+    return secured.compare(name or trial.name, values, None, limit)
+
+
+def record_notes(trial: Trial, compared: Comparison) -> Iterator[str]:
     """Yield what the steady part of a record says against the case."""
-    if case.test.steady is not None and case.test.begin is None:
-        yield from unsteady_notes(trial.record, case.test.steady)
-        yield from level_notes(compared, case.test.steady)
+    test = trial.test
+    if test.steady is not None and test.begin is None:
+        yield from unsteady_notes(trial.record, test.steady)
+        yield from level_notes(compared, test.steady)
 
 
 def refuse_unfit(case: Case, residuals: Residuals) -> None:
     """Raise ExfitError where a record cannot be fitted: it is too short, flat, or out of scale."""
-    samples, unknown = residuals.measured.size, len(residuals.free)
+    samples, unknown = residuals.count, len(residuals.free)
     if samples < unknown:
         raise CaseError([f"{case.path}: record: {samples} samples for {unknown} free parameters"])
     for channel in residuals.channels:
@@ -137,7 +253,7 @@ def refuse_unfit(case: Case, residuals: Residuals) -> None:
 
 
 def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, FittedParameter]:
-    units = case.units()
+    units, shared = case.units(), case.free()
     return {
         one.name: FittedParameter(
             value=values[one.name],
@@ -145,10 +261,17 @@ def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, F
             min=one.low,
             max=one.high,
             at_bound=one.bound(values[one.name]),
-            unit=units[one.name],
+            unit=units.get(one.name, unit_of(one.name)),
+            of_record=one.name not in shared,
         )
         for one in residuals.free
     }
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a value that no data sheet has: what is found about a record."""
+    kind = name.rpartition(".")[2]
+    return UNITS.get(kind, "")
 
 
 def _iteration(line: estimate.Iteration, residuals: Residuals) -> Iteration:
@@ -174,10 +297,9 @@ def inputs(case: Case, *trials: Trial) -> dict[str, str]:
     files = {"case": file_hash(case.path)}
     if case.model is not None and case.model.endswith(".py"):
         files["model"] = file_hash(case.folder / case.model)
-    labels = ["record", *(f"validate.{one.name}" for one in case.validations)]
-    return files | {
-        label: trial.record.sha256 for label, trial in zip(labels, trials, strict=False)
-    }
+    fitted = ["record"] if not case.records else [f"records.{one.name}" for one in case.records]
+    labels = [*fitted, *(f"validate.{one.name}" for one in case.validations)]
+    return files | {label: trial.record.sha256 for label, trial in zip(labels, trials, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -190,16 +312,16 @@ class Simulation:
 
 
 def simulate(case: Case, changes: Values) -> Simulation:
-    """Simulate a case at its start values, with changes upon them.
+    """Simulate a case at its start values, with changes upon them; of several records the first.
 
     Raises ExfitError for input that cannot be used.
     """
     values = values_of(case, changes)
-    if case.record is not None:
-        trial = trial_of(case, case.test, case.record, values).secured(values)
-        response = trial.simulator.response({**values, **trial.levels})
+    if case.recordings:
+        trial = trial_of(case, case.recordings[0], values).secured(values)
+        response = trial.response(values)
         compared = trial.compare("record", values) if trial.channels else None
-        told = [] if compared is None else record_notes(case, trial, compared)
+        told = [] if compared is None else record_notes(trial, compared)
         return Simulation(response, compared, (*simulation_notes(case, response), *told))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
@@ -217,25 +339,25 @@ def simulation_notes(case: Case, response: Response) -> Iterator[str]:
 
 
 def validate(case: Case, changes: Values, record: Path | None = None) -> list[Comparison]:
-    """Compare a case with its records: the fitted one first, then those that no fit saw.
+    """Compare a case with its records: the fitted ones first, then those that no fit saw.
 
     ``record`` takes the place of the first of the latter (or of the fitted one if there is no
     other), under the same test and columns. Raises ExfitError for input that cannot be used.
     """
-    limit = None if case.accept is None else case.accept.rmse
-    named = [(one.name, one.test, one.record, limit) for one in case.validations]
-    fitted = [] if case.record is None else [("fit", case.test, case.record, None)]
+    fitted, others = list(case.recordings), list(case.validations)
     if record is not None:
-        if not named + fitted:
+        if not fitted + others:
             raise CaseError([f"{case.path}: record: missing; nothing says how to read {record}"])
-        _, test, file, _ = (named + fitted)[0]
-        other = file.model_copy(update={"file": str(record.absolute())})
-        name = record.name if record.stem == "fit" else record.stem
-        named = [(name, test, other, limit)]
-    if not named + fitted:
+        like = (others + fitted)[0]
+        file = like.record.model_copy(update={"file": str(record.absolute())})
+        name = record.name if record.stem == SINGLE else record.stem
+        others = [like.model_copy(update={"name": name, "record": file})]
+    if not fitted + others:
         raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
     values = values_of(case, changes)
+    seen = [trial_of(case, one, values).secured(values) for one in fitted]
+    unseen = [trial_of(case, one, values) for one in others]
     return [
-        trial_of(case, test, file, values).secured(values).compare(name, values, None, most)
-        for name, test, file, most in fitted + named
+        *(one.compare(one.name, values) for one in seen),
+        *(tried_on(case, one, values) for one in unseen),
     ]

@@ -25,6 +25,8 @@ FILES_OF_A_FIT = {
     "overlay.png",
     "convergence.png",
     "trajectories.png",
+    "sensitivity.png",
+    "correlation.png",
     "down-step.csv",
     "down-step.png",
 }

@@ -13,7 +13,7 @@ from exfit.case import load_case
 from exfit.result import FitResult, Overlay
 
 ROOT = Path(__file__).parent.parent
-INSIDE = {"comparison": "fit", "parts": "machine_model"}  # under another name
+INSIDE = {"comparisons": "records", "parts": "machine_model"}  # under another name
 ELSEWHERE = {"name", "history"}  # in the name of the folder and in the history
 
 laws = settings(deadline=None, derandomize=True, max_examples=25)
@@ -46,4 +46,4 @@ def test_the_json_of_a_fit_has_every_field_with_its_value(fitted):
         if isinstance(value, bool | int | float | str):
             assert told[name] == value, name
     assert tuple(told["typical"]) == fitted.typical
-    assert told["fit"] == fitted.comparison.as_json()
+    assert told["fit"] == fitted.comparison.as_json() == told["records"][0]

@@ -9,7 +9,7 @@ import pytest
 from exfit.case import load_case
 from exfit.plant import VT0
 from exfit.study import fit, simulate, validate
-from exfit.trial import fitted_trial, residuals_of, trial_of, values_of
+from exfit.trial import fitted_trials, trial_of, values_of
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "tests" / "reference"
@@ -33,7 +33,7 @@ def true_cost(name):
     truth = json.loads(reference.read_text())["params_in_effect"]
     known = {NAMES.get(key, key): value for key, value in truth.items()}
     wanted = [*loaded.parameters.free, "KA"]
-    trial = fitted_trial(loaded)
+    trial = fitted_trials(loaded)[0]
     return trial.compare("truth", values_of(loaded, {key: known[key] for key in wanted})).cost
 
 
@@ -95,9 +95,9 @@ def test_the_fit_holds_on_the_step_down_that_it_never_saw_or_says_that_it_does_n
 
 @pytest.mark.parametrize("name", ["ac8b_unit1_ka_free", "ac8b_unit2_ka_free"])
 def test_exactly_redundant_gains_are_named(fits, name):
-    (note,) = [text for text in fits(name, None).notes if "move together" in text]
-    named = set(note.partition(" can ")[0].split(", "))
-    assert named == {"KA", "KPR", "KIR", "KDR"}
+    unseen = fits(name, None).knowledge.identifiability.unseen
+    (exact,) = [one for one in unseen if one.exact]
+    assert {symbol for symbol, _ in exact.moves} == {"KA", "KPR", "KIR", "KDR"}
 
 
 def test_the_check_system_gives_back_its_two_numbers(fits):
@@ -176,12 +176,12 @@ def test_an_interrupted_fit_keeps_the_best_point_so_far():
 def test_the_initial_voltage_is_the_mean_before_the_step_where_the_case_gives_none():
     loaded = case("ac1a_typical")
     down = loaded.validations[0]
-    trial = trial_of(loaded, down.test, down.record, loaded.values())
+    trial = trial_of(loaded, down, loaded.values())
     before = trial.record.time < 1.0
-    assert trial.levels[VT0] == pytest.approx(
+    assert trial.experiment.own[VT0] == pytest.approx(
         np.mean(trial.record.signals["vt"][before]), rel=1e-12
     )
-    assert residuals_of(loaded, fitted_trial(loaded)).fixed[VT0] == 1.0
+    assert fitted_trials(loaded)[0].experiment.own[VT0] == 1.0
 
 
 def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):

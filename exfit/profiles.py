@@ -1,0 +1,148 @@
+"""The profile likelihood of a case's parameters: how far each can move if the others follow."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit import estimate
+from exfit.case import Case
+from exfit.case_form import near
+from exfit.errors import CaseError
+from exfit.inference import LEVEL
+from exfit.knowledge import Knowledge, knowledge
+from exfit.residuals import Residuals
+from exfit.study import UNIT, fitted, names_of_records, search, unit_of
+from exfit.trial import residuals_of
+
+Array = NDArray[np.float64]
+
+ENDS = {
+    estimate.End.RISE: "",
+    estimate.End.BOUND: "the record refutes no value down or up to its bound",
+    estimate.End.FLAT: "the cost hardly rises",
+    estimate.End.FAILED: "there is no response beyond",
+    estimate.End.INTERRUPTED: "interrupted",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The least cost (K,) for given values ``at`` (K,) of a parameter, the others fitted anew.
+
+    ``low`` and ``high`` end the interval, None where the cost does not rise as far before what
+    ``ends`` says; ``linear`` is the interval of the linear theory, if it has one.
+    """
+
+    name: str
+    unit: str
+    value: float
+    at: Array
+    costs: Array
+    low: float | None
+    high: float | None
+    ends: tuple[str, str]
+    linear: tuple[float, float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """Profiles of some parameters about the minimum ``cost``.
+
+    At the ends of an interval the cost is ``rise`` above it: half the squared quantile of
+    Student's t, times the variance of the residuals, widened where these are not white.
+    """
+
+    name: str
+    cost: float
+    rise: float
+    profiles: tuple[Profile, ...]
+    notes: tuple[str, ...]
+    interrupted: bool
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures."""
+        return {
+            "cost": self.cost,
+            "rise": self.rise,
+            "level": LEVEL,
+            "interrupted": self.interrupted,
+            "notes": list(self.notes),
+            "parameters": {
+                one.name: {
+                    "value": one.value,
+                    "low": one.low,
+                    "high": one.high,
+                    "ends": list(one.ends),
+                    "linear": one.linear,
+                    "at": one.at.tolist(),
+                    "costs": one.costs.tolist(),
+                }
+                for one in self.profiles
+            },
+        }
+
+
+def profile(
+    case: Case,
+    names: Iterable[str] = (),
+    watch: Callable[[estimate.Progress], None] = lambda _: None,
+) -> Profiles:
+    """Fit a case and return the profiles of some of its free parameters, all by default.
+
+    ``watch`` is told the progress; an interruption keeps what is done. Raises ExfitError for input
+    that cannot be used.
+
+    Source: Venzon & Moolgavkar 1988.
+    """
+    trials = fitted(case)
+    residuals = residuals_of(case, trials)
+    free = [one.name for one in residuals.free]
+    wanted = tuple(names) or tuple(free)
+    unknown = [name for name in wanted if name not in free]
+    if unknown:
+        raise CaseError(f"{case.path}: {name}: not free; {near(name, free)}" for name in unknown)
+    found, _ = search(case, residuals, case.estimate.strategy, lambda _: None, watch)
+    known = knowledge(residuals, found.x, names_of_records(trials))
+    rise = known.rise
+    sides = estimate.profiles(
+        residuals,
+        residuals.exact,
+        found.x,
+        [free.index(name) for name in wanted],
+        residuals.bounds,
+        rise,
+        x_scale=UNIT,
+        watch=watch,
+    )
+    moved = any(one.moved for one in sides)
+    notes = ("a lower minimum was met on the way: the profiles are about that one",)
+    return Profiles(
+        name=case.path.stem,
+        cost=sides[0].cost,
+        rise=rise,
+        profiles=tuple(_profile(case, residuals, known, one) for one in sides),
+        notes=notes if moved else (),
+        interrupted=any(estimate.End.INTERRUPTED in one.ends for one in sides),
+    )
+
+
+def _profile(
+    case: Case, residuals: Residuals, known: Knowledge, found: estimate.Profile
+) -> Profile:
+    """Return a profile in the parameter's own values."""
+    one = residuals.free[found.index]
+    below, above = found.ends
+    return Profile(
+        name=one.name,
+        unit=case.units().get(one.name, unit_of(one.name)),
+        value=one.value(float(found.x[found.index])),
+        at=np.array([one.value(float(x)) for x in found.at]),
+        costs=found.costs,
+        low=None if found.low is None else one.value(found.low),
+        high=None if found.high is None else one.value(found.high),
+        ends=(ENDS[below], ENDS[above]),
+        linear=known.confidence.parameters[one.name].interval,
+    )
