@@ -149,7 +149,7 @@ def test_intervals_are_widened_for_noise_that_is_not_white():
 
 def test_a_prior_that_is_right_narrows_the_interval_and_keeps_its_promise():
     rng = np.random.default_rng(5)
-    sigma, std = 0.5, 0.05
+    sigma, std = 0.2, 0.02
     taken = 2.0 * sigma  # the fit thinks that the noise is larger than it is
     covered, errors = [], []
     for noise in sigma * rng.standard_normal((PROBLEMS, 200)):
@@ -228,8 +228,13 @@ def test_a_robust_fit_knows_how_well_it_does_on_outliers():
             influence=np.clip(errors, -limit, limit),
             curvature=(np.abs(errors) <= limit).astype(float),
         )
+        known = confidence(lin)
         missed.append(fitted - TRUTH)
-        told.append(std_errors(confidence(lin)))
+        told.append(std_errors(known))
+    # as Huber 1981 has it for one channel
+    square = np.sum(lin.influence**2) / (100 - 2) / np.mean(lin.curvature) ** 2
+    exact = square * known.noise[0].inflation * np.linalg.inv(rows.T @ rows)
+    assert known.covariance == pytest.approx(exact, rel=1e-9)
     assert np.mean(told, axis=0) == pytest.approx(np.std(missed, axis=0), rel=0.15)
     least = std_errors(confidence(next(lines(np.repeat(noise[:1], 2, axis=1)))))
     assert np.all(np.mean(told, axis=0) < least)
@@ -369,6 +374,22 @@ def test_near_zero_the_interval_between_the_bounds_is_the_measure(nuisance):
         f"is not determined by the record: standard error "
         f"{small.parameters['a'].std_error:.2g} pu; see `exfit profile`"
     )
+
+
+def test_an_instant_is_measured_by_its_bounds_not_by_its_value():
+    errors = np.random.default_rng(22).standard_normal(400)
+    for nuisance in (True, False):  # a standard error of 0.05 s
+        lin = linearised(
+            [1.0],
+            errors,
+            np.ones((400, 1)),
+            units=("s",),
+            width=np.array([0.1]),
+            nuisances=(nuisance,),
+        )
+        one = confidence(lin).parameters["a"]
+        assert (one.interval is None) == nuisance
+        assert one.relative_error == pytest.approx(0.05, rel=0.1)
 
 
 def test_a_fit_without_any_error_is_certain():

@@ -79,6 +79,8 @@ ORDER = (
     "exfit.inference.wording",
     "exfit.inference.factors",
     "exfit.inference.noise",
+    "exfit.inference.combinations",
+    "exfit.inference.fixings",
     "exfit.inference.confidence",
     "exfit.inference.identifiability",
     "exfit.inference",

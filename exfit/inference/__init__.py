@@ -4,16 +4,10 @@ Arrays in, results out: a `Linearisation` of the fit at its minimum gives `confi
 errors, intervals) and `identifiability` (what can move together unseen, and what to fix).
 """
 
+from exfit.inference.combinations import WEAK, Change, Combination
 from exfit.inference.confidence import LEVEL, UNDETERMINED, Confidence, Uncertainty, confidence
-from exfit.inference.identifiability import (
-    WEAK,
-    Change,
-    Combination,
-    Fixing,
-    Identifiability,
-    identifiability,
-    sensitivity,
-)
+from exfit.inference.fixings import Fixing
+from exfit.inference.identifiability import Identifiability, identifiability, sensitivity
 from exfit.inference.linear import Channel, Linearisation, Prior
 from exfit.inference.noise import Noise
 

@@ -10,7 +10,7 @@ import numpy as np
 from exfit.inference.factors import Factors, factored
 from exfit.inference.linear import Array, Linearisation
 from exfit.inference.noise import Noise, noise_of
-from exfit.inference.wording import error, listed
+from exfit.inference.wording import error, finite, listed
 
 LEVEL = 0.95
 UNDETERMINED = 0.3  # relative standard error: the response is no longer linear over the interval
@@ -67,11 +67,6 @@ class Confidence:
         }
 
 
-def finite(value: Any) -> Any:
-    """Return a value, None for a number that is not finite."""
-    return None if isinstance(value, float) and not isfinite(value) else value
-
-
 def confidence(lin: Linearisation) -> Confidence:
     """Return standard errors and 95 % intervals of the parameters of a fit, by linear theory.
 
@@ -107,7 +102,7 @@ def confidence(lin: Linearisation) -> Confidence:
 
 def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
     """Return the effective samples less the parameters that they determine, at least 1."""
-    if all(one.given is not None and one.accepted and one.inflation == 1.0 for one in noise):
+    if all(one.accepted and one.inflation == 1.0 for one in noise):
         return inf
     return max(sum(one.effective for one in noise) - factors.leverage, 1.0)
 

@@ -23,7 +23,7 @@ class Noise:
     std        standard deviation that counts: the one given, or the estimated one
     estimated  standard deviation of the residuals; nan without more samples than parameters
     given      what the user gave
-    accepted   whether the one given agrees with the residuals
+    accepted   whether the one given agrees with the residuals; None if none is given
     p_value    of the test of whiteness; None if there are too few samples, or no errors at all
     effective  how many independent samples they are worth
     inflation  samples / effective: the factor on the variance
@@ -34,7 +34,7 @@ class Noise:
     std: float
     estimated: float
     given: float | None
-    accepted: bool
+    accepted: bool | None
     p_value: float | None
     effective: float
     inflation: float
@@ -46,7 +46,7 @@ class Noise:
 
     def sentences(self, alone: bool) -> Iterator[str]:
         """Yield what is remarkable; ``alone``: there is no other channel."""
-        if self.given is not None and not self.accepted:
+        if self.given is not None and self.accepted is False:
             used = "the larger one" if self.std != self.given else "the one given"
             yield (
                 f"the residuals of {self.label} are {digits(self.estimated / self.given)} times "
@@ -104,18 +104,21 @@ def _noise(factors: Factors, channel: Channel, share: float) -> Noise:
     )
 
 
-def _chosen(estimated: float, given: float | None, accepted: bool) -> float:
+def _chosen(estimated: float, given: float | None, accepted: bool | None) -> float:
     if given is None:
         return estimated
     return given if accepted else max(given, estimated)
 
 
-def agrees(estimated: float, given: float | None, dof: float) -> bool:
-    """Return whether a given standard deviation passes the chi-square test at 1 %, two-sided."""
+def agrees(estimated: float, given: float | None, dof: float) -> bool | None:
+    """Return whether a given standard deviation passes the chi-square test at 1 %, two-sided.
+
+    Without degrees of freedom nothing speaks against it.
+    """
     from scipy.special import chdtr, chdtrc
 
     if given is None or not dof:
-        return given is not None
+        return None if given is None else True
     ratio = dof * (estimated / given) ** 2
     return bool(min(chdtr(dof, ratio), chdtrc(dof, ratio)) >= SURPRISING / 2.0)
 

@@ -1,7 +1,8 @@
 """Numbers and lists as the sentences about a fit print them."""
 
 from collections.abc import Sequence
-from math import exp
+from math import exp, isfinite
+from typing import Any
 
 from exfit.inference.linear import Linearisation
 
@@ -40,3 +41,8 @@ def _factor(logarithm: float) -> str:
     if abs(logarithm) > MOST:
         return "by orders of magnitude"
     return f"times {digits(exp(logarithm))}"
+
+
+def finite(value: Any) -> Any:
+    """Return a value, None for a number that is not finite."""
+    return None if isinstance(value, float) and not isfinite(value) else value

@@ -1,0 +1,144 @@
+"""Combinations of parameters that a record sees weakly, or not at all."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.inference.factors import Factors, factored, tall_svd
+from exfit.inference.linear import Array, Linearisation
+from exfit.inference.noise import Noise
+from exfit.inference.wording import digits, finite, listed, move
+
+Indices = NDArray[np.intp]
+
+WEAK = 0.1  # relative standard error: worse than a data sheet
+SHOWN = 0.1  # of the largest part of a combination: smaller ones hide what matters
+EXACT_MOVE = 0.1  # relative change that shows an exact redundancy, which holds for any
+TIED = 6  # digits: components that differ less are equal but for rounding
+
+
+@dataclass(frozen=True)
+class Change:
+    """By how much a signal moves: root mean square, in pu and in standard deviations of noise."""
+
+    signal: str
+    rms: float
+    noises: float
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Parameters that can move together without being seen.
+
+    moves    name and relative change, the largest first: by one standard error (``exact``: by 10 %)
+    changes  what the signals do then
+    error    the standard error along the combination; None if exact
+    """
+
+    moves: tuple[tuple[str, float], ...]
+    changes: tuple[Change, ...]
+    error: float | None
+    exact: bool
+    sentence: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the content as JSON takes it: None for what is not a finite number."""
+        return {
+            "moves": dict(self.moves),
+            "changes": [
+                {name: finite(value) for name, value in asdict(one).items()} for one in self.changes
+            ],
+            "error": self.error,
+            "exact": self.exact,
+            "sentence": self.sentence,
+        }
+
+
+def seen_directions(factors: Factors, noise: Sequence[Noise]) -> tuple[Array, Array]:
+    """Return the singular values (K,) and right directions (K, K) of relative changes.
+
+    Those without any effect come last, with singular value 0.
+    """
+    lin, seen, count = factors.lin, factors.seen, len(factors.null)
+    rounding = np.finfo(float).eps * np.max(np.abs(lin.relative), initial=0.0)
+    spread = lin.by_row([np.fmax(one.spread, rounding) for one in noise])
+    rows = np.vstack([lin.relative / spread[:, None], lin.prior_rows])[:, seen]
+    _, singular, directions = tall_svd(rows)
+    if count:
+        singular[-count:], directions[-count:] = 0.0, np.linalg.qr(factors.null.T)[0].T
+    return singular, directions
+
+
+def exact_combinations(lin: Linearisation, noise: Sequence[Noise]) -> Iterator[Combination]:
+    """Yield what nothing tells apart, those on a bound too: it may be why they are there."""
+    factors = factored(lin, np.ones(len(lin.names), dtype=bool))
+    signals = listed([one.label for one in lin.channels])
+    still = tuple(Change(one.label, 0.0, 0.0) for one in lin.channels)
+    for k in np.flatnonzero(~factors.seen):
+        name = lin.names[k]
+        text = f"{name} has no effect on {signals}: fix it"
+        yield Combination(((name, EXACT_MOVE),), still, None, True, text)
+    kept = np.flatnonzero(factors.seen)
+    for direction, joined in zip(factors.null, factors.joined, strict=True):
+        moves = ordered(kept[joined], EXACT_MOVE * direction[joined])
+        told = f"{together(lin, moves)} without any change of {signals}: fix one of them"
+        yield Combination(named(lin, moves), still, None, True, told)
+
+
+def weak_combinations(
+    lin: Linearisation, noise: Sequence[Noise], kept: Indices, singular: Array, directions: Array
+) -> Iterator[Combination]:
+    """Yield the directions with a standard error beyond WEAK, the weakest first."""
+    for value, direction in reversed(list(zip(singular, directions, strict=True))):
+        if value == 0.0 or value * WEAK >= 1.0:
+            continue
+        step = direction / value
+        shown = np.abs(step) > SHOWN * np.max(np.abs(step))
+        moves = ordered(kept[shown], step[shown])
+        changes = tuple(changes_of(lin, noise, lin.relative[:, kept] @ step))
+        told = f"{together(lin, moves)}: {effects(changes)}"
+        yield Combination(named(lin, moves), changes, 1.0 / float(value), False, told)
+
+
+def changes_of(lin: Linearisation, noise: Sequence[Noise], moved: Array) -> Iterator[Change]:
+    """Yield what each channel does when the weighted errors move (M,)."""
+    for channel, one in zip(lin.channels, noise, strict=True):
+        rms = float(np.sqrt(np.mean(moved[channel.rows] ** 2)))
+        yield Change(channel.label, rms / channel.weight, rms / one.std if one.std else inf)
+
+
+def effects(changes: Sequence[Change]) -> str:
+    """Return "vt changes by 3e-6 pu rms, 0.03 of its noise; efd by 5e-4 pu, 0.02"."""
+    first, *others = changes
+    told = (
+        f"{first.signal} changes by {digits(first.rms)} pu rms, {digits(first.noises)} of its noise"
+    )
+    return "; ".join(
+        [told, *(f"{one.signal} by {digits(one.rms)} pu, {digits(one.noises)}" for one in others)]
+    )
+
+
+def ordered(kept: Indices, shares: Array) -> list[tuple[int, float]]:
+    """Return parameters and their shares, the largest first and upwards; ties as they come."""
+    size = np.abs(shares)
+    order = np.argsort(-np.round(size / np.max(size), TIED), kind="stable")
+    upwards = np.sign(shares[order[0]])
+    return [(int(kept[k]), float(upwards * shares[k])) for k in order]
+
+
+def named(lin: Linearisation, moves: Sequence[tuple[int, float]]) -> tuple[tuple[str, float], ...]:
+    """Return moves with the names of the parameters for their indices."""
+    return tuple((lin.names[k], share) for k, share in moves)
+
+
+def together(lin: Linearisation, moves: Sequence[tuple[int, float]]) -> str:
+    """Return "KD, TE and KA can move together (KD +50 %, TE +10 %, KA +9.7 %)"."""
+    if len(moves) == 1:
+        k, share = moves[0]
+        return f"{lin.names[k]} can move alone ({move(lin, k, share)})"
+    steps = ", ".join(f"{lin.names[k]} {move(lin, k, share)}" for k, share in moves)
+    return f"{listed([lin.names[k] for k, _ in moves])} can move together ({steps})"
