@@ -70,7 +70,7 @@ class Run:
             self.iterations += 1
             self.announce(search.phase, linear, move, before)
             stop = self.rules.after(before, linear, move)
-            stop = stop or self.rules.creeping(self.history[first:])
+            stop = stop or self.rules.creeping(self.history[first:], linear)
             if stop is not None:
                 return Outcome(linear, stop)
         return Outcome(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)

@@ -56,13 +56,18 @@ class Rules:
             return self.at_rest(linear) or stuck(linear, Stop.STALLED)
         return move.stop
 
-    def creeping(self, log: Sequence[Iteration]) -> Stop | None:
-        """Return why to stop after these iterations of a phase: a valley of kinks has no end."""
+    def creeping(self, log: Sequence[Iteration], linear: Linear) -> Stop | None:
+        """Return why to stop after these iterations of a phase: a valley of kinks has no end.
+
+        It is no minimum where the linear model still promises much: then the search has stalled.
+        """
         last = log[-LULL:]
         if len(log) <= LULL or min(line.inner for line in last) == 0:
             return None
-        gain = log[-1 - LULL].cost - log[-1].cost
-        return Stop.CREEPING if gain <= CREEP * log[-1].cost else None
+        gain, cost = log[-1 - LULL].cost - log[-1].cost, log[-1].cost
+        if gain > CREEP * cost:
+            return None
+        return Stop.CREEPING if linear.full.promise <= KINK * cost else Stop.STALLED
 
     def tiny(self, there: Array, here: Array, box: Box) -> bool:
         """Tell whether a step is below the tolerance in every variable."""

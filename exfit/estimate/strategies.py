@@ -21,8 +21,11 @@ def alone(search: Search) -> Strategy:
 
 
 def lm_then_dgn(run: Run, start: Linear, _: float | None) -> Outcome:
-    """Let lm find the valley and dgn follow it."""
-    return relay(run, start, TrustRegion(hand_over=True), LineSearch())
+    """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on."""
+    outcome = relay(run, start, TrustRegion(hand_over=True), LineSearch())
+    if outcome.stop is not Stop.STALLED:
+        return outcome
+    return run.descend(TrustRegion(), outcome.linear)
 
 
 def robust(run: Run, start: Linear, _: float | None) -> Outcome:
