@@ -20,11 +20,12 @@ class Nuisance:
     """What a fit finds about a record, under ``name``: it is no parameter of the unit.
 
     ``step`` is the place in the course of a step whose instant or size it is, ``signal`` the
-    channel whose scale or offset it is.
+    channel whose scale or offset it is. The instant of an only step is a ``shift`` of the whole
+    response: the simulation stays as it is.
     """
 
     name: str
-    kind: Literal["at", "step", "vt0", "delay", "scale", "offset"]
+    kind: Literal["at", "shift", "step", "vt0", "delay", "scale", "offset"]
     step: int = 0
     signal: str = ""
 
@@ -85,7 +86,7 @@ class Experiment:
     @property
     def moves(self) -> bool:
         """Whether the fit moves what its simulations do not have side by side."""
-        return any(one.kind in ("at", "step", "delay") for one in self.nuisances)
+        return any(one.kind in ("at", "shift", "step", "delay") for one in self.nuisances)
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -113,7 +114,10 @@ class Experiment:
                 steps[one.step] = steps[one.step]._replace(step=values[one.name])
             elif one.kind == "delay":
                 delay = values[one.name]
-        return self.simulator.moved(tuple(steps), delay)
+        shifts = [
+            values[one.name] - steps[one.step].at for one in self.nuisances if one.kind == "shift"
+        ]
+        return self.simulator.moved(tuple(steps), sum(shifts, start=delay))
 
     def measured(self, channel: Channel, values: Values) -> Array:
         """Return a record (M,) in per unit, by the scale and offset that the values give."""
@@ -187,7 +191,7 @@ class Experiment:
                 steps[one.step] = (at + d, step)
             elif one.kind == "step":
                 steps[one.step] = (at, step + d)
-            elif one.kind == "delay":
+            elif one.kind in ("delay", "shift"):
                 delay += d
             elif one.kind == "vt0":
                 parameters = {**parameters, VT0: d}

@@ -34,7 +34,8 @@ MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mis
 REST_TOLERANCE = 1e-6  # pu/s: below any real motion
 ROUNDING = 1e-13  # of a state
 ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
-NEIGHBOURS = 4  # grid points of the interpolation: its error is then of Runge-Kutta's order
+REMEMBERED = 64  # sets of values: several threads ask for a few of theirs again
+NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
 
 
 class Stretch(NamedTuple):
@@ -184,7 +185,7 @@ def lagrange(points: int) -> Array:
 class Sampling:
     """Reads a run, whose stretches lie one behind the other, at given times less a delay (s).
 
-    Between grid points it interpolates with a cubic that never reaches across an exact step of the
+    Between grid points it interpolates with a polynomial that never reaches across an exact step of the
     inputs; at the instant of such a step it gives the values before the step. Before the start and
     after the end it gives the values there.
     """
@@ -216,13 +217,16 @@ class Sampling:
         exact = (before[owner] + nearest).astype(np.int64)
         if np.any(on_grid):
             self._weights[:, on_grid] = (self._rows == exact)[:, on_grid]
-        self._exact = exact if np.all(on_grid) else None
+        within = nearest.astype(np.int64)
+        parts = [within[owner == k] for k in range(len(grid))]
+        self._exact = parts if np.all(on_grid) else None
 
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
-        if self._exact is not None:
-            return np.asarray(_rows(run)[self._exact])
-        return self._combined(run, self._weights)
+        if self._exact is None:
+            return self._combined(run, self._weights)
+        # each stretch by itself: a copy of the whole run costs more than a simulation's tenth
+        return np.concatenate([part[k] for part, k in zip(run, self._exact, strict=True)])
 
     def slope(self, run: Sequence[Array]) -> Array:
         """Return the time derivatives (M, ...), per s, of what a run gives as samples."""
@@ -288,7 +292,7 @@ class Simulator:
         self._grid = stretches(course, step)
         self._inputs = [self._inputs_of(part) for part in self._grid]
         self._sampling = Sampling(self._grid, times, delay)
-        self._last = [(b"", 0)]  # the sub-steps of the last values asked for
+        self._known: dict[bytes, int] = {}  # the sub-steps of values asked for lately
 
     def moved(self, steps: tuple[Change, ...], delay: float) -> "Simulator":
         """Return the simulator of the same course, whose steps and delay (s) are others.
@@ -327,10 +331,13 @@ class Simulator:
         Raises SimulationError where the start is no rest, or beyond ``MOST_SUBSTEPS``.
         """
         p = self._vector(values)
-        known, parts = self._last[0]
-        if known != p.tobytes():
+        key = p.tobytes()
+        parts = self._known.get(key)
+        if parts is None:
             parts = max(self.least, self._parts(values, self._rate_at_rest(values, p)))
-            self._last[0] = p.tobytes(), parts
+            if len(self._known) >= REMEMBERED:
+                self._known.clear()
+            self._known[key] = parts
         return parts
 
     def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:

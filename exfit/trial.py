@@ -243,7 +243,10 @@ class Trial:
         """Read off the first step of the reference that the record shows."""
         kept = np.isfinite(signal)
         time = self.record.time[kept]
-        steps = self.experiment.moved(values).course.steps
+        simulator = self.experiment.moved(values)
+        steps = [
+            change._replace(at=change.at + simulator.delay) for change in simulator.course.steps
+        ]
         inside = [change for change in steps if change.at >= time[0]]
         if not inside or inside[0].signal != "vref":
             return None
@@ -317,9 +320,16 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
     begin = float(record.time[0]) if test.begin is None else test.begin
     steps = tuple(changes(view, test, values))
     nuisances, free = unknowns(prefix, test, file, steps)
+    if any(one.kind == "shift" for one in nuisances):
+        steps = tuple(change._replace(smooth=False) for change in steps)
     delay = known(file.delay) or 0.0
-    earliest = min([delay, *(one.low for one in free if one.name == f"{prefix}delay")])
-    course = Course(begin, float(record.time[-1]) - min(0.0, earliest), steps)
+    # what is read early asks for a simulation beyond the record
+    early = [
+        one.start - one.low
+        for one, nuisance in zip(free, nuisances, strict=True)
+        if nuisance.kind in ("delay", "shift")
+    ]
+    course = Course(begin, float(record.time[-1]) + max(0.0, sum(early) - delay), steps)
     driving = [signal for signal in file.channels if signal in system.inputs]
     if driving:
         heard: dict[str, Array] = {signal: _moved(test, record, signal) for signal in driving}

@@ -11,7 +11,7 @@ from exfit.record import Record
 from exfit.residuals import Free
 from exfit.simulate import Change
 
-Kind = Literal["at", "step", "vt0", "delay", "scale", "offset"]
+JUMPS = ("efd",)  # signals that follow a step at once
 
 AROUND = 0.25  # s: how far the instant may be from where a record shows the step
 SHARE = 0.5  # of the size that a record shows: how far the size may be from it
@@ -69,27 +69,37 @@ def _bounded(case: Case, recording: Recording, record: Record, k: int) -> Any:
     return step.model_copy(update=update)
 
 
+def shifted(test: BumpTest, file: RecordFile, steps: Sequence[Change]) -> bool:
+    """Tell whether the instant of a step can be found by shifting the whole response.
+
+    That leaves the simulation as it is, and with it the steps at which limits are met; a smooth
+    step that moves over the grid meets them now a step earlier, now later, and so gives the cost a
+    kink for each. It needs an only step from rest, and signals that do not jump with it.
+    """
+    return len(steps) == 1 and test.begin is None and not set(JUMPS) & set(file.channels)
+
+
 def unknowns(
     prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[Change]
 ) -> tuple[tuple[Nuisance, ...], tuple[Free, ...]]:
     """Return what a fit finds about a record; the names begin with ``prefix``."""
-    found = [*_of_steps(prefix, test, steps), *_of_record(prefix, test, file)]
+    shift = shifted(test, file, steps)
+    found = [*_of_steps(prefix, test, steps, shift), *_of_record(prefix, test, file)]
     return tuple(one for one, _ in found), tuple(free for _, free in found)
 
 
 def _of_steps(
-    prefix: str, test: BumpTest, steps: Sequence[Change]
+    prefix: str, test: BumpTest, steps: Sequence[Change], shift: bool
 ) -> Iterator[tuple[Nuisance, Free]]:
     for signal in ("vref", "vs"):
         places = [place for place, change in enumerate(steps) if change.signal == signal]
         for number, (place, step) in enumerate(zip(places, getattr(test, signal), strict=True)):
             which = f"{prefix}{signal}{number + 1 if number else ''}"
-            kinds: tuple[Kind, Kind] = ("at", "step")
-            for kind in kinds:
-                value = getattr(step, kind)
-                if isinstance(value, Unknown):
-                    name = f"{which}.{kind}"
-                    yield Nuisance(name, kind, step=place), _free(name, value)
+            if isinstance(step.at, Unknown):
+                kind: Literal["at", "shift"] = "shift" if shift else "at"
+                yield Nuisance(f"{which}.at", kind, place), _free(f"{which}.at", step.at)
+            if isinstance(step.step, Unknown):
+                yield Nuisance(f"{which}.step", "step", place), _free(f"{which}.step", step.step)
 
 
 def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[Nuisance, Free]]:
@@ -97,7 +107,7 @@ def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[
         yield Nuisance(f"{prefix}vt0", "vt0"), _free(f"{prefix}vt0", test.vt0)
     if isinstance(file.delay, Unknown):
         yield Nuisance(f"{prefix}delay", "delay"), _free(f"{prefix}delay", file.delay)
-    kinds: tuple[Kind, Kind] = ("scale", "offset")
+    kinds: tuple[Literal["scale", "offset"], ...] = ("scale", "offset")
     for signal, channel in file.channels.items():
         for kind in kinds:
             value = getattr(channel, kind)

@@ -128,7 +128,8 @@ def compiled(ir: str, *, long_vectors: bool) -> Any:
 def _address(array: Array) -> int:
     if array.dtype != np.float64 or not array.flags.c_contiguous:
         raise TypeError("the kernel takes C-contiguous arrays of float64")
-    return array.ctypes.data
+    address: int = array.__array_interface__["data"][0]  # a third of the time of array.ctypes
+    return address
 
 
 def _function(engine: Any, name: str, arrays: int, extra: Sequence[Any] = ()) -> Any:
@@ -219,10 +220,10 @@ class TangentKernel:
         directions = dp.shape[1]
         firsts = range(0, max(directions, 1), DIRECTIONS)
         blocks = list(in_threads(lambda first: self._directions(p, dp, spans, first), firsts))
-        values = blocks[0][0]
-        slopes = [
-            np.concatenate(parts, axis=2) for parts in zip(*(b[1] for b in blocks), strict=True)
-        ]
+        values, slopes = blocks[0]
+        if len(blocks) > 1:
+            pairs = zip(*(block[1] for block in blocks), strict=True)
+            slopes = [np.concatenate(parts, axis=2) for parts in pairs]
         return values, [slope[:, :, :directions] for slope in slopes]
 
     def _directions(
