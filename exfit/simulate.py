@@ -185,9 +185,9 @@ def lagrange(points: int) -> Array:
 class Sampling:
     """Reads a run, whose stretches lie one behind the other, at given times less a delay (s).
 
-    Between grid points it interpolates with a polynomial that never reaches across an exact step of the
-    inputs; at the instant of such a step it gives the values before the step. Before the start and
-    after the end it gives the values there.
+    Between grid points it interpolates with a polynomial that never reaches across an exact step of
+    the inputs; at the instant of such a step it gives the values before the step. Before the start
+    and after the end it gives the values there.
     """
 
     def __init__(self, grid: Sequence[Stretch], times: Array, delay: float = 0.0) -> None:
