@@ -103,7 +103,7 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
         told(own),
         tuple(one.simulator.times for one in own for _ in one.channels),
         tuple(plans),
-        {signal: levels[signal] for signal in levels},
+        {signal: level for signal, level in levels.items() if signal in _signals(case, own)},
     )
 
 
@@ -145,11 +145,17 @@ def _variants(
         yield f"{100 * size:g} %", tuple(_scaled(one, size) for one in own)
     yield "longer", tuple(_longer(one) for one in own)
     present = {channel.signal for one in own for channel in one.channels}
-    extra = [signal for signal in EXTRA[case.plant.type] if signal not in present]
+    extra = [signal for signal in _signals(case, own) if signal not in present]
     for signal in extra:
         yield f"+ {signal}", tuple(_with(one, (signal,)) for one in own)
     if len(extra) > 1:
         yield "+ all", tuple(_with(one, extra) for one in own)
+
+
+def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
+    """Return the signals that are recorded, then those that could be."""
+    present = [channel.signal for one in own for channel in one.channels]
+    return tuple(dict.fromkeys([*present, *EXTRA.get(case.plant.type, ())]))
 
 
 def _scaled(one: Experiment, size: float) -> Experiment:

@@ -229,7 +229,7 @@ def waterfall(found: Minima, title: str) -> Figure:
     axes.set_xlabel("start, by the cost that it led to")
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(loc="upper left", frameon=False)
+    figure.legend(loc="outside lower right", ncols=2, frameon=False)
     best = found.minima[0].starts
     axes.set_title(
         f"{best} of {len(order)} refined starts led to the lowest minimum", fontsize=9, loc="right"
@@ -255,6 +255,7 @@ def profiles(found: Profiles) -> Figure:
         axes.plot([one.value], [0.0], "s", color=START, markersize=5)
         axes.set_xlabel(f"{one.name} ({one.unit})" if one.unit else one.name)
         axes.set_ylim(-0.05, 1.5)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
         _tidy(axes)
     for k, axes in enumerate(grid.flat):
         axes.set_visible(k < len(found.profiles))

@@ -169,6 +169,7 @@ def design(console: Console, found: Design) -> None:
     """Show what planned tests would tell of each parameter: standard errors in percent."""
     listed = ", ".join(f"{signal} {level:.2g}" for signal, level in found.noise.items())
     console.print(f"standard errors, with noise (pu): {listed}")
+    console.print("of this test; of steps of 2, 5, 10 %; twice as long; with further signals")
     console.print()
     heads = ["this test", *(plan.label for plan in found.plans)]
     table = plain_table("parameter", *heads, numbers=heads)
