@@ -197,7 +197,8 @@ def _notes(
     """Yield what must be known beside the numbers of a fit."""
     yield from notes(case, residuals, found, compared)
     for trial, one in zip(trials, compared, strict=True):
-        yield from match_notes(one, known(trial.test.vt0))
+        before = trial.test.vt0 if trial.test.begin is None else None
+        yield from match_notes(one, known(before))
         yield from record_notes(trial, one)
     yield from validation_notes(compared, tried)
 
