@@ -345,11 +345,12 @@ class Simulator:
         p = self._vector(values)
         rest = linear_kernel(self.system).rest(p)
         inputs = self._sampling(self._inputs)
-        rate = 0.0
-        for row in np.linspace(0, len(response.time) - 1, points).astype(int):
-            x = np.array([response.signals[name][row] for name in self.system.states])
-            rate = max(rate, self._motion(p, rest, x, np.ascontiguousarray(inputs[row]))[1])
-        return self._parts(values, rate)
+        rows = np.linspace(0, len(response.time) - 1, points).astype(int)
+        states = np.stack([response.signals[name][rows] for name in self.system.states], axis=1)
+        code, r = linear_kernel(self.system), rest.r
+        pairs = zip(np.ascontiguousarray(states), np.ascontiguousarray(inputs[rows]), strict=True)
+        jacobians = np.stack([code.motion(p, r, x, u)[1] for x, u in pairs])
+        return self._parts(values, fastest(jacobians))
 
     def secured(self, values: Values) -> "Simulator":
         """Return a simulator whose sub-steps are enough all along the response to these values.
@@ -494,9 +495,8 @@ class Simulator:
     def _motion(self, p: Array, rest: Start, x: Array, u: Array) -> tuple[Array, float]:
         """Return the slopes at states x and the spectral radius (1/s) of their Jacobian."""
         slopes, jacobian = linear_kernel(self.system).motion(p, rest.r, x, u)
-        if not np.all(np.isfinite(jacobian)):
-            return np.full(len(x), np.nan), np.inf
-        return slopes, float(np.max(np.abs(np.linalg.eigvals(jacobian))))
+        rate = fastest(jacobian)
+        return slopes if math.isfinite(rate) else np.full(len(x), np.nan), rate
 
     def _parts(self, values: Values, radius: float) -> int:
         lags = {name: values[name] for name in self.time_constants if values[name] >= SHORTEST}
@@ -550,6 +550,13 @@ class Simulator:
 def _fixed(change: Change) -> Change:
     """Return what of a step cannot be moved."""
     return change._replace(at=0.0 if change.smooth else change.at, step=0.0)
+
+
+def fastest(jacobians: Array) -> float:
+    """Return the largest spectral radius of Jacobians (..., nx, nx), inf where one is not finite."""
+    if not np.isfinite(jacobians).all():
+        return math.inf
+    return float(np.abs(np.linalg.eigvals(jacobians)).max())
 
 
 def _limit_name(node: Node) -> str:
