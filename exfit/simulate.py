@@ -553,7 +553,7 @@ def _fixed(change: Change) -> Change:
 
 
 def fastest(jacobians: Array) -> float:
-    """Return the largest spectral radius of Jacobians (..., nx, nx), inf where one is not finite."""
+    """Return the largest spectral radius of Jacobians (..., nx, nx), inf where one is infinite."""
     if not np.isfinite(jacobians).all():
         return math.inf
     return float(np.abs(np.linalg.eigvals(jacobians)).max())
