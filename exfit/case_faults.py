@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import inf, isfinite
 from typing import Any, TypeGuard
 
-from exfit.case_form import near, show
+from exfit.case_form import PERCENT, near, show, show_value
 from exfit.case_parts import (
     TIE,
     WITHOUT_EXCITER,
@@ -17,7 +17,9 @@ from exfit.case_parts import (
     Parts,
     helpers_of,
     network_part,
+    places_of_ties,
     plants_of_records,
+    used_by_ties,
 )
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
@@ -71,7 +73,7 @@ def contradictions(data: Data, parts: Parts, ties: Ties) -> Iterator[Fault]:
     yield from _model_faults(data, kind)
     tied, faults = _tied_values(data, parts, ties)
     yield from faults
-    helpers = _helper_places(data, parts, ties)
+    helpers = _helper_places(data, parts)
     for part in parts.all:
         yield from _part_faults(data, part, tied, helpers)
     yield from _stabiliser_faults(data, parts, kind)
@@ -122,24 +124,28 @@ def _tied_values(data: Data, parts: Parts, ties: Ties) -> tuple[dict[str, float]
     for part in parts.all:
         fixed, free = _given_of(data, part)
         starts = {symbol: _section(free, symbol).get("start") for symbol in free}
-        values = part.resolved(_numbers(fixed), _numbers(starts))
+        values = _readable(part, fixed, starts)
         known |= {part.prefix + symbol: value for symbol, value in values.items()}
     for name, place in helpers_of(data, parts).items():
         value = _section(data, *place[:-1]).get(name)
         start = _numbers({name: value.get("start") if isinstance(value, dict) else value})
         known |= start
-    try:
-        values = ties.apply(known)
-    except TieError as error:
-        return {}, [Fault(("parameters",), str(error))]
-    except KeyError:
-        return {}, []  # of a value that has no readable form, which is told
-    return {name: values[name] for name in ties.by_name}, []
+    found: dict[str, float] = {}
+    faults, places = [], places_of_ties(data, parts)
+    for name in ties.order:
+        tie = ties.by_name[name]
+        if not known.keys() >= {*tie.names}:
+            continue  # it uses a value that has no readable form, which is told
+        try:
+            known[name] = found[name] = tie.value(known)
+        except TieError as error:
+            faults.append(Fault(places[name], str(error)))
+    return found, faults
 
 
-def _helper_places(data: Data, parts: Parts, ties: Ties) -> dict[str, Place]:
+def _helper_places(data: Data, parts: Parts) -> dict[str, Place]:
     """Return the helpers that some tie uses: they may stand among the exciter's parameters."""
-    used = {name for tie in ties.by_name.values() for name in tie.names}
+    used = used_by_ties(data, parts)
     return {name: place for name, place in helpers_of(data, parts).items() if name in used}
 
 
@@ -170,7 +176,7 @@ def _part_faults(
     }
     places = {symbol: (*part.fixed, symbol) for symbol in fixed}
     rows = {row.symbol: row for row in part.sheet}
-    allowed = {*rows, *helpers} if part.kind == "exciter" else {*rows}
+    allowed = [*rows, *helpers] if part.kind == "exciter" else [*rows]
     yield from _unknown_symbols(part.fixed, fixed, allowed, part.name)
     yield from _outside_sheet(part.fixed, fixed, rows)
     if part.free is not None:
@@ -234,15 +240,24 @@ def _bound_faults(place: Place, entry: Data, row: Parameter | None) -> Iterator[
         yield Fault(
             (*place, "min"), f"{show(low)} is not above 0, as scale: log needs; or scale: linear"
         )
-    prior = _section(entry, "prior")
-    if _numbers(prior).get("mean") == 0.0 and isinstance(prior.get("std"), str):
-        yield Fault((*place, "prior", "std"), "a share of mean = 0 is nothing: give a number")
+    yield from _prior_faults((*place, "prior"), _section(entry, "prior"))
     if row is None:
         return
     yield from _outside_sheet(place, numbers, dict.fromkeys(("start", "min", "max"), row))
     if row.unit == "s" and low is not None and low < SHORTEST <= (inf if high is None else high):
         limit = f"{show(SHORTEST)} s, below which the block is bypassed"
         yield Fault((*place, "min"), f"{show(low)} is below {limit}; a free time must not cross it")
+
+
+def _prior_faults(place: Place, prior: Data) -> Iterator[Fault]:
+    """Yield why a share of the mean is no standard deviation."""
+    std, mean = prior.get("std"), _numbers(prior).get("mean")
+    if not isinstance(std, str) or not re.search(PERCENT, std):
+        return
+    if mean == 0.0:
+        yield Fault((*place, "std"), "a share of mean = 0 is nothing: give a number")
+    if not 0.0 < float(std.rstrip("% ")) < inf:
+        yield Fault((*place, "std"), f"{show_value(std)} is not above 0, or not finite")
 
 
 def _outside(start: float | None, low: float | None, high: float | None) -> bool:
@@ -273,17 +288,22 @@ def _trial_faults(place: Place, trial: Any, data: Data, kind: str) -> Iterator[F
             here = (*place, "test", "network", index, "E")
             yield Fault(here, "only where plant.network gives E; test.E changes it by steps")
     has_record = isinstance(trial, dict) and "record" in trial
+    yield from _unknown_faults(place, test, record, kind, has_record)
     if has_record:
         yield from _record_faults(place, test, record)
         yield from _channel_faults((*place, "record"), _section(record, "channels"), kind)
-        yield from _unknown_faults(place, test, record, kind)
     elif kind in NEEDED:
         yield Fault((*place, "record"), f"is missing: plant {kind} plays it back")
     elif not place:
         yield from _missing_without_record((*place, "test"), test)
     vt0 = _starts(test).get("vt0")
-    if kind in SIGNALS and kind != "none" and vt0 is not None and vt0 <= 0:
+    lowest = _numbers(_section(test, "vt0")).get("min")
+    if kind not in SIGNALS or kind == "none":
+        return
+    if vt0 is not None and vt0 <= 0:
         yield Fault((*place, "test", "vt0"), f"{show(vt0)} is not above 0")
+    if lowest is not None and lowest <= 0:
+        yield Fault((*place, "test", "vt0", "min"), f"{show(lowest)} is not above 0")
 
 
 def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
@@ -293,9 +313,18 @@ def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
             here = (*place, "channels", signal)
             yield Fault(here, f"does not go with plant {kind}, which has {known}")
     for signal in DRIVERS.get(kind, ()):
-        if "weight" in _section(channels, signal):
-            here = (*place, "channels", signal, "weight")
-            yield Fault(here, "has no effect: the signal drives, and is not compared")
+        for key in ("weight", "noise", "filter", "outliers"):
+            if key in _section(channels, signal):
+                here = (*place, "channels", signal, key)
+                yield Fault(here, "has no effect: the signal drives, and is not compared")
+    for signal in channels:
+        median = _numbers(_section(channels, signal, "filter")).get("median")
+        if median is not None and median % 2 == 0:
+            here = (*place, "channels", signal, "filter", "median")
+            yield Fault(here, f"{show(median)} is not an odd number")
+        if _numbers(_section(channels, signal)).get("scale") == 0.0:
+            here = (*place, "channels", signal, "scale")
+            yield Fault(here, "0 leaves nothing of the column")
     for signal in NEEDED.get(kind, ()):
         if channels and signal not in channels:
             yield Fault((*place, "channels", signal), f"is missing: plant {kind} needs it")
@@ -404,7 +433,9 @@ def _missing_without_record(place: Place, test: Data) -> Iterator[Fault]:
         yield Fault((*place, "vt0"), "is missing: without a record it says where to start")
 
 
-def _unknown_faults(place: Place, test: Data, record: Data, kind: str) -> Iterator[Fault]:
+def _unknown_faults(
+    place: Place, test: Data, record: Data, kind: str, has_record: bool
+) -> Iterator[Fault]:
     """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
     found: list[tuple[Place, Any]] = [((*place, "test", "vt0"), test.get("vt0"))]
     for name in ("vref", "vs"):
@@ -421,13 +452,18 @@ def _unknown_faults(place: Place, test: Data, record: Data, kind: str) -> Iterat
             yield from _unknown_value_faults(here, value)
             if kind in NEEDED:
                 yield Fault(here, f"does not go with plant {kind}: the record drives it")
+            elif value.get("start") == "auto":
+                if not has_record:
+                    yield Fault((*here, "start"), "auto needs a record")
+                elif "vt" not in _section(record, "channels"):
+                    yield Fault((*here, "start"), "auto needs vt in the record")
     vt = _section(record, "channels", "vt")
     for key in ("scale", "offset"):
         if isinstance(vt.get(key), dict) and "vt0" not in test:
             here = (*place, "test", "vt0")
             yield Fault(here, f"is missing: the record cannot tell it where {key} of vt is found")
             break
-    if kind in NEEDED and record.get("delay", 0) != 0:
+    if kind in NEEDED and _numbers(record).get("delay", 0.0) != 0.0:
         yield Fault((*place, "record", "delay"), f"does not go with plant {kind}")
 
 
@@ -455,29 +491,27 @@ def _noise_faults(data: Data, trials: list[tuple[Place, Any]], kind: str) -> Ite
     channels = {
         (*place, "record", "channels", signal): channel if isinstance(channel, dict) else {}
         for place, trial in trials
-        if not place or place[0] == "records"
         for signal, channel in _section(trial, "record", "channels").items()
         if signal not in DRIVERS.get(kind, ())
     }
-    given = [place for place, channel in channels.items() if "noise" in channel]
+    fitted = {place: one for place, one in channels.items() if place[0] != "validate"}
+    given = any("noise" in channel for channel in fitted.values())
     for place, channel in channels.items():
         if "noise" in channel and "weight" in channel:
             yield Fault((*place, "weight"), "does not go with noise: it is one over the noise")
-        if given and "noise" not in channel:
+        if given and place in fitted and "noise" not in channel:
             yield Fault((*place, "noise"), "is missing: other channels have it")
-        median = _numbers(_section(channel, "filter")).get("median")
-        if median is not None and median % 2 == 0:
-            yield Fault((*place, "filter", "median"), f"{show(median)} is not an odd number")
 
 
 def _repeated_names(trials: Sequence[tuple[Place, Any]]) -> Iterator[Fault]:
     seen = dict.fromkeys(TAKEN, "a file of every run")
-    seen |= dict.fromkeys(PREFIXES, "parts of the plant")
     for place, trial in trials:
         name = trial.get("name") if isinstance(trial, dict) else None
         if not isinstance(name, str):
             continue
-        if name.casefold() in seen:
+        if name.casefold().partition(".")[0] in PREFIXES:
+            yield Fault((*place, "name"), f"{name!r} is taken: a part of the plant begins so")
+        elif name.casefold() in seen:
             text = f"{name!r} is taken by {seen[name.casefold()]}: files are named after it"
             yield Fault((*place, "name"), text)
         seen.setdefault(name.casefold(), repr(name))

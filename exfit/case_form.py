@@ -8,7 +8,14 @@ from exfit.yaml_lines import Fault, Place
 Data = Mapping[str, Any]
 
 SHOWN = 60  # characters of a wrong value
+FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
+
+PATTERNS: Mapping[str, str] = {
+    FILE_NAME: "must begin with a letter or digit and hold letters, digits, - _ . only",
+    PERCENT: "is neither a number nor a share such as 20 %",
+}
 # kind of fault -> what to say of the value, given the limits
 WORDS: Mapping[str, Callable[[str, Data], str]] = {
     "missing": lambda _, __: "is missing",
@@ -21,9 +28,10 @@ WORDS: Mapping[str, Callable[[str, Data], str]] = {
     "string_too_long": lambda value, limits: (
         f"{value} is longer than {limits['max_length']} characters"
     ),
-    "string_pattern_mismatch": lambda value, _: (
-        f"{value} must begin with a letter or digit and hold letters, digits, - _ . only"
+    "string_pattern_mismatch": lambda value, limits: (
+        f"{value} {PATTERNS.get(limits['pattern'], 'has another form')}"
     ),
+    "model_attributes_type": lambda value, _: f"{value} is not a mapping (key: value)",
     "model_type": lambda value, limits: (
         f"{value} is not a mapping (key: value)"
         + (" or, as text, a column" if limits["class_name"] == "Channel" else "")

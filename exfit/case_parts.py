@@ -1,6 +1,7 @@
 """The parts of a case that have a data sheet: exciter, machine, network, stabiliser."""
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
@@ -19,7 +20,7 @@ from exfit.models.sheet import (
     typical,
 )
 from exfit.plant import MACHINE, NETWORK, STABILISER, flow_sheet
-from exfit.ties import Tie, Ties, parse
+from exfit.ties import Tie, TieError, Ties, parse
 from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
@@ -28,6 +29,7 @@ Contradictions = Iterator[tuple[str, str]]
 WITH_MACHINE = ("open-circuit", "infinite-bus", "machine-playback")
 WITHOUT_EXCITER = ("machine-playback",)
 TIE = "="  # what the arithmetic of other parameters begins with
+OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 
 @dataclass(frozen=True)
@@ -114,10 +116,10 @@ def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
         places[name] = place
         try:
             found[name] = parse(text)
-        except ValueError as error:
+        except TieError as error:
             faults.append(Fault(place, str(error)))
-    known = {*helpers_of(data, parts)}
-    known |= {part.prefix + symbol for part in parts.all for symbol in part.symbols}
+    known = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
+    known += helpers_of(data, parts)
     for name, tie in list(found.items()):
         for used in tie.names:
             if used not in known:
@@ -125,20 +127,38 @@ def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
                 found.pop(name, None)
     try:
         return Ties(found)
-    except ValueError as error:
-        faults.append(Fault(next(iter(places.values())), str(error)))
+    except TieError as error:
+        first = str(error).partition(" -> ")[0]
+        faults.append(Fault(places[first], str(error)))
         return Ties({})
 
 
+def used_by_ties(data: Data, parts: Parts) -> set[str]:
+    """Return the names that stand in the arithmetic of a case file's data."""
+    used: set[str] = set()
+    for _, _, text in _tied(data, parts):
+        with suppress(TieError):
+            used |= {*parse(text).names}
+    return used
+
+
+def places_of_ties(data: Data, parts: Parts) -> dict[str, Place]:
+    """Return where the arithmetic stands that gives each tied parameter."""
+    return {name: place for name, place, _ in _tied(data, parts)}
+
+
 def helpers_of(data: Data, parts: Parts) -> dict[str, Place]:
-    """Return the names among the exciter's parameters that are none of them, with their places."""
+    """Return the names among the exciter's parameters that are none of them, with their places.
+
+    A name of another part (machine.H), or of what may be found about a record, is no helper.
+    """
     own = next((part.symbols for part in parts.all if part.kind == "exciter"), ())
     section = _mapping(data.get("parameters"))
     return {
         name: ("parameters", key, name)
         for key in ("fixed", "free")
         for name in _mapping(section.get(key))
-        if name not in own
+        if name not in own and name.isidentifier() and name not in OF_RECORD
     }
 
 

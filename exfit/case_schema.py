@@ -19,10 +19,8 @@ from pydantic import (
     WrapSerializer,
 )
 
+from exfit.case_form import FILE_NAME, PERCENT
 from exfit.case_parts import TIE
-
-FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
-PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
 Value = TypeVar("Value")
 Signal = Literal["vt", "efd", "ifd", "p", "q", "vref"]
@@ -57,6 +55,10 @@ def _is_percent(value: Any) -> str:
     return "[percent]" if isinstance(value, str) else "[number]"
 
 
+def _is_word(value: Any) -> str:
+    return "[auto]" if isinstance(value, str) else "[number]"
+
+
 def _is_unknown(value: Any) -> str:
     return "[unknown]" if isinstance(value, dict | BaseModel) else "[number]"
 
@@ -65,6 +67,10 @@ def _is_unknown(value: Any) -> str:
 Given = Annotated[
     Annotated[Number, Tag("[number]")] | Annotated[str, Field(pattern="^="), Tag("[tie]")],
     Discriminator(_is_tie),
+]
+Start = Annotated[
+    Annotated[Number, Tag("[number]")] | Annotated[Literal["auto"], Tag("[auto]")],
+    Discriminator(_is_word),
 ]
 Spread = Annotated[
     Annotated[Positive, Tag("[number]")] | Annotated[str, Field(pattern=PERCENT), Tag("[percent]")],
@@ -112,7 +118,7 @@ class Free(Section):
 class Unknown(Section):
     """A value of a record or its test that the fit finds, on a linear scale."""
 
-    start: Number | Literal["auto"] = Field(
+    start: Start = Field(
         description="Value from which the fit starts; auto: as the record shows the first step."
     )
     min: Number | None = Field(default=None, description="Lower bound; auto needs none.")
