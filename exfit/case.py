@@ -17,6 +17,7 @@ from exfit.case_schema import (
     BumpTest,
     Channel,
     Estimate,
+    FindableStep,
     Free,
     InfiniteBus,
     Limit,
@@ -46,6 +47,7 @@ from exfit.yaml_lines import Fault, Place, read_text, read_yaml
 __all__ = [
     "BumpTest",
     "Case",
+    "FindableStep",
     "InfiniteBus",
     "MachinePlayback",
     "NoPlant",
@@ -289,9 +291,18 @@ def column_of(channel: Channel) -> Column:
 
 
 def initial_level(test: BumpTest, record: Record, signal: str) -> float:
-    """Return the mean of a recorded signal while the unit is still at rest."""
+    """Return the mean of a recorded signal while the unit is still at rest.
+
+    Raises RecordError where it has no sample there.
+    """
     until = np.inf if test.steady is None else test.steady
-    return float(np.nanmean(record.signals[signal][record.time < until]))
+    rest = record.signals[signal][record.time < until]
+    rest = rest[np.isfinite(rest)]
+    if not len(rest):
+        raise RecordError(
+            f"{record.source}: {signal}: no sample before {show(until)} s tells where it starts"
+        )
+    return float(np.mean(rest))
 
 
 def initial_voltage(test: BumpTest, record: Record) -> float:

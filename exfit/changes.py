@@ -1,30 +1,42 @@
 """Values given beside a case: on the command line, or in the file of a former fit."""
 
 from collections.abc import Iterator, Mapping
+from math import isclose, isfinite
 from pathlib import Path
+from typing import Any
 
 from exfit.case import Case
 from exfit.case_form import near
 from exfit.errors import CaseError
+from exfit.ties import TieError
 from exfit.trial import values_of
+from exfit.unknowns import names_of
 from exfit.yaml_lines import read_text, read_yaml
 
 
 def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[str, float]:
-    """Return changes of parameters as the system names them: KA, or machine.Tpd0.
+    """Return changes of values by name: KA, machine.Tpd0, or what is found about a record.
 
-    Raises CaseError, naming ``place``, for a symbol that no data sheet has or a value it excludes.
+    Raises CaseError, naming ``place``, for a name that the case does not know, a value that its
+    data sheet excludes, or values that do not fit together.
     """
     rows = {part.prefix + row.symbol: row for part in case.parts.all for row in part.sheet}
+    known = [*rows, *(name for name in case.values() if name not in rows), *_of_records(case)]
     faults = []
     for name, value in given.items():
-        if name not in rows:
-            faults.append(f"{place}: {name}: not a parameter; {near(name, rows)}")
-        elif not rows[name].low <= value <= rows[name].high:
+        if name not in known:
+            faults.append(f"{place}: {name}: not a parameter; {near(name, known)}")
+        elif name not in rows and not isfinite(value):
+            faults.append(f"{place}: {name}: {value:g} is not a finite number")
+        elif name in rows and not rows[name].low <= value <= rows[name].high:
             low, high = rows[name].low, rows[name].high
             faults.append(f"{place}: {name}: {value:g} lies outside {low:g} ... {high:g}")
     if not faults:
-        faults = [f"{place}: {text}" for text in contradictions(case, values_of(case, given))]
+        try:
+            values = values_of(case, given)
+        except TieError as fault:
+            raise CaseError([f"{place}: {fault}"]) from None
+        faults = [f"{place}: {text}" for text in contradictions(case, values)]
     if faults:
         raise CaseError(faults)
     return dict(given)
@@ -40,7 +52,9 @@ def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
 def read_parameters(case: Case, path: Path) -> dict[str, float]:
     """Return the changes that a file of parameters makes to a case.
 
-    Raises CaseError where it is not such a file, or is of another model.
+    What follows others in the case is left to them, if the file agrees; so is what the file tells
+    of records that the case does not have. Raises CaseError where it is not such a file, or is of
+    another model.
     """
     top, faults = read_yaml(read_text(path), path)
     content = top.value if isinstance(top.value, dict) else {}
@@ -50,11 +64,32 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
         raise CaseError([*texts, f"{path}: parameters: missing"])
     if str(content.get("model", case.subject)).upper() != case.subject:
         texts.append(f"{path}: model: {content['model']}, but {case.path} has {case.subject}")
-    texts += [
-        f"{path}: parameters.{name}: {value!r} is not a number"
-        for name, value in parameters.items()
-        if isinstance(value, bool) or not isinstance(value, int | float)
-    ]
+    texts += [f"{path}: parameters.{text}" for text in _no_numbers(parameters)]
+    about = content.get("records", {})
+    if not isinstance(about, dict):
+        texts.append(f"{path}: records: not a mapping (key: value)")
+        about = {}
+    texts += [f"{path}: records.{text}" for text in _no_numbers(about)]
     if texts:
         raise CaseError(texts)
-    return changed_values(case, parameters, str(path))
+    about = {name: value for name, value in about.items() if name in _of_records(case)}
+    given = changed_values(case, {**parameters, **about}, str(path))
+    others = {name: value for name, value in given.items() if name not in case.ties.by_name}
+    following = values_of(case, others)
+    return {
+        name: value
+        for name, value in given.items()
+        if name in others or not isclose(value, following[name])
+    }
+
+
+def _no_numbers(given: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the values that are no numbers."""
+    for name, value in given.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            yield f"{name}: {value!r} is not a number"
+
+
+def _of_records(case: Case) -> list[str]:
+    """Return the names of all that a fit of a case finds about its records."""
+    return [name for one in case.recordings for name in names_of(one)]

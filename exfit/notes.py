@@ -77,12 +77,12 @@ def validation_notes(fitted: Sequence[Comparison], tried: Sequence[Comparison]) 
 
 def level_notes(fitted: Comparison, steady: float) -> Iterator[str]:
     """Yield the signals that start elsewhere than their record."""
-    before = fitted.time < steady
     for signal, overlay in fitted.overlays.items():
+        before = (fitted.time < steady) & np.isfinite(overlay.error)
         if signal == "vt" or not before.any():
             continue
-        measured = float(np.nanmean(overlay.measured[before]))
-        simulated = float(np.nanmean(overlay.simulated[before]))
+        measured = float(np.mean(overlay.measured[before]))
+        simulated = float(np.mean(overlay.simulated[before]))
         if abs(measured - simulated) > FAR_FROM_BASE * max(abs(simulated), 0.1):
             yield (
                 f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu: "

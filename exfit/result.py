@@ -434,8 +434,11 @@ def parameter_file(result: FitResult) -> str:
         f"model: {result.model}",
         "parameters:",
     ]
+    of_records = {name: one for name, one in result.parameters.items() if one.of_record}
     for name, value in result.values.items():
         one = result.parameters.get(name)
+        if name in of_records:
+            continue
         if one is None and name not in result.values_of(""):
             continue  # as the case has it
         if one is None:
@@ -443,6 +446,9 @@ def parameter_file(result: FitResult) -> str:
         else:
             origin = f"fitted, on its {one.at_bound}" if one.at_bound else "fitted"
         lines.append(f"  {name}: {yaml_number(value)}  # {origin}")
+    if of_records:
+        lines += ["records:  # what was found about them"]
+        lines += [f"  {name}: {yaml_number(one.value)}" for name, one in of_records.items()]
     return "\n".join(lines) + "\n"
 
 

@@ -37,6 +37,7 @@ from exfit.trial import (
     fitted_trials,
     plain_simulator,
     residuals_of,
+    robust_of,
     secured,
     trial_of,
     values_of,
@@ -212,7 +213,8 @@ def tried_on(case: Case, trial: Trial, values: Values, name: str | None = None) 
     limit = None if case.accept is None else case.accept.rmse
     secured = trial.secured(values)
     if trial.free:
-        residuals = Residuals([secured.experiment], trial.free, values)
+        robust = robust_of(case)
+        residuals = Residuals([secured.experiment], trial.free, values, robust=robust)
         aligned = estimate.least_squares(
             residuals,
             residuals.start,
@@ -239,8 +241,9 @@ def refuse_unfit(case: Case, residuals: Residuals) -> None:
     if samples < unknown:
         raise CaseError([f"{case.path}: record: {samples} samples for {unknown} free parameters"])
     for channel in residuals.channels:
-        if np.all(channel.measured == channel.measured[0]):
-            level = f"{channel.signal} is {channel.measured[0]:g} pu throughout"
+        measured = channel.measured[channel.kept]
+        if np.all(measured == measured[0]):
+            level = f"{channel.signal} is {measured[0]:g} pu throughout"
             raise CaseError([f"{case.path}: record: {level}: it shows no test"])
     with np.errstate(over="ignore"):
         start = residuals(residuals.start)

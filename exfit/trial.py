@@ -63,12 +63,13 @@ from exfit.simulate import (
     Simulator,
     parameters_used,
 )
-from exfit.unknowns import started, unknowns
+from exfit.ties import Ties
+from exfit.unknowns import prefix_of, started, unknowns
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-FEWEST = 2  # samples of a channel
+FEWEST = 3  # samples of a channel: fewer do not show its noise
 
 
 def system_of(case: Case) -> System:
@@ -155,8 +156,8 @@ def _refuse_untraceable(system: System, path: Path) -> None:
 
 def values_of(case: Case, changed: Values) -> dict[str, float]:
     """Return every value of a case: as it has them, with changes upon them, and what follows."""
-    values = {**case.values(), **changed}
-    return {**case.ties.apply(values), **changed}
+    following = {name: tie for name, tie in case.ties.by_name.items() if name not in changed}
+    return Ties(following).apply({**case.values(), **changed})
 
 
 def secured(simulator: Simulator, values: Values, case: Path) -> Simulator:
@@ -244,10 +245,8 @@ class Trial:
         kept = np.isfinite(signal)
         time = self.record.time[kept]
         simulator = self.experiment.moved(values)
-        steps = [
-            change._replace(at=change.at + simulator.delay) for change in simulator.course.steps
-        ]
-        inside = [change for change in steps if change.at >= time[0]]
+        shown = [step._replace(at=step.at + simulator.delay) for step in simulator.course.steps]
+        inside = [change for change in shown if change.at >= time[0]]
         if not inside or inside[0].signal != "vref":
             return None
         later = [change.at for change in inside if change.at > inside[0].at]
@@ -308,15 +307,16 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
     Raises RecordError where the record cannot be used, CaseError where a signal is not simulated.
     """
     view, file = case.seen_from(recording), recording.record
-    record = case.measure(recording.test, file)
-    test = started(case, recording, record)
     system = system_of(view)
+    driving = [signal for signal in file.channels if signal in system.inputs]
+    record = _without_masked(case.measure(recording.test, file), file, driving)
+    test = started(case, recording, record)
     if view is not case:
         own = {name: v for name, v in view.values().items() if name.startswith(NETWORK)}
         values = {**values, **own}
     else:
         own = {}
-    prefix = "" if recording.name == SINGLE else f"{recording.name}."
+    prefix = prefix_of(recording)
     begin = float(record.time[0]) if test.begin is None else test.begin
     steps = tuple(changes(view, test, values))
     nuisances, free = unknowns(prefix, test, file, steps)
@@ -330,7 +330,6 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
         if nuisance.kind in ("delay", "shift")
     ]
     course = Course(begin, float(record.time[-1]) + max(0.0, sum(early) - delay), steps)
-    driving = [signal for signal in file.channels if signal in system.inputs]
     if driving:
         heard: dict[str, Array] = {signal: _moved(test, record, signal) for signal in driving}
         course = replace(course, played=Played(record.time, heard))
@@ -349,14 +348,33 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
     return Trial(case.path, test, record, experiment, free)
 
 
+def _without_masked(record: Record, file: RecordFile, driving: Sequence[str]) -> Record:
+    """Return a record with nan in place of what is masked; what drives stays as it is.
+
+    Raises RecordError where a signal that drives has a gap.
+    """
+    masked = np.zeros(len(record.time), dtype=bool)
+    for first, last in file.mask:
+        masked |= (record.time >= first) & (record.time <= last)
+    signals = dict(record.signals)
+    for signal, samples in record.signals.items():
+        if signal not in driving:
+            signals[signal] = np.where(masked, np.nan, samples)
+        elif np.isnan(samples).any():
+            at = record.time[np.isnan(samples)][0]
+            raise RecordError(f"{record.source}: {signal}: it drives, and has a gap at {at:g} s")
+    return replace(record, signals=signals)
+
+
 def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> Channel:
     """Return a channel of a record, with what is done to it before it is compared."""
     entry, samples = file.channels[signal], record.signals[signal]
     kept = np.isfinite(samples)
-    for first, last in file.mask:
-        kept &= ~((record.time >= first) & (record.time <= last))
     if entry.outliers is not None:
-        kept[kept] = ~outliers(record.time[kept], samples[kept], entry.outliers)
+        try:
+            kept[kept] = ~outliers(record.time[kept], samples[kept], entry.outliers)
+        except ValueError as fault:
+            raise RecordError(f"{record.source}: {signal}: outliers: {fault}") from fault
     if np.count_nonzero(kept) < FEWEST:
         raise RecordError(f"{record.source}: {signal}: fewer than {FEWEST} samples are left")
     conditioning = None
@@ -365,7 +383,7 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> 
             conditioning = Conditioning(record.time, kept, _filter(entry.filter))
         except ValueError as fault:
             raise RecordError(f"{record.source}: {signal}: filter: {fault}") from fault
-    weight = entry.weight if entry.noise is None else finest_noise(case) / entry.noise
+    weight = entry.weight if entry.noise is None else finest_noise(case, entry.noise) / entry.noise
     column = column_of(entry)
     return Channel(signal, samples, weight, conditioning, entry.noise, column.scale, column.offset)
 
@@ -378,10 +396,10 @@ def _filter(chosen: Filter | None) -> LowPass | Median | None:
     return LowPass(chosen.lowpass)
 
 
-def finest_noise(case: Case) -> float:
-    """Return the least noise that a case gives for a channel: by it the others are weighted."""
+def finest_noise(case: Case, own: float) -> float:
+    """Return the least noise that a case gives for a fitted channel, its ``own`` where none has."""
     channels = [entry for one in case.recordings for entry in one.record.channels.values()]
-    return min(entry.noise for entry in channels if entry.noise is not None)
+    return min((entry.noise for entry in channels if entry.noise is not None), default=own)
 
 
 def _moved(test: BumpTest, record: Record, signal: str) -> Array:
@@ -458,10 +476,15 @@ def residuals_of(case: Case, trials: Sequence[Trial]) -> Residuals:
         raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
     names = {one.name for one in free}
     fixed = {name: value for name, value in case.values().items() if name not in names}
-    robust = None
-    if case.estimate.loss != "least-squares":
-        robust = Robust(LOSSES[case.estimate.loss], case.estimate.loss_scale)
-    return Residuals([one.experiment for one in trials], free, fixed, case.ties, robust)
+    return Residuals([one.experiment for one in trials], free, fixed, case.ties, robust_of(case))
+
+
+def robust_of(case: Case) -> Robust | None:
+    """Return the loss that a case asks for in place of the squares."""
+    asked = case.estimate
+    if asked.loss == "least-squares":
+        return None
+    return Robust(LOSSES[asked.loss], asked.loss_scale)
 
 
 def free_of(case: Case, trials: Sequence[Trial] = ()) -> list[Free]:

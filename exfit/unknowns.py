@@ -1,9 +1,22 @@
 """What a fit finds about a record beside the parameters of the unit: instants, sizes, levels."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal
+from itertools import pairwise
+from math import inf
+from typing import Literal
 
-from exfit.case import BumpTest, Case, RecordFile, Recording, Unknown, known
+import numpy as np
+
+from exfit.case import (
+    SINGLE,
+    BumpTest,
+    Case,
+    FindableStep,
+    RecordFile,
+    Recording,
+    Unknown,
+    known,
+)
 from exfit.errors import CaseError, RecordError
 from exfit.experiment import Nuisance
 from exfit.onset import find_step
@@ -23,20 +36,37 @@ def started(case: Case, recording: Recording, record: Record) -> BumpTest:
     Where the instant of a step is to be found, the record is at rest until its lower bound.
     Raises CaseError or RecordError where the record shows no step to start from.
     """
+    place = f"{case.path}: {prefix_of(recording)}test"
     test = recording.test
-    steps = [_bounded(case, recording, record, k) for k in range(len(test.vref))]
-    instants = [step.at for step in (*steps, *test.vs) if isinstance(step.at, Unknown)]
-    steady = test.steady_until
-    if steady is None and instants:
-        lowest = [one.min for one in instants if one.min is not None]
-        others = [at for at in (known(step.at) for step in (*steps, *test.vs)) if at is not None]
-        steady = max(min([*lowest, *others]), float(record.time[1]))
-    return test.model_copy(update={"vref": tuple(steps), "steady_until": steady})
+    steps = tuple(_bounded(f"{place}.vref[{k}]", one, record) for k, one in enumerate(test.vref))
+    instants = [known(step.at) or 0.0 for step in steps]
+    for k, (before, at) in enumerate(pairwise(instants), 1):
+        if at <= before:
+            text = f"{at:g} s is not after {before:.4g} s, where the record shows the step before"
+            raise CaseError([f"{place}.vref[{k}].at: {text}"])
+    test = test.model_copy(update={"vref": steps})
+    return test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
 
 
-def _bounded(case: Case, recording: Recording, record: Record, k: int) -> Any:
+def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | None:
+    """Return until when a record is at rest, s: until the earliest instant that it may show."""
+    delay = _lowest(file.delay)
+    found = [step.at for step in (*test.vref, *test.vs) if isinstance(step.at, Unknown)]
+    if test.steady_until is not None or not (found or delay < 0.0):
+        return test.steady_until
+    earliest = min([*test.instants, *map(_lowest, found)]) if test.instants else inf
+    return max(earliest + min(delay, 0.0), float(record.time[1]))
+
+
+def _lowest(value: float | Unknown) -> float:
+    """Return the least that a value may be."""
+    if isinstance(value, Unknown):
+        return -inf if value.min is None else value.min
+    return value
+
+
+def _bounded(place: str, step: FindableStep, record: Record) -> FindableStep:
     """Return a step of the reference, with numbers where it says auto."""
-    step = recording.test.vref[k]
     auto = [
         key
         for key in ("at", "step")
@@ -44,12 +74,12 @@ def _bounded(case: Case, recording: Recording, record: Record, k: int) -> Any:
     ]
     if not auto:
         return step
-    if "vt" not in record.signals:
-        raise CaseError([f"{case.path}: test.vref[{k}]: auto needs vt in the record"])
+    vt = record.signals["vt"]
+    seen = np.isfinite(vt)
     try:
-        found = find_step(record.time, record.signals["vt"])
+        found = find_step(record.time[seen], vt[seen])
     except ValueError as fault:
-        raise RecordError(f"{record.source}: {fault}; {case.path} asks for start: auto") from fault
+        raise RecordError(f"{record.source}: {fault}; {place} asks for start: auto") from fault
     first, last = float(record.time[0]), float(record.time[-1])
     bounds = {
         "at": (found.at, max(first, found.at - AROUND), min(last, found.at + AROUND)),
@@ -61,10 +91,8 @@ def _bounded(case: Case, recording: Recording, record: Record, k: int) -> Any:
         low = low if value.min is None else value.min
         high = high if value.max is None else value.max
         if not low <= start <= high:
-            place = f"{case.path}: test.vref[{k}].{key}"
-            raise CaseError(
-                [f"{place}: the record shows {start:.4g}, outside {low:g} ... {high:g}"]
-            )
+            text = f"the record shows {start:.4g}, outside {low:g} ... {high:g}"
+            raise CaseError([f"{place}.{key}: {text}"])
         update[key] = Unknown(start=start, min=low, max=high)
     return step.model_copy(update=update)
 
@@ -79,41 +107,57 @@ def shifted(test: BumpTest, file: RecordFile, steps: Sequence[Change]) -> bool:
     return len(steps) == 1 and test.begin is None and not set(JUMPS) & set(file.channels)
 
 
+def prefix_of(recording: Recording) -> str:
+    """Return how the names of all begin that a fit finds about a record."""
+    return "" if recording.name == SINGLE else f"{recording.name}."
+
+
+def names_of(recording: Recording) -> tuple[str, ...]:
+    """Return the names of all that a fit finds about a record."""
+    test, file = recording.test, recording.record
+    steps = [Change(0.0, 0.0, signal) for signal in ("vref", "vs") for _ in getattr(test, signal)]
+    return tuple(one.name for one, _ in _found(prefix_of(recording), test, file, steps))
+
+
 def unknowns(
     prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[Change]
 ) -> tuple[tuple[Nuisance, ...], tuple[Free, ...]]:
     """Return what a fit finds about a record; the names begin with ``prefix``."""
-    shift = shifted(test, file, steps)
-    found = [*_of_steps(prefix, test, steps, shift), *_of_record(prefix, test, file)]
-    return tuple(one for one, _ in found), tuple(free for _, free in found)
+    found = [*_found(prefix, test, file, steps)]
+    return tuple(one for one, _ in found), tuple(_free(one.name, value) for one, value in found)
+
+
+def _found(
+    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[Change]
+) -> Iterator[tuple[Nuisance, Unknown]]:
+    yield from _of_steps(prefix, test, steps, shifted(test, file, steps))
+    yield from _of_record(prefix, test, file)
 
 
 def _of_steps(
     prefix: str, test: BumpTest, steps: Sequence[Change], shift: bool
-) -> Iterator[tuple[Nuisance, Free]]:
+) -> Iterator[tuple[Nuisance, Unknown]]:
     for signal in ("vref", "vs"):
         places = [place for place, change in enumerate(steps) if change.signal == signal]
         for number, (place, step) in enumerate(zip(places, getattr(test, signal), strict=True)):
             which = f"{prefix}{signal}{number + 1 if number else ''}"
             if isinstance(step.at, Unknown):
-                kind: Literal["at", "shift"] = "shift" if shift else "at"
-                yield Nuisance(f"{which}.at", kind, place), _free(f"{which}.at", step.at)
+                yield Nuisance(f"{which}.at", "shift" if shift else "at", place), step.at
             if isinstance(step.step, Unknown):
-                yield Nuisance(f"{which}.step", "step", place), _free(f"{which}.step", step.step)
+                yield Nuisance(f"{which}.step", "step", place), step.step
 
 
-def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[Nuisance, Free]]:
+def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[Nuisance, Unknown]]:
     if isinstance(test.vt0, Unknown):
-        yield Nuisance(f"{prefix}vt0", "vt0"), _free(f"{prefix}vt0", test.vt0)
+        yield Nuisance(f"{prefix}vt0", "vt0"), test.vt0
     if isinstance(file.delay, Unknown):
-        yield Nuisance(f"{prefix}delay", "delay"), _free(f"{prefix}delay", file.delay)
+        yield Nuisance(f"{prefix}delay", "delay"), file.delay
     kinds: tuple[Literal["scale", "offset"], ...] = ("scale", "offset")
     for signal, channel in file.channels.items():
         for kind in kinds:
             value = getattr(channel, kind)
             if isinstance(value, Unknown):
-                name = f"{prefix}{signal}.{kind}"
-                yield Nuisance(name, kind, signal=signal), _free(name, value)
+                yield Nuisance(f"{prefix}{signal}.{kind}", kind, signal=signal), value
 
 
 def _free(name: str, value: Unknown) -> Free:
