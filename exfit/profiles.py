@@ -19,6 +19,9 @@ from exfit.trial import residuals_of
 
 Array = NDArray[np.float64]
 
+LOWER = "a lower minimum was met on the way: the profiles are about that one"
+MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
+
 ENDS = {
     estimate.End.RISE: "",
     estimate.End.BOUND: "the record refutes no value down or up to its bound",
@@ -92,8 +95,8 @@ def profile(
 ) -> Profiles:
     """Fit a case and return the profiles of some of its free parameters, all by default.
 
-    ``watch`` is told the progress; an interruption keeps what is done. Raises ExfitError for input
-    that cannot be used.
+    ``watch`` is told the progress; an interruption keeps what is done of the profiles, one of the
+    fit before them is passed on. Raises ExfitError for input that cannot be used.
 
     Source: Venzon & Moolgavkar 1988.
     """
@@ -104,28 +107,36 @@ def profile(
     unknown = [name for name in wanted if name not in free]
     if unknown:
         raise CaseError(f"{case.path}: {name}: not free; {near(name, free)}" for name in unknown)
-    found, _ = search(case, residuals, case.estimate.strategy, lambda _: None, watch)
-    known = knowledge(residuals, found.x, names_of_records(trials))
-    rise = known.rise
-    sides = estimate.profiles(
-        residuals,
-        residuals.exact,
-        found.x,
-        [free.index(name) for name in wanted],
-        residuals.bounds,
-        rise,
-        x_scale=UNIT,
-        watch=watch,
-    )
-    moved = any(one.moved for one in sides)
-    notes = ("a lower minimum was met on the way: the profiles are about that one",)
+    found, minima = search(case, residuals, case.estimate.strategy, lambda _: None, watch)
+    if found.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
+        raise KeyboardInterrupt
+    notes = [] if found.success else [f"the fit did not end at a minimum: {found.message}"]
+    x, indices = found.x, [free.index(name) for name in wanted]
+    for _ in range(MOST_MINIMA):
+        known = knowledge(residuals, x, names_of_records(trials))
+        sides = estimate.profiles(
+            residuals,
+            residuals.exact,
+            x,
+            indices,
+            residuals.bounds,
+            known.rise,
+            x_scale=UNIT,
+            watch=watch,
+        )
+        interrupted = any(estimate.End.INTERRUPTED in one.ends for one in sides)
+        if interrupted or not sides[0].moved:
+            break
+        x = sides[0].x  # its residuals, and so the rise, are others
+    if not np.array_equal(sides[0].x, found.x):
+        notes.append(LOWER)
     return Profiles(
         name=case.path.stem,
         cost=sides[0].cost,
-        rise=rise,
+        rise=known.rise,
         profiles=tuple(_profile(case, residuals, known, one) for one in sides),
-        notes=notes if moved else (),
-        interrupted=any(estimate.End.INTERRUPTED in one.ends for one in sides),
+        notes=tuple(notes),
+        interrupted=interrupted,
     )
 
 
