@@ -6,6 +6,7 @@ chapter 6.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from exfit.experiment import Channel, Experiment
 from exfit.inference import Confidence, confidence, identifiability
 from exfit.knowledge import Knowledge, linearisation
 from exfit.noise import noise
-from exfit.residuals import Residuals
+from exfit.residuals import Free, Residuals
 from exfit.simulate import Simulator
 from exfit.trial import fitted_trials, free_of, planned
 
@@ -80,15 +81,14 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
         raise CaseError([f"{case.path}: parameters.free: empty: there is nothing to identify"])
     values = {**case.values(), **{one.name: one.start for one in free}}
     own = [trial.experiment for trial in trials] or [planned(case)]
-    unknown = [name for name in given if name not in NOISE]
-    if unknown:
-        raise CaseError(f"--noise: {name}: not a signal; {near(name, NOISE)}" for name in unknown)
+    _refuse_noise(given)
     levels = _noise(own, given)
     fixed = {name: v for name, v in values.items() if name not in {one.name for one in free}}
 
     def told(experiments: Sequence[Experiment]) -> Knowledge:
-        seen = [_secured(_seen(one, levels), values, case) for one in experiments]
-        residuals = Residuals(seen, free, fixed, case.ties)
+        at = {**values, **_steps(experiments)}
+        seen = [_secured(_seen(one, levels), at, case) for one in experiments]
+        residuals = Residuals(seen, _moved(free, experiments), fixed, case.ties)
         names = tuple(one.name for trial in trials for one in trial.free)
         still = np.zeros(residuals.count)
         linear = linearisation(residuals, residuals.start, names, still)
@@ -105,6 +105,34 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
         tuple(plans),
         {signal: level for signal, level in levels.items() if signal in _signals(case, own)},
     )
+
+
+def _refuse_noise(given: Mapping[str, float]) -> None:
+    unknown = [name for name in given if name not in NOISE]
+    if unknown:
+        raise CaseError(f"--noise: {name}: not a signal; {near(name, NOISE)}" for name in unknown)
+    wrong = {name: level for name, level in given.items() if not 0.0 < level < inf}
+    if wrong:
+        raise CaseError(
+            f"--noise: {name}: {level:g}: must be finite and above 0"
+            for name, level in wrong.items()
+        )
+
+
+def _steps(experiments: Sequence[Experiment]) -> dict[str, float]:
+    """Return the sizes that the tests have of steps which a fit would find."""
+    return {
+        unknown.name: one.simulator.course.steps[unknown.step].step
+        for one in experiments
+        for unknown in one.nuisances
+        if unknown.kind == "step"
+    }
+
+
+def _moved(free: Sequence[Free], experiments: Sequence[Experiment]) -> list[Free]:
+    """Return what is free, with the sizes of the tests' steps to start from."""
+    sizes = _steps(experiments)
+    return [replace(one, start=sizes.get(one.name, one.start)) for one in free]
 
 
 def _noise(own: Sequence[Experiment], given: Mapping[str, float]) -> dict[str, float]:

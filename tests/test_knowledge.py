@@ -43,7 +43,7 @@ def changed(tmp_path):
         still = {key: value for key, value in old.get("fixed", {}).items() if key not in free}
         content["parameters"] = {"fixed": {**still, **fixed}, "free": {**kept, **free}}
         path = tmp_path / "case.yaml"
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(yaml.safe_dump(content, sort_keys=False))
         return load_case(path)
 
     return loaded

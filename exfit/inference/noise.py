@@ -117,7 +117,7 @@ def agrees(estimated: float, given: float | None, dof: float) -> bool | None:
     """
     from scipy.special import chdtr, chdtrc
 
-    if given is None or not dof:
+    if given is None or not dof or not estimated:
         return None if given is None else True
     ratio = dof * (estimated / given) ** 2
     return bool(min(chdtr(dof, ratio), chdtrc(dof, ratio)) >= SURPRISING / 2.0)

@@ -76,7 +76,7 @@ class Setting:
 NOISES = ((0.0, None), (PHI, None), (0.0, NOISE), (PHI, NOISE))
 SETTINGS = (
     Setting("KD fixed", 0.0, None, profiled=True),
-    *(Setting("KD fixed", *noise) for noise in NOISES[1:3]),
+    Setting("KD fixed", PHI, None),
     Setting("KD, KC fixed", 0.0, None, profiled=True),
     *(Setting("KD, KC fixed, VAMAX 20", *noise) for noise in NOISES),
 )
