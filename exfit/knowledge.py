@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.inference import (
-    LEVEL,
     Channel,
     Confidence,
     Identifiability,
@@ -15,6 +14,7 @@ from exfit.inference import (
     Prior,
     confidence,
     identifiability,
+    rises,
 )
 from exfit.residuals import Residuals
 
@@ -37,19 +37,9 @@ class Knowledge:
         }
 
     @property
-    def rise(self) -> float:
-        """By how much the cost rises from its minimum to the end of a profile's interval.
-
-        Half the squared quantile of Student's t, times the variance of the weighted errors, widened
-        where they are not white (Bates & Watts 1988, section 6.1).
-        """
-        from scipy.special import stdtrit
-
-        t = float(stdtrit(self.confidence.dof, 0.5 * (1.0 + LEVEL)))
-        noise = self.confidence.noise
-        squares = [one.spread**2 for one in noise]
-        variance = float(np.average(squares, weights=[one.samples for one in noise]))
-        return 0.5 * t**2 * variance
+    def rises(self) -> dict[str, float]:
+        """By how much the cost rises from its minimum to the ends of each profile's interval."""
+        return rises(self.linear, self.confidence)
 
     @property
     def open(self) -> tuple[str, ...]:

@@ -246,7 +246,7 @@ def profiles(found: Profiles) -> Figure:
     figure = Figure(figsize=(WIDTH, 1.1 + 2.4 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
     for axes, one in zip(grid.flat, found.profiles, strict=False):
-        rise = (one.costs - found.cost) / found.rise
+        rise = (one.costs - found.cost) / one.rise
         axes.plot(one.at, rise, "o-", color=SIMULATED, linewidth=1.3, markersize=3)
         axes.axhline(1.0, color=LIMIT, linewidth=1.0, linestyle=":")
         for limit in (one.low, one.high):

@@ -1,7 +1,7 @@
 """The profile likelihood of a case's parameters: how far each can move if the others follow."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from exfit.trial import residuals_of
 Array = NDArray[np.float64]
 
 LOWER = "a lower minimum was met on the way: the profiles are about that one"
+ALIKE = 6  # digits: rises that differ less are equal but for rounding
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 ENDS = {
@@ -36,7 +37,8 @@ class Profile:
     """The least cost (K,) for given values ``at`` (K,) of a parameter, the others fitted anew.
 
     ``low`` and ``high`` end the interval, None where the cost does not rise as far before what
-    ``ends`` says; ``linear`` is the interval of the linear theory, if it has one.
+    ``ends`` says: at the ends of the interval the cost is ``rise`` above the minimum.
+    ``linear`` is the interval of the linear theory, if it has one.
     """
 
     name: str
@@ -47,20 +49,16 @@ class Profile:
     low: float | None
     high: float | None
     ends: tuple[str, str]
+    rise: float
     linear: tuple[float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
 class Profiles:
-    """Profiles of some parameters about the minimum ``cost``.
-
-    At the ends of an interval the cost is ``rise`` above it: half the squared quantile of
-    Student's t, times the variance of the residuals, widened where these are not white.
-    """
+    """Profiles of some parameters about the minimum ``cost``."""
 
     name: str
     cost: float
-    rise: float
     profiles: tuple[Profile, ...]
     notes: tuple[str, ...]
     interrupted: bool
@@ -69,7 +67,6 @@ class Profiles:
         """Return the figures."""
         return {
             "cost": self.cost,
-            "rise": self.rise,
             "level": LEVEL,
             "interrupted": self.interrupted,
             "notes": list(self.notes),
@@ -79,6 +76,7 @@ class Profiles:
                     "low": one.low,
                     "high": one.high,
                     "ends": list(one.ends),
+                    "rise": one.rise,
                     "linear": one.linear,
                     "at": one.at.tolist(),
                     "costs": one.costs.tolist(),
@@ -111,19 +109,11 @@ def profile(
     if found.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
         raise KeyboardInterrupt
     notes = [] if found.success else [f"the fit did not end at a minimum: {found.message}"]
-    x, indices = found.x, [free.index(name) for name in wanted]
+    x = found.x
     for _ in range(MOST_MINIMA):
         known = knowledge(residuals, x, names_of_records(trials))
-        sides = estimate.profiles(
-            residuals,
-            residuals.exact,
-            x,
-            indices,
-            residuals.bounds,
-            known.rise,
-            x_scale=UNIT,
-            watch=watch,
-        )
+        rises = {free.index(name): known.rises[name] for name in wanted}
+        sides = _sides(residuals, x, rises, watch)
         interrupted = any(estimate.End.INTERRUPTED in one.ends for one in sides)
         if interrupted or not sides[0].moved:
             break
@@ -133,11 +123,44 @@ def profile(
     return Profiles(
         name=case.path.stem,
         cost=sides[0].cost,
-        rise=known.rise,
         profiles=tuple(_profile(case, residuals, known, one) for one in sides),
         notes=tuple(notes),
         interrupted=interrupted,
     )
+
+
+def _sides(
+    residuals: Residuals,
+    x: Array,
+    rises: Mapping[int, float],
+    watch: Callable[[estimate.Progress], None],
+) -> list[estimate.Profile]:
+    """Return the profiles about x, those of like rises side by side; if x is a minimum, of all."""
+    alike: dict[str, list[int]] = {}
+    for index, rise in rises.items():
+        alike.setdefault(f"{rise:.{ALIKE}e}", []).append(index)
+    found: dict[int, estimate.Profile] = {}
+    for indices in alike.values():
+
+        def tell(progress: estimate.Progress, done: int = 2 * len(found)) -> None:
+            watch(replace(progress, done=done + progress.done, total=2 * len(rises)))
+
+        profiles = estimate.profiles(
+            residuals,
+            residuals.exact,
+            x,
+            indices,
+            residuals.bounds,
+            rises[indices[0]],
+            x_scale=UNIT,
+            watch=tell,
+        )
+        found |= {one.index: one for one in profiles}
+        if profiles[0].moved:
+            return list(profiles)
+        if any(estimate.End.INTERRUPTED in one.ends for one in profiles):
+            break
+    return [found[index] for index in rises if index in found]
 
 
 def _profile(
@@ -155,5 +178,6 @@ def _profile(
         low=None if found.low is None else one.value(found.low),
         high=None if found.high is None else one.value(found.high),
         ends=(ENDS[below], ENDS[above]),
+        rise=known.rises[one.name],
         linear=known.confidence.parameters[one.name].interval,
     )

@@ -55,6 +55,19 @@ def test_where_the_response_is_linear_the_interval_is_that_of_linear_theory(near
         assert one.ends == ("", "")
 
 
+def test_channels_of_unlike_noise_each_count_by_their_own():
+    """The machine's data show in vt, whose errors are slow, and in ifd, whose errors are white."""
+    found = profile(case_of("machine_playback"))
+    noise = fit(case_of("machine_playback")).knowledge.confidence.noise
+    assert max(one.spread for one in noise) > 10.0 * min(one.spread for one in noise)
+    assert len({one.rise for one in found.profiles}) == 3
+    for one in found.profiles:
+        low, high = one.linear
+        # intervals of a percent or less
+        assert one.low == pytest.approx(low, abs=0.02 * (high - low))
+        assert one.high == pytest.approx(high, abs=0.02 * (high - low))
+
+
 def test_a_profile_is_lowest_at_the_value_that_the_fit_finds(nearly_linear):
     found = fit(case_of("first_order"))
     assert nearly_linear.cost == pytest.approx(found.cost, rel=1e-9)
@@ -74,7 +87,7 @@ def test_kd_of_ac1a_is_open_down_to_its_bound(kd):
     assert one.low is None
     assert one.ends == ("the record refutes no value down or up to its bound", "")
     assert one.at[0] == 0.03556
-    assert one.costs[0] < kd.cost + kd.rise
+    assert one.costs[0] < kd.cost + one.rise
     # what the record was made with lies inside
     assert one.value < 0.4039 < one.high
 
@@ -92,14 +105,14 @@ def test_at_the_end_of_the_interval_no_refit_costs_less_than_the_rise(kd):
         for x in (residuals.start, *start)
     ]
     # from afar they may end a little higher, at a kink
-    assert 0.99 < (min(costs) - kd.cost) / kd.rise < 1.1
+    assert 0.99 < (min(costs) - kd.cost) / one.rise < 1.1
 
 
 def test_the_rise_and_the_linear_interval_are_those_of_the_fit(kd, nearly_linear):
     for name, one in (("ac1a_typical", kd), ("first_order", nearly_linear)):
         known = fit(case_of(name)).knowledge
-        assert one.rise == pytest.approx(known.rise, rel=1e-9)
         for each in one.profiles:
+            assert each.rise == pytest.approx(known.rises[each.name], rel=1e-9)
             linear = known.confidence.parameters[each.name].interval
             assert each.linear == (linear if linear is None else pytest.approx(linear, rel=1e-9))
 
@@ -165,10 +178,10 @@ def test_profiles_are_about_a_lower_minimum_that_is_met_on_the_way(search_ends, 
     told = "a lower minimum was met on the way: the profiles are about that one"
     assert found.notes == (told,)
     assert found.cost == pytest.approx(nearly_linear.cost, rel=1e-6)
-    # the noise by which the rise is judged is that of the lower one too
-    assert found.rise == pytest.approx(nearly_linear.rise, rel=1e-4)
     for one, other in zip(found.profiles, nearly_linear.profiles, strict=True):
         assert (one.low, one.high) == pytest.approx((other.low, other.high), rel=1e-8)
+        # the noise by which the rise is judged is that of the lower one too
+        assert one.rise == pytest.approx(other.rise, rel=1e-4)
         assert one.linear == pytest.approx(other.linear, rel=1e-8)
 
 

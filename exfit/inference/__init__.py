@@ -5,7 +5,14 @@ errors, intervals) and `identifiability` (what can move together unseen, and wha
 """
 
 from exfit.inference.combinations import WEAK, Change, Combination
-from exfit.inference.confidence import LEVEL, UNDETERMINED, Confidence, Uncertainty, confidence
+from exfit.inference.confidence import (
+    LEVEL,
+    UNDETERMINED,
+    Confidence,
+    Uncertainty,
+    confidence,
+    rises,
+)
 from exfit.inference.fixings import Fixing
 from exfit.inference.identifiability import Identifiability, identifiability, sensitivity
 from exfit.inference.linear import Channel, Linearisation, Prior
@@ -27,5 +34,6 @@ __all__ = [
     "Uncertainty",
     "confidence",
     "identifiability",
+    "rises",
     "sensitivity",
 ]

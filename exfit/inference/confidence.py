@@ -100,6 +100,26 @@ def confidence(lin: Linearisation) -> Confidence:
     )
 
 
+def rises(lin: Linearisation, known: Confidence) -> dict[str, float]:
+    """Return by how much the cost rises from its minimum to the ends of each profile's interval.
+
+    Half the squared quantile of Student's t, times the variance of the parameter over that by the
+    cost alone, the inverse of its second derivatives (Royall & Tsou 2003). With one channel and
+    least squares the ratio is the variance of the weighted errors, widened where they are not
+    white (Bates & Watts 1988, section 6.1). What has no variance, as on a bound, takes the mean
+    of the channels by their samples.
+    """
+    from scipy.special import stdtrit
+
+    half = 0.5 * float(stdtrit(known.dof, 0.5 * (1.0 + LEVEL))) ** 2
+    squares = [one.spread**2 for one in known.noise]
+    mean = float(np.average(squares, weights=[one.samples for one in known.noise]))
+    plain = np.diag(factored(lin, lin.free).inverse) * lin.size**2
+    ratios = np.diag(known.covariance) / plain
+    ratios = np.where(np.isfinite(ratios), ratios, mean)
+    return dict(zip(lin.names, (half * ratios).tolist(), strict=True))
+
+
 def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
     """Return the effective samples less the parameters that they determine, at least 1."""
     if all(one.accepted and one.inflation == 1.0 for one in noise):

@@ -52,8 +52,17 @@ class Factors:
         lin = self.lin
         curvature = lin.by_row([lin.mean_curvature(channel) for channel in lin.channels])
         rows = np.append(lin.by_row(noise) * np.sqrt(curvature), lin.prior_noise)
-        root = self.spread @ (self.left[: len(rows)] * rows[:, None]).T
-        whole = np.full((len(lin.names), len(lin.names)), np.nan)
+        return self.of_all(self.spread @ (self.left[: len(rows)] * rows[:, None]).T)
+
+    @property
+    def inverse(self) -> Array:
+        """The inverse of A: of the second derivatives that the cost has, (N, N)."""
+        return self.of_all(self.spread)
+
+    def of_all(self, root: Array) -> Array:
+        """Return root root' (k, k) for all parameters (N, N), nan where nothing is determined."""
+        count = len(self.lin.names)
+        whole = np.full((count, count), np.nan)
         whole[np.ix_(self.seen, self.seen)] = root @ root.T
         whole[~self.determined, :] = whole[:, ~self.determined] = np.nan
         return whole

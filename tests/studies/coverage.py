@@ -148,7 +148,7 @@ def outcome(residuals, aside, profiled):
         told=np.sqrt(np.diag(covariance)),
         inside=np.array([holds(one, TRUTH[name]) for name, one in known.parameters.items()]),
         ellipsoid=distance <= limit(len(truth), known.dof),
-        profiled=in_profiles(residuals, found, told.rise) if profiled else np.zeros(0),
+        profiled=in_profiles(residuals, found, told.rises) if profiled else np.zeros(0),
         inflation=known.noise[0].inflation,
         converged=found.success,
     )
@@ -159,13 +159,13 @@ def holds(one, truth):
     return np.nan if one.interval is None else one.interval[0] <= truth <= one.interval[1]
 
 
-def in_profiles(residuals, found, rise):
-    """Return for each parameter whether its profile, at the truth, is no higher than the rise."""
+def in_profiles(residuals, found, rises):
+    """Return for each parameter whether its profile, at the truth, is no higher than its rise."""
     costs = [
         fitted(with_fixed(residuals, {one.name: TRUTH[one.name]}), np.delete(found.x, k)).cost
         for k, one in enumerate(residuals.free)
     ]
-    return np.array(costs) <= found.cost + rise
+    return np.array(costs) <= found.cost + np.array(list(rises.values()))
 
 
 def limit(count, dof):
