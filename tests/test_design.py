@@ -45,7 +45,7 @@ def changed(tmp_path):
 def plain(changed):
     """Return a function that loads an exciter with its typical data, without a record."""
 
-    def loaded(name, step=0.05):
+    def loaded(name, step=0.05, duration=10.0):
         content = yaml.safe_load((CONFIGS / "models" / f"{name}.yaml").read_text())
         free = {
             key: {"start": value, "min": 0.1 * value, "max": 10.0 * value}
@@ -54,7 +54,7 @@ def plain(changed):
         fixed = {k: v for k, v in content["parameters"]["fixed"].items() if k not in free}
         return changed(
             f"models/{name}",
-            test={**content["test"], "vref": [{"at": 1.0, "step": step}]},
+            test={"vt0": 1.0, "duration": duration, "vref": [{"at": 1.0, "step": step}]},
             parameters={"fixed": fixed, "free": free},
         )
 
@@ -116,6 +116,13 @@ def test_a_step_as_large_as_the_own_one_tells_the_same(plain, name):
     other = identify(plain(name, -0.02), {})
     larger = identify(plain(name, -0.1), {})
     assert errors(plans(other)["10 %"]) == pytest.approx(errors(larger.own.confidence), rel=EXACT)
+
+
+def test_a_longer_test_tells_what_one_of_twice_the_duration_does(plain):
+    planned = plans(identify(plain("ac1a"), VT))["longer"]
+    own = identify(plain("ac1a", duration=20.0), VT).own.confidence
+    assert errors(planned) == pytest.approx(errors(own), rel=EXACT)
+    assert planned.noise[0].samples == own.noise[0].samples
 
 
 def test_a_signal_without_noise_to_speak_of_decides_alone(plain):

@@ -231,6 +231,19 @@ def test_intervals_of_a_fit_hold_the_truth_as_often_as_they_promise(given):
     assert np.mean(told, axis=0) == pytest.approx(np.std(missed, axis=0), rel=0.21)
 
 
+def test_the_weight_of_a_channel_changes_nothing_that_is_known():
+    exact, noise = first_order(), STD * np.random.default_rng(3).standard_normal(301)
+    (experiment,), (channel,) = exact.experiments, exact.channels
+    heavy = replace(experiment, channels=(replace(channel, weight=4.0),))
+    weighted = Residuals([heavy], exact.free, exact.fixed)
+    plain, other = known_with(exact, noise, STD), known_with(weighted, noise, STD)
+    assert other.noise[0].given == pytest.approx(4.0 * plain.noise[0].given) == 4.0 * STD
+    for name in plain.names:
+        assert other.parameters[name].interval == pytest.approx(
+            plain.parameters[name].interval, rel=1e-6
+        )
+
+
 def test_intervals_of_a_fit_are_widened_for_noise_that_is_not_white():
     exact, rng = first_order(), np.random.default_rng(2)
     held, wider = [], []
