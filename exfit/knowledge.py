@@ -23,17 +23,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Confidence and identifiability at the solution, with the linearisation that they are of."""
+    """Confidence and identifiability at the solution, with the linearisation that they are of.
+
+    ``bent`` names the parameters over whose intervals the response is not linear.
+    """
 
     linear: Linearisation
     confidence: Confidence
     identifiability: Identifiability
+    bent: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures, without the samples."""
         return {
             "confidence": self.confidence.as_json(),
             "identifiability": self.identifiability.as_json(),
+            "not_linear": list(self.bent),
         }
 
     @property
@@ -54,7 +59,9 @@ class Knowledge:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What a reader must know of it, in words."""
-        return (*self.confidence.sentences, *self.open)
+        names = ", ".join(self.bent)
+        told = f"the response is not linear over the intervals of {names}: see `exfit profile`"
+        return (*self.confidence.sentences, *([told] if names else []), *self.open)
 
 
 def knowledge(residuals: Residuals, theta: Array, of_record: tuple[str, ...]) -> Knowledge:

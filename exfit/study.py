@@ -3,15 +3,16 @@
 import sys
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exfit import __version__, estimate
 from exfit.case import SINGLE, Case, known
 from exfit.errors import CaseError, SimulationError
-from exfit.knowledge import knowledge
+from exfit.knowledge import Knowledge, knowledge
 from exfit.notes import (
     level_notes,
     match_notes,
@@ -32,6 +33,7 @@ from exfit.result import (
     PartOf,
 )
 from exfit.simulate import Response
+from exfit.straightness import bent
 from exfit.trial import (
     Trial,
     fitted_trials,
@@ -43,6 +45,7 @@ from exfit.trial import (
     values_of,
 )
 
+Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
@@ -76,6 +79,8 @@ def fit(
 
     found, minima = search(case, residuals, method, announce, progress)
     values, begin = residuals.values(found.x), residuals.values(residuals.start)
+    interrupted = found.stop is estimate.Stop.INTERRUPTED
+    known = None if interrupted else told(residuals, found.x, trials)
     compared = tuple(one.secured(values).compare(one.name, values, begin) for one in trials)
     tried = tuple(tried_on(case, one, values) for one in validations)
     return FitResult(
@@ -90,13 +95,12 @@ def fit(
         parts=tuple(PartOf(part.kind, part.name, part.prefix) for part in case.parts.all),
         cost=found.cost,
         comparisons=compared,
-        knowledge=knowledge(residuals, found.x, names_of_records(trials)),
+        knowledge=known,
         minima=None if minima is None else minima_of(residuals, minima),
         status=found.status,
         message=found.message,
         success=found.success,
-        interrupted=found.stop is estimate.Stop.INTERRUPTED
-        or (minima is not None and minima.interrupted),
+        interrupted=interrupted or (minima is not None and minima.interrupted),
         history=tuple(history),
         nfev=found.nfev,
         njev=found.njev,
@@ -119,6 +123,12 @@ def fitted(case: Case) -> tuple[Trial, ...]:
     trials = tuple(trial.secured(given) for trial in fitted_trials(case))
     refuse_unfit(case, residuals_of(case, trials))
     return trials
+
+
+def told(residuals: Residuals, theta: Array, trials: Iterable[Trial]) -> Knowledge:
+    """Return what the records tell at the solution theta (N,), in scaled parameters."""
+    known = knowledge(residuals, theta, names_of_records(trials))
+    return replace(known, bent=bent(residuals, theta, known))
 
 
 def names_of_records(trials: Iterable[Trial]) -> tuple[str, ...]:
@@ -196,6 +206,8 @@ def _notes(
     tried: Sequence[Comparison],
 ) -> Iterator[str]:
     """Yield what must be known beside the numbers of a fit."""
+    if not found.success:
+        yield "the search did not end at a minimum: errors and intervals would be those of one"
     yield from notes(case, residuals, found, compared)
     for trial, one in zip(trials, compared, strict=True):
         before = trial.test.vt0 if trial.test.begin is None else None

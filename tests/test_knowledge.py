@@ -161,23 +161,6 @@ def test_a_limit_that_the_test_never_reaches_is_said_to_have_no_effect(ac1a, cha
     assert found.confidence.parameters["KA"].relative_error < 0.02
 
 
-@pytest.mark.parametrize("after", [1, 3])
-def test_an_interrupted_fit_tells_what_its_point_allows(after):
-    told = []
-
-    def watch(line):
-        told.append(line)
-        if len(told) == after:
-            raise KeyboardInterrupt
-
-    found = fit(case_of("ac1a_typical"), watch=watch)
-    assert found.interrupted
-    assert found.knowledge.confidence.names == tuple(found.parameters)
-    # what the model misses, far from the minimum, is no white noise
-    assert found.knowledge.sentences[0].startswith("the residuals of vt are not white")
-    assert found.knowledge.confidence.noise[0].inflation > 10.0
-
-
 def test_the_rise_is_the_quantile_of_one_parameter(ac1a):
     dof = 1001 - 7
     variance = 2.0 * ac1a.cost / dof
@@ -255,3 +238,22 @@ def test_intervals_of_a_fit_are_widened_for_noise_that_is_not_white():
     # the fit takes some of the slow noise for itself: the widening is a little too small
     assert 0.85 * RECORDS <= np.sum(held) <= COVERED[1]
     assert np.mean(wider) == pytest.approx(np.sqrt((1.0 + PHI) / (1.0 - PHI)), rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "bent"), [("first_order", False), ("ac1a_typical", True)])
+def test_a_response_that_is_not_linear_over_the_intervals_is_told(name, bent):
+    """The check system is nearly linear; AC1A meets its limits within the interval of KA."""
+    found = fit(case_of(name)).knowledge
+    assert ("KA" in found.bent) == bent
+    assert any("not linear over the intervals" in text for text in found.sentences) == bent
+
+
+def test_an_interrupted_fit_claims_no_intervals():
+    def interrupt(line):
+        if line.number == 2:
+            raise KeyboardInterrupt
+
+    found = fit(case_of("first_order"), None, interrupt)
+    assert found.interrupted
+    assert found.knowledge is None
+    assert found.as_json()["parameters"]["k"]["interval"] is None

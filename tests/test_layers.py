@@ -85,6 +85,7 @@ ORDER = (
     "exfit.inference.identifiability",
     "exfit.inference",
     "exfit.knowledge",
+    "exfit.straightness",
     "exfit.features",
     "exfit.result",
     "exfit.case_writer",
