@@ -8,6 +8,7 @@ from typing import Any
 from exfit.case import Case
 from exfit.case_form import near
 from exfit.errors import CaseError
+from exfit.models.sheet import Parameter
 from exfit.ties import TieError
 from exfit.trial import values_of
 from exfit.unknowns import names_of
@@ -28,18 +29,26 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
             faults.append(f"{place}: {name}: not a parameter; {near(name, known)}")
         elif name not in rows and not isfinite(value):
             faults.append(f"{place}: {name}: {value:g} is not a finite number")
-        elif name in rows and not rows[name].low <= value <= rows[name].high:
-            low, high = rows[name].low, rows[name].high
-            faults.append(f"{place}: {name}: {value:g} lies outside {low:g} ... {high:g}")
+    faults += [f"{place}: {text}" for text in _outside(rows, given)]
     if not faults:
         try:
             values = values_of(case, given)
         except TieError as fault:
             raise CaseError([f"{place}: {fault}"]) from None
-        faults = [f"{place}: {text}" for text in contradictions(case, values)]
+        following = {name: values[name] for name in case.ties.by_name if name not in given}
+        faults = [f"{place}: {text}" for text in _outside(rows, following)]
+        faults += [f"{place}: {text}" for text in contradictions(case, values)]
     if faults:
         raise CaseError(faults)
     return dict(given)
+
+
+def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
+    """Yield the values that lie outside the range of their data sheet."""
+    for name, value in values.items():
+        row = rows.get(name)
+        if row is not None and not row.low <= value <= row.high:
+            yield f"{name}: {value:g} lies outside {row.low:g} ... {row.high:g}"
 
 
 def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:

@@ -191,13 +191,19 @@ class Residuals:
         return self.differences(theta, -ONE_SIDED_STEP, 0.0)
 
     def differences(self, theta: Array, below: float, above: float) -> Array:
-        """Return difference quotients over [theta + below, theta + above] within the bounds."""
+        """Return difference quotients over [theta + below, theta + above] within the bounds.
+
+        Raises SimulationError where one of these points has no response.
+        """
         low, high = self.bounds
         down, up = np.clip(theta + below, low, high), np.clip(theta + above, low, high)
         stuck = down == up  # a one-sided difference at the bound that it points to
         down, up = np.where(stuck, theta - above, down), np.where(stuck, theta - below, up)
         sets = [*self._moved(theta, down), *self._moved(theta, up)]
-        columns = np.stack(self._of_many(sets), axis=1)
+        try:
+            columns = np.stack(self._of_many(sets), axis=1)
+        except TieError as fault:
+            raise SimulationError(str(fault)) from fault
         count = len(theta)
         return np.asarray((columns[:, count:] - columns[:, :count]) / (up - down))
 
@@ -231,9 +237,14 @@ class Residuals:
         return [np.where(np.arange(len(theta)) == k, to, theta) for k in range(len(theta))]
 
     def _moves(self, theta: Array) -> list[dict[str, float]]:
-        """Return which values each scaled parameter moves, and how fast."""
-        values = self.values(theta)
-        tied = self.ties.slopes(values, [one.name for one in self.free])
+        """Return which values each scaled parameter moves, and how fast.
+
+        Raises SimulationError where what follows them moves infinitely fast.
+        """
+        try:
+            tied = self.ties.slopes(self.values(theta), [one.name for one in self.free])
+        except TieError as fault:
+            raise SimulationError(str(fault)) from fault
         moves = []
         for one, x in zip(self.free, theta, strict=True):
             slope = one.slope(float(x))

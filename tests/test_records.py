@@ -243,6 +243,20 @@ def test_a_tie_without_a_value_is_told(tmp_path):
         changed_values(case, {"TE0": 1.0}, "--set")
 
 
+def test_what_follows_a_value_that_is_set_keeps_to_its_data_sheet(tmp_path):
+    content = single()
+    free = content["parameters"]["free"]
+    free["TE0"] = free.pop("TE")
+    content["parameters"]["fixed"] |= {"TE": "=0.9*TE0", "VRMIN": "=-VAMAX"}
+    case = case_of(content, tmp_path)
+    with pytest.raises(CaseError, match=r"--set: TE: -1\.8 lies outside"):
+        changed_values(case, {"TE0": -2.0}, "--set")
+    with pytest.raises(CaseError, match="--set: TE0: nan is not a finite number"):
+        changed_values(case, {"TE0": np.nan}, "--set")
+    with pytest.raises(CaseError, match=r"--set: .*VRM"):
+        changed_values(case, {"VAMAX": -15.0, "VAMIN": -20.0}, "--set")
+
+
 def test_a_parameters_file_gives_the_fit_back(tmp_path):
     """Helpers, tied parameters and what was found about the records take part."""
     content = three_free(

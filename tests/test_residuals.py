@@ -1,5 +1,7 @@
 """Residuals and their Jacobians over the scaled free parameters."""
 
+import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,17 +10,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import lively_values, system_of
 
+from exfit.errors import SimulationError
 from exfit.experiment import Channel, Experiment
+from exfit.loss import LOSSES
 from exfit.models import MODELS
+from exfit.noise import noise
 from exfit.plant import VT0
 from exfit.residuals import (
     CENTRAL_STEP,
+    FINEST,
     JACOBIANS,
     ONE_SIDED_STEP,
     Free,
+    Known,
     Residuals,
+    Robust,
 )
 from exfit.simulate import Change, Course, Simulator, each
+from exfit.ties import Ties, parse
 
 TIMES = np.linspace(0.0, 2.0, 101)
 COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
@@ -176,3 +185,67 @@ def test_every_run_is_counted(exciter):
         call(residuals.start)
         assert residuals.simulations == before + cost
     assert residuals.substeps >= 1
+
+
+def with_extras(exciter, free, ties=None, robust=None):
+    """Return residuals whose free parameters, ties and loss are others."""
+    plain = problem(exciter)
+    names = {one.name for one in free}
+    fixed = {name: value for name, value in plain.fixed.items() if name not in names}
+    return Residuals(plain.experiments, free, fixed, ties, robust)
+
+
+def test_a_prior_is_one_more_error_in_the_unit_of_the_noise():
+    plain = problem("AC1A")
+    known = Known(plain.free[0].start * 1.1, plain.free[0].start * 0.05)
+    free = [replace(plain.free[0], prior=known), *plain.free[1:]]
+    residuals = with_extras("AC1A", free)
+    found, theta = residuals(residuals.start), residuals.start
+    assert found[:-1] == pytest.approx(plain(plain.start), abs=1e-15)
+    # the start is two standard deviations below the mean
+    assert found[-1] == pytest.approx(-2.0 * residuals.noise, rel=1e-12)
+    exact = residuals.exact(theta)
+    assert exact.shape == (len(found), len(free))
+    assert exact[-1, 0] == pytest.approx(residuals.noise * np.exp(theta[0]) / known.std)
+    assert np.all(exact[-1, 1:] == 0.0)
+
+
+@pytest.mark.parametrize("name", ["huber", "soft-l1"])
+def test_a_loss_applies_to_samples_and_not_to_priors(name):
+    plain = problem("AC1A")
+    known = Known(plain.free[0].start * 1.1, plain.free[0].start * 1e-9)
+    free = [replace(plain.free[0], prior=known), *plain.free[1:]]
+    loss = LOSSES[name]
+    residuals = with_extras("AC1A", free, robust=Robust(loss, 2.0))
+    found = residuals(residuals.start)
+    scale = 2.0 * max(noise(plain.channels[0].measured), FINEST)
+    assert found[:-1] == pytest.approx(loss.residual(plain(plain.start), scale), rel=1e-12)
+    assert found[-1] == pytest.approx(-1e8 * residuals.noise, rel=1e-6)
+    differences = residuals.central(residuals.start)
+    size = np.abs(differences).max(axis=0)
+    assert (np.abs(residuals.exact(residuals.start) - differences).max(axis=0) <= 1e-6 * size).all()
+
+
+def test_a_tied_parameter_moves_with_what_it_follows():
+    """Its column is the sum of both, each times its own slope."""
+    plain = problem("AC1A")
+    first, second = plain.free[0], plain.free[1]
+    ties = Ties({second.name: parse(f"={second.start / first.start!r}*{first.name}")})
+    tied = with_extras("AC1A", [first, *plain.free[2:]], ties)
+    apart, together = plain.exact(plain.start), tied.exact(tied.start)
+    # on the scale of logarithms a ratio that stays moves both alike
+    assert together[:, 0] == pytest.approx(apart[:, 0] + apart[:, 1], rel=1e-9, abs=1e-15)
+    assert together[:, 1:] == pytest.approx(apart[:, 2:], rel=1e-9, abs=1e-15)
+
+
+def test_a_tie_without_a_value_costs_infinity_and_has_no_derivative():
+    plain = problem("AC1A")
+    first, second = plain.free[0], plain.free[1]
+    ties = Ties({second.name: parse(f"=({first.name}-{first.start!r})**0.5")})
+    residuals = with_extras("AC1A", [first, *plain.free[2:]], ties)
+    below = residuals.start - np.eye(len(residuals.free))[0] * 0.1
+    assert np.all(residuals(below) == np.inf)
+    assert residuals.costs(np.array([below]))[0] == np.inf
+    for jacobian in (residuals.exact, residuals.central):
+        with pytest.raises(SimulationError, match=re.escape(f"({first.name}-")):
+            jacobian(residuals.start)
