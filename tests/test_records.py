@@ -20,6 +20,7 @@ from records import (
 )
 
 from exfit.changes import changed_values, read_parameters
+from exfit.check import check
 from exfit.errors import CaseError, RecordError
 from exfit.files import write_fit
 from exfit.record import read_columns
@@ -478,3 +479,39 @@ def test_a_signal_that_drives_must_have_no_gap(tmp_path):
     content["record"] |= {"file": "record.csv", "gaps": "skip"}
     with pytest.raises(RecordError, match="it drives, and has a gap at"):
         fitted_trials(case_of({**content, "validate": []}, tmp_path))
+
+
+def test_a_check_covers_all_records_and_what_is_found_about_them(tmp_path):
+    up = recording("up", at=found_in(1.0, 0.8, 1.2), delay=found_in(0.0123, -0.1, 0.1))
+    down = recording("down", step=found_in(-0.05, -0.08, -0.02))
+    up["test"]["vt0"] = found_in(1.0, 0.9, 1.1)
+    content = three_free(several(up, down))
+    content["parameters"]["fixed"]["VAMIN"] = "=-VAMAX"
+    found = check(case_of(content, tmp_path))
+    assert list(found.deviations)[-4:] == ["up.vref.at", "up.vt0", "up.delay", "down.vref.step"]
+    assert len(found.deviations) == 7
+    assert found.agrees
+    assert found.flat
+
+
+def test_a_fit_tells_what_is_of_the_unit_from_what_is_of_the_records(tmp_path):
+    content = three_free(several(recording("up", delay=found_in(0.0, -0.1, 0.1))))
+    content["records"][0]["test"]["vt0"] = 1.0
+    found = fit(case_of(content, tmp_path))
+    assert unit(found).keys() == THREE.keys()
+    assert found.parameters["up.delay"].unit == "s"
+    assert found.inputs.keys() == {"case", "records.up"}
+    assert [one.name for one in found.comparisons] == ["up"]
+
+
+def test_many_starts_end_at_one_minimum_with_unknowns_too(tmp_path):
+    content = three_free(several(recording("up", step=found_in(0.045, 0.02, 0.08))))
+    content["records"][0]["test"]["vt0"] = 1.0
+    content["parameters"]["free"] = {"KA": found_in(300.0, 100.0, 1000.0)}
+    content["parameters"]["fixed"] |= {"TE": 1.5238, "TF": 1.5754}
+    plain = fit(case_of(content, tmp_path))
+    content["estimate"] = {"starts": 6, "refine": 2}
+    found = fit(case_of(content, tmp_path))
+    assert found.minima is not None
+    assert found.values == pytest.approx(plain.values, rel=1e-4)
+    assert found.minima.minima[0].values.keys() == {"KA", "up.vref.step"}
