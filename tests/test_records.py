@@ -190,6 +190,21 @@ def test_a_case_on_line_may_hold_a_record_off_line(tmp_path):
     assert unit(on_line) == pytest.approx(unit(off_line), rel=1e-9)
 
 
+def test_a_switching_starts_from_the_network_of_its_own_record(tmp_path):
+    content, _, _ = on_and_off_line(tmp_path)
+    content["parameters"]["fixed"] |= {"KPR": 80.0, "KIR": 6.0}
+    on = content["records"][1]
+    on["plant"]["network"] = {**on["plant"]["network"], "X": 0.25}
+    on["test"]["network"] = [{"at": 2.0, "X": 0.4}]
+    trial = fitted_trials(case_of(content, tmp_path))[1]
+    (switch,) = [step for step in trial.experiment.simulator.course.steps if step.signal == "X"]
+    assert (switch.at, switch.step) == (2.0, pytest.approx(0.15))
+    content["plant"] |= {"type": "infinite-bus", "network": {**on["plant"]["network"], "X": 0.1}}
+    trial = fitted_trials(case_of(content, tmp_path))[1]
+    (switch,) = [step for step in trial.experiment.simulator.course.steps if step.signal == "X"]
+    assert switch.step == pytest.approx(0.15)
+
+
 def test_a_tie_is_the_number_that_it_gives(tmp_path):
     content = single()
     by_hand = fit(case_of(content, tmp_path))

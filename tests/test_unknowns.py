@@ -193,8 +193,21 @@ def test_a_delay_moves_the_features_of_both_signals_alike(tmp_path):
     prompt = fitted_trials(case_of(one(TEST), tmp_path))[0]
     late = fitted_trials(case_of(one(TEST, delay=0.5), tmp_path))[0]
     values = case_of(one(TEST), tmp_path).values()
-    rise = prompt.compare("prompt", values).simulated.rise_time
-    assert late.compare("late", values).simulated.rise_time == pytest.approx(rise, abs=1e-3)
+    peak = prompt.compare("prompt", values).simulated.peak_time
+    assert late.compare("late", values).simulated.peak_time == pytest.approx(peak, abs=1e-3)
+
+
+def test_an_early_recorder_sees_beyond_the_end_of_its_own_clock(tmp_path):
+    """At a delay of -0.4 s a record until 1.5 s shows what happens until 1.9 s, still in motion."""
+    values = case_of(one(TEST), tmp_path).values()
+    synthetic(tmp_path, TEST, TIME, noise=0.0)
+    whole = read_columns(tmp_path / "record.csv", ["t", "vt"])
+    write(tmp_path / "record.csv", t=TIME[:151], vt=whole["vt"][:151])
+    for delay in (-0.4, found_in(-0.4, -0.5, 0.1)):
+        trial = fitted_trials(case_of(one(TEST, delay=delay), tmp_path))[0]
+        early = trial.response(values).signals["vt"]
+        # grids of 1 ms that end elsewhere, and a cubic between the samples
+        assert early == pytest.approx(whole["vt"][40:191], abs=1e-6)
 
 
 def test_an_early_recorder_leaves_less_to_tell_the_level(tmp_path):
