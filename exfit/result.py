@@ -207,9 +207,10 @@ class PartOf(NamedTuple):
 class FitResult:
     """A fit: what was found, how, and how well it matches.
 
-    ``parameters`` holds the fitted ones, ``fixed`` all others, of every part, under their names in
-    the system: KA, machine.Tpd0. ``cost`` is what the fit made small, ``comparisons`` are with each
-    record, ``knowledge`` is what they tell of the parameters, None where that is not known.
+    ``parameters`` holds the fitted ones, ``fixed`` all others of every part, those that follow
+    others by ``ties`` too, under their names in the system: KA, machine.Tpd0. ``cost`` is what the
+    fit made small, ``comparisons`` are with each record, ``knowledge`` is what they tell of the
+    parameters, None where that is not known.
     """
 
     case: Path
@@ -219,6 +220,7 @@ class FitResult:
     saturation: str
     parameters: Mapping[str, FittedParameter]
     fixed: Mapping[str, float]
+    ties: Mapping[str, str]
     typical: tuple[str, ...]
     parts: tuple[PartOf, ...]
     cost: float
@@ -292,6 +294,7 @@ class FitResult:
                     "min": one.min,
                     "max": one.max,
                     "at_bound": one.at_bound,
+                    "of_record": one.of_record,
                     **self._confidence_as_json(name),
                 }
                 for name, one in self.parameters.items()
@@ -301,6 +304,7 @@ class FitResult:
                 for name, value in self.values_of("").items()
                 if name not in self.parameters
             },
+            "ties": dict(self.ties),
             "typical": list(self.typical),
             **self._parts_as_json(),
             "cost": self.cost,
@@ -442,7 +446,7 @@ def parameter_file(result: FitResult) -> str:
         if one is None and name not in result.values_of(""):
             continue  # as the case has it
         if one is None:
-            origin = "typical" if name in result.typical else "fixed"
+            origin = "typical" if name in result.typical else result.ties.get(name, "fixed")
         else:
             origin = f"fitted, on its {one.at_bound}" if one.at_bound else "fitted"
         lines.append(f"  {name}: {yaml_number(value)}  # {origin}")

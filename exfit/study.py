@@ -91,6 +91,7 @@ def fit(
         saturation=case.saturation,
         parameters=_parameters(case, residuals, values),
         fixed={name: values[name] for name in given if name not in case.free()},
+        ties={name: tie.text for name, tie in case.ties.by_name.items()},
         typical=case.typical(),
         parts=tuple(PartOf(part.kind, part.name, part.prefix) for part in case.parts.all),
         cost=found.cost,

@@ -68,6 +68,7 @@ def result(free=2, iterations=4, phases=("lm", "dgn"), at_bound=None):
             name: FittedParameter(end[name], 1.0, 0.1, 10.0, at_bound, "pu") for name in names
         },
         fixed={},
+        ties={},
         typical=(),
         parts=(),
         cost=1.0,
