@@ -798,7 +798,9 @@ def test_the_program_starts_as_a_command_and_as_a_pipe(tmp_path):
     [
         pytest.param(("record.file", "flat.csv"), "vt is 1 pu throughout", id="flat"),
         pytest.param(
-            ("record.channels.vt", {"column": "v", "scale": 0.0}), "vt is 0 pu", id="scaled away"
+            ("record.channels.vt", {"column": "v", "scale": 0.0}),
+            "leaves nothing",
+            id="scaled away",
         ),
         pytest.param(
             ("record.channels.vt", {"column": "v", "scale": 1e200}), "too large", id="overflow"
