@@ -171,13 +171,15 @@ def stretches(course: Course, step: float) -> list[Stretch]:
 
 @cache
 def lagrange(points: int) -> Array:
-    """Return the polynomials that are one at one of 0 ... points - 1 and zero at the others.
+    """Return the polynomials that are one at one of some points a step apart, zero at the others.
 
-    A row of coefficients each, from the lowest power up, and below them those of their slopes:
-    zero where there are fewer points than NEIGHBOURS, (2 NEIGHBOURS, NEIGHBOURS).
+    A row of coefficients each, from the lowest power of the distance from their middle up, and
+    below them those of their slopes: zero where there are fewer points than NEIGHBOURS,
+    (2 NEIGHBOURS, NEIGHBOURS).
     """
+    places = np.arange(points) - 0.5 * (points - 1)  # about the middle powers stay small
     values = np.zeros((NEIGHBOURS, NEIGHBOURS))
-    values[:points, :points] = np.linalg.inv(np.vander(np.arange(points), increasing=True)).T
+    values[:points, :points] = np.linalg.inv(np.vander(places, increasing=True)).T
     slopes = np.roll(values * np.arange(NEIGHBOURS), -1, axis=1)
     return np.vstack([values, slopes])
 
@@ -203,7 +205,7 @@ class Sampling:
         first = np.clip(np.floor(position) - 1.0, 0.0, last + 1.0 - points)
         powers = np.ones((NEIGHBOURS, len(times)))
         for k in range(1, NEIGHBOURS):
-            powers[k] = powers[k - 1] * (position - first)
+            powers[k] = powers[k - 1] * (position - first - 0.5 * (points - 1.0))
         weights = np.zeros((2 * NEIGHBOURS, len(times)))
         for n in {min(NEIGHBOURS, part.steps + 1) for part in grid}:
             weights += lagrange(n) @ (powers * (points == n))
@@ -213,7 +215,7 @@ class Sampling:
         rows = before[owner] + first + np.arange(NEIGHBOURS)[:, None]
         self._rows = np.minimum(rows, before[-1] + count[-1]).astype(np.int64)
         nearest = np.clip(np.rint(position), 0.0, last)
-        on_grid = np.abs(position - nearest) < near
+        on_grid = still | (np.abs(position - nearest) < near)
         exact = (before[owner] + nearest).astype(np.int64)
         if np.any(on_grid):
             self._weights[:, on_grid] = (self._rows == exact)[:, on_grid]
