@@ -44,7 +44,7 @@ class Design:
     """What the test of a case would tell, and others beside it.
 
     ``times`` are those of the samples of each channel of the case's own test; ``noise`` is the
-    standard deviation that was taken for each signal, per unit.
+    standard deviation that was taken for each signal, per unit; of each record, where they differ.
     """
 
     name: str
@@ -82,12 +82,14 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
     values = {**case.values(), **{one.name: one.start for one in free}}
     own = [trial.experiment for trial in trials] or [planned(case)]
     _refuse_noise(given)
-    levels = _noise(own, given)
+    levels = [_noise(one, given) for one in own]
+    finest = min(min(noises.values()) for noises in levels)
     fixed = {name: v for name, v in values.items() if name not in {one.name for one in free}}
 
     def told(experiments: Sequence[Experiment]) -> Knowledge:
         at = {**values, **_steps(experiments)}
-        seen = [_secured(_seen(one, levels), at, case) for one in experiments]
+        pairs = zip(experiments, levels, strict=True)
+        seen = [_secured(_seen(one, noises, finest), at, case) for one, noises in pairs]
         residuals = Residuals(seen, _moved(free, experiments), fixed, case.ties)
         names = tuple(one.name for trial in trials for one in trial.free)
         still = np.zeros(residuals.count)
@@ -103,7 +105,7 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
         told(own),
         tuple(one.simulator.times for one in own for _ in one.channels),
         tuple(plans),
-        {signal: level for signal, level in levels.items() if signal in _signals(case, own)},
+        _told_noise(case, own, levels),
     )
 
 
@@ -135,10 +137,10 @@ def _moved(free: Sequence[Free], experiments: Sequence[Experiment]) -> list[Free
     return [replace(one, start=sizes.get(one.name, one.start)) for one in free]
 
 
-def _noise(own: Sequence[Experiment], given: Mapping[str, float]) -> dict[str, float]:
-    """Return the noise of each signal."""
+def _noise(own: Experiment, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the noise of each signal in a test."""
     found = dict(NOISE)
-    for channel in (channel for one in own for channel in one.channels):
+    for channel in own.channels:
         recorded = noise(channel.measured[channel.kept]) if np.ptp(channel.measured) else 0.0
         known = channel.noise or recorded
         if known > 0.0:
@@ -146,9 +148,22 @@ def _noise(own: Sequence[Experiment], given: Mapping[str, float]) -> dict[str, f
     return {**found, **given}
 
 
-def _seen(one: Experiment, levels: Mapping[str, float]) -> Experiment:
+def _told_noise(
+    case: Case, own: Sequence[Experiment], levels: Sequence[Mapping[str, float]]
+) -> dict[str, float]:
+    """Return the noise of each signal, under the name of its record too where they differ."""
+    found = {}
+    for signal in _signals(case, own):
+        if len({noises[signal] for noises in levels}) == 1:
+            found[signal] = levels[0][signal]
+        else:
+            pairs = zip(own, levels, strict=True)
+            found |= {f"{one.name} {signal}": noises[signal] for one, noises in pairs}
+    return found
+
+
+def _seen(one: Experiment, levels: Mapping[str, float], finest: float) -> Experiment:
     """Return an experiment whose channels have the noise that is expected of them."""
-    finest = min(levels.values())
     channels = tuple(
         replace(channel, noise=levels[channel.signal], weight=finest / levels[channel.signal])
         for channel in one.channels

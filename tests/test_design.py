@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from records import UNIT, case_of, found_in, recording, several
 
 from exfit.case import load_case
 from exfit.design import NOISE, identify
@@ -138,7 +139,7 @@ def test_a_case_without_a_record_is_planned_on_its_own_clock(plain):
     (times,) = design.times
     assert (times[0], times[-1]) == (0.0, 10.0)
     assert list(plans(design)) == ["2 %", "5 %", "10 %", "longer", "+ efd", "+ ifd", "+ all"]
-    assert design.noise == NOISE
+    assert design.noise == {signal: NOISE[signal] for signal in ("vt", "efd", "ifd")}
 
 
 def test_a_plant_without_a_network_has_no_other_tests():
@@ -176,6 +177,26 @@ def test_the_own_test_is_as_telling_as_the_fit_to_its_record(changed):
     # nothing given: the noise is taken from the record, which tells it to some percent
     told = identify(case, {}).own.confidence
     assert errors(told) == pytest.approx(errors(known), rel=0.1)
+
+
+def test_records_of_different_noise_add_what_each_tells(tmp_path):
+    """The inverses of the covariances add up: each record counts by its own noise."""
+    levels = {"up": 1e-4, "down": 1e-3}
+    entries = {}
+    for name, noise in levels.items():
+        entries[name] = recording(name, channels={"vt": {"column": "vt", "noise": noise}})
+        entries[name]["test"]["vt0"] = 1.0
+    free = {name: found_in(UNIT[name], UNIT[name] / 10, UNIT[name] * 10) for name in ("KA", "TE")}
+
+    def planned(*names):
+        content = several(*(entries[name] for name in names), free=free)
+        content["parameters"]["fixed"] |= {k: v for k, v in UNIT.items() if k not in free}
+        return identify(case_of(content, tmp_path), {})
+
+    apart = [np.linalg.inv(planned(name).own.confidence.covariance) for name in levels]
+    both = planned(*levels)
+    assert np.linalg.inv(both.own.confidence.covariance) == pytest.approx(sum(apart), rel=1e-6)
+    assert {name: both.noise[f"{name} vt"] for name in levels} == levels
 
 
 def test_a_planned_test_says_nothing_of_residuals_that_there_are_not(plain):
