@@ -8,8 +8,9 @@ from known_minima import CERTIFIED, random_problem
 from linearised import autoregressive, decay, linearised, std_errors
 from scipy.optimize import curve_fit, least_squares
 from scipy.stats import chi2, kstest
+from scipy.stats import t as student
 
-from exfit.inference import Channel, Prior, confidence, sensitivity
+from exfit.inference import Channel, Prior, confidence, rises, sensitivity
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 
 # NIST Statistical Reference Datasets: certified standard deviations of the estimates
@@ -404,6 +405,60 @@ def test_as_many_samples_as_parameters_leave_nothing_to_judge_by():
     known = confidence(linearised(TRUTH, np.zeros(2), rows))
     why = "the record has no more samples than the fit has parameters"
     assert {one.why for one in known.parameters.values()} == {why}
+
+
+def test_what_a_prior_determines_takes_no_sample():
+    """A slope that its prior holds leaves the noise, and the degrees of freedom, of one fixed."""
+    noise = 0.2 * np.random.default_rng(14).standard_normal(10)
+    line = LINE[:: len(T) // 10]
+    held = linearised(TRUTH, noise, line, priors=(Prior(1, TRUTH[1], 1e-9, 0.2),))
+    known = confidence(held)
+    assert known.dof == pytest.approx(9.0)
+    assert known.noise[0].estimated == pytest.approx(np.sqrt(noise @ noise / 9.0))
+
+
+def test_one_channel_without_a_given_noise_leaves_it_to_be_judged():
+    noise = 0.1 * np.random.default_rng(15).standard_normal(len(T))
+    half = len(T) // 2
+    both = (Channel("vt", slice(0, half), 0.1), Channel("efd", slice(half, len(T))))
+    known = confidence(linearised(TRUTH, noise, LINE, channels=both))
+    assert known.noise[0].accepted
+    assert known.dof == pytest.approx(len(T) - 2)
+
+
+def test_samples_that_repeat_each_other_ask_for_students_t():
+    noise = autoregressive(np.random.default_rng(16), 0.9, len(T))
+    known = confidence(linearised(10.0 * TRUTH, noise, LINE))
+    worth = known.noise[0].effective
+    assert worth < 30.0
+    widths = [0.5 * np.ptp(one.interval) / one.std_error for one in known.parameters.values()]
+    assert widths == pytest.approx([student.ppf(0.975, worth - 2.0)] * 2)
+
+
+def test_a_given_noise_is_not_rejected_for_being_correlated():
+    noise = autoregressive(np.random.default_rng(17), 0.9, (200, len(T)))
+    given = (Channel("vt", slice(0, len(T)), 1.0),)
+    lins = [linearised(TRUTH, one, LINE, channels=given) for one in noise]
+    # as many samples, taken for independent, would reject 4 of 10
+    assert np.mean([not confidence(one).noise[0].accepted for one in lins]) <= 0.03
+
+
+def test_on_a_bound_the_cost_rises_by_the_mean_variance_of_all_samples():
+    noise, cut = np.random.default_rng(18).standard_normal(len(T)), 50
+    noise[:cut] *= 0.1
+    both = (Channel("vt", slice(0, cut), 0.1), Channel("efd", slice(cut, len(T)), 1.0))
+    lin = linearised(TRUTH, noise, LINE, channels=both, held=(None, "max"))
+    mean = (cut * 0.1**2 + (len(T) - cut)) / len(T)
+    assert rises(lin, confidence(lin))["b"] == pytest.approx(0.5 * chi2.ppf(0.95, 1) * mean)
+
+
+def test_the_partners_of_a_redundancy_are_named_beside_what_has_no_effect():
+    columns = np.column_stack([np.zeros_like(T), T, np.ones_like(T), T])
+    noise = np.random.default_rng(19).standard_normal(len(T))
+    known = confidence(linearised(np.full(4, 2.0), noise, columns)).parameters
+    assert known["a"].why == "has no effect on the record"
+    assert known["b"].why == "cannot be told apart from d"
+    assert known["d"].why == "cannot be told apart from b"
 
 
 @pytest.mark.parametrize("seed", range(3))

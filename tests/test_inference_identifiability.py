@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linearised import decay, linearised, std_errors
+from linearised import autoregressive, decay, linearised, std_errors
 
 from exfit.inference import WEAK, Channel, Prior, confidence, identifiability
 from exfit.inference.wording import digits, listed, move
@@ -50,6 +50,15 @@ def test_the_singular_values_are_those_of_relative_changes_in_units_of_noise():
     assert np.abs(np.sum(found.directions * right, axis=1)) == pytest.approx(np.ones(3))
     assert found.condition == pytest.approx(450.0)
     assert found.names == lin.names
+
+
+def test_a_singular_value_is_one_over_the_error_where_noise_is_not_white_too():
+    errors = autoregressive(np.random.default_rng(21), 0.9, SAMPLES)
+    lin = linearised([2.0], errors, np.linspace(0.0, 1.0, SAMPLES)[:, None])
+    known, found = analysed(lin)
+    (error,) = (one.relative_error for one in known.parameters.values())
+    assert known.noise[0].inflation > 2.0
+    assert 1.0 / found.singular_values[0] == pytest.approx(error)
 
 
 def test_a_weak_combination_moves_by_one_standard_error():
@@ -216,6 +225,20 @@ def test_a_nuisance_is_never_fixed():
         for one in found.suggestion:
             assert lin.names[most] not in one.names
             assert lin.names[most] not in one.errors
+
+
+def test_for_a_nuisance_that_is_hardly_known_nothing_is_fixed():
+    rows = np.linalg.qr(np.random.default_rng(22).standard_normal((SAMPLES, 3)))[0]
+    lin = linearised(
+        [1.0, 1.0, 1.0],
+        noise(22),
+        rows * [1e3, 1e3, 1.0],
+        width=np.ones(3),
+        nuisances=(False, False, True),
+    )
+    known, found = analysed(lin)
+    assert list(std_errors(known) > WEAK) == [False, False, True]
+    assert found.suggestion == ()
 
 
 def test_what_a_prior_says_is_seen():
