@@ -78,6 +78,7 @@ def fit(
         watch(history[-1])
 
     found, minima = search(case, residuals, method, announce, progress)
+    simulations, substeps = residuals.simulations, residuals.substeps  # of the search alone
     values, begin = residuals.values(found.x), residuals.values(residuals.start)
     interrupted = found.stop is estimate.Stop.INTERRUPTED
     known = None if interrupted else told(residuals, found.x, trials)
@@ -105,8 +106,8 @@ def fit(
         history=tuple(history),
         nfev=found.nfev,
         njev=found.njev,
-        simulations=residuals.simulations,
-        substeps=residuals.substeps,
+        simulations=simulations,
+        substeps=substeps,
         seconds=clock.perf_counter() - began,
         notes=tuple(_notes(case, residuals, found, trials, compared, tried)),
         validation=tried,
