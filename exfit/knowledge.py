@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.errors import SimulationError
 from exfit.inference import (
     Channel,
     Confidence,
@@ -67,7 +68,8 @@ class Knowledge:
 def knowledge(residuals: Residuals, theta: Array, of_record: tuple[str, ...]) -> Knowledge:
     """Return what the records tell at the scaled parameters theta (N,).
 
-    ``of_record`` names what belongs to a record and is no parameter of the unit.
+    ``of_record`` names what belongs to a record and is no parameter of the unit. Raises
+    SimulationError where a derivative is not finite.
     """
     linear = linearisation(residuals, theta, of_record)
     known = confidence(linear)
@@ -77,9 +79,15 @@ def knowledge(residuals: Residuals, theta: Array, of_record: tuple[str, ...]) ->
 def linearisation(
     residuals: Residuals, theta: Array, of_record: tuple[str, ...], errors: Array | None = None
 ) -> Linearisation:
-    """Return the errors and their exact derivatives at theta, in the parameters' own units."""
+    """Return the errors and their exact derivatives at theta, in the parameters' own units.
+
+    Raises SimulationError where a derivative is not finite.
+    """
     values = residuals.values(theta)
     found, slopes = residuals.errors(theta)
+    if not np.isfinite(slopes).all():
+        at = ", ".join(f"{one.name} = {values[one.name]:g}" for one in residuals.free)
+        raise SimulationError(f"the derivatives are not finite at {at}")
     errors = found if errors is None else errors
     influence, curvature = residuals.influence(errors)
     own = np.array([one.slope(float(x)) for one, x in zip(residuals.free, theta, strict=True)])

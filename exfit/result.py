@@ -333,7 +333,8 @@ class FitResult:
     def _confidence_as_json(self, name: str) -> dict[str, Any]:
         """Return how well a parameter is known."""
         if self.knowledge is None:
-            return {"std_error": None, "interval": None, "why": "the search was interrupted"}
+            why = "the search was interrupted" if self.interrupted else "no finite derivatives"
+            return {"std_error": None, "interval": None, "why": why}
         one = self.knowledge.confidence.parameters[name]
         return {"std_error": one.std_error, "interval": one.interval, "why": one.why}
 

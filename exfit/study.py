@@ -127,9 +127,15 @@ def fitted(case: Case) -> tuple[Trial, ...]:
     return trials
 
 
-def told(residuals: Residuals, theta: Array, trials: Iterable[Trial]) -> Knowledge:
-    """Return what the records tell at the solution theta (N,), in scaled parameters."""
-    known = knowledge(residuals, theta, names_of_records(trials))
+def told(residuals: Residuals, theta: Array, trials: Iterable[Trial]) -> Knowledge | None:
+    """Return what the records tell at the solution theta (N,), in scaled parameters.
+
+    None where the derivatives there are not finite.
+    """
+    try:
+        known = knowledge(residuals, theta, names_of_records(trials))
+    except SimulationError:
+        return None
     return replace(known, bent=bent(residuals, theta, known))
 
 

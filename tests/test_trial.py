@@ -10,7 +10,9 @@ import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
 from exfit.case import load_case
+from exfit.errors import SimulationError
 from exfit.plant import SATURATION, VT0
+from exfit.profiles import profile
 from exfit.simulate import Simulator
 from exfit.study import fit, simulate
 from exfit.trial import fitted_trials, values_of
@@ -118,3 +120,24 @@ def test_a_jacobian_costs_the_simulations_of_its_kind(load, jacobian, runs):
     found = fit(load(changed(CASE, "estimate", jacobian=jacobian), vt=TRUTH))
     assert found.success
     assert 0 <= found.simulations - (found.nfev + runs * found.njev) <= 1
+
+
+def test_a_fit_that_ends_where_the_response_has_no_slope_tells_what_it_found(load, tmp_path):
+    """The gain goes with the root of c, which is steepest where the best c lies: on its bound 0."""
+    text = (ROOT / "exfit" / "models" / "first_order.py").read_text()
+    text = text.replace("p.k", "(p.k + sqrt(p.c))")
+    text = text.replace(
+        "sheet(\n", 'sheet(\n    ("c", 0.1, "", (0.0, 10.0), "a part of the gain"),\n'
+    )
+    text = text.replace("import Signal\n", "import Signal, sqrt\n")
+    (tmp_path / "steep.py").write_text(text)
+    bounds = {"a": {"start": 1.0, "min": 0.1, "max": 100.0}}
+    bounds["c"] = {"start": 1.0, "min": 0.0, "max": 5.0, "scale": "linear"}
+    parameters = {"fixed": {"k": 4.5}, "free": bounds}  # the record has k = 4
+    case = load({**CASE, "model": "steep.py", "parameters": parameters}, vt=TRUTH)
+    found = fit(case)
+    assert (found.success, found.values["c"]) == (False, 0.0)
+    assert found.knowledge is None
+    assert found.as_json()["parameters"]["a"]["why"] == "no finite derivatives"
+    with pytest.raises(SimulationError, match=r"the derivatives are not finite at .*c = 0"):
+        profile(case)
