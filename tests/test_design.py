@@ -22,6 +22,7 @@ EXCITERS = {
     "st1a": {"KA": 190.0, "TC": 1.0},
 }
 VT = {"vt": 1e-4}
+OFF_LINE = {signal: NOISE[signal] for signal in ("vt", "efd", "ifd")}
 SMALL = 1e-4  # pu, of the reference: no limit is met, and what is quadratic is 1e-4 of it
 EXACT = 1e-9  # rounding
 
@@ -139,7 +140,7 @@ def test_a_case_without_a_record_is_planned_on_its_own_clock(plain):
     (times,) = design.times
     assert (times[0], times[-1]) == (0.0, 10.0)
     assert list(plans(design)) == ["2 %", "5 %", "10 %", "longer", "+ efd", "+ ifd", "+ all"]
-    assert design.noise == {signal: NOISE[signal] for signal in ("vt", "efd", "ifd")}
+    assert design.noise == OFF_LINE
 
 
 def test_a_plant_without_a_network_has_no_other_tests():
@@ -240,6 +241,6 @@ def test_the_figures_survive_json(plain):
     design = identify(plain("ac1a"), {})
     content = json.loads(json.dumps(design.as_json(), allow_nan=False))
     assert content["plans"].keys() == plans(design).keys()
-    assert content["noise"] == NOISE
+    assert content["noise"] == OFF_LINE
     errors_of = content["confidence"]["parameters"]["KA"]
     assert errors_of["std_error"] == design.own.confidence.parameters["KA"].std_error
