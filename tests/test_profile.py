@@ -64,6 +64,31 @@ def test_on_a_linear_problem_the_profile_is_a_parabola(seed):
     assert one.costs == pytest.approx(expected, abs=1e-3 * 0.7)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_on_a_linear_problem_either_side_takes_as_many_evaluations(seed):
+    """What is known of one step tells the next, downwards as upwards."""
+    fun, jac, x, _ = linear(seed)
+    below, above = [], []
+
+    def counted(z):
+        (below if z[1] < x[1] else above).append(z)
+        return fun(z)
+
+    profile(counted, jac, x, 1, FREE, 0.7)
+    assert len(below) == pytest.approx(len(above), abs=4)
+
+
+def test_a_minimum_lower_by_what_a_search_leaves_moves_no_profile():
+    fun, jac, x, J = linear(7, count=1)
+    rise = 0.7
+    # two steps of a hundred to the rise: the first step falls, by less than counts
+    left = x.copy()
+    left[0] += 0.02 * np.sqrt(2.0 * rise * np.linalg.inv(J.T @ J)[0, 0])
+    one = profile(fun, jac, left, 0, FREE, rise, points=100)
+    assert np.min(one.costs) < one.cost
+    assert not one.moved
+
+
 @pytest.mark.parametrize("points", [1, 2, 10])  # few are far apart: it takes refits in between
 @pytest.mark.parametrize(("index", "low", "high"), [(0, 197.3, 229.3), (1, 0.0469, 0.0862)])
 def test_the_intervals_of_puromycin_are_the_published_ones(index, low, high, points):
