@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from records import SAMPLES, UNIT, case_of, config, found_in
+from records import SAMPLES, UNIT, case_of, config, found_in, recording, several
 
 from exfit.conditioning import Conditioning
 from exfit.experiment import Channel
 from exfit.inference import sensitivity
 from exfit.knowledge import knowledge
 from exfit.residuals import noise_of
+from exfit.study import fit
 from exfit.trial import fitted_trials, residuals_of
 
 LOSSES = ("least-squares", "huber", "soft-l1")
@@ -66,3 +67,27 @@ def test_what_is_left_out_does_not_tell_the_noise(lost):
     spoiled = np.where(kept, measured, lost)
     without = noise_of(Channel("vt", measured[kept]))
     assert noise_of(Channel("vt", spoiled, conditioning=Conditioning(time, kept))) == without
+
+
+def test_one_record_that_is_not_described_is_not_made_up_for_by_another(tmp_path):
+    """Its step is given the wrong way round; as it hardly counts, the other one fits well."""
+    wrong = recording("down", step=0.05, channels={"vt": {"column": "vt", "weight": 0.01}})
+    records = (recording("up"), wrong)
+    for one, level in zip(records, (1.0, 1.0495), strict=True):
+        one["test"]["vt0"] = level
+    content = several(*records, free={"KA": found_in(300.0, 76.6, 7660.0)})
+    content["parameters"]["fixed"] |= {name: UNIT[name] for name in UNIT if name != "KA"}
+    found = fit(case_of(content, tmp_path))
+    assert found.success
+    assert found.comparisons[0].fit_percent > 95.0 > 0.0 > found.comparisons[1].fit_percent
+    assert not found.describes
+
+
+def test_of_many_starts_the_first_is_that_of_the_case(tmp_path):
+    content = several(recording("up"), free={"KA": found_in(310.0, 76.6, 7660.0)})
+    content["records"][0]["test"]["vt0"] = 1.0
+    content["parameters"]["fixed"] |= {name: UNIT[name] for name in UNIT if name != "KA"}
+    alone = fit(case_of(content, tmp_path))
+    many = fit(case_of({**content, "estimate": {"starts": 3}}, tmp_path))
+    assert many.minima.start_costs[0] == pytest.approx(alone.start_cost, rel=1e-12)
+    assert many.cost <= alone.cost * (1.0 + 1e-6)
