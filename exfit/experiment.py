@@ -214,5 +214,7 @@ class Experiment:
 
     def secured(self, values: Values) -> "Experiment":
         """Return the experiment with sub-steps enough all along the response to the values."""
+        steps, delay = self.simulator.course.steps, self.simulator.delay
         simulator = self.moved(values).secured(self.parameters(values))
-        return replace(self, simulator=simulator)
+        # moved back: what the values shift must not be shifted twice
+        return replace(self, simulator=simulator.moved(steps, delay))

@@ -24,7 +24,7 @@ from records import (
 from exfit.errors import CaseError, RecordError
 from exfit.plant import VT0
 from exfit.record import read_columns
-from exfit.study import fit, tried_on
+from exfit.study import fit, simulate, tried_on, validate
 from exfit.trial import fitted_trials, residuals_of, trial_of
 from exfit.unknowns import names_of
 
@@ -169,6 +169,18 @@ def test_auto_ends_where_other_starts_end(tmp_path, unit, direction):
     if unit == "ac1a" or direction == "up":
         assert ends[0][0] == pytest.approx(1.0, abs=1e-3)
         assert ends[0][1] == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("delay", [0.0, found_in(0.0, -0.05, 0.05)])
+def test_what_is_shown_of_a_record_has_the_cost_that_the_fit_found(tmp_path, delay):
+    """The instant, 40 ms off its start, moves the response once, also when it is read back."""
+    synthetic(tmp_path, TEST, TIME)
+    test = {"vt0": 1.0, "vref": [{"at": found_in(1.04, 0.9, 1.1), "step": 0.05}]}
+    case = case_of(one(test, delay=delay), tmp_path)
+    found = fit(case)
+    assert found.comparisons[0].cost == pytest.approx(found.cost, rel=1e-9)
+    for again in (validate(case, found.values)[0], simulate(case, found.values).comparison):
+        assert again.cost == pytest.approx(found.cost, rel=1e-9)
 
 
 def test_a_late_recorder_is_found(tmp_path):
