@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case import Case
+from exfit.knowledge import Knowledge
 from exfit.record import Record
-from exfit.residuals import Residuals
+from exfit.residuals import Residuals, noise_of
 from exfit.result import Comparison
 from exfit.simulate import parameters_used
 from exfit.trial import system_of
@@ -21,6 +22,7 @@ FAR = 0.01  # of vt0: beyond the noise of a record
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
 UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 MUCH_WORSE = 3.0  # than the fit
+MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 
 
 def notes(
@@ -62,6 +64,21 @@ def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:
             yield f"the record moves by {way:+.3g} pu, the response the other way"
         if vt0 is not None and abs(measured.initial_value - vt0) > FAR * abs(vt0):
             yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
+
+
+def misfit_notes(residuals: Residuals, known: Knowledge) -> Iterator[str]:
+    """Yield the channels that the fit misses by more than their noise, which none gave.
+
+    A given noise is compared with the residuals where the intervals are made.
+    """
+    for channel, seen in zip(residuals.channels, known.confidence.noise, strict=True):
+        times = seen.estimated / (channel.weight * noise_of(channel))
+        if channel.noise is None and times > MISFIT:
+            yield (
+                f"the error of {seen.label} is {times:.2g} times what its record scatters from "
+                "sample to sample: the step, the model or the record is not as the case says, and "
+                "the intervals do not hold that error"
+            )
 
 
 def validation_notes(fitted: Sequence[Comparison], tried: Sequence[Comparison]) -> Iterator[str]:

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import __version__, estimate
-from exfit.case import SINGLE, Case, known
+from exfit.case import SINGLE, Case, Unknown
 from exfit.errors import CaseError, SimulationError
 from exfit.knowledge import Knowledge, knowledge
 from exfit.notes import (
     level_notes,
     match_notes,
+    misfit_notes,
     notes,
     typical_notes,
     unsteady_notes,
@@ -109,7 +110,10 @@ def fit(
         simulations=simulations,
         substeps=substeps,
         seconds=clock.perf_counter() - began,
-        notes=tuple(_notes(case, residuals, found, trials, compared, tried)),
+        notes=(
+            *_notes(case, residuals, found, trials, compared, tried),
+            *(() if known is None else misfit_notes(residuals, known)),
+        ),
         validation=tried,
         versions=versions(),
         inputs=inputs(case, *trials, *validations),
@@ -219,7 +223,8 @@ def _notes(
     yield from notes(case, residuals, found, compared)
     for trial, one in zip(trials, compared, strict=True):
         before = trial.test.vt0 if trial.test.begin is None else None
-        yield from match_notes(one, known(before))
+        # one that is found lies where the record begins, or on a bound, which is told
+        yield from match_notes(one, None if isinstance(before, Unknown) else before)
         yield from record_notes(trial, one)
     yield from validation_notes(compared, tried)
 

@@ -373,3 +373,38 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     assert tried_on(case, trial, found.values).rmse == after.rmse
     unaligned = trial.secured(found.values).compare("start", found.values)
     assert unaligned.rmse > 10 * after.rmse
+
+
+def test_a_voltage_that_is_found_is_not_held_against_its_start(tmp_path):
+    """It starts 2 % off; on a bound it is that which is told, not the number it started from."""
+    synthetic(tmp_path, {**TEST, "vt0": 0.987}, TIME, noise=2e-5)
+    found = fit(case_of(one({**TEST, "vt0": found_in(1.01, 0.9, 1.1)}), tmp_path))
+    assert not [note for note in found.notes if note.startswith("vt0")]
+
+
+@pytest.mark.parametrize(
+    ("at", "step", "drift", "told"),
+    [
+        (1.0, 0.05, 0.0, False),
+        (0.93, 0.05, 0.0, True),
+        (1.0, 0.04, 0.0, True),
+        (1.0, 0.05, 1e-4, True),
+    ],
+)
+def test_an_error_far_above_the_noise_is_noted(tmp_path, at, step, drift, told):
+    """Of a step that the case has 70 ms early or a fifth too small, and of a record that drifts."""
+    shown = synthetic(tmp_path, TEST, TIME)["vt"]
+    write(tmp_path / "record.csv", t=TIME, vt=shown + drift * TIME)
+    test = {"vt0": 1.0, "vref": [{"at": at, "step": step}]}
+    found = fit(case_of(one(test, free=["KA", "TE", "TA"]), tmp_path))
+    assert any("scatters from sample to sample" in note for note in found.notes) == told
+
+
+def test_spikes_that_a_robust_loss_bears_are_no_misfit(tmp_path):
+    shown = synthetic(tmp_path, TEST, TIME)["vt"]
+    shown[::40] += 0.02
+    write(tmp_path / "record.csv", t=TIME, vt=shown)
+    plain = one(TEST, free=["KA", "TE"])
+    for content, told in ((plain, True), ({**plain, "estimate": {"loss": "huber"}}, False)):
+        found = fit(case_of(content, tmp_path))
+        assert any("scatters from sample to sample" in note for note in found.notes) == told
