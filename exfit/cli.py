@@ -115,7 +115,8 @@ def fit(
                 result = study.fit(loaded, strategy, watch)
         files.write_fit(result, folder, plots)
         show.fit(console, result, folder)
-    if not (result.success and result.accepted and result.describes):
+    done = result.success and not result.interrupted
+    if not (done and result.accepted and result.describes):
         raise SystemExit(NOT_CONVERGED)
 
 

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 
@@ -21,7 +21,7 @@ import yaml
 from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH
 from rich.console import Console
 
-from exfit import cli, show
+from exfit import cli, show, study
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.result import Iteration
@@ -834,3 +834,13 @@ def test_an_acceptance_without_a_validation_is_refused(run):
     ran = run("fit", case_file(case), "--no-plots")
     assert ran.code == 1
     assert "no validation" in ran.err
+
+
+def test_a_search_that_was_cut_short_ends_with_3_though_its_best_point_converged(run, monkeypatch):
+    found = study.fit
+    monkeypatch.setattr(
+        "exfit.study.fit",
+        lambda *given, **more: replace(found(*given, **more), interrupted=True),
+    )
+    ran = run("fit", case_file(), "--no-plots")
+    assert ran.code == 3
