@@ -97,6 +97,8 @@ def contradictions(data: Data, parts: Parts, ties: Ties) -> Iterator[Fault]:
     estimate = _section(data, "estimate")
     if "refine" in estimate and _numbers(estimate).get("starts", 1.0) <= 1.0:
         yield Fault(("estimate", "refine"), "only with more than one of estimate.starts")
+    if "loss_scale" in estimate and estimate.get("loss", "least-squares") == "least-squares":
+        yield Fault(("estimate", "loss_scale"), "only with estimate.loss: huber or soft-l1")
 
 
 def _records_faults(data: Data, kind: str) -> Iterator[Fault]:

@@ -43,6 +43,7 @@ Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
+MOST_STARTS = 1_000_000  # a day of simulations; their points alone fill 100 MB
 Text = Annotated[str, Strict(), Field(min_length=1)]
 Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSerializer(_thawed)]
 
@@ -416,7 +417,7 @@ class Estimate(Section):
         description="From how many standard deviations of the noise on an error costs less than "
         "its square.",
     )
-    starts: Count = Field(
+    starts: Annotated[Count, Field(le=MOST_STARTS)] = Field(
         default=1, description="Starts spread over the bounds, beside the case's own."
     )
     refine: Count | None = Field(

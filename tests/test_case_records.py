@@ -376,6 +376,18 @@ MEANING = {
         (*FIXED, "machine.Tpd0"),
         "not a parameter of AC1A",
     ),
+    "a scale of no loss": (
+        ("estimate", "loss"),
+        "least-squares",
+        ("estimate", "loss_scale"),
+        "only with estimate.loss",
+    ),
+    "starts beyond number": (
+        ("estimate", "starts"),
+        10**9,
+        ("estimate", "starts"),
+        "1000000000 is above 1000000",
+    ),
     "starts that are none": (("estimate", "starts"), 1, ("estimate", "refine"), "only with more"),
 }
 FAULTS = FORM | MEANING
