@@ -340,7 +340,9 @@ def test_on_a_bound_the_bound_decides_and_the_others_hold_for_it():
     known = confidence(linearised([0.0356, 2.0, 3.0], errors, rows, held=("min", None, None)))
     without = confidence(linearised([2.0, 3.0], errors, rows[:, 1:]))
     assert known.parameters["a"].interval is None
-    assert known.parameters["a"].why == "lies on its min 0.0356: the bound decides, not the record"
+    assert known.parameters["a"].why == (
+        "lies on its min 0.0356: the bound decides, not the record; the others hold for it there"
+    )
     assert std_errors(known)[1:] == pytest.approx(std_errors(without))
     assert known.dof == pytest.approx(58)
 

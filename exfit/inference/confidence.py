@@ -151,7 +151,8 @@ def reason(factors: Factors, k: int, share: float) -> str | None:
     """Return why a parameter has no interval."""
     lin = factors.lin
     if lin.held[k] is not None:
-        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: the bound decides, not the record"
+        told = "the bound decides, not the record; the others hold for it there"
+        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: {told}"
     if not factors.seen[k]:
         return "has no effect on the record"
     if not factors.determined[k]:
