@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case import Case
+from exfit.experiment import Channel
 from exfit.knowledge import Knowledge
 from exfit.record import Record
 from exfit.residuals import Residuals, noise_of
@@ -78,6 +79,18 @@ def misfit_notes(residuals: Residuals, known: Knowledge) -> Iterator[str]:
                 f"the error of {seen.label} is {times:.2g} times what its record scatters from "
                 "sample to sample: the step, the model or the record is not as the case says, and "
                 "the intervals do not hold that error"
+            )
+
+
+def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:
+    """Yield how many samples of each channel of a record were taken for outliers."""
+    for channel in channels:
+        seen = np.isfinite(channel.measured)
+        beyond = int(np.count_nonzero(seen & ~channel.kept))
+        if beyond:
+            yield (
+                f"{beyond} of {np.count_nonzero(seen)} samples of {channel.signal} of {name} are "
+                "left out as outliers"
             )
 
 

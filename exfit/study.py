@@ -18,6 +18,7 @@ from exfit.notes import (
     match_notes,
     misfit_notes,
     notes,
+    outlier_notes,
     typical_notes,
     unsteady_notes,
     validation_notes,
@@ -226,6 +227,7 @@ def _notes(
         # one that is found lies where the record begins, or on a bound, which is told
         yield from match_notes(one, None if isinstance(before, Unknown) else before)
         yield from record_notes(trial, one)
+        yield from outlier_notes(trial.record.source.name, trial.channels)
     yield from validation_notes(compared, tried)
 
 

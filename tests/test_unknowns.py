@@ -408,3 +408,14 @@ def test_spikes_that_a_robust_loss_bears_are_no_misfit(tmp_path):
     for content, told in ((plain, True), ({**plain, "estimate": {"loss": "huber"}}, False)):
         found = fit(case_of(content, tmp_path))
         assert any("scatters from sample to sample" in note for note in found.notes) == told
+
+
+def test_how_many_samples_are_left_out_as_outliers_is_noted(tmp_path):
+    shown = synthetic(tmp_path, TEST, TIME)["vt"]
+    shown[::60] += 0.02
+    shown[30:35] = np.nan
+    write(tmp_path / "record.csv", t=TIME, vt=shown)
+    channel = {"vt": {"column": "vt", "outliers": 8}}
+    found = fit(case_of(one(TEST, channel, free=["KA"], gaps="skip"), tmp_path))
+    told = f"10 of {len(TIME) - 5} samples of vt of record.csv are left out as outliers"
+    assert told in found.notes
