@@ -17,6 +17,7 @@ from exfit.inference import (
     identifiability,
     rises,
 )
+from exfit.inference.wording import listed
 from exfit.residuals import Residuals
 
 Array = NDArray[np.float64]
@@ -50,11 +51,15 @@ class Knowledge:
     @property
     def open(self) -> tuple[str, ...]:
         """What is not determined, and what could be done about it, in words."""
-        reasons = [
-            f"{name} {one.why}"
-            for name, one in self.confidence.parameters.items()
-            if one.why is not None
-        ]
+        without = {
+            name: one for name, one in self.confidence.parameters.items() if one.why is not None
+        }
+        vague = [name for name, one in without.items() if one.std_error is not None]
+        if len(vague) < 2:
+            vague = []  # its own reason says more
+        reasons = [f"{name} {one.why}" for name, one in without.items() if name not in vague]
+        if vague:
+            reasons.append(f"{listed(vague)} are not determined by the record: see `exfit profile`")
         return (*reasons, *self.identifiability.sentences)
 
     @property

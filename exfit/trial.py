@@ -69,6 +69,7 @@ from exfit.unknowns import prefix_of, started, unknowns
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
+WIDEST = 10  # windows of a running median that a record holds: a wider one hides the response
 FEWEST = 3  # samples of a channel: fewer do not show its noise
 
 
@@ -377,6 +378,12 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> 
             raise RecordError(f"{record.source}: {signal}: outliers: {fault}") from fault
     if np.count_nonzero(kept) < FEWEST:
         raise RecordError(f"{record.source}: {signal}: fewer than {FEWEST} samples are left")
+    most = len(samples) // WIDEST
+    if isinstance(entry.filter, case_schema.Median) and entry.filter.median > most:
+        text = (
+            f"filter: median: {entry.filter.median} samples; at most {most}, a tenth of the record"
+        )
+        raise RecordError(f"{record.source}: {signal}: {text}")
     conditioning = None
     if entry.filter is not None or not kept.all():
         try:

@@ -17,6 +17,7 @@ from exfit.case import (
     Unknown,
     known,
 )
+from exfit.conditioning import outliers
 from exfit.errors import CaseError, RecordError
 from exfit.experiment import Nuisance
 from exfit.onset import find_step
@@ -38,7 +39,11 @@ def started(case: Case, recording: Recording, record: Record) -> BumpTest:
     """
     place = f"{case.path}: {prefix_of(recording)}test"
     test = recording.test
-    steps = tuple(_bounded(f"{place}.vref[{k}]", one, record) for k, one in enumerate(test.vref))
+    channel = recording.record.channels.get("vt")
+    limit = None if channel is None else channel.outliers
+    steps = tuple(
+        _bounded(f"{place}.vref[{k}]", one, record, limit) for k, one in enumerate(test.vref)
+    )
     instants = [known(step.at) or 0.0 for step in steps]
     for k, (before, at) in enumerate(pairwise(instants), 1):
         if at <= before:
@@ -65,8 +70,8 @@ def _lowest(value: float | Unknown) -> float:
     return value
 
 
-def _bounded(place: str, step: FindableStep, record: Record) -> FindableStep:
-    """Return a step of the reference, with numbers where it says auto."""
+def _bounded(place: str, step: FindableStep, record: Record, limit: float | None) -> FindableStep:
+    """Return a step of the reference, with numbers where it says auto; ``limit``: of outliers."""
     auto = [
         key
         for key in ("at", "step")
@@ -77,6 +82,8 @@ def _bounded(place: str, step: FindableStep, record: Record) -> FindableStep:
     vt = record.signals["vt"]
     seen = np.isfinite(vt)
     try:
+        if limit is not None:
+            seen[seen] = ~outliers(record.time[seen], vt[seen], limit)
         found = find_step(record.time[seen], vt[seen])
     except ValueError as fault:
         raise RecordError(f"{record.source}: {fault}; {place} asks for start: auto") from fault

@@ -257,3 +257,10 @@ def test_an_interrupted_fit_claims_no_intervals():
     assert found.interrupted
     assert found.knowledge is None
     assert found.as_json()["parameters"]["k"]["interval"] is None
+
+
+def test_several_parameters_that_are_not_determined_stand_in_one_sentence():
+    found = fit(case_of("ac1a_both")).knowledge
+    assert found.confidence.parameters["KA"].interval is None
+    told = [text for text in found.open if "not determined" in text]
+    assert told == ["KA and TE are not determined by the record: see `exfit profile`"]

@@ -419,3 +419,10 @@ def test_how_many_samples_are_left_out_as_outliers_is_noted(tmp_path):
     found = fit(case_of(one(TEST, channel, free=["KA"], gaps="skip"), tmp_path))
     told = f"10 of {len(TIME) - 5} samples of vt of record.csv are left out as outliers"
     assert told in found.notes
+
+
+def test_a_median_wider_than_a_tenth_of_the_record_is_refused(tmp_path):
+    channels = {"vt": {"column": "vt", "filter": {"median": 999}}}
+    content = several(recording("up", channels=channels), recording("down"))
+    with pytest.raises(RecordError, match=r"median: 999 samples; at most 100, a tenth"):
+        fit(case_of(content, tmp_path))
