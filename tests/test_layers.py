@@ -52,6 +52,8 @@ ORDER = (
     "exfit.psse.records",
     "exfit.psse.unit",
     "exfit.psse",
+    "exfit.case_data",
+    "exfit.record_faults",
     "exfit.case_faults",
     "exfit.case_schema",
     "exfit.case",
