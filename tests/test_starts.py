@@ -215,7 +215,16 @@ def test_an_interruption_from_watch_keeps_what_is_done(stage, workers):
     assert refined < 500
 
 
+@pytest.fixture
+def heeded():
+    """Heed SIGINT as a terminal's programme does: one in the background is told to ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.parametrize("place", [10, 700])
+@pytest.mark.usefixtures("heeded")
 def test_a_signal_ends_the_threads_at_once(place):
     """What Ctrl-C does: the main thread is interrupted while others are in the middle of fun."""
     calls, released, once = [], Event(), Lock()
