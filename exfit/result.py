@@ -433,9 +433,9 @@ def history_table(result: FitResult) -> str:
 def parameter_file(result: FitResult) -> str:
     """Return the values as YAML, to be read back by simulate and validate."""
     state = "interrupted" if result.interrupted else result.message
+    matches = (f"{one.record.name}: rmse {one.rmse:.4g} pu" for one in result.comparisons)
     lines = [
-        f"# {result.model} fitted to {result.comparison.record.name}: "
-        f"rmse {result.comparison.rmse:.4g} pu; {state}",
+        f"# {result.model} fitted to {', '.join(matches)}; {state}",
         f"model: {result.model}",
         "parameters:",
     ]

@@ -24,6 +24,7 @@ from records import (
 from exfit.errors import CaseError, RecordError
 from exfit.plant import VT0
 from exfit.record import read_columns
+from exfit.result import parameter_file
 from exfit.study import fit, simulate, tried_on, validate
 from exfit.trial import fitted_trials, residuals_of, trial_of
 from exfit.unknowns import names_of
@@ -426,3 +427,19 @@ def test_a_median_wider_than_a_tenth_of_the_record_is_refused(tmp_path):
     content = several(recording("up", channels=channels), recording("down"))
     with pytest.raises(RecordError, match=r"median: 999 samples; at most 100, a tenth"):
         fit(case_of(content, tmp_path))
+
+
+def test_a_step_that_may_be_earlier_asks_for_a_simulation_beyond_the_record(tmp_path):
+    """Shifted to its lower bound, the response is read behind the end of the record."""
+    content = several(recording("up", at=found_in(1.0, 0.8, 1.2)), recording("down"))
+    first, second = fitted_trials(case_of(content, tmp_path))
+    assert first.experiment.simulator.course.end == pytest.approx(first.record.time[-1] + 0.2)
+    assert second.experiment.simulator.course.end == second.record.time[-1]
+
+
+def test_the_file_of_parameters_names_every_record_with_its_error(tmp_path):
+    content = several(recording("up"), recording("down"), estimate={"iterations": 1})
+    found = fit(case_of(content, tmp_path))
+    heading = parameter_file(found).splitlines()[0]
+    for one_of in found.comparisons:
+        assert f"{one_of.record.name}: rmse {one_of.rmse:.4g} pu" in heading
