@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any, TypeGuard
 
-from exfit.case_parts import TIE
-
 Data = Mapping[str, Any]
 
 
@@ -30,11 +28,6 @@ def starts_in(entries: Any) -> dict[str, float]:
         for key, value in entries.items()
     }
     return numbers_in(known)
-
-
-def is_tie(value: Any) -> bool:
-    """Tell whether a value is the arithmetic of others."""
-    return isinstance(value, str) and value.startswith(TIE)
 
 
 def is_pair(value: Any) -> TypeGuard[list[float]]:

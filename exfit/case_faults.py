@@ -8,7 +8,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from math import inf
 
-from exfit.case_data import Data, is_number, is_tie, list_of, numbers_in, section_of
+from exfit.case_data import Data, is_number, list_of, numbers_in, section_of
 from exfit.case_form import PERCENT, near, show, show_value
 from exfit.case_parts import (
     WITHOUT_EXCITER,
@@ -23,7 +23,7 @@ from exfit.case_parts import (
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
 from exfit.record_faults import noise_faults, outside, repeated_names, trial_faults
-from exfit.ties import TieError, Ties
+from exfit.ties import TieError, Ties, is_tie
 from exfit.yaml_lines import Fault, Place
 
 Contradictions = Iterable[tuple[str, str]]

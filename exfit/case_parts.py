@@ -20,7 +20,7 @@ from exfit.models.sheet import (
     typical,
 )
 from exfit.plant import MACHINE, NETWORK, STABILISER, flow_sheet
-from exfit.ties import Tie, TieError, Ties, parse
+from exfit.ties import Tie, TieError, Ties, is_tie, parse
 from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
@@ -28,7 +28,6 @@ Contradictions = Iterator[tuple[str, str]]
 
 WITH_MACHINE = ("open-circuit", "infinite-bus", "machine-playback")
 WITHOUT_EXCITER = ("machine-playback",)
-TIE = "="  # what the arithmetic of other parameters begins with
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 
@@ -172,7 +171,7 @@ def _tied(data: Data, parts: Parts) -> Iterator[tuple[str, Place, str]]:
         for key in place:
             section = _mapping(section.get(str(key)))
         for symbol, value in section.items():
-            if isinstance(value, str) and value.startswith(TIE):
+            if is_tie(value):
                 yield prefix + symbol, (*place, symbol), value
 
 

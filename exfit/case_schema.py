@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from exfit.case_form import FILE_NAME, PERCENT
-from exfit.case_parts import TIE
+from exfit.ties import is_tie
 
 Value = TypeVar("Value")
 Signal = Literal["vt", "efd", "ifd", "p", "q", "vref"]
@@ -49,7 +49,7 @@ Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSe
 
 
 def _is_tie(value: Any) -> str:
-    return "[tie]" if isinstance(value, str) and value.startswith(TIE) else "[number]"
+    return "[tie]" if is_tie(value) else "[number]"
 
 
 def _is_percent(value: Any) -> str:

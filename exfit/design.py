@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from exfit.case import Case, InfiniteBus, OpenCircuit
 from exfit.case_form import near
-from exfit.errors import CaseError, SimulationError
+from exfit.errors import CaseError
 from exfit.experiment import Channel, Experiment
 from exfit.inference import Confidence, confidence, identifiability
 from exfit.knowledge import Knowledge, linearisation
 from exfit.noise import noise
 from exfit.residuals import Free, Residuals
 from exfit.simulate import Simulator
-from exfit.trial import fitted_trials, free_of, planned
+from exfit.trial import fitted_trials, free_of, planned, secured
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
     def told(experiments: Sequence[Experiment]) -> Knowledge:
         at = {**values, **_steps(experiments)}
         pairs = zip(experiments, levels, strict=True)
-        seen = [_secured(_seen(one, noises, finest), at, case) for one, noises in pairs]
+        seen = [secured(_seen(one, noises, finest), at, case.path) for one, noises in pairs]
         residuals = Residuals(seen, _moved(free, experiments), fixed, case.ties)
         names = tuple(one.name for trial in trials for one in trial.free)
         still = np.zeros(residuals.count)
@@ -169,13 +169,6 @@ def _seen(one: Experiment, levels: Mapping[str, float], finest: float) -> Experi
         for channel in one.channels
     )
     return replace(one, channels=channels)
-
-
-def _secured(one: Experiment, values: Mapping[str, float], case: Case) -> Experiment:
-    try:
-        return one.secured(values)
-    except SimulationError as fault:
-        raise SimulationError(f"{case.path}: {fault}") from fault
 
 
 def _variants(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -55,6 +56,11 @@ class Channel:
         if self.conditioning is None:
             return slopes
         return self.conditioning.tangents(samples, slopes)
+
+    @cached_property
+    def record(self) -> Array:
+        """The record as it is compared: filtering it for every evaluation would double the work."""
+        return self.conditioned(self.measured)
 
     @property
     def kept(self) -> NDArray[np.bool_]:
@@ -148,13 +154,15 @@ class Experiment:
 
     def compared(self, samples: Array, values: Values) -> Array:
         """Return the weighted errors of simulated signals (M, channels)."""
-        return np.concatenate(
-            [
-                channel.weight * channel.conditioned(samples[:, k])
-                - channel.weight * channel.conditioned(self.measured(channel, values))
-                for k, channel in enumerate(self.channels)
-            ]
-        )
+        blocks = []
+        for k, channel in enumerate(self.channels):
+            measured = self.measured(channel, values)
+            same = measured is channel.measured
+            theirs = channel.record if same else channel.conditioned(measured)
+            blocks.append(
+                channel.weight * channel.conditioned(samples[:, k]) - channel.weight * theirs
+            )
+        return np.concatenate(blocks)
 
     def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
         """Return the weighted errors and their derivatives (errors, N).

@@ -15,7 +15,7 @@ from exfit.check import STEPS, Check
 from exfit.design import Design
 from exfit.estimate import Progress
 from exfit.features import Features
-from exfit.inference import Confidence
+from exfit.inference import Uncertainty
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Sheet
 from exfit.profiles import Profiles
@@ -175,16 +175,15 @@ def design(console: Console, found: Design) -> None:
     table = plain_table("parameter", *heads, numbers=heads)
     known = [found.own.confidence, *(plan.confidence for plan in found.plans)]
     for name in found.own.linear.names:
-        table.add_row(name, *(_error(one, name) for one in known))
+        table.add_row(name, *(_error(one.parameters[name]) for one in known))
     console.print(table)
     console.print()
     remarks(console, "open", found.sentences)
 
 
-def _error(known: Confidence, name: str) -> str:
-    """Return the standard error of a parameter as it is shown."""
-    one = known.parameters[name]
-    if one.relative_error is not None:
+def _error(one: Uncertainty, of_record: bool = False) -> str:
+    """Return a standard error as it is shown: in percent, but of a record in its own unit."""
+    if one.relative_error is not None and not of_record:
         return percent(one.relative_error)
     return "-" if one.std_error is None else f"{one.std_error:.1e}"
 
@@ -239,10 +238,7 @@ def fitted_table(result: FitResult) -> Table:
             style = style or ("yellow" if known.why else "")
             if known.interval is not None:
                 interval = " ... ".join(number(limit) for limit in known.interval)
-            if known.relative_error is not None and not one.of_record:
-                error = percent(known.relative_error)
-            elif known.std_error is not None:
-                error = f"{known.std_error:.1e}"
+            error = _error(known, one.of_record)
         cells = (number(one.start), number(one.value), interval, error, one.unit, mark)
         table.add_row(name, *cells, style=style)
     return table

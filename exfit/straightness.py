@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.estimate.problem import half_square
 from exfit.knowledge import Knowledge
 from exfit.residuals import Residuals
 
@@ -22,11 +23,11 @@ def bent(residuals: Residuals, theta: Array, known: Knowledge) -> tuple[str, ...
 
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
-    least, rises, linear = _cost(residuals, theta), known.rises, known.linear
+    least, rises, linear = half_square(residuals(theta)), known.rises, known.linear
     found = [
         name
         for name, end in _ends(residuals, theta, known)
-        if not 1.0 / BENT <= (_cost(residuals, end) - least) / rises[name] <= BENT
+        if not 1.0 / BENT <= (half_square(residuals(end)) - least) / rises[name] <= BENT
     ]
     of_record = dict(zip(linear.names, linear.nuisances, strict=True))
     return tuple(name for name in dict.fromkeys(found) if not of_record[name])
@@ -44,9 +45,3 @@ def _ends(residuals: Residuals, theta: Array, known: Knowledge) -> Iterator[tupl
                 end = theta + along
                 if np.all((end >= low) & (end <= high)):
                     yield one.name, end
-
-
-def _cost(residuals: Residuals, theta: Array) -> float:
-    found = residuals(theta)
-    with np.errstate(all="ignore"):
-        return 0.5 * float(found @ found)

@@ -68,6 +68,11 @@ class Tie:
         return TieError(f"{self.text}: {what}" + (f" at {at}" if at else ""))
 
 
+def is_tie(value: object) -> bool:
+    """Tell whether a value stands for the arithmetic of others."""
+    return isinstance(value, str) and value.startswith("=")
+
+
 def parse(text: str) -> Tie:
     """Return the tie that a text beginning with = stands for.
 
@@ -77,7 +82,7 @@ def parse(text: str) -> Tie:
     if len(text) > LONGEST:
         start = text[:20]
         raise TieError(f"{start}...: {len(text)} characters; at most {LONGEST} are allowed")
-    if not text.startswith("="):
+    if not is_tie(text):
         raise TieError(f"{text}: does not begin with =")
     body = text[1:].strip(" ")
     if foreign := FOREIGN.search(body):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from traceback import extract_tb
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,7 @@ from exfit.unknowns import prefix_of, started, unknowns
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+Securable = TypeVar("Securable", Simulator, Experiment)
 
 WIDEST = 10  # windows of a running median that a record holds: a wider one hides the response
 FEWEST = 3  # samples of a channel: fewer do not show its noise
@@ -161,13 +163,13 @@ def values_of(case: Case, changed: Values) -> dict[str, float]:
     return Ties(following).apply({**case.values(), **changed})
 
 
-def secured(simulator: Simulator, values: Values, case: Path) -> Simulator:
-    """Return a simulator with sub-steps enough all along the response to the values.
+def secured(one: Securable, values: Values, case: Path) -> Securable:
+    """Return a simulator, or what has one, with sub-steps enough all along the response to values.
 
     Raises SimulationError, naming the case, where they have no start or no finite response.
     """
     try:
-        return simulator.secured(values)
+        return one.secured(values)
     except SimulationError as fault:
         raise SimulationError(f"{case}: {fault}") from fault
 
@@ -201,10 +203,8 @@ class Trial:
 
     def secured(self, values: Values) -> "Trial":
         """Return the trial with sub-steps enough all along the response to the values."""
-        try:
-            return replace(self, experiment=self.experiment.secured(self.known(values)))
-        except SimulationError as fault:
-            raise SimulationError(f"{self.case}: {fault}") from fault
+        experiment = secured(self.experiment, self.known(values), self.case)
+        return replace(self, experiment=experiment)
 
     def response(self, values: Values) -> Response:
         """Return everything that the simulation gives, on the clock of the record."""
@@ -295,11 +295,6 @@ def _step_of(event: Step | Switch, name: str, level: float | None) -> float | No
         return event.step if name == "E" else None
     then: float | None = getattr(event, name)
     return None if then is None or level is None else then - level
-
-
-def course_of(case: Case, test: BumpTest, span: tuple[float, float], values: Values) -> Course:
-    """Return a test from start to end, s, as the simulator takes it."""
-    return Course(*span, tuple(changes(case, test, values)))
 
 
 def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
@@ -459,7 +454,7 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
             ]
         )
     times = np.linspace(0.0, test.duration, round(count) + 1)
-    course = course_of(case, test, (0.0, test.duration), values)
+    course = Course(0.0, test.duration, tuple(changes(case, test, values)))
     return Simulator(system_of(case), course, times, case.simulation.step), {VT0: vt0}
 
 

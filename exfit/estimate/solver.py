@@ -37,7 +37,8 @@ def least_squares(
     method    gn           full Gauss-Newton steps, or nothing
               dgn          the same direction, shortened until Armijo's rule holds
               lm           Levenberg-Marquardt within a trust region
-              lm-then-dgn  lm until a full Gauss-Newton step proves good, then dgn
+              lm-then-dgn  lm until a full Gauss-Newton step proves good, then dgn; lm again where
+                           a kink stalls that
               auto         dgn; if that is not good enough, lm-then-dgn from x0; the better one
               robust       gn while it works, then lm
 
@@ -52,8 +53,8 @@ def least_squares(
     directions) or f(x) is below gtol^2 f(x0); (FLOOR) an iteration neither promised nor brought
     ftol f(x); (STEP) the full step is below xtol; (KINK) no trial is better and the full step
     promises less than a thousandth of f(x), as at a minimum where the derivative jumps; (CREEPING)
-    ten iterations, each with rejected trials, gained less than a millionth of f(x); or after
-    max_iterations, in each phase anew.
+    ten iterations, each with rejected trials, gained less than a millionth of f(x), and the full
+    step promises less than a thousandth; or after max_iterations, in each phase anew.
 
     Raises ValueError for bounds that cross, x0 outside them or residuals not finite there.
     """

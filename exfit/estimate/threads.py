@@ -24,8 +24,8 @@ def side_by_side(
     workers: int | None,
     told: Callable[[Done], object],
     stop: Event,
-) -> bool:
-    """Do a task for every item in ``workers`` threads; return whether all were done undisturbed.
+) -> None:
+    """Do a task for every item in ``workers`` threads.
 
     ``told`` is called with every result, in the thread that waits here. KeyboardInterrupt, there
     or in a task, sets ``stop``, which tasks obey by ``until``, and drops what has not begun. Any
@@ -45,7 +45,6 @@ def side_by_side(
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-    return not stop.is_set()
 
 
 def next_of(finished: "SimpleQueue[Future[Done]]") -> "Future[Done]":
