@@ -1,0 +1,54 @@
+"""The command line: reads arguments, calls study, shows what comes back; it computes nothing.
+
+Everything but click is imported in the command that needs it, so that help appears at once.
+"""
+
+import gc
+import os
+from typing import Any
+
+import click
+
+from exfit.cli.catalogue import models, schema
+from exfit.cli.exchange import export, import_
+from exfit.cli.fitting import check, fit, simulate, validate
+from exfit.cli.knowing import identify, profile
+from exfit.errors import ExfitError
+
+# before NumPy is imported: starting its threads costs more than they gain on matrices this small
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# else pydantic searches all packages that are installed, and runs what they plug into it
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+# a look for circles of dead objects at every 700 new ones takes a twentieth of a short fit
+gc.set_threshold(100_000)
+
+
+class Refusal(click.ClickException):
+    """Input that cannot be used: its faults on standard error, exit code 1."""
+
+    def show(self, file: Any = None) -> None:
+        """Print the message, all faults of a case under each other."""
+        lines = self.message.splitlines()
+        click.echo("Error: " + "\n       ".join(lines), err=True, file=file)
+
+
+class Commands(click.Group):
+    """The commands; what they refuse is told without a traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command, and turn what is wrong with its input into a message."""
+        try:
+            return super().invoke(ctx)
+        except ExfitError as fault:
+            raise Refusal(str(fault)) from fault
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="exfit")
+def main() -> None:
+    """Find the parameters of a generator's excitation system from a recorded bump test."""
+
+
+COMMANDS = (fit, simulate, validate, check, profile, identify, import_, export, models, schema)
+for command in COMMANDS:
+    main.add_command(command)

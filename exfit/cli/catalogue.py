@@ -1,0 +1,46 @@
+"""The commands models and schema."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command(short_help="List the models, or describe one.")
+@click.argument("name", required=False)
+@click.option(
+    "--plot",
+    "folder",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write a page with a figure of every model.",
+)
+def models(name: str | None, folder: Path | None) -> None:
+    """List the models, or print the drawing, data sheet and states of one."""
+    from exfit import show
+    from exfit.models import MODELS, STABILISERS, find
+    from exfit.models.machines import MACHINES
+
+    if folder is not None:
+        from exfit import files
+        from exfit.overview import write_overview
+
+        files.refuse_unwritable(folder)
+        write_overview(folder)
+        show.written(show.console(), folder)
+    elif name is None:
+        show.catalogue(show.console(), MODELS.values(), MACHINES.values(), STABILISERS.values())
+    elif name.upper() in STABILISERS:
+        show.model(show.console(), STABILISERS[name.upper()])
+    elif name.upper() in MACHINES:
+        show.machine(show.console(), MACHINES[name.upper()])
+    else:
+        show.model(show.console(), find(name, Path()))
+
+
+@click.command(short_help="Print the JSON Schema of a case file.")
+def schema() -> None:
+    """Print the JSON Schema of a case file, for editors that complete and check."""
+    from exfit.case import json_schema
+    from exfit.result import to_json
+
+    click.echo(to_json(json_schema()), nl=False)

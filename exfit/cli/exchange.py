@@ -1,0 +1,87 @@
+"""The commands import and export."""
+
+from pathlib import Path
+
+import click
+
+from exfit.cli.options import file_option, force_option, refuse_existing, write_text
+
+BUSES = click.IntRange(1, 999_999)
+
+
+@click.command("import", short_help="Make a case of a PSS/E dynamics file.")
+@click.argument("unit", type=click.Path(path_type=Path))
+@click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit.")
+@click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
+@file_option
+@force_option
+def import_(
+    unit: Path, bus: int | None, machine_id: str | None, output: Path | None, force: bool
+) -> None:
+    """Make a case of the machine, exciter and stabiliser in UNIT, a PSS/E .dyr file.
+
+    The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
+    holds several units, --bus and --id choose one.
+    """
+    from exfit.case_writer import case_text, import_unit
+    from exfit.psse import located
+
+    if output is not None:
+        refuse_existing(output, force)
+    found = import_unit(unit, bus, machine_id)
+    write_text(case_text(found, unit.name), output, located(found.warnings, str(unit)))
+    if output is not None:
+        click.echo(f"written to {output}; next: exfit simulate {output}")
+
+
+@click.command(short_help="Write the result of a fit as PSS/E records.")
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option(
+    "--format",
+    "_format",
+    type=click.Choice(["dyr"]),
+    default="dyr",
+    help="Kind of file: dyr, a PSS/E dynamics file (default).",
+)
+@click.option("--bus", type=BUSES, metavar="N", default=1, help="Bus of the unit (default: 1).")
+@click.option(
+    "--id",
+    "machine_id",
+    metavar="ID",
+    default="1",
+    callback=lambda _, __, value: _machine_id(value),
+    help="Machine id of the unit (default: 1).",
+)
+@click.option(
+    "--model", metavar="NAME", help="Another record of the exciter's model, such as ESAC8B."
+)
+@file_option
+@force_option
+def export(
+    result: Path,
+    _format: str,
+    bus: int,
+    machine_id: str,
+    model: str | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Write the machine, exciter and stabiliser of RESULT as PSS/E records.
+
+    RESULT is the result.json of a fit, or the folder that holds it. What a record cannot hold, or
+    what is not sure about it, is told.
+    """
+    from exfit.export import export as exported
+
+    if output is not None:
+        refuse_existing(output, force)
+    found = exported(result, bus, machine_id, model)
+    write_text(found.text, output, found.warnings)
+    if output is not None:
+        click.echo(f"written to {output}")
+
+
+def _machine_id(value: str) -> str:
+    if not (1 <= len(value) <= 2 and value.isascii() and value.isalnum()):
+        raise click.BadParameter(f"{value!r} is not one or two letters or digits.")
+    return value

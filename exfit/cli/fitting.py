@@ -1,0 +1,179 @@
+"""The commands fit, simulate, validate and check."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli.options import (
+    NOT_CONVERGED,
+    assignments,
+    case_argument,
+    folder_of,
+    json_option,
+    load,
+    output_option,
+    parameters_option,
+    plots_option,
+    quiet_option,
+)
+
+if TYPE_CHECKING:
+    from exfit.estimate import Method
+
+STRATEGIES = ("gn", "dgn", "lm", "lm-then-dgn", "auto", "robust")
+
+
+@click.command()
+@case_argument
+@output_option
+@click.option("--strategy", type=click.Choice(STRATEGIES), help="In place of the case's own.")
+@plots_option
+@quiet_option
+@json_option
+def fit(
+    case: Path,
+    output: Path | None,
+    strategy: "Method | None",
+    plots: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Fit the free parameters of CASE to its record.
+
+    Writes result.json, parameters.yaml, history.csv, response.csv and figures to runs/CASE-fit, or
+    to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad input; 3: not
+    converged, no match at all, or a validation beyond the limit that the case accepts.
+    """
+    from exfit import files, study
+    from exfit.result import to_json
+
+    loaded = load(case)
+    folder = output or folder_of(case, "fit")
+    files.refuse_unwritable(folder)
+    if quiet or as_json:
+        result = study.fit(loaded, strategy)
+        files.write_fit(result, folder, plots)
+        if as_json:
+            click.echo(to_json(result.as_json()), nl=False)
+    else:
+        from exfit import show
+
+        console = show.console()
+        if loaded.estimate.starts > 1:
+            with show.Bar(console).running() as progress:
+                result = study.fit(loaded, strategy, progress=progress)
+        else:
+            with show.Watch(console, show.task(loaded, strategy)).running() as watch:
+                result = study.fit(loaded, strategy, watch)
+        files.write_fit(result, folder, plots)
+        show.fit(console, result, folder)
+    done = result.success and not result.interrupted
+    if not (done and result.accepted and result.describes):
+        raise SystemExit(NOT_CONVERGED)
+
+
+@click.command()
+@case_argument
+@click.option("--set", "changes", multiple=True, metavar="KA=400", help="Value of a parameter.")
+@parameters_option
+@output_option
+@plots_option
+@quiet_option
+def simulate(
+    case: Path,
+    changes: tuple[str, ...],
+    parameters: Path | None,
+    output: Path | None,
+    plots: bool,
+    quiet: bool,
+) -> None:
+    """Simulate CASE at its start values.
+
+    Writes response.csv (t, vref, vt, efd, ifd and the states) and figures to runs/CASE-simulate, or
+    to DIR. --set goes over --parameters, and both over the case; a parameter of the machine is
+    named as in --set machine.Tpd0=6.
+    """
+    from exfit import files, study
+    from exfit.changes import changed_values, read_parameters
+
+    loaded = load(case)
+    folder = output or folder_of(case, "simulate")
+    files.refuse_unwritable(folder)
+    values = read_parameters(loaded, parameters) if parameters else {}
+    values |= changed_values(loaded, assignments(changes, "--set"), "--set")
+    simulation = study.simulate(loaded, values)
+    files.write_simulation(simulation, case.stem, folder, plots)
+    if not quiet:
+        from exfit import show
+
+        console = show.console()
+        if simulation.comparison is not None:
+            show.comparisons(console, [simulation.comparison])
+        console.print(f"sub-steps {simulation.response.substeps}")
+        show.notes(console, simulation.notes)
+        show.written(console, folder)
+
+
+@click.command(short_help="Compare fitted values with records that no fit saw.")
+@case_argument
+@parameters_option
+@click.option(
+    "--record",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Record in place of the first that the case validates on.",
+)
+@output_option
+@plots_option
+@quiet_option
+@json_option
+def validate(
+    case: Path,
+    parameters: Path | None,
+    record: Path | None,
+    output: Path | None,
+    plots: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Compare fitted values with the records of CASE that the fit never saw.
+
+    The values are those of the last fit of the case, or of --parameters. Writes validation.json,
+    samples and overlays to runs/CASE-validate, or to DIR.
+    """
+    from exfit import files, study
+    from exfit.changes import read_parameters
+    from exfit.result import to_json
+
+    loaded = load(case)
+    folder = output or folder_of(case, "validate")
+    files.refuse_unwritable(folder)
+    source = parameters or files.last_fit(case)
+    found = study.validate(loaded, read_parameters(loaded, source), record)
+    files.write_validation(found, folder, plots)
+    if as_json:
+        click.echo(to_json({"validation": [one.as_json() for one in found]}), nl=False)
+    elif not quiet:
+        from exfit import show
+
+        console = show.console()
+        console.print(f"values of {parameters or 'the last fit'}", soft_wrap=True, markup=False)
+        show.comparisons(console, found)
+        console.print()
+        show.written(console, folder)
+    if not all(one.accepted for one in found):
+        raise SystemExit(NOT_CONVERGED)
+
+
+@click.command(short_help="Check a case before its fit.")
+@case_argument
+def check(case: Path) -> None:
+    """Check CASE before a fit: derivatives, bypasses, sub-steps, a flat run."""
+    from exfit import show
+    from exfit.check import check as checked
+
+    found = checked(load(case))
+    show.check(show.console(), found)
+    if not (found.agrees and found.flat):
+        raise SystemExit(NOT_CONVERGED)

@@ -1,0 +1,83 @@
+"""What several commands share: their options, and small steps on the way."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.errors import ExfitError
+
+if TYPE_CHECKING:
+    from exfit.case import Case
+
+NOT_CONVERGED = 3
+
+case_argument = click.argument("case", type=click.Path(path_type=Path))
+output_option = click.option(
+    "-o", "--output", type=click.Path(path_type=Path), metavar="DIR", help="Folder for the files."
+)
+plots_option = click.option("--plots/--no-plots", default=True, help="Draw figures (default: yes).")
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else."
+)
+parameters_option = click.option(
+    "--parameters",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Values from the parameters.yaml of a fit.",
+)
+file_option = click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File to write; without it, to the terminal.",
+)
+force_option = click.option("--force", is_flag=True, help="Write over a file that exists.")
+
+
+def load(case: Path) -> "Case":
+    """Return the case of a file; raises CaseError with all faults of it."""
+    from exfit.case import load_case
+
+    return load_case(case)
+
+
+def refuse_existing(output: Path, force: bool) -> None:
+    """Raise ExfitError where a file would be lost: it may be the only copy of someone's work."""
+    if output.is_dir():
+        raise ExfitError(f"{output}: cannot be written: it is a folder")
+    if output.exists() and not force:
+        raise ExfitError(f"{output}: exists already; --force writes over it")
+
+
+def write_text(text: str, output: Path | None, warnings: Iterable[str]) -> None:
+    """Write a file, or to the terminal, and the warnings to standard error."""
+    from exfit.result import write
+
+    if output is None:
+        click.echo(text, nl=False)
+    else:
+        write(output, text)
+    for warning in warnings:
+        click.echo(f"Warning: {warning}", err=True)
+
+
+def folder_of(case: Path, command: str) -> Path:
+    """Return where a command leaves its files unless it is told."""
+    return Path("runs") / f"{case.stem}-{command}"
+
+
+def assignments(texts: tuple[str, ...], option: str) -> dict[str, float]:
+    """Return the numbers of an option such as --set KA=400; raises ExfitError for other text."""
+    values = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            values[name.strip()] = float(value)
+        except ValueError:
+            example = "KA=400" if option == "--set" else "vt=1e-4"
+            raise ExfitError(f"{option} {text}: not of the form {example}") from None
+    return values

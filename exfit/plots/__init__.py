@@ -1,0 +1,20 @@
+"""Figures of results: functions that return one, and touch nothing else."""
+
+from exfit.plots.knowledge import correlation, profiles, sensitivity
+from exfit.plots.overlays import overlay
+from exfit.plots.responses import overview, response
+from exfit.plots.search import convergence, trajectories, waterfall
+from exfit.plots.style import png
+
+__all__ = [
+    "convergence",
+    "correlation",
+    "overlay",
+    "overview",
+    "png",
+    "profiles",
+    "response",
+    "sensitivity",
+    "trajectories",
+    "waterfall",
+]

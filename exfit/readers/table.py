@@ -1,0 +1,57 @@
+"""A recorder's file as a table: named columns of numbers, whatever kind of file it is."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import RecordError
+
+Array = NDArray[np.float64]
+
+NONE: frozenset[str] = frozenset()
+COLUMNS_SHOWN = 30
+NANOSECOND = 1e-9  # s
+
+
+class Table(Protocol):
+    """Named columns, each (M,); what a fault is in, the messages call by its place in the file."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    @property
+    def sha256(self) -> str:
+        """The hash of its bytes; of a file in two parts, of both."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns, in the order of the file."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The units that the file itself gives, by column."""
+
+    @property
+    def clock(self) -> tuple[str, ...]:
+        """The column that holds the time, or those of date and time; empty where none seems to."""
+
+    def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
+        """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
+
+        Raises RecordError for a column that is not there, and a cell that is no number.
+        """
+
+    def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
+        """Return the time (M,) in s: numbers as they stand, timestamps since the first of them.
+
+        ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
+        RecordError where it contradicts the file, or a cell is neither number nor timestamp.
+        """
+
+    def place(self, row: int) -> str:
+        """Return where a sample stands, counted from 0, as messages name it: record.csv:17."""

@@ -1,0 +1,26 @@
+"""What the terminal shows: tables and lines, with rich."""
+
+from exfit.show.checks import check
+from exfit.show.fits import fit
+from exfit.show.knowledge import design, profiles
+from exfit.show.matches import comparisons
+from exfit.show.progress import Bar, Watch, task
+from exfit.show.sheets import catalogue, machine, model
+from exfit.show.terminal import console, notes, written
+
+__all__ = [
+    "Bar",
+    "Watch",
+    "catalogue",
+    "check",
+    "comparisons",
+    "console",
+    "design",
+    "fit",
+    "machine",
+    "model",
+    "notes",
+    "profiles",
+    "task",
+    "written",
+]

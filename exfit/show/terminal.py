@@ -1,0 +1,66 @@
+"""The terminal, and what all that is shown on it shares."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from exfit.inference import Uncertainty
+
+NARROW = 80  # columns where the width is unknown
+
+
+def console() -> Console:
+    """Return the terminal; a file or pipe is taken for a narrow one."""
+    found = Console(highlight=False)
+    return found if found.is_terminal else Console(highlight=False, width=NARROW)
+
+
+def plain_table(*columns: str, numbers: Sequence[str] = ()) -> Table:
+    """Return a table without frames; the named columns are numbers, aligned to the right."""
+    table = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
+    for column in columns[:-1]:
+        table.add_column(column, justify="right" if column in numbers else "left", no_wrap=True)
+    # the last column gives way where the terminal is narrow
+    table.add_column(columns[-1], justify="right" if columns[-1] in numbers else "left")
+    return table
+
+
+def number(value: float | None, digits: int = 5) -> str:
+    """Return a number in a few digits, a dash for None."""
+    return "-" if value is None else f"{value:.{digits}g}"
+
+
+def written(console: Console, folder: Path) -> None:
+    """Say where the files are."""
+    console.print(f"written to {folder}", soft_wrap=True, markup=False)
+
+
+def error_of(one: Uncertainty, of_record: bool = False) -> str:
+    """Return a standard error as it is shown: in percent, but of a record in its own unit."""
+    if one.relative_error is not None and not of_record:
+        return percent(one.relative_error)
+    return "-" if one.std_error is None else f"{one.std_error:.1e}"
+
+
+def notes(console: Console, texts: Iterable[str]) -> None:
+    """Show what must be known beside the numbers."""
+    remarks(console, "note", texts)
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, two digits of it."""
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
+
+
+def remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
+    """Show sentences one below the other, each behind its kind."""
+    table = Table.grid(padding=(0, 1))
+    table.add_column(style="yellow", no_wrap=True)
+    table.add_column()
+    for text in texts:
+        table.add_row(kind, Text(text))
+    if table.row_count:
+        console.print(table)
