@@ -1,20 +1,15 @@
 """A recorder's file as a table: named columns of numbers, whatever kind of file it is."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.errors import RecordError
-
 Array = NDArray[np.float64]
 
 NONE: frozenset[str] = frozenset()
-COLUMNS_SHOWN = 30
-NANOSECOND = 1e-9  # s
 
 
 class Table(Protocol):
