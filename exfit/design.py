@@ -16,8 +16,8 @@ from exfit.case import Case, InfiniteBus, OpenCircuit
 from exfit.case_form import near
 from exfit.errors import CaseError
 from exfit.experiment import Channel, Experiment
-from exfit.inference import Confidence, confidence, identifiability
-from exfit.knowledge import Knowledge, linearisation
+from exfit.inference import Confidence
+from exfit.knowledge import Knowledge, known_of, linearisation
 from exfit.noise import noise
 from exfit.residuals import Free, Residuals
 from exfit.simulate import Simulator
@@ -43,13 +43,12 @@ class Plan:
 class Design:
     """What the test of a case would tell, and others beside it.
 
-    ``times`` are those of the samples of each channel of the case's own test; ``noise`` is the
-    standard deviation that was taken for each signal, per unit; of each record, where they differ.
+    ``noise`` is the standard deviation that was taken for each signal, per unit; of each record,
+    where they differ.
     """
 
     name: str
     own: Knowledge
-    times: tuple[Array, ...]
     plans: tuple[Plan, ...]
     noise: Mapping[str, float]
 
@@ -96,14 +95,12 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
         linear = linearisation(residuals, residuals.start, names, still)
         # a start on its bound is no result
         linear = replace(linear, held=(None,) * len(linear.names))
-        known = confidence(linear)
-        return Knowledge(linear, known, identifiability(linear, known))
+        return known_of(residuals, residuals.start, linear)
 
     plans = [Plan(label, told(one).confidence) for label, one in _variants(case, own)]
     return Design(
         case.path.stem,
         told(own),
-        tuple(one.simulator.times for one in own for _ in one.channels),
         tuple(plans),
         _told_noise(case, own, levels),
     )

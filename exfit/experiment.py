@@ -69,6 +69,21 @@ class Channel:
             return np.ones(len(self.measured), dtype=bool)
         return self.conditioning.kept
 
+    @property
+    def samples(self) -> int:
+        """How many samples are compared."""
+        return int(np.count_nonzero(self.kept))
+
+    @property
+    def size(self) -> int:
+        """How many errors there are: one for each of these samples."""
+        return self.samples
+
+    @property
+    def plain(self) -> bool:
+        """Whether samples are compared as they stand."""
+        return self.conditioning is None or self.conditioning.filter is None
+
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
@@ -96,8 +111,8 @@ class Experiment:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """How many samples of each channel are compared."""
-        return tuple(int(np.count_nonzero(channel.kept)) for channel in self.channels)
+        """How many errors each channel has."""
+        return tuple(channel.size for channel in self.channels)
 
     def parameters(self, values: Values) -> dict[str, float]:
         """Return the parameters of the system."""
@@ -169,19 +184,26 @@ class Experiment:
 
         Each of ``moves`` (N) is a direction: by how much it changes which value.
         """
-        directions = [self._direction(move) for move in moves]
-        moving = [k for k, direction in enumerate(directions) if direction != Direction()]
-        samples, found = self.moved(values).tangents(
-            self.parameters(values), self.signals, [directions[k] for k in moving]
-        )
-        slopes = np.zeros((*samples.shape, len(moves)))
-        slopes[:, :, moving] = found
+        samples, slopes = self.course(values, moves)
         blocks = []
         for k, channel in enumerate(self.channels):
             ours = channel.slopes(samples[:, k], slopes[:, k])
             theirs = self._measured_slopes(channel, values, moves)
             blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
         return self.compared(samples, values), np.concatenate(blocks)
+
+    def course(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
+        """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
+        directions = [self._direction(move) for move in moves]
+        moving = [k for k, direction in enumerate(directions) if direction != Direction()]
+        samples, found = self.moved(values).tangents(
+            self.parameters(values), self.signals, [directions[k] for k in moving]
+        )
+        if len(moving) == len(moves):
+            return samples, found
+        slopes = np.zeros((*samples.shape, len(moves)))
+        slopes[:, :, moving] = found
+        return samples, slopes
 
     def _direction(self, move: Values) -> Direction:
         """Return a direction as the simulator takes it."""

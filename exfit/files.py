@@ -75,8 +75,7 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
         write(folder / "convergence.png", plots.png(plots.convergence(result)))
         write(folder / "trajectories.png", plots.png(plots.trajectories(result)))
         if result.knowledge is not None:
-            times = [one.time for one in result.comparisons for _ in one.overlays]
-            write_knowledge_figures(result.knowledge, times, result.name, folder)
+            write_knowledge_figures(result.knowledge, result.name, folder)
         if result.minima is not None:
             write(folder / "starts.png", plots.png(plots.waterfall(result.minima, result.name)))
     # last: where it stands, everything else does
@@ -85,13 +84,11 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
         write(_kept(result.case), parameter_file(result))
 
 
-def write_knowledge_figures(
-    known: Knowledge, times: Sequence[Array], name: str, folder: Path
-) -> None:
+def write_knowledge_figures(known: Knowledge, name: str, folder: Path) -> None:
     """Write what each parameter does to each signal over time, and how they are correlated."""
     from exfit import plots
 
-    write(folder / "sensitivity.png", plots.png(plots.sensitivity(known, times, name)))
+    write(folder / "sensitivity.png", plots.png(plots.sensitivity(known, name)))
     write(folder / "correlation.png", plots.png(plots.correlation(known, name)))
 
 
@@ -131,7 +128,7 @@ def write_profiles(found: Profiles, folder: Path, figures: bool) -> None:
 def write_design(found: Design, folder: Path, figures: bool) -> None:
     """Write what a planned test would tell as JSON and as figures."""
     if figures:
-        write_knowledge_figures(found.own, found.times, found.name, folder)
+        write_knowledge_figures(found.own, found.name, folder)
     write(folder / "identify.json", to_json(found.as_json()))
 
 

@@ -1,11 +1,14 @@
 """What the records of a fit tell of its parameters, and what they leave open."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import accumulate
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.condensed import condensed
 from exfit.errors import SimulationError
 from exfit.inference import (
     Channel,
@@ -23,16 +26,29 @@ from exfit.residuals import Residuals
 Array = NDArray[np.float64]
 
 
+class Moved(NamedTuple):
+    """By how much a signal moves over ``time`` (S,) in s for 100 % of each parameter: (S, N), pu.
+
+    What counts as 100 % says `Linearisation.size`: the value, for most.
+    """
+
+    label: str
+    time: Array
+    moved: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Knowledge:
     """Confidence and identifiability at the solution, with the linearisation that they are of.
 
-    ``bent`` names the parameters over whose intervals the response is not linear.
+    ``sensitivity`` is one course for each channel. ``bent`` names the parameters over whose
+    intervals the response is not linear.
     """
 
     linear: Linearisation
     confidence: Confidence
     identifiability: Identifiability
+    sensitivity: tuple[Moved, ...]
     bent: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
@@ -77,8 +93,30 @@ def knowledge(residuals: Residuals, theta: Array, of_record: tuple[str, ...]) ->
     SimulationError where a derivative is not finite.
     """
     linear = linearisation(residuals, theta, of_record)
-    known = confidence(linear)
-    return Knowledge(linear, known, identifiability(linear, known))
+    return known_of(residuals, theta, linear)
+
+
+def known_of(residuals: Residuals, theta: Array, linear: Linearisation) -> Knowledge:
+    """Return what a linearisation of the residuals at theta (N,) tells."""
+    known, courses = confidence(linear), tuple(_courses(residuals, theta, linear))
+    return Knowledge(linear, known, identifiability(linear, known), courses)
+
+
+def _courses(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Moved]:
+    """Yield what each channel shows: on the record's clock or, where condensed, on the grid."""
+    values, moves = residuals.values(theta), residuals.moves(theta)
+    size = linear.size / slopes_of(residuals, theta)
+    labels = iter(linear.channels)
+    for one in condensed(residuals).experiments:
+        _, slopes = one.course(values, moves)
+        for k in range(len(one.channels)):
+            yield Moved(next(labels).label, one.simulator.times, slopes[:, k] * size)
+
+
+def slopes_of(residuals: Residuals, theta: Array) -> Array:
+    """Return the derivative of each parameter to the number that the estimator moves, (N,)."""
+    pairs = zip(residuals.free, theta, strict=True)
+    return np.array([one.slope(float(x)) for one, x in pairs])
 
 
 def linearisation(
@@ -86,16 +124,17 @@ def linearisation(
 ) -> Linearisation:
     """Return the errors and their exact derivatives at theta, in the parameters' own units.
 
-    Raises SimulationError where a derivative is not finite.
+    ``errors`` takes the place of those at theta. Raises SimulationError where a derivative is not
+    finite.
     """
-    values = residuals.values(theta)
-    found, slopes = residuals.errors(theta)
+    values, fewer = residuals.values(theta), condensed(residuals)
+    found, slopes = fewer.errors(theta)
     if not np.isfinite(slopes).all():
         at = ", ".join(f"{one.name} = {values[one.name]:g}" for one in residuals.free)
         raise SimulationError(f"the derivatives are not finite at {at}")
-    errors = found if errors is None else errors
+    if errors is None:
+        errors = found if fewer is residuals else residuals(theta)[: residuals.count]
     influence, curvature = residuals.influence(errors)
-    own = np.array([one.slope(float(x)) for one, x in zip(residuals.free, theta, strict=True)])
     free = residuals.free
     return Linearisation(
         names=tuple(one.name for one in free),
@@ -105,10 +144,10 @@ def linearisation(
         width=np.array([one.high - one.low for one in free]),
         held=tuple(one.bound(values[one.name]) for one in free),
         errors=errors,
-        jacobian=slopes / own,
+        jacobian=slopes / slopes_of(residuals, theta),
         influence=influence,
         curvature=curvature,
-        channels=tuple(_channels(residuals)),
+        channels=tuple(_channels(residuals, fewer.sizes)),
         priors=tuple(
             Prior(k, known.mean, known.std, residuals.noise)
             for k, known in residuals.priors.items()
@@ -117,14 +156,18 @@ def linearisation(
     )
 
 
-def _channels(residuals: Residuals) -> list[Channel]:
-    """Return where the errors of each channel stand among those of all."""
-    found, first, several = [], 0, len(residuals.experiments) > 1
-    for one in residuals.experiments:
-        for channel, size in zip(one.channels, one.sizes, strict=True):
-            label = f"{one.name} {channel.signal}" if several else channel.signal
-            noise = None if channel.noise is None else channel.noise * channel.weight
-            rows = slice(first, first + size)
-            found.append(Channel(label, rows, noise, channel.weight))
-            first += size
-    return found
+def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[Channel]:
+    """Yield where the errors of each channel stand among those of all, and its rows."""
+    several = len(residuals.experiments) > 1
+    each = [(one, channel) for one in residuals.experiments for channel in one.channels]
+    places = zip(slices(rows), slices(residuals.sizes), strict=True)
+    for (one, channel), (own, errors) in zip(each, places, strict=True):
+        label = f"{one.name} {channel.signal}" if several else channel.signal
+        noise = None if channel.noise is None else channel.noise * channel.weight
+        yield Channel(label, own, noise, channel.weight, errors)
+
+
+def slices(sizes: Sequence[int]) -> list[slice]:
+    """Return where blocks of these sizes stand, one behind the other."""
+    ends = list(accumulate(sizes))
+    return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]

@@ -32,7 +32,7 @@ def notes(
     """Yield the notes on what a fit found; ``compared`` has sub-steps enough for its response."""
     values = residuals.values(found.x)
     yield from typical_notes(case)
-    rmse = float(np.sqrt(np.mean(found.fun**2)))
+    rmse = float(np.sqrt(2.0 * found.cost / residuals.samples))
     for one, match in zip(residuals.experiments, compared, strict=True):
         simulator, at = one.moved(values), one.parameters(values)
         moved = simulator.step_error(at, one.signals)

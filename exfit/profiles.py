@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case import Case
 from exfit.case_form import near
+from exfit.condensed import condensed
 from exfit.errors import CaseError
 from exfit.inference import LEVEL
 from exfit.knowledge import Knowledge, knowledge
@@ -136,6 +137,7 @@ def _sides(
     watch: Callable[[estimate.Progress], None],
 ) -> list[estimate.Profile]:
     """Return the profiles about x, those of like rises side by side; if x is a minimum, of all."""
+    fewer = condensed(residuals)
     alike: dict[str, list[int]] = {}
     for index, rise in rises.items():
         alike.setdefault(f"{rise:.{ALIKE}e}", []).append(index)
@@ -146,11 +148,11 @@ def _sides(
             watch(replace(progress, done=done + progress.done, total=2 * len(rises)))
 
         profiles = estimate.profiles(
-            residuals,
-            residuals.exact,
+            fewer,
+            fewer.exact,
             x,
             indices,
-            residuals.bounds,
+            fewer.bounds,
             rises[indices[0]],
             x_scale=UNIT,
             watch=tell,

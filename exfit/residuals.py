@@ -98,7 +98,7 @@ class Residuals:
         self.ties = Ties({}) if ties is None else ties
         self.sizes = tuple(size for one in experiments for size in one.sizes)
         self.simulations, self.substeps = 0, 1
-        self._robust = robust
+        self.robust = robust
         self._scales = self._loss_scales() if robust else np.zeros(0)
 
     @property
@@ -108,8 +108,13 @@ class Residuals:
 
     @property
     def count(self) -> int:
-        """How many samples are compared."""
+        """How many errors there are."""
         return sum(self.sizes)
+
+    @property
+    def samples(self) -> int:
+        """How many samples are compared: as many, unless they are condensed."""
+        return sum(channel.samples for channel in self.channels)
 
     @property
     def start(self) -> Array:
@@ -150,15 +155,15 @@ class Residuals:
         No loss is applied, and no prior is among them.
         """
         self.simulations += len(self.experiments)
-        values, moves = self.values(theta), self._moves(theta)
+        values, moves = self.values(theta), self.moves(theta)
         found = [one.tangents(values, moves) for one in self.experiments]
         return np.concatenate([e for e, _ in found]), np.concatenate([s for _, s in found])
 
     def exact(self, theta: Array) -> Array:
         """Return the exact Jacobian (samples + priors, N)."""
         errors, slopes = self.errors(theta)
-        if self._robust:
-            slopes *= self._robust.loss.slope(errors, self._scales)[:, None]
+        if self.robust:
+            slopes *= self.robust.loss.slope(errors, self._scales)[:, None]
         if not self.priors:
             return slopes
         known = np.zeros((len(self.priors), len(theta)))
@@ -168,9 +173,9 @@ class Residuals:
 
     def influence(self, errors: Array) -> tuple[Array, Array]:
         """Return how far each weighted error pulls, and the derivative of that; (samples,)."""
-        if self._robust is None:
+        if self.robust is None:
             return errors, np.ones_like(errors)
-        loss = self._robust.loss
+        loss = self.robust.loss
         return loss.influence(errors, self._scales), loss.curvature(errors, self._scales)
 
     @property
@@ -236,7 +241,7 @@ class Residuals:
     def _moved(self, theta: Array, to: Array) -> list[Array]:
         return [np.where(np.arange(len(theta)) == k, to, theta) for k in range(len(theta))]
 
-    def _moves(self, theta: Array) -> list[dict[str, float]]:
+    def moves(self, theta: Array) -> list[dict[str, float]]:
         """Return which values each scaled parameter moves, and how fast.
 
         Raises SimulationError where what follows them moves infinitely fast.
@@ -253,8 +258,8 @@ class Residuals:
         return moves
 
     def _residuals(self, errors: Array, values: Mapping[str, float]) -> Array:
-        if self._robust:
-            errors = self._robust.loss.residual(errors, self._scales)
+        if self.robust:
+            errors = self.robust.loss.residual(errors, self._scales)
         if not self.priors:
             return errors
         known = [
@@ -265,7 +270,7 @@ class Residuals:
 
     def _loss_scales(self) -> Array:
         """Return the error of each sample from which on it costs less than its square."""
-        share = 1.0 if self._robust is None else self._robust.scale
+        share = 1.0 if self.robust is None else self.robust.scale
         scales = [share * channel.weight * noise_of(channel) for channel in self.channels]
         return np.repeat(scales, self.sizes)
 

@@ -1,7 +1,7 @@
 """From parameter values to a response: the start at rest, the grid, the sub-steps, the samples."""
 
 import math
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -35,6 +35,7 @@ REST_TOLERANCE = 1e-6  # pu/s: below any real motion
 ROUNDING = 1e-13  # of a state
 ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
 REMEMBERED = 64  # sets of values: several threads ask for a few of theirs again
+BLOCK = 1 << 16  # samples whose interpolation is kept
 NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
 
 
@@ -189,7 +190,8 @@ class Sampling:
 
     Between grid points it interpolates with a polynomial that never reaches across an exact step of
     the inputs; at the instant of such a step it gives the values before the step. Before the start
-    and after the end it gives the values there.
+    and after the end it gives the values there. What it needs for that is kept for BLOCK times, and
+    found anew for each block of more.
     """
 
     def __init__(self, grid: Sequence[Stretch], times: Array, delay: float = 0.0) -> None:
@@ -197,45 +199,106 @@ class Sampling:
         near = ON_GRID if delay == 0.0 else 0.0
         wanted = times - delay
         read = np.clip(wanted, grid[0].start, grid[-1].end)
-        still = np.abs(wanted - read) > near * grid[0].step
+        self._still = np.abs(wanted - read) > near * grid[0].step
         start, step, count, end = np.array([(*part, part.end) for part in grid]).T
         owner = np.minimum(np.searchsorted(end, read - near * step[0]), len(grid) - 1)
         position, last = (read - start[owner]) / step[owner], count[owner]
-        points = np.minimum(NEIGHBOURS, last + 1.0)  # a short stretch has fewer
-        first = np.clip(np.floor(position) - 1.0, 0.0, last + 1.0 - points)
-        powers = np.ones((NEIGHBOURS, len(times)))
-        for k in range(1, NEIGHBOURS):
-            powers[k] = powers[k - 1] * (position - first - 0.5 * (points - 1.0))
-        weights = np.zeros((2 * NEIGHBOURS, len(times)))
-        for n in {min(NEIGHBOURS, part.steps + 1) for part in grid}:
-            weights += lagrange(n) @ (powers * (points == n))
-        self._weights, self._slopes = weights[:NEIGHBOURS], weights[NEIGHBOURS:] / step[owner]
-        self._slopes[:, still] = 0.0
+        self._step, self._points = step[owner], np.minimum(NEIGHBOURS, last + 1.0)
+        first = np.clip(np.floor(position) - 1.0, 0.0, last + 1.0 - self._points)
+        self._from_middle = position - first - 0.5 * (self._points - 1.0)
         before = np.cumsum(count + 1.0) - count - 1.0
-        rows = before[owner] + first + np.arange(NEIGHBOURS)[:, None]
-        self._rows = np.minimum(rows, before[-1] + count[-1]).astype(np.int64)
+        self.first = (before[owner] + first).astype(np.int64)
+        self.last = int(before[-1] + count[-1])
         nearest = np.clip(np.rint(position), 0.0, last)
-        on_grid = still | (np.abs(position - nearest) < near)
-        exact = (before[owner] + nearest).astype(np.int64)
-        if np.any(on_grid):
-            self._weights[:, on_grid] = (self._rows == exact)[:, on_grid]
-        within = nearest.astype(np.int64)
-        parts = [within[owner == k] for k in range(len(grid))]
-        self._exact = parts if np.all(on_grid) else None
+        self._on_grid = self._still | (np.abs(position - nearest) < near)
+        self._nearest = (before[owner] + nearest).astype(np.int64)
+        self._exact: list[NDArray[np.int64]] | None = None
+        if np.all(self._on_grid):
+            within = nearest.astype(np.int64)
+            self._exact = [within[owner == k] for k in range(len(grid))]
+
+    @property
+    def blocks(self) -> list[slice]:
+        """The samples, so many at a time that what belongs to them takes little memory."""
+        count = len(self.first)
+        return [slice(first, min(first + BLOCK, count)) for first in range(0, count, BLOCK)]
 
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
         if self._exact is None:
-            return self._combined(run, self._weights)
+            return self._read(run, self.weights)
         # each stretch by itself: a copy of the whole run costs more than a simulation's tenth
         return np.concatenate([part[k] for part, k in zip(run, self._exact, strict=True)])
 
     def slope(self, run: Sequence[Array]) -> Array:
         """Return the time derivatives (M, ...), per s, of what a run gives as samples."""
-        return self._combined(run, self._slopes)
+        return self._read(run, self._slopes)
 
-    def _combined(self, run: Sequence[Array], weights: Array) -> Array:
-        return np.asarray(np.einsum("km,km...->m...", weights, _rows(run)[self._rows]))
+    def rows(self, block: slice) -> NDArray[np.int64]:
+        """Return which points of a run each sample of a block is read from, (NEIGHBOURS, block)."""
+        if block == slice(0, len(self.first)):
+            return self._all_rows
+        return self._rows_of(block)
+
+    def weights(self, block: slice) -> Array:
+        """Return how much each of these points counts, (NEIGHBOURS, block)."""
+        if block == slice(0, len(self.first)):
+            return self._all_weights
+        return self._weights_of(block)
+
+    @cached_property
+    def _all_rows(self) -> NDArray[np.int64]:
+        return self._rows_of(slice(0, len(self.first)))
+
+    @cached_property
+    def _all_weights(self) -> Array:
+        return self._weights_of(slice(0, len(self.first)))
+
+    def _rows_of(self, block: slice) -> NDArray[np.int64]:
+        return np.asarray(np.minimum(self.first[block] + np.arange(NEIGHBOURS)[:, None], self.last))
+
+    def _weights_of(self, block: slice) -> Array:
+        weights = self._polynomials(block, slice(0, NEIGHBOURS))
+        on_grid = self._on_grid[block]
+        if np.any(on_grid):
+            exact = self._rows_of(block) == self._nearest[block]
+            weights[:, on_grid] = exact[:, on_grid]
+        return weights
+
+    def _slopes(self, block: slice) -> Array:
+        slopes = self._polynomials(block, slice(NEIGHBOURS, 2 * NEIGHBOURS)) / self._step[block]
+        slopes[:, self._still[block]] = 0.0
+        return np.asarray(slopes)
+
+    def _polynomials(self, block: slice, rows: slice) -> Array:
+        """Return rows of ``lagrange`` at the samples of a block, (NEIGHBOURS, block)."""
+        away, points = self._from_middle[block], self._points[block]
+        powers = np.ones((NEIGHBOURS, len(away)))
+        for k in range(1, NEIGHBOURS):
+            powers[k] = powers[k - 1] * away
+        found = np.zeros((NEIGHBOURS, len(away)))
+        for n in np.unique(points):
+            found += lagrange(int(n))[rows] @ (powers * (points == n))
+        return found
+
+    def _read(self, run: Sequence[Array], weights: Callable[[slice], Array]) -> Array:
+        whole = _rows(run)
+        found = np.empty((len(self.first), *whole.shape[1:]))
+        for block in self.blocks:
+            np.einsum("km,km...->m...", weights(block), whole[self.rows(block)], out=found[block])
+        return found
+
+
+class WholeRun:
+    """Reads a run at all points of its grid, one stretch behind the other."""
+
+    def __call__(self, run: Sequence[Array]) -> Array:
+        """Return all points (G, ...) of a run."""
+        return _rows(run)
+
+    def slope(self, run: Sequence[Array]) -> Array:
+        """Raise: a delay is one of samples."""
+        raise NotImplementedError("a delay between points of the grid")
 
 
 def _rows(run: Sequence[Array]) -> Array:
@@ -293,7 +356,7 @@ class Simulator:
         self.step, self.least, self.delay = step, least, delay
         self._grid = stretches(course, step)
         self._inputs = [self._inputs_of(part) for part in self._grid]
-        self._sampling = Sampling(self._grid, times, delay)
+        self._sampling: Sampling | WholeRun = Sampling(self._grid, times, delay)
         self._known: dict[bytes, int] = {}  # the sub-steps of values asked for lately
 
     def moved(self, steps: tuple[Change, ...], delay: float) -> "Simulator":
@@ -314,6 +377,19 @@ class Simulator:
         if delay != self.delay:
             result._sampling = Sampling(self._grid, self.times, delay)
         return result
+
+    def on_grid(self) -> "Simulator":
+        """Return the simulator that gives all points of its grid, whatever the delay.
+
+        An instant of an exact step is there twice: before and after it.
+        """
+        result = copy(self)
+        result.times, result._sampling = np.concatenate([p.times for p in self._grid]), WholeRun()
+        return result
+
+    def sampling(self) -> Sampling:
+        """Return what reads the response at the sample times from the points of its grid."""
+        return Sampling(self._grid, self.times, self.delay)
 
     @cached_property
     def time_constants(self) -> tuple[str, ...]:
@@ -361,8 +437,9 @@ class Simulator:
         """
         simulator = self
         for _ in range(MOST_REPEATS):
-            response = simulator.response(values)
-            wanted = simulator.substeps_along(values, response)
+            whole = simulator.on_grid()
+            response = whole.response(values)
+            wanted = whole.substeps_along(values, response)
             if wanted <= response.substeps:
                 break
             simulator = self._with(self.step, wanted)

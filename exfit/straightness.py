@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.condensed import condensed
 from exfit.estimate.problem import half_square
 from exfit.knowledge import Knowledge
 from exfit.residuals import Residuals
@@ -23,6 +24,7 @@ def bent(residuals: Residuals, theta: Array, known: Knowledge) -> tuple[str, ...
 
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
+    residuals = condensed(residuals)
     least, rises, linear = half_square(residuals(theta)), known.rises, known.linear
     found = [
         name

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from exfit import __version__, estimate
 from exfit.case import SINGLE, Case, Unknown
+from exfit.condensed import condensed
 from exfit.errors import CaseError, SimulationError
 from exfit.knowledge import Knowledge, knowledge
 from exfit.notes import (
@@ -80,7 +81,8 @@ def fit(
         watch(history[-1])
 
     found, minima = search(case, residuals, method, announce, progress)
-    simulations, substeps = residuals.simulations, residuals.substeps  # of the search alone
+    fewer = condensed(residuals)
+    simulations, substeps = fewer.simulations, fewer.substeps  # of the search alone
     values, begin = residuals.values(found.x), residuals.values(residuals.start)
     interrupted = found.stop is estimate.Stop.INTERRUPTED
     known = None if interrupted else told(residuals, found.x, trials)
@@ -158,29 +160,31 @@ def search(
 ) -> tuple[estimate.Result, estimate.Minima | None]:
     """Return the best point found from the start of a case, or from all its starts."""
     asked = case.estimate
-    jacobian = JACOBIANS[asked.jacobian](residuals)
+    fewer = condensed(residuals)
+    good_enough = asked.good_enough.rmse * np.sqrt(fewer.samples / fewer.count)
+    jacobian = JACOBIANS[asked.jacobian](fewer)
     if asked.starts == 1:
         found = estimate.least_squares(
-            residuals,
-            residuals.start,
+            fewer,
+            fewer.start,
             jac=jacobian,
-            bounds=residuals.bounds,
+            bounds=fewer.bounds,
             method=method,
             max_iterations=asked.iterations,
             gtol=asked.tolerance.gradient,
             xtol=asked.tolerance.step,
             x_scale=UNIT,
-            good_enough=asked.good_enough.rmse,
+            good_enough=good_enough,
             callback=announce,
         )
         return found, None
     minima = estimate.multistart(
-        residuals,
+        fewer,
         jacobian,
-        residuals.bounds,
+        fewer.bounds,
         asked.starts,
-        x0=residuals.start,
-        screen=residuals.costs,
+        x0=fewer.start,
+        screen=fewer.costs,
         refine=asked.refine,
         watch=progress,
         method=method,
@@ -188,7 +192,7 @@ def search(
         gtol=asked.tolerance.gradient,
         xtol=asked.tolerance.step,
         x_scale=UNIT,
-        good_enough=asked.good_enough.rmse,
+        good_enough=good_enough,
     )
     if not minima.minima:
         raise KeyboardInterrupt

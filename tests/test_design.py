@@ -137,7 +137,7 @@ def test_a_signal_without_noise_to_speak_of_decides_alone(plain):
 
 def test_a_case_without_a_record_is_planned_on_its_own_clock(plain):
     design = identify(plain("ac1a"), {})
-    (times,) = design.times
+    times = design.own.sensitivity[0].time
     assert (times[0], times[-1]) == (0.0, 10.0)
     assert list(plans(design)) == ["2 %", "5 %", "10 %", "longer", "+ efd", "+ ifd", "+ all"]
     assert design.noise == OFF_LINE

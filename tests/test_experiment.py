@@ -6,7 +6,6 @@ from records import SAMPLES, UNIT, case_of, config, found_in, recording, several
 
 from exfit.conditioning import Conditioning
 from exfit.experiment import Channel
-from exfit.inference import sensitivity
 from exfit.knowledge import knowledge
 from exfit.residuals import noise_of
 from exfit.study import fit
@@ -54,7 +53,8 @@ def test_how_far_a_signal_moves_in_per_unit_does_not_depend_on_its_weight(tmp_pa
     moved = []
     for weight in (1.0, WEIGHT):
         residuals = open_case(tmp_path, weight)
-        moved.append(sensitivity(knowledge(residuals, residuals.start, ()).linear))
+        courses = knowledge(residuals, residuals.start, ()).sensitivity
+        moved.append(np.concatenate([one.moved for one in courses]))
     assert np.ptp(moved[0]) > 0.1
     assert moved[1] == pytest.approx(moved[0], rel=1e-9, abs=1e-15)
 

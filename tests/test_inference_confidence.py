@@ -10,7 +10,7 @@ from scipy.optimize import curve_fit, least_squares
 from scipy.stats import chi2, kstest
 from scipy.stats import t as student
 
-from exfit.inference import Channel, Prior, confidence, rises, sensitivity
+from exfit.inference import Channel, Prior, confidence, rises
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 
 # NIST Statistical Reference Datasets: certified standard deviations of the estimates
@@ -482,15 +482,8 @@ def test_the_content_survives_json():
     assert content["noise"][0]["label"] == "vt"
 
 
-def test_the_sensitivity_is_what_a_change_by_all_of_the_value_does():
-    channel = Channel("vt", slice(0, len(T)), weight=4.0)
-    response, slopes = decay(T, 2.0, 0.5)
-    lin = linearised([2.0, 0.5], response, 4.0 * slopes, channels=(channel,))
-    assert sensitivity(lin)[:, 0] == pytest.approx(response)
-
-
 def test_arrays_that_cannot_be_are_refused():
-    with pytest.raises(ValueError, match=r"jacobian: shape \(200, 2\), not \(199, 2\)"):
+    with pytest.raises(ValueError, match=r"channels: must cover the 200 rows"):
         linearised(TRUTH, np.zeros(199), LINE)
     with pytest.raises(ValueError, match="jacobian: not finite"):
         linearised(TRUTH, np.zeros(200), LINE * np.nan)

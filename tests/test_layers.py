@@ -63,6 +63,7 @@ ORDER = (
     "exfit.simulate",
     "exfit.experiment",
     "exfit.residuals",
+    "exfit.condensed",
     "exfit.estimate.arrays",
     "exfit.estimate.answer",
     "exfit.estimate.box",

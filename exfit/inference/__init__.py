@@ -14,7 +14,7 @@ from exfit.inference.confidence import (
     rises,
 )
 from exfit.inference.fixings import Fixing
-from exfit.inference.identifiability import Identifiability, identifiability, sensitivity
+from exfit.inference.identifiability import Identifiability, identifiability
 from exfit.inference.linear import Channel, Linearisation, Prior
 from exfit.inference.noise import Noise
 
@@ -35,5 +35,4 @@ __all__ = [
     "confidence",
     "identifiability",
     "rises",
-    "sensitivity",
 ]

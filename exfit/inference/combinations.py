@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from math import inf
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -107,7 +107,7 @@ def weak_combinations(
 def changes_of(lin: Linearisation, noise: Sequence[Noise], moved: Array) -> Iterator[Change]:
     """Yield what each channel does when the weighted errors move (M,)."""
     for channel, one in zip(lin.channels, noise, strict=True):
-        rms = float(np.sqrt(np.mean(moved[channel.rows] ** 2)))
+        rms = float(np.linalg.norm(moved[channel.rows])) / sqrt(one.samples)
         yield Change(channel.label, rms / channel.weight, rms / one.std if one.std else inf)
 
 

@@ -32,7 +32,7 @@ class Factors:
     @property
     def leverage(self) -> float:
         """How many parameters the errors determine; what the priors determine does not count."""
-        return float(np.sum(self.left[: len(self.lin.errors)] ** 2))
+        return float(np.sum(self.left[: len(self.lin.jacobian)] ** 2))
 
     @cached_property
     def determined(self) -> Mask:

@@ -58,14 +58,6 @@ class Identifiability:
         }
 
 
-def sensitivity(lin: Linearisation) -> Array:
-    """Return by how much each signal moves over time for a change by 100 %, (M, N), in pu.
-
-    What counts as 100 % says `Linearisation.size`: the value, for most.
-    """
-    return lin.relative / lin.by_row([one.weight for one in lin.channels])[:, None]
-
-
 def identifiability(lin: Linearisation, known: Confidence) -> Identifiability:
     """Return which combinations of parameters the record does not see, and what would help.
 

@@ -19,15 +19,22 @@ class Channel:
     """The errors of one signal in one record, on one clock, in the order of time.
 
     label   "vt", or "up vt" where there are several records
-    rows    which of the errors, contiguous
+    rows    which rows of the Jacobian, contiguous
     noise   standard deviation of its weighted errors as the user gave it
     weight  of its errors: weighted error = weight * (simulated - measured)
+    errors  which of the errors, contiguous, where they are more than the rows
     """
 
     label: str
     rows: slice
     noise: float | None = None
     weight: float = 1.0
+    errors: slice | None = None
+
+    @property
+    def samples(self) -> slice:
+        """Which of the errors are its own."""
+        return self.rows if self.errors is None else self.errors
 
 
 @dataclass(frozen=True)
@@ -47,13 +54,15 @@ class Prior:
 class Linearisation:
     """A fit of N parameters to M weighted errors at its minimum.
 
+    Where the samples are many, fewer rows R of the Jacobian have the same J'J; else R = M.
+
     names, units   of the parameters
     values         (N,) in their own units
     logarithmic    (N,) whether the fit moved the logarithm
     width          (N,) high - low of the bounds
     held           "min" or "max" for a parameter on that bound
     errors         (M,) simulated minus measured, weighted, no robust loss applied
-    jacobian       (M, N) d errors / d values
+    jacobian       (R, N) d errors / d values
     influence      (M,) psi(e) of the loss; least squares: the errors
     curvature      (M,) psi'(e) of the loss; least squares: ones
     channels       covering all rows
@@ -77,20 +86,22 @@ class Linearisation:
     nuisances: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
-        rows, count = len(self.errors), len(self.names)
+        samples, rows, count = len(self.errors), len(self.jacobian), len(self.names)
         if not self.nuisances:
             object.__setattr__(self, "nuisances", (False,) * count)
         for name in ("units", "values", "logarithmic", "width", "held", "nuisances"):
             if len(getattr(self, name)) != count:
                 raise ValueError(f"{name}: {len(getattr(self, name))} for {count} parameters")
         for name in ("errors", "jacobian", "influence", "curvature"):
-            shape = (rows, count) if name == "jacobian" else (rows,)
+            shape = (rows, count) if name == "jacobian" else (samples,)
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name}: shape {getattr(self, name).shape}, not {shape}")
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name}: not finite")
-        if sum(len(self.errors[one.rows]) for one in self.channels) != rows:
-            raise ValueError(f"channels: must cover the {rows} errors")
+        if sum(len(self.errors[one.samples]) for one in self.channels) != samples:
+            raise ValueError(f"channels: must cover the {samples} errors")
+        if sum(len(self.jacobian[one.rows]) for one in self.channels) != rows:
+            raise ValueError(f"channels: must cover the {rows} rows")
 
     @cached_property
     def size(self) -> Array:
@@ -112,16 +123,16 @@ class Linearisation:
 
     @cached_property
     def relative(self) -> Array:
-        """The derivative of the errors to relative changes, (M, N)."""
+        """The derivative of the errors to relative changes, (R, N)."""
         return np.asarray(self.jacobian * self.size)
 
     def mean_curvature(self, channel: Channel) -> float:
         """Return psi' of the loss over a channel, on average: 1 for least squares."""
-        return max(float(np.mean(self.curvature[channel.rows])), LEAST_CURVATURE)
+        return max(float(np.mean(self.curvature[channel.samples])), LEAST_CURVATURE)
 
     def by_row(self, values: Sequence[float]) -> Array:
-        """Return a number for each channel as one for each error, (M,)."""
-        rows = np.empty(len(self.errors))
+        """Return a number for each channel as one for each row, (R,)."""
+        rows = np.empty(len(self.jacobian))
         for channel, value in zip(self.channels, values, strict=True):
             rows[channel.rows] = value
         return rows

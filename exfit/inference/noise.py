@@ -81,7 +81,7 @@ def noise_of(factors: Factors) -> tuple[Noise, ...]:
 
 def _noise(factors: Factors, channel: Channel, share: float) -> Noise:
     lin = factors.lin
-    influence = lin.influence[channel.rows]
+    influence = lin.influence[channel.samples]
     samples = len(influence)
     # a share of the order of rounding: as many parameters as samples
     dof = samples * share if share > samples * np.finfo(float).eps else 0.0

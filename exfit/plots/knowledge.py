@@ -1,13 +1,10 @@
 """What a record tells of the parameters."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from exfit.inference import sensitivity as sensitivities
 from exfit.knowledge import Knowledge
 from exfit.plots.style import COLORS, LIMIT, MILLI, SIMULATED, START, STYLES, WIDTH, tidy
 from exfit.profiles import Profiles
@@ -16,30 +13,27 @@ Array = NDArray[np.float64]
 PERCENT = 1e-2
 
 
-def sensitivity(known: Knowledge, times: Sequence[Array], title: str) -> Figure:
+def sensitivity(known: Knowledge, title: str) -> Figure:
     """Return by how much 1 % more of each parameter moves each signal over time.
 
-    ``times`` are those of the samples of each channel. What belongs to a record is left out.
+    What belongs to a record is left out.
     """
-    linear = known.linear
+    linear, courses = known.linear, known.sensitivity
     shown = [k for k, of_record in enumerate(linear.nuisances) if not of_record]
-    moved = PERCENT * MILLI * sensitivities(linear)
-    count = len(linear.channels)
-    figure = Figure(figsize=(WIDTH, 1.2 + 3.0 * count), layout="constrained")
-    panels = figure.subplots(count, 1, squeeze=False)[:, 0]
-    for axes, channel, time in zip(panels, linear.channels, times, strict=True):
+    figure = Figure(figsize=(WIDTH, 1.2 + 3.0 * len(courses)), layout="constrained")
+    panels = figure.subplots(len(courses), 1, squeeze=False)[:, 0]
+    for axes, course in zip(panels, courses, strict=True):
         for place, k in enumerate(shown):
-            color, style = COLORS[place % len(COLORS)], STYLES[place // len(COLORS) % len(STYLES)]
             axes.plot(
-                time,
-                moved[channel.rows, k],
-                style,
-                color=color,
+                course.time,
+                PERCENT * MILLI * course.moved[:, k],
+                STYLES[place // len(COLORS) % len(STYLES)],
+                color=COLORS[place % len(COLORS)],
                 linewidth=1.3,
                 label=linear.names[k],
             )
         axes.axhline(0.0, color="black", linewidth=0.6)
-        axes.set_ylabel(f"change of {channel.label}\nfor +1 % (1e-3 pu)")
+        axes.set_ylabel(f"change of {course.label}\nfor +1 % (1e-3 pu)")
         tidy(axes)
     panels[-1].set_xlabel("time (s)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False)

@@ -1,0 +1,108 @@
+"""Condensed records: the same cost, gradient and J'J as those of all samples, and when not."""
+
+import numpy as np
+import pytest
+from records import UNIT, case_of, found_in, one, synthetic
+
+from exfit import condensed as module
+from exfit.condensed import condensed
+from exfit.inference import confidence
+from exfit.knowledge import linearisation
+from exfit.residuals import Residuals
+from exfit.study import fit
+from exfit.trial import fitted_trials, residuals_of
+
+TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}, {"at": 2.0, "step": -0.03}]}
+SEED = 3
+DENSE = 60_000  # samples in 3 s, at random instants
+GRID = {"simulation": {"step": 0.01}}
+CHANNELS = {"vt": "vt", "efd": {"column": "efd", "weight": 0.02}}
+AGREE = 1e-10  # relative: what the rounding of sums of squares leaves
+
+
+def dense_case(folder, record=None, channels=None, sections=None, known=True):
+    """Return a case whose record has two hundred samples to each step of the simulation."""
+    rng = np.random.default_rng(SEED)
+    time = np.sort(rng.uniform(0.0, 3.0, DENSE))
+    synthetic(folder, TEST, time, signals=("vt", "efd"))
+    content = {**one(TEST, channels or CHANNELS, tuple(UNIT), **(record or {})), **GRID}
+    if known:
+        content["parameters"]["free"]["TE"]["prior"] = {"mean": 1.4, "std": "10 %"}
+    return case_of({**content, **(sections or {})}, folder)
+
+
+def residuals(case):
+    return residuals_of(case, [one.secured(case.values()) for one in fitted_trials(case)])
+
+
+def forms(found, theta):
+    """Return cost, gradient and J'J."""
+    r, slopes = found(theta), found.exact(theta)
+    return 0.5 * float(r @ r), slopes.T @ r, slopes.T @ slopes
+
+
+@pytest.mark.parametrize("mask", [[], [[0.4, 0.7], [1.001, 1.004]]])
+def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, mask):
+    """Where samples are left out, too, some steps of the grid whole; and the last parts of both."""
+    every = residuals(dense_case(tmp_path, {"mask": mask}))
+    few = condensed(every)
+    assert module.WORTH * few.count < every.count
+    rng = np.random.default_rng(SEED)
+    for _ in range(3):
+        theta = every.start + rng.uniform(-0.3, 0.3, len(every.start))
+        for all_, ours in zip(forms(every, theta), forms(few, theta), strict=True):
+            assert ours == pytest.approx(all_, rel=AGREE, abs=AGREE * np.max(np.abs(all_)))
+
+
+def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
+    case = dense_case(tmp_path, sections={"estimate": {"strategy": "auto"}})
+    ours = fit(case)
+    for user in ("study", "knowledge", "straightness"):
+        monkeypatch.setattr(f"exfit.{user}.condensed", lambda whole: whole)
+    every = fit(case)
+    assert (ours.message, ours.nfev, ours.njev) == (every.message, every.nfev, every.njev)
+    assert ours.cost == pytest.approx(every.cost, rel=AGREE)
+    assert ours.knowledge.sentences == every.knowledge.sentences
+    for name, value in every.values.items():
+        assert ours.values[name] == pytest.approx(value, rel=1e-6)
+
+
+def test_errors_and_intervals_are_those_of_all_samples(tmp_path, monkeypatch):
+    whole = residuals(dense_case(tmp_path))
+    ours = confidence(linearisation(whole, whole.start, ()))
+    monkeypatch.setattr("exfit.knowledge.condensed", lambda whole: whole)
+    every = confidence(linearisation(whole, whole.start, ()))
+    assert ours.dof == pytest.approx(every.dof, rel=1e-6)
+    for name, one_ in every.parameters.items():
+        assert ours.parameters[name].std_error == pytest.approx(one_.std_error, rel=1e-6)
+    for ours_, theirs in zip(ours.noise, every.noise, strict=True):
+        assert ours_.std == pytest.approx(theirs.std, rel=1e-9)
+        assert ours_.p_value == theirs.p_value
+
+
+def filtered(filter_):
+    return {"channels": {"vt": {"column": "vt", "filter": filter_}}}
+
+
+@pytest.mark.parametrize(
+    ("record", "sections"),
+    [
+        (filtered({"median": 3}), {}),
+        ({"delay": found_in(0.0, -0.1, 0.1)}, {}),
+        ({"channels": {"vt": {"column": "vt", "offset": found_in(0.0, -0.1, 0.1)}}}, {}),
+        ({}, {"estimate": {"loss": "huber"}}),
+    ],
+    ids=["filter", "delay", "offset", "loss"],
+)
+def test_what_is_not_a_quadratic_form_of_the_grid_stays_as_it_is(tmp_path, record, sections):
+    given = {key: value for key, value in record.items() if key != "channels"}
+    case = dense_case(tmp_path, given, record.get("channels"), sections)
+    every = residuals(case)
+    assert condensed(every) is every
+
+
+def test_a_record_with_few_samples_stays_as_it_is(tmp_path):
+    synthetic(tmp_path, TEST, np.arange(0.0, 3.0, 0.01))
+    every = residuals(case_of(one(TEST, free=("KA",)), tmp_path))
+    assert isinstance(every, Residuals)
+    assert condensed(every) is every
