@@ -79,13 +79,15 @@ def condensed(residuals: Residuals) -> Residuals:
     """
     if residuals.robust is not None:
         return residuals
-    experiments = [_condensed(one) for one in residuals.experiments]
+    known = bool(residuals.priors)
+    experiments = [_condensed(one, known) for one in residuals.experiments]
     if all(new is old for new, old in zip(experiments, residuals.experiments, strict=True)):
         return residuals
     return Residuals(experiments, residuals.free, residuals.fixed, residuals.ties)
 
 
-def _condensed(one: Experiment) -> Experiment:
+def _condensed(one: Experiment, noise: bool) -> Experiment:
+    """Return an experiment with fewer errors; with the ``noise`` of its samples if asked for."""
     simulator = one.simulator.on_grid()
     possible = all(channel.plain for channel in one.channels) and not any(
         nuisance.kind in READS for nuisance in one.nuisances
@@ -97,17 +99,17 @@ def _condensed(one: Experiment) -> Experiment:
     return replace(
         one,
         simulator=simulator,
-        channels=tuple(_condensed_channel(channel, sampling) for channel in one.channels),
+        channels=tuple(_condensed_channel(channel, sampling, noise) for channel in one.channels),
     )
 
 
-def _condensed_channel(channel: Channel, sampling: Sampling) -> CondensedChannel:
+def _condensed_channel(channel: Channel, sampling: Sampling, noise: bool) -> CondensedChannel:
     return CondensedChannel(
         signal=channel.signal,
         measured=channel.measured,
         weight=channel.weight,
         conditioning=channel.conditioning,
-        noise=noise_of(channel),
+        noise=noise_of(channel) if noise else channel.noise,
         form=form_of(sampling, channel.measured, channel.kept),
     )
 

@@ -203,6 +203,7 @@ class Sampling:
         start, step, count, end = np.array([(*part, part.end) for part in grid]).T
         owner = np.minimum(np.searchsorted(end, read - near * step[0]), len(grid) - 1)
         position, last = (read - start[owner]) / step[owner], count[owner]
+        self._kinds = {min(NEIGHBOURS, part.steps + 1) for part in grid}
         self._step, self._points = step[owner], np.minimum(NEIGHBOURS, last + 1.0)
         first = np.clip(np.floor(position) - 1.0, 0.0, last + 1.0 - self._points)
         self._from_middle = position - first - 0.5 * (self._points - 1.0)
@@ -276,9 +277,11 @@ class Sampling:
         powers = np.ones((NEIGHBOURS, len(away)))
         for k in range(1, NEIGHBOURS):
             powers[k] = powers[k - 1] * away
+        if len(self._kinds) == 1:
+            return np.asarray(lagrange(*self._kinds)[rows] @ powers)
         found = np.zeros((NEIGHBOURS, len(away)))
-        for n in np.unique(points):
-            found += lagrange(int(n))[rows] @ (powers * (points == n))
+        for n in self._kinds:
+            found += lagrange(n)[rows] @ (powers * (points == n))
         return found
 
     def _read(self, run: Sequence[Array], weights: Callable[[slice], Array]) -> Array:
@@ -389,7 +392,10 @@ class Simulator:
 
     def sampling(self) -> Sampling:
         """Return what reads the response at the sample times from the points of its grid."""
-        return Sampling(self._grid, self.times, self.delay)
+        known = self._sampling
+        return (
+            known if isinstance(known, Sampling) else Sampling(self._grid, self.times, self.delay)
+        )
 
     @cached_property
     def time_constants(self) -> tuple[str, ...]:
@@ -446,9 +452,14 @@ class Simulator:
         return simulator
 
     def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
-        """Return by how much, at most and per unit, halving every step moves the outputs."""
-        samples, parts = self.samples(values, outputs)
-        finer = self._with(self.step / 2.0, parts)
+        """Return by how much, at most and per unit, halving every step moves the outputs.
+
+        At the points of the grid: a record with many more samples shows no more.
+        """
+        times = np.unique(np.concatenate([part.times for part in self._grid]))
+        coarse = Simulator(self.system, self.course, times, self.step, self.least)
+        samples, parts = coarse.samples(values, outputs)
+        finer = Simulator(self.system, self.course, times, self.step / 2.0, parts)
         return float(np.max(np.abs(samples - finer.samples(values, outputs)[0])))
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:

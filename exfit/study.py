@@ -277,7 +277,7 @@ def refuse_unfit(case: Case, residuals: Residuals) -> None:
             level = f"{channel.signal} is {measured[0]:g} pu throughout"
             raise CaseError([f"{case.path}: record: {level}: it shows no test"])
     with np.errstate(over="ignore"):
-        start = residuals(residuals.start)
+        start = condensed(residuals)(residuals.start)
         square = float(start @ start)
     if not np.isfinite(square):
         largest = float(np.max(np.abs(start)))

@@ -375,7 +375,7 @@ def test_a_simulator_made_from_another_keeps_its_steps_and_its_delay():
     assert (secured.delay, secured.course) == (0.11, moved.course)
     parts = moved.substeps(values)
     coarse, fine = (
-        Simulator(STIFFENING, moved.course, times, 0.02 / n, parts, 0.11).samples(values, ("x",))[0]
+        Simulator(STIFFENING, moved.course, times, 0.02 / n, parts).samples(values, ("x",))[0]
         for n in (1, 2)
     )
     assert moved.step_error(values, ("x",)) == np.abs(coarse - fine).max() > 0.0
