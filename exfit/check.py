@@ -1,6 +1,6 @@
 """Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from exfit.simulate import Course, Simulator
 from exfit.trial import fitted_trials, free_of, planned
 
 Array = NDArray[np.float64]
+Values = Mapping[str, float]
 
 STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
 AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
@@ -66,11 +67,7 @@ def check(case: Case) -> Check:
     drift, error = 0.0, 0.0
     for one in experiments:
         simulator, at = one.moved(values), one.parameters(values)
-        still = Simulator(
-            simulator.system, Course(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step
-        )
-        flat, _ = still.samples(at, one.signals)
-        drift = max(drift, float(np.max(np.abs(flat - flat[0]))))
+        drift = max(drift, flat_drift(simulator, at, one.signals))
         error = max(error, simulator.step_error(at, one.signals))
     first = experiments[0].simulator
     at = experiments[0].parameters(values)
@@ -83,6 +80,17 @@ def check(case: Case) -> Check:
         drift=drift,
         notes=tuple(typical_notes(case)),
     )
+
+
+def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:
+    """Return how far signals stray from their start (pu) in FLAT_SECONDS without any change.
+
+    ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
+    is no rest.
+    """
+    still = Simulator(simulator.system, Course(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
+    flat, _ = still.samples(values, tuple(signals))
+    return float(np.max(np.abs(flat - flat[0])))
 
 
 def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:

@@ -21,8 +21,9 @@ from exfit.engine.kernel import (
     in_threads,
 )
 from exfit.engine.system import System, trace
-from exfit.engine.trace import Node, evaluate, in_order
+from exfit.engine.trace import in_order
 from exfit.errors import SimulationError
+from exfit.limiters import limits_passed
 from exfit.models.blocks import SHORTEST
 
 Array = NDArray[np.float64]
@@ -143,6 +144,18 @@ class Direction:
 def each(names: Iterable[str]) -> tuple[Direction, ...]:
     """Return a direction for each parameter, which moves alone."""
     return tuple(Direction({name: 1.0}) for name in names)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A simulation at every point of its grid: ``time`` (n,) in s, the outputs and inputs (n,).
+
+    The instant of an exact step is there twice, before it and after it.
+    """
+
+    time: Array
+    outputs: Mapping[str, Array]
+    inputs: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -476,6 +489,17 @@ class Simulator:
         run = code.run(p, code.start(p), self._spans(parts))
         return self._sampling(run)[:, :, 0], parts
 
+    def run(self, values: Values) -> Run:
+        """Return all outputs and inputs of the system on the grid, without the recorder's delay."""
+        code = kernel(self.system, self.system.outputs, 1)
+        p = self._vector(values)[:, None]
+        run = code.run(p, code.start(p), self._spans(self.substeps(values)))
+        return Run(
+            np.concatenate([part.times for part in self._grid]),
+            dict(zip(self.system.outputs, _rows(run)[:, :, 0].T, strict=True)),
+            dict(zip(self.system.inputs, _rows(self._inputs).T, strict=True)),
+        )
+
     def samples_of_many(self, sets: Sequence[Values], outputs: tuple[str, ...]) -> Array:
         """Return outputs (M, ny, sets): side by side, in threads, and with equal sub-steps."""
         spans = self._spans(max(self.substeps(values) for values in sets))
@@ -614,27 +638,9 @@ class Simulator:
             for name, slope, moves in states
             if moves and math.isfinite(slope)
         ]
-        return self._limits_passed(values) or ", ".join(moved) or "the values do not define one"
-
-    def _limits_passed(self, values: Values) -> str:
-        """Name the limits that the start would have to pass, with both values."""
-        traced = trace(self.system, self.system.outputs)
-        rest = evaluate(traced.rest, {node: values[node.args[0][2:]] for node in traced.p})
-        at_rest = dict(
-            zip((*traced.x, *traced.r), (rest[node] for node in traced.rest), strict=True)
+        return (
+            limits_passed(self.system, values) or ", ".join(moved) or "the values do not define one"
         )
-        known = {**rest, **at_rest, **dict.fromkeys(traced.u, 0.0)}
-        everything = evaluate([*traced.slopes, *traced.outputs, *traced.clamped], known)
-        found = []
-        for node in [node for node in everything if node.op == "clip"]:
-            x, low, high = (everything[operand] for operand in node.operands)
-            for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
-                name = _limit_name(node.operands[limit])
-                if passed and name:
-                    found.append(
-                        f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
-                    )
-        return "; ".join(dict.fromkeys(found))
 
 
 def _fixed(change: Change) -> Change:
@@ -647,10 +653,3 @@ def fastest(jacobians: Array) -> float:
     if not np.isfinite(jacobians).all():
         return math.inf
     return float(np.abs(np.linalg.eigvals(jacobians)).max())
-
-
-def _limit_name(node: Node) -> str:
-    """Return the parameter that gives a limit: of all it is computed from, the one named so."""
-    names = [str(n.args[0])[2:] for n in in_order([node]) if n.op == "symbol" and not n.varies]
-    limits = [name for name in names if "MAX" in name or "MIN" in name]
-    return ", ".join(limits or names)

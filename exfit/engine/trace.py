@@ -344,8 +344,11 @@ def _tangent(node: Node, t: list[Node]) -> Node:
             raise KeyError(op)
 
 
-def evaluate(targets: Iterable[Node], values: Mapping[Node, float]) -> dict[Node, Any]:
-    """Return the value of every node that the targets need, given those of the symbols."""
+def evaluate(targets: Iterable[Node], values: Mapping[Node, Any]) -> dict[Node, Any]:
+    """Return the value of every node that the targets need, given those of the symbols.
+
+    They may be arrays, which broadcast: the instants of a run, or the directions of a tangent.
+    """
     known: dict[Node, Any] = dict(values)
     for node in in_order(targets):
         if node not in known:
@@ -365,11 +368,11 @@ def _value(node: Node, args: list[Any]) -> Any:
         case "<=":
             return args[0] <= args[1]
         case "&":
-            return args[0] and args[1]
+            return args[0] & args[1]
         case "|":
-            return args[0] or args[1]
+            return args[0] | args[1]
         case "select":
-            return args[1] if args[0] else args[2]
+            return where(*args)
         case "clip":
             return clip(*args)
         case name:

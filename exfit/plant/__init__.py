@@ -5,6 +5,7 @@ from exfit.plant.infinite_bus import Given, Stabilised, flow_sheet, infinite_bus
 from exfit.plant.open_circuit import open_circuit
 from exfit.plant.parts import (
     MACHINE,
+    MEASURED,
     NETWORK,
     SATURATION,
     STABILISER,
@@ -27,6 +28,7 @@ __all__ = [
     "DRIVING",
     "EFD0",
     "MACHINE",
+    "MEASURED",
     "NETWORK",
     "SATURATION",
     "STABILISER",

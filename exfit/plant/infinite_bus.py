@@ -11,6 +11,7 @@ from exfit.models.phasors import angle, modulus
 from exfit.models.sheet import Model, Sheet, sheet
 from exfit.plant.parts import (
     MACHINE,
+    MEASURED,
     NETWORK,
     STABILISER,
     VT0,
@@ -155,13 +156,13 @@ def infinite_bus(
 
     2H dw/dt = (Pm - D dw) / (1 + dw) - Te, as in PSS/E. Parameters are the exciter's, those of
     machine, network and stabiliser under their prefixes (``network.X``), and the initial voltage
-    ``vt0``. The inputs are changes: of the reference ``vref``, of ``vs`` beside the stabiliser, and
-    of ``E``, ``R`` and ``X``. All per unit on the machine's base; ``delta`` in rad, ``speed`` 1
-    when rated.
+    ``vt0``. The inputs are changes: of the reference ``vref``, of ``vs`` beside the stabiliser, of
+    ``vc1``, the voltage that the exciter measures, and of ``E``, ``R`` and ``X``. All per unit on
+    the machine's base; ``delta`` in rad, ``speed`` 1 when rated.
     """
     of_stabiliser = () if stabiliser is None else stabiliser.model.states
     own = tuple(STABILISER + name for name in of_stabiliser)
-    refuse_taken(model, (*SIGNALS, *SWING, *machine.states))
+    refuse_taken(model, (*SIGNALS, MEASURED, *SWING, *machine.states))
     states = (*machine.states, *SWING, *model.states, *own)
     network = flow_sheet(given)
     stabiliser_sheet = () if stabiliser is None else stabiliser.model.sheet
@@ -202,9 +203,9 @@ def infinite_bus(
             heard = Names(speed=x["dw"], p=power, vt=vt)
             vs = vs + stabilising(stabiliser, heard, p, x, d)
         vref = r["vref"] + u["vref"]
-        seen = exciter_inputs(
-            vref=vref, vs=vs, vt=vt, vc1=compensated(v, i, n), ifd=ifd, p=power, q=reactive
-        )
+        vc1 = compensated(v, i, n)
+        measured = vc1 + u.get(MEASURED, 0.0)
+        seen = exciter_inputs(vref=vref, vs=vs, vt=vt, vc1=measured, ifd=ifd, p=power, q=reactive)
         efd = model.equations(
             state_of(model, x, r), seen, exciter_parameters(p, model, saturation), d
         )
@@ -220,7 +221,7 @@ def infinite_bus(
                 strict=True,
             )
         )
-        return motion(d, states, {**x, **outputs})
+        return motion(d, states, {**x, **outputs, MEASURED: vc1})
 
     return System(
         parameters=(

@@ -10,6 +10,7 @@ from exfit.models.machines import Axes, Machine
 from exfit.models.sheet import Model
 from exfit.plant.parts import (
     MACHINE,
+    MEASURED,
     VT0,
     Names,
     SaturationForm,
@@ -67,9 +68,10 @@ def open_circuit(
 
     Parameters are the exciter's, the machine's (``machine.Tpd0``) and the initial voltage ``vt0``;
     of the inputs, ``vref`` is the change of the reference from the one that holds ``vt0``, and
-    ``vs`` a signal in place of a stabiliser. All per unit.
+    ``vs`` a signal in place of a stabiliser; ``vc1`` is added to the voltage that the exciter
+    measures. All per unit.
     """
-    refuse_taken(model, (*SIGNALS, *machine.d_axis))
+    refuse_taken(model, (*SIGNALS, MEASURED, *machine.d_axis))
     states = (*machine.d_axis, *model.states)
 
     def rest(p: Signals) -> Rest:
@@ -82,11 +84,12 @@ def open_circuit(
         d = Names()
         at = machine_on_open_circuit(machine, x, named_parameters(p, MACHINE, machine.sheet))
         vref = r["vref"] + u["vref"]
-        seen = exciter_inputs(vref=vref, vt=at.vt, ifd=at.ifd, vs=u.get("vs", 0.0))
+        measured = at.vt + u.get(MEASURED, 0.0)
+        seen = exciter_inputs(vref=vref, vt=at.vt, vc1=measured, ifd=at.ifd, vs=u.get("vs", 0.0))
         values = exciter_parameters(p, model, saturation)
         efd = model.equations(state_of(model, x, r), seen, values, d)
         at.moved(efd, d)
-        outputs = {"vref": vref, "vt": at.vt, "efd": efd, "ifd": at.ifd, **x}
+        outputs = {"vref": vref, "vt": at.vt, MEASURED: at.vt, "efd": efd, "ifd": at.ifd, **x}
         return motion(d, states, outputs)
 
     return System(

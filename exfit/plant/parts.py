@@ -26,6 +26,8 @@ NETWORK = "network."
 STABILISER = "stabiliser."
 VT0 = "vt0"
 
+MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
+
 
 class Names(SimpleNamespace):
     """Values by name, as a model reads and writes them."""

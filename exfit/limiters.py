@@ -1,0 +1,149 @@
+"""The limits in a system's equations: what each holds, and the parameter that sets it."""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from exfit.engine.system import System, Trace, trace
+from exfit.engine.trace import Node, evaluate, in_order
+
+Values = Mapping[str, float]
+
+
+class Limiter(NamedTuple):
+    """A value of the graph that stops at a limit: a ceiling where ``sign`` is 1, a floor at -1.
+
+    ``limit`` is the parameter that sets it, "0" for a state that cannot become negative; ``signal``
+    is the state that is held, "" where the value is none. A value that ``stands`` is never beyond
+    its limit, as a state; any other is what the limited one would be without it.
+    """
+
+    limit: str
+    signal: str
+    sign: float
+    value: Node
+    bound: Node
+    stands: bool
+
+
+@cache
+def traced(system: System) -> Trace:
+    """Return the graph of a system, with all its outputs."""
+    return trace(system, system.outputs)
+
+
+def at_rest(of: Trace, values: Values) -> dict[Node, Any]:
+    """Return what the symbols of a graph are at rest."""
+    p = {node: values[_name(node)] for node in of.p}
+    found = evaluate(of.rest, p)
+    starts = zip((*of.x, *of.r), (found[node] for node in of.rest), strict=True)
+    return {**p, **dict(starts), **dict.fromkeys(of.u, 0.0)}
+
+
+def limits_passed(system: System, values: Values) -> str:
+    """Name the limits that the start would have to pass, with both values."""
+    of = traced(system)
+    everything = evaluate([*of.slopes, *of.outputs, *of.clamped], at_rest(of, values))
+    found = []
+    for node in [node for node in everything if node.op == "clip"]:
+        x, low, high = (everything[operand] for operand in node.operands)
+        for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
+            name = limit_name(node.operands[limit])
+            if passed and name:
+                found.append(
+                    f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
+                )
+    return "; ".join(dict.fromkeys(found))
+
+
+def limit_name(node: Node) -> str:
+    """Return the parameter that gives a limit: of all it is computed from, the one named so."""
+    symbols = [n for n in in_order([node]) if n.op == "symbol" and not n.varies]
+    limits = [_name(n) for n in symbols if _is_limit(n)]
+    return ", ".join(limits or map(_name, symbols))
+
+
+@cache
+def limiters(system: System) -> tuple[Limiter, ...]:
+    """Return every limit of a system that is not infinite, in the order of the signal.
+
+    They are its states' non-windup limits, its clamps, gates to a fixed parameter, and contacts
+    that force a value to one; neither the arcs of a rectifier nor what only cannot be negative.
+    """
+    of = traced(system)
+    states = {node: node for node in of.x}
+    clamps = [(node, held) for node, held in zip(of.x, of.clamped, strict=True) if node is not held]
+    found = []
+    for state, held in clamps:
+        _, low, high = held.operands
+        found += [_limiter(state, bound, sign, state) for bound, sign in ((low, -1.0), (high, 1.0))]
+    ours = {held for _, held in clamps}
+    for node in in_order([*of.slopes, *of.outputs, *of.clamped]):
+        if node not in ours:
+            found += list(_clamp(node, states))
+    known = (one for one in found if one is not None)
+    return tuple(sorted(dict.fromkeys(known), key=lambda one: one.value.index))
+
+
+def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]:
+    """Yield the limits of a node that is a clamp, or a choice between a limit and a value."""
+    if node.op == "clip":
+        x, low, high = node.operands
+        for bound, sign in ((low, -1.0), (high, 1.0)):
+            clamped_there = x.op == "clip" and any(bound is one for one in x.operands)
+            if limit_name(bound) and not clamped_there:
+                yield _limiter(x, bound, sign, _state_in(x, states))
+    elif node.op == "select" and node.operands[0].varies:
+        yield from _choice(node, states)
+
+
+def _choice(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]:
+    """Yield the limits of the higher or lower of two values, or of one forced by a contact."""
+    condition, chosen, other = node.operands
+    gate = condition.op == "<" and {*condition.operands} == {chosen, other}
+    for bound, x in ((chosen, other), (other, chosen)):
+        if gate and not bound.varies and any(_is_limit(n) for n in in_order([bound])):
+            ceiling = chosen is condition.operands[0]
+            yield _limiter(x, bound, 1.0 if ceiling else -1.0, _state_in(x, states))
+        elif not gate and _is_limit(bound):
+            yield Limiter(
+                _given(bound), "", 1.0 if "MAX" in _name(bound) else -1.0, node, bound, True
+            )
+
+
+def _limiter(value: Node, bound: Node, sign: float, state: Node | None) -> Limiter | None:
+    """Return a limit, None where it is infinite."""
+    fixed = bound.constant
+    if fixed is not None and abs(fixed) == float("inf"):
+        return None
+    name = _given(bound) if fixed is None else f"{fixed:g}"
+    signal = "" if state is None else _name(state)
+    return Limiter(name, signal, sign, value, bound, value is state)
+
+
+def _given(bound: Node) -> str:
+    """Return the parameter that gives a limit, also where it is computed at the start.
+
+    Where a parameter may ask for that by being 0, the setpoint has its name with a 0 behind it.
+    """
+    computed = any(n.op == "symbol" and n.args[0].startswith("r.") for n in in_order([bound]))
+    return limit_name(bound).removesuffix("0") if computed else limit_name(bound)
+
+
+def _state_in(node: Node, states: Mapping[Node, Node]) -> Node | None:
+    """Return the state that a node is, or is unless its lag is bypassed."""
+    if node.op == "select":
+        found = (_state_in(branch, states) for branch in node.operands[1:])
+        return next((one for one in found if one is not None), None)
+    return states.get(node)
+
+
+def _is_limit(node: Node) -> bool:
+    return (
+        node.op == "symbol" and not node.varies and ("MAX" in _name(node) or "MIN" in _name(node))
+    )
+
+
+def _name(symbol: Node) -> str:
+    """Return the name of what a symbol of a trace stands for."""
+    return str(symbol.args[0]).partition(".")[2]
