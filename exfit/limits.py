@@ -22,9 +22,9 @@ class LimitHit(NamedTuple):
     """A limit that a response has met.
 
     ``limit`` is the parameter that sets it, "0" for a state that cannot become negative;
-    ``signal`` the state that was held, "" where it was no state; ``value`` the limit when it was
-    first met (pu, of the signal: VFEMAX limits VE where VFE reaches it); ``seconds`` how long in
-    all, and which ``share`` of the test that is; ``first`` when (s).
+    ``signal`` the state that was held or cut, "" where it was no state; ``value`` the limit when
+    it was first met (pu, of the signal: VFEMAX limits VE where VFE reaches it); ``seconds`` how
+    long in all, and which ``share`` of the test that is; ``first`` when (s).
     """
 
     limit: str
@@ -150,7 +150,7 @@ def _hit(same: Sequence[Followed], run: Run, delay: float) -> LimitHit | None:
         return None
     first = int(np.argmax(held))
     one = next(one for one in same if one.held[first])
-    seconds = float(np.trapezoid(held, run.time))
+    seconds = float(np.trapezoid(held.astype(np.float64), run.time))
     return LimitHit(
         limit=one.limiter.limit,
         signal=one.limiter.signal,

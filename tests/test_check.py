@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from exfit.case import load_case, parse_case
-from exfit.check import AGREEMENT, STEPS, check, deviations
+from exfit.check import AGREEMENT, STEPS, check, deviations, flat_drift
 from exfit.residuals import Residuals
 from exfit.trial import fitted_trials, residuals_of
 
@@ -70,6 +70,12 @@ def test_a_run_without_a_step_stays_flat(first_order):
     found = check(first_order)
     assert found.flat
     assert found.drift < 1e-12
+
+
+def test_the_drift_of_a_flat_run_can_be_asked_for_alone(first_order):
+    (trial,) = fitted_trials(first_order)
+    one, values = trial.experiment, {"k": 4.0, "a": 2.0} | first_order.values()
+    assert flat_drift(one.moved(values), one.parameters(values)) < 1e-12
 
 
 def test_a_run_that_drifts_is_found(first_order, monkeypatch):
