@@ -14,8 +14,8 @@ class Limiter(NamedTuple):
     """A value of the graph that stops at a limit: a ceiling where ``sign`` is 1, a floor at -1.
 
     ``limit`` is the parameter that sets it, "0" for a state that cannot become negative; ``signal``
-    is the state that is held or cut, "" where the value is none. A value that ``stands`` is never beyond
-    its limit, as a state; any other is what the limited one would be without it.
+    is the state that is held or cut, "" where the value is none. A value that ``stands`` is never
+    beyond its limit, as a state; any other is what the limited one would be without it.
     """
 
     limit: str
