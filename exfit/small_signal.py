@@ -27,11 +27,12 @@ Values = Mapping[str, float]
 MOST_STATES = 3  # named with a pole
 TAKES_PART = 0.2  # of the participation of the state that takes part most
 NO_POLE = 1e-12  # of the fastest rate: an eigenvalue of zero, but for rounding
+SPLIT = 1e-6  # of a pole: rounding moves the two of a double one apart by its square root
 POINTS = 350  # of a frequency response, beside those around its peaks
 AROUND = np.linspace(-3.0, 3.0, 25)  # half widths of a peak: where its points lie
 LIGHTLY = 0.5  # damping ratio: a mode below it has a peak that the other points would cut off
 DECADE = 10.0  # beyond the slowest and the fastest pole
-FINER = 4  # times as many points to find crossovers between
+FINER = 2  # times as many points to find crossovers between
 BETWEEN = 33  # points in a gap that is searched for its crossover
 ROUNDS = 6  # of that search, each 32 times finer: to rounding
 HALF_POWER = 1.0 / sqrt(2.0)  # -3 dB
@@ -241,6 +242,7 @@ def poles_of(linear: Linear) -> tuple[Pole, ...]:
     modes: Any = eig(linear.A, left=True, right=True)
     found, left, right = modes
     size = np.max(np.abs(found), initial=0.0)
+    found = np.where(np.abs(found.imag) > SPLIT * np.abs(found), found, found.real + 0j)
     taking_part = np.abs(left.conj() * right)
     poles = [
         _pole(complex(value), taking_part[:, k], linear.states, size)

@@ -415,3 +415,13 @@ def test_the_input_that_breaks_the_loop_moves_what_the_exciter_measures():
         return Simulator(several, course, times, 1e-3).samples(values, ("vt",))[0]
 
     np.testing.assert_allclose(moved(MEASURED, 0.01), moved("vref", -0.01), rtol=0.0, atol=1e-14)
+
+
+def test_two_equal_lags_are_two_real_poles():
+    """Rounding splits a double pole into a pair beside the real axis."""
+    values = lively_values("AC1A")
+    values["TC"] = values["TB"] = values["TR"]
+    found = [pole for pole in small_signal(system_of("AC1A"), values).poles if pole.frequency == 0]
+    same = [pole for pole in found if abs(pole.value + 1.0 / values["TR"]) < 1e-4]
+    assert len(same) == 2
+    assert all(pole.damping == 1.0 for pole in same)
