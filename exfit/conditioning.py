@@ -15,6 +15,7 @@ Places = NDArray[np.intp]
 
 ORDER = 2  # of the Butterworth filter, which runs twice
 FEWEST_FILTERED = 10  # samples: the filter starts on a mirror of three times its length
+FEWEST_AVERAGED = 2  # samples of a line
 UNEVEN = 0.01  # of a sampling step
 WINDOW = 7  # samples around one that is held against its neighbours; 3 may be spikes
 
@@ -39,27 +40,69 @@ class Median:
             raise ValueError(f"a median over {self.samples} samples: the number must be odd")
 
 
+@dataclass(frozen=True)
+class MovingAverage:
+    """The mean over a ``window`` (s) about each instant, of the line through the samples.
+
+    A kink between two of them, ``step`` s apart, where the slope jumps by ``jump`` per second, is
+    cut by the line: the mean there errs by up to ``jump * step**2 / (8 * window)``.
+    """
+
+    window: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.window < np.inf:
+            raise ValueError(f"an average over {self.window:g} s: it must be longer than 0")
+
+
 @dataclass(frozen=True, eq=False)
 class Conditioning:
     """How a signal (M,) on the clock ``time`` (s) is filtered, and which samples are ``kept``.
 
     Samples that are not kept, which may be nan, are bridged in a line between their kept
-    neighbours before the filter, so that they do not smear, and dropped behind it.
+    neighbours before the filter, so that they do not smear, and dropped behind it. Where the record
+    holds averages already, the simulation is ``averaged`` alike before all that.
 
     Raises:
-        ValueError: no sample is kept, or the low-pass filter finds uneven sampling, a cutoff that
-            is not between zero and half the sampling rate, or fewer than ten samples.
+        ValueError: no sample is kept, the low-pass filter finds uneven sampling, a cutoff that is
+            not between zero and half the sampling rate, or fewer than ten samples, or an average
+            finds fewer than two samples or a window longer than the record.
     """
 
     time: Array
     kept: Mask
     filter: LowPass | Median | None = None
+    averaged: MovingAverage | None = None
 
     def __post_init__(self) -> None:
         if not self.kept.any():
             raise ValueError("no sample is kept")
         if isinstance(self.filter, LowPass):
             _check_filter(self.time, self.filter.cutoff)
+        if self.averaged is not None:
+            _check_average(self.time, self.averaged.window)
+
+    def shown(self, simulated: Array) -> Array:
+        """Return simulated values (M, ...) as the record shows them: averaged, where it is so.
+
+        Beyond the ends they go on in a line. It is linear: derivatives are averaged as values.
+        """
+        if self.averaged is None:
+            return simulated
+        column = (-1, *[1] * (simulated.ndim - 1))
+        steps = np.diff(self.time).reshape(column)
+        # from the first value on: a mean is a difference of areas, and these are rounded
+        values = simulated - simulated[0]
+        areas, slopes = np.zeros_like(values), np.diff(values, axis=0) / steps
+        np.cumsum(0.5 * steps * (values[1:] + values[:-1]), axis=0, out=areas[1:])
+
+        def area(place: Places, beyond: Array) -> Array:
+            way = beyond.reshape(column)
+            return np.asarray(areas[place] + way * (values[place] + 0.5 * way * slopes[place]))
+
+        before, behind = self._windows
+        rise = area(*behind) - area(*before)
+        return np.asarray(simulated[0] + rise / self.averaged.window)
 
     def apply(self, samples: Array) -> Array:
         """Return what is compared of a signal (M,), one number for each kept sample."""
@@ -89,6 +132,20 @@ class Conditioning:
     @cached_property
     def _nothing_to_do(self) -> bool:
         return self.filter is None and bool(self.kept.all())
+
+    @cached_property
+    def _windows(self) -> tuple[tuple[Places, Array], tuple[Places, Array]]:
+        """Return the lines on which each window begins and ends, and how far (s) along them."""
+        assert self.averaged is not None
+        half = 0.5 * self.averaged.window
+        begin, end = (
+            np.clip(np.searchsorted(self.time, at) - 1, 0, len(self.time) - 2)
+            for at in (self.time - half, self.time + half)
+        )
+        return (
+            (begin, self.time - half - self.time[begin]),
+            (end, self.time + half - self.time[end]),
+        )
 
     @cached_property
     def _bridges(self) -> tuple[Places, Places, Places, Array]:
@@ -181,6 +238,16 @@ def _check_filter(time: Array, cutoff: float) -> None:
         raise ValueError(
             f"cutoff of {cutoff:g} Hz: it must lie between 0 and half the sampling rate, "
             f"{0.5 / step:g} Hz"
+        )
+
+
+def _check_average(time: Array, window: float) -> None:
+    """Raise a ValueError where a moving average has nothing to average."""
+    if len(time) < FEWEST_AVERAGED:
+        raise ValueError(f"{len(time)} samples: an average needs {FEWEST_AVERAGED} or more")
+    if window > time[-1] - time[0]:
+        raise ValueError(
+            f"an average over {window:g} s: the record is {time[-1] - time[0]:g} s long"
         )
 
 

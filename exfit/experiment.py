@@ -51,6 +51,13 @@ class Channel:
         """Return samples (M,) as they are compared: filtered, without those left out."""
         return samples if self.conditioning is None else self.conditioning.apply(samples)
 
+    def shown(self, simulated: Array) -> Array:
+        """Return simulated values (M, ...) as the recorder shows them, before they are conditioned.
+
+        Where it records averages, these are averaged alike; so are derivatives.
+        """
+        return simulated if self.conditioning is None else self.conditioning.shown(simulated)
+
     def slopes(self, samples: Array, slopes: Array) -> Array:
         """Return the derivatives of conditioned samples, given those (M, N) of the samples."""
         if self.conditioning is None:
@@ -174,9 +181,8 @@ class Experiment:
             measured = self.measured(channel, values)
             same = measured is channel.measured
             theirs = channel.record if same else channel.conditioned(measured)
-            blocks.append(
-                channel.weight * channel.conditioned(samples[:, k]) - channel.weight * theirs
-            )
+            ours = channel.conditioned(channel.shown(samples[:, k]))
+            blocks.append(channel.weight * ours - channel.weight * theirs)
         return np.concatenate(blocks)
 
     def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
@@ -187,7 +193,7 @@ class Experiment:
         samples, slopes = self.course(values, moves)
         blocks = []
         for k, channel in enumerate(self.channels):
-            ours = channel.slopes(samples[:, k], slopes[:, k])
+            ours = channel.slopes(channel.shown(samples[:, k]), channel.shown(slopes[:, k]))
             theirs = self._measured_slopes(channel, values, moves)
             blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
         return self.compared(samples, values), np.concatenate(blocks)

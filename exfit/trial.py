@@ -221,8 +221,8 @@ class Trial:
         overlays = {
             channel.signal: Overlay(
                 _compared(channel, self.experiment.measured(channel, at)),
-                _compared(channel, samples[:, k]),
-                None if first is None else _compared(channel, first[:, k]),
+                _compared(channel, channel.shown(samples[:, k])),
+                None if first is None else _compared(channel, channel.shown(first[:, k])),
             )
             for k, channel in enumerate(self.channels)
         }

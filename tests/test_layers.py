@@ -42,6 +42,8 @@ ORDER = (
     "exfit.readers.clock",
     "exfit.readers.table",
     "exfit.readers",
+    "exfit.three_phase",
+    "exfit.resampling",
     "exfit.record",
     "exfit.noise",
     "exfit.onset",

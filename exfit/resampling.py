@@ -1,0 +1,146 @@
+"""Signals on a slower, even clock, without aliases and without delay."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from math import ceil, floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+EVEN = 0.01  # of a sampling step that an instant may lie off an even clock: stamps are rounded
+GAP = 3.0  # sampling steps: across more no curve through the samples is known
+PASSED = 0.8  # of half the new rate: up to here a signal stays as it is
+ATTENUATION = 82.0  # dB by Kaiser's formula, 80 in fact: of a step, less than a recorder resolves
+FINER = 2  # times the mean rate, of the even clock that uneven samples are put on
+DENOMINATOR = 1000  # largest of a ratio of rates that is taken exactly
+AS_ASKED = 1e-6  # of the rate: as near are two recorders' clocks
+SMOOTH = 8  # samples to one of the new rate, where these are read off a cubic spline
+FEWEST = 2  # samples of a signal
+
+
+def resampled(
+    time: Array, signals: Mapping[str, Array], rate: float
+) -> tuple[Array, dict[str, Array]]:
+    """Return signals on an even clock of a lower ``rate`` (Hz), which begins with the record.
+
+    The anti-alias filter is a finite impulse response, symmetric and so of zero phase, designed
+    with a Kaiser window: up to 0.8 of half the new rate amplitudes stay within 0.01 %, and from
+    half the new rate on they are 80 dB down. It reaches over 25 new samples to either side; at the
+    ends the record goes on as its mirror image about the first and last sample, which the result
+    passes through; lines stay lines.
+
+    A simulation is not filtered alike: what a step does beyond 0.4 of the rate is missing from the
+    record, and rings about its instant, before it too. Of a lag of 20 ms the error is at most 3.1 %
+    of its rise at 200 Hz, 0.6 % at 1 kHz, and grows as 1 / (rate * time constant).
+
+    Noise that was white has ``0.9 * rate`` over the old rate of its variance left, and neighbours
+    correlated by 0.11.
+
+    Samples at uneven instants are first put on an even clock of twice their mean rate or finer by a
+    cubic spline, which weakens a wave of frequency f by (f / (mean rate - f))**4: 0.02 % at a tenth
+    of the mean rate, 0.4 % at a fifth.
+
+    Args:
+        time: (M,), s, increasing.
+        signals: (M,) each, finite.
+        rate: below the record's mean rate.
+
+    Source: Kaiser 1974 (window); Unser 1999 (spline).
+
+    Raises:
+        ValueError: a signal has a sample that is no finite number, the record a gap of more than
+            three sampling steps, or the rate is not between that of two samples and the record's.
+    """
+    own = _mean_rate(time, signals, rate)
+    if not _is_even(time, own):
+        ratio = ceil(FINER * own / rate)
+        fine = _clock(time, ratio * rate)
+        return fine[::ratio], {
+            name: _filtered(_spline(time, signal, fine), ratio * rate, Fraction(1, ratio), rate)
+            for name, signal in signals.items()
+        }
+    share = Fraction(rate / own).limit_denominator(DENOMINATOR)
+    if abs(float(share) * own - rate) <= AS_ASKED * rate:
+        return _clock(time, float(share) * own), {
+            name: _filtered(signal, own, share, rate) for name, signal in signals.items()
+        }
+    share = _finer_share(SMOOTH * rate / own)
+    fine, clock = _clock(time, float(share) * own), _clock(time, rate)
+    return clock, {
+        name: _spline(fine, _filtered(signal, own, share, rate), clock)
+        for name, signal in signals.items()
+    }
+
+
+def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
+    """Return the mean rate (Hz) of a record; raises ValueError where it cannot be resampled."""
+    for name, signal in signals.items():
+        lost = ~np.isfinite(signal)
+        if lost.any():
+            raise ValueError(
+                f"{name}: no finite number at {time[lost][0]:g} s; resampling needs all of them"
+            )
+    if len(time) < FEWEST:
+        raise ValueError(f"{len(time)} samples: resampling needs {FEWEST} or more")
+    steps = np.diff(time)
+    longest, usual = int(np.argmax(steps)), float(np.median(steps))
+    if steps[longest] > GAP * usual:
+        raise ValueError(
+            f"a gap of {steps[longest]:g} s after {time[longest]:g} s: resampling bridges at most "
+            f"{GAP:g} sampling steps of {usual:g} s"
+        )
+    length = float(time[-1] - time[0])
+    own = len(steps) / length
+    if not 1.0 / length <= rate < own:
+        raise ValueError(
+            f"{rate:g} Hz: it must lie between {1.0 / length:.3g} Hz, two samples, and the "
+            f"record's mean rate of {own:.6g} Hz"
+        )
+    return own
+
+
+def _is_even(time: Array, rate: float) -> bool:
+    """Tell whether instants lie on an even clock, up to the rounding of their stamps."""
+    away = time - np.linspace(time[0], time[-1], len(time))
+    return float(np.max(np.abs(away))) * rate <= EVEN
+
+
+def _clock(time: Array, rate: float) -> Array:
+    """Return an even clock within a record, from its first instant on."""
+    count = floor((time[-1] - time[0]) * rate + EVEN) + 1
+    return np.asarray(time[0] + np.arange(count) / rate)
+
+
+def _finer_share(least: float) -> Fraction:
+    """Return a whole number, or one over a whole number, that is not below ``least``."""
+    return Fraction(1, floor(1.0 / least)) if least <= 1.0 else Fraction(ceil(least))
+
+
+def _spline(time: Array, signal: Array, at: Array) -> Array:
+    """Return what a cubic spline through the samples gives at other instants."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(time, signal)(at))
+
+
+def _filtered(signal: Array, own: float, share: Fraction, rate: float) -> Array:
+    """Return an even signal at a share of its ``own`` rate (Hz), free of all above ``rate`` / 2."""
+    from scipy.signal import firwin, kaiserord, resample_poly
+
+    up, down = share.as_integer_ratio()
+    finest, half = own * up, 0.5 * rate
+    taps, beta = kaiserord(ATTENUATION, (1.0 - PASSED) * half / (0.5 * finest))
+    cutoff = 0.5 * (1.0 + PASSED) * half
+    response = firwin(taps | 1, cutoff, window=("kaiser", beta), fs=finest)
+    # apart from the line between its ends a signal starts and stops at zero, and a level, which is
+    # large, meets no ripple
+    line = np.linspace(signal[0], signal[-1], len(signal))
+    before = ceil(len(response) / (2 * up * down))
+    longer = np.pad(signal - line, before * down, mode="reflect", reflect_type="odd")
+    count = floor((len(signal) - 1) * share) + 1
+    kept = slice(before * up, before * up + count)
+    moved = resample_poly(longer, up, down, window=response)[kept]
+    rise = (signal[-1] - signal[0]) / (len(signal) - 1)
+    return np.asarray(moved + signal[0] + rise * np.arange(count) * (down / up))

@@ -1,0 +1,260 @@
+"""One terminal voltage from three recorded phases: waveforms or RMS values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import ceil, pi, sqrt
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Connection = Literal["phase-to-ground", "phase-to-phase"]
+
+LINE_VOLTAGE: Mapping[Connection, float] = MappingProxyType(
+    {"phase-to-ground": sqrt(3.0), "phase-to-phase": 1.0}
+)  # over the voltage that is recorded
+PHASES = 3
+SPACE_VECTOR = sqrt(2.0) / PHASES * np.exp(2j * pi / PHASES * np.arange(PHASES))
+FREQUENCIES = (40.0, 70.0)  # Hz: systems of 50 and 60 Hz, and units that run off them
+FEWEST_PER_CYCLE = 8  # samples: fewer do not show the third harmonic
+FEWEST_CYCLES = 3  # beside the window: fewer do not tell the frequency
+UNEVEN = 0.01  # of a sampling step
+REVERSED = 0.2  # of the positive sequence: a unit shows 0.02, one that lost a phase 0.5
+DEAD = 0.1  # of the largest voltage: below it noise turns the phase
+DRIFT = 1.0  # Hz: beyond it the window is no whole cycle to 2 %
+HARMONICS = 40  # orders that the window takes out, as far as IEC 61000-3-6 counts them
+NEAR_NYQUIST = 0.9  # of half the sampling rate: beyond it the samples show no harmonic
+UNBALANCE = 0.05  # of the mean: IEC 60034-1 has generators run at 0.01
+SPIKES = 0.01  # of the samples: so many may lie off without a wrong column
+
+
+@dataclass(frozen=True, eq=False)
+class PhasorCourse:
+    """The positive sequence of three waveforms: RMS ``voltage`` (K,) at ``time`` (K,), in s.
+
+    It is the mean over a ``window`` (s) about each instant, and shorter than the record by one
+    window: the samples ``kept`` of it. ``frequency`` (Hz) is the mean one.
+    """
+
+    time: Array
+    voltage: Array
+    kept: slice
+    frequency: float
+    window: float
+
+
+def vt_of_waveforms(
+    time: Array, phases: Array, base: float, connection: Connection, cycles: int = 1
+) -> PhasorCourse:
+    """Return the terminal voltage per unit that three waveforms (M, 3) show.
+
+    Args:
+        time: (M,), s, increasing evenly.
+        phases: instantaneous voltages a, b, c to ground, or ab, bc, ca; in the unit of ``base``.
+        base: rated line-to-line RMS voltage.
+        connection: between what the voltages are recorded.
+        cycles: of the window, a whole number.
+
+    Raises ValueError as ``positive_sequence``.
+    """
+    course = positive_sequence(time, phases, cycles)
+    return replace(course, voltage=course.voltage * (LINE_VOLTAGE[connection] / base))
+
+
+def vt_of_rms(phases: Array, base: float, connection: Connection) -> Array:
+    """Return the terminal voltage (M,) per unit that three RMS values (M, 3) show.
+
+    ``base`` is the rated line-to-line RMS voltage, in the unit of the phases. Raises ValueError as
+    ``mean_rms``.
+    """
+    return mean_rms(phases) * (LINE_VOLTAGE[connection] / base)
+
+
+def mean_rms(phases: Array) -> Array:
+    """Return the mean (M,) of three RMS values (M, 3), nan where one of them is.
+
+    It exceeds the positive sequence by less than the square of the unbalance.
+
+    Source: IEC 60034-1 (unbalance of generators); Fortescue 1918.
+
+    Raises:
+        ValueError: one phase is off the mean by more than 5 % in more than 1 % of the samples.
+    """
+    _check_columns(phases)
+    mean = np.asarray(np.mean(phases, axis=1))
+    seen = np.isfinite(mean)
+    if not seen.any():
+        raise ValueError("at no instant do all three phases have a number")
+    away = np.max(np.abs(phases[seen] - mean[seen, None]), axis=1)
+    lasting = float(np.quantile(away - UNBALANCE * np.abs(mean[seen]), 1.0 - SPIKES))
+    if lasting > 0.0 or not np.median(mean[seen]) > 0.0:
+        levels = ", ".join(f"{level:.4g}" for level in np.median(phases[seen], axis=0))
+        raise ValueError(
+            f"the phases' RMS values, {levels} (medians), lie more than {100 * UNBALANCE:g} % off "
+            "their mean: one is missing, or a column is another signal"
+        )
+    return mean
+
+
+def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PhasorCourse:
+    """Return the RMS value of the positive sequence of three waveforms (M, 3), without delay.
+
+    Their space vector, turned back by the record's own frequency, is averaged over a window of
+    whole cycles about each sample. So negative sequence, offset and harmonics cancel as far as
+    they are constant; zero sequence is not in it. A voltage that moves appears as its moving
+    average over the window, and so must a simulation before the two are compared. Where the
+    frequency moves, the mean is corrected for how far the vector turns within the window.
+
+    Args:
+        time: (M,), s, increasing evenly.
+        phases: instantaneous voltages in the order of the phases, in one unit.
+        cycles: of the window, a whole number.
+
+    Source: Clarke 1943 (space vector); Fortescue 1918 (sequences); IEEE C37.118.1-2011, annex C
+    (phasors of a window of whole cycles about their instant).
+
+    Raises:
+        ValueError: a sample is no finite number, sampling is uneven by more than 1 % of a step or
+            gives fewer than eight samples a cycle, the record is shorter than the window and three
+            cycles, the frequency is not within 40 ... 70 Hz or moves by more than 1 Hz, the voltage
+            falls below a tenth, or the negative sequence exceeds a fifth of the positive one.
+    """
+    if cycles < 1 or cycles != int(cycles):
+        raise ValueError(f"a window of {cycles:g} cycles: it must be a whole number, 1 or more")
+    _check_columns(phases)
+    if not np.isfinite(phases).all():
+        at = time[~np.isfinite(phases).all(axis=1)][0]
+        raise ValueError(f"a waveform has no finite number at {at:g} s; its window needs all")
+    step = _even_step(time)
+    clock = step * np.arange(len(time))
+    vector: Complex = phases @ SPACE_VECTOR
+    frequency = _checked(_frequency(clock, vector), step, len(time), cycles)
+    # once more from what is left when the ripple is gone
+    positive = _windowed(vector, clock, frequency, cycles)
+    frequency += _frequency(clock[: len(positive)], positive)
+    positive = _windowed(vector, clock, frequency, cycles)
+    negative = _windowed(vector.conj(), clock, frequency, cycles)
+    half = (len(time) - len(positive)) // 2
+    kept = slice(half, len(time) - half)
+    window = cycles / frequency
+    _check_balance(time[kept], np.abs(positive), np.abs(negative))
+    drift = _drift(positive, step, round(0.5 * window / step))
+    if np.max(np.abs(drift)) > DRIFT:
+        raise ValueError(
+            f"the frequency moves by {np.max(np.abs(drift)):.3g} Hz off its mean of "
+            f"{frequency:.5g} Hz; at most {DRIFT:g} Hz"
+        )
+    voltage = np.abs(positive) / np.sinc(drift * window)
+    return PhasorCourse(time[kept], voltage, kept, frequency, window)
+
+
+def _check_columns(phases: Array) -> None:
+    """Raise a ValueError where there are not three phases."""
+    if phases.ndim != 2 or phases.shape[1] != PHASES:
+        raise ValueError(f"phases of shape {phases.shape}: {PHASES} columns are needed")
+
+
+def _even_step(time: Array) -> float:
+    """Return the sampling step (s); raises ValueError where it varies, or is too long."""
+    steps = np.diff(time)
+    step = float(np.mean(steps)) if len(steps) else np.inf
+    if step > 1.0 / (FEWEST_PER_CYCLE * FREQUENCIES[0]):
+        raise ValueError(
+            f"a sampling rate of {1.0 / step:.4g} Hz: a waveform needs {FEWEST_PER_CYCLE} samples "
+            "a cycle"
+        )
+    uneven = float(np.max(np.abs(steps - step))) / step
+    if uneven > UNEVEN:
+        raise ValueError(
+            f"the phasor of a waveform needs even sampling: a step differs by {100 * uneven:.3g} % "
+            f"from the mean of {step:g} s, allowed is {100 * UNEVEN:g} %"
+        )
+    return step
+
+
+def _frequency(clock: Array, vector: Complex) -> float:
+    """Return how fast a vector (M,) turns, Hz."""
+    middle = clock - np.mean(clock)
+    return float(middle @ np.unwrap(np.angle(vector)) / (middle @ middle) / (2.0 * pi))
+
+
+def _checked(frequency: float, step: float, count: int, cycles: int) -> float:
+    """Return a frequency (Hz); raises ValueError where it is no unit's, or badly seen."""
+    low, high = FREQUENCIES
+    if low <= -frequency <= high:
+        raise ValueError(
+            "the negative sequence dominates: two phases are swapped, or one has the wrong sign"
+        )
+    if not low <= frequency <= high:
+        raise ValueError(
+            f"the three waveforms turn with {frequency:.4g} Hz; a unit's lies within {low:g} ... "
+            f"{high:g} Hz"
+        )
+    if frequency * step * FEWEST_PER_CYCLE > 1.0:
+        raise ValueError(
+            f"{1.0 / (frequency * step):.3g} samples a cycle of {frequency:.4g} Hz; a waveform "
+            f"needs {FEWEST_PER_CYCLE}"
+        )
+    if count * step * frequency < cycles + FEWEST_CYCLES:
+        raise ValueError(
+            f"{count * step:.3g} s of {frequency:.4g} Hz; a window of {cycles} cycles needs "
+            f"{cycles + FEWEST_CYCLES} cycles"
+        )
+    return frequency
+
+
+def _windowed(vector: Complex, clock: Array, frequency: float, cycles: int) -> Complex:
+    """Return the mean of a vector (M,), turned back, over each window that lies in the record."""
+    from scipy.signal import oaconvolve
+
+    weights = _weights(1.0 / (frequency * clock[1]), cycles)
+    turned = vector * np.exp(-2j * pi * frequency * clock)
+    return np.asarray(oaconvolve(turned, weights, mode="valid"))
+
+
+def _weights(per_cycle: float, cycles: int) -> Array:
+    """Return the weights (2 L + 1,) of samples in a window of whole cycles about the middle one.
+
+    They are the integral of the line through the samples, changed as little as makes the mean of
+    every harmonic zero.
+    """
+    width = per_cycle * cycles
+    reach = ceil(0.5 * width)
+    beyond = 0.5 * width - (reach - 1)
+    one_side = np.ones(reach + 1)
+    one_side[-1] = 0.5 * beyond**2
+    one_side[-2] -= 0.5 * (1.0 - beyond) ** 2
+    weights = np.concatenate([one_side[:0:-1], one_side]) / width
+    orders = np.arange(1 + min(HARMONICS, int(0.5 * NEAR_NYQUIST * per_cycle)))
+    harmonics = np.cos(2.0 * pi * np.outer(orders, np.arange(-reach, reach + 1)) / per_cycle)
+    wanted = np.where(orders == 0, 1.0, 0.0)
+    return weights + np.linalg.lstsq(harmonics, wanted - harmonics @ weights)[0]
+
+
+def _check_balance(time: Array, positive: Array, negative: Array) -> None:
+    """Raise a ValueError where the voltage is gone, or is not that of three phases."""
+    low = int(np.argmin(positive))
+    if positive[low] < DEAD * np.max(positive):
+        raise ValueError(
+            f"at {time[low]:g} s the voltage is below {100 * DEAD:g} % of its largest: its phase "
+            "is lost there; choose a window of the record without it"
+        )
+    worst = int(np.argmax(negative / positive))
+    share = float(negative[worst] / positive[worst])
+    if share > REVERSED:
+        raise ValueError(
+            f"at {time[worst]:g} s the negative sequence is {100 * share:.3g} % of the positive "
+            f"one, allowed is {100 * REVERSED:g} %: a phase is missing, or a column is another "
+            "signal"
+        )
+
+
+def _drift(positive: Complex, step: float, reach: int) -> Array:
+    """Return by how much the frequency (Hz) about each sample differs from the mean."""
+    phase = np.unwrap(np.angle(positive))
+    reach = min(reach, (len(phase) - 1) // 2)
+    inner = (phase[2 * reach :] - phase[: len(phase) - 2 * reach]) / (4.0 * pi * reach * step)
+    return np.asarray(np.pad(inner, reach, mode="edge"))
