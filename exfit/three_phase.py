@@ -129,7 +129,7 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PhasorCour
         at = time[~np.isfinite(phases).all(axis=1)][0]
         raise ValueError(f"a waveform has no finite number at {at:g} s; its window needs all")
     step = _even_step(time)
-    clock = step * np.arange(len(time))
+    clock: Array = step * np.arange(len(time), dtype=np.float64)
     vector: Complex = phases @ SPACE_VECTOR
     frequency = _checked(_frequency(clock, vector), step, len(time), cycles)
     # once more from what is left when the ripple is gone
@@ -231,7 +231,7 @@ def _weights(per_cycle: float, cycles: int) -> Array:
     orders = np.arange(1 + min(HARMONICS, int(0.5 * NEAR_NYQUIST * per_cycle)))
     harmonics = np.cos(2.0 * pi * np.outer(orders, np.arange(-reach, reach + 1)) / per_cycle)
     wanted = np.where(orders == 0, 1.0, 0.0)
-    return weights + np.linalg.lstsq(harmonics, wanted - harmonics @ weights)[0]
+    return np.asarray(weights + np.linalg.lstsq(harmonics, wanted - harmonics @ weights)[0])
 
 
 def _check_balance(time: Array, positive: Array, negative: Array) -> None:
