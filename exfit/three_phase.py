@@ -190,7 +190,7 @@ def _checked(frequency: float, step: float, count: int, cycles: int) -> float:
         )
     if not low <= frequency <= high:
         raise ValueError(
-            f"the three waveforms turn with {frequency:.4g} Hz; a unit's lies within {low:g} ... "
+            f"the three waveforms turn with {frequency:.3f} Hz; a unit's lies within {low:g} ... "
             f"{high:g} Hz"
         )
     if frequency * step * FEWEST_PER_CYCLE > 1.0:

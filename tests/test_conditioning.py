@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 from scipy.ndimage import median_filter
 
-from exfit.conditioning import Conditioning, LowPass, Median, outliers
+from exfit.conditioning import Conditioning, LowPass, Median, MovingAverage, outliers
 
 RATE = 100.0
 TIME = np.arange(0.0, 10.0, 1.0 / RATE)
@@ -151,6 +152,77 @@ def test_uneven_sampling_is_refused_to_a_low_pass_only():
     with pytest.raises(ValueError, match=r"differs by 4 %.* 0\.01 s, allowed is 1 %"):
         Conditioning(time, ALL, LowPass(5.0))
     Conditioning(np.round(TIME + 5e-6, 5), ALL, LowPass(5.0))  # rounded stamps are even
+
+
+UNEVEN = np.cumsum(np.random.default_rng(0).uniform(0.001, 0.02, 500))
+WINDOWS = [0.0005, 0.02, 0.1, 3.0]  # s: shorter than a step, and longer than many
+
+every_window = pytest.mark.parametrize("window", WINDOWS)
+
+
+def averaging(window, time=UNEVEN, kept=None, filter=None):
+    kept = np.ones(len(time), dtype=bool) if kept is None else kept
+    return Conditioning(time, kept, filter, MovingAverage(window))
+
+
+def test_without_an_average_a_simulation_is_shown_as_it_is():
+    assert Conditioning(TIME, some_lost(), LowPass(5.0)).shown(RESPONSE) is RESPONSE
+
+
+@every_window
+def test_an_average_is_the_integral_of_the_line_through_the_samples(window):
+    signal = np.random.default_rng(1).normal(1.0, 0.1, UNEVEN.size)
+    line, half = make_interp_spline(UNEVEN, signal, k=1), window / 2
+    got = averaging(window).shown(signal)
+    inside = (UNEVEN - half >= UNEVEN[0]) & (UNEVEN + half <= UNEVEN[-1])
+    expected = [line.integrate(t - half, t + half) / window for t in UNEVEN[inside]]
+    assert got[inside] == pytest.approx(np.array(expected, dtype=float), abs=1e-11)
+
+
+@every_window
+def test_an_average_leaves_a_constant_and_a_line_as_they_are_to_their_ends(window):
+    average = averaging(window)
+    assert np.array_equal(average.shown(np.full(UNEVEN.size, 1.05)), np.full(UNEVEN.size, 1.05))
+    line = 1.0 + 0.3 * UNEVEN
+    assert average.shown(line) == pytest.approx(line, abs=1e-11)
+
+
+@every_window
+def test_derivatives_are_averaged_as_values_are(window):
+    columns = np.random.default_rng(2).normal(0.0, 1.0, (UNEVEN.size, 3))
+    average = averaging(window)
+    expected = np.stack([average.shown(column) for column in columns.T], axis=1)
+    assert average.shown(columns) == pytest.approx(expected, abs=1e-11)
+
+
+@every_filter
+def test_a_record_is_not_averaged_once_more(filter):
+    kept = some_lost()
+    measured = np.where(kept, RESPONSE, np.nan)
+    plain, average = Conditioning(TIME, kept, filter), averaging(0.1, TIME, kept, filter)
+    assert np.array_equal(average.apply(measured), plain.apply(measured))
+
+
+def test_a_kink_between_two_samples_errs_by_what_the_line_cuts_off():
+    step, window, at = 0.005, 0.02, 1.0025
+    time = np.arange(0.0, 2.0, step)
+    got = averaging(window, time).shown(np.maximum(time - at, 0.0))
+    expected = np.clip(time - at + window / 2, 0.0, window) ** 2 / (2.0 * window)
+    expected += np.maximum(time - at - window / 2, 0.0)
+    assert np.abs(got - expected).max() == pytest.approx(step**2 / (8.0 * window), rel=1e-6)
+
+
+@pytest.mark.parametrize("window", [0.0, -0.02, np.nan, np.inf])
+def test_an_average_over_no_time_is_refused(window):
+    with pytest.raises(ValueError, match="longer than 0"):
+        MovingAverage(window)
+
+
+def test_an_average_over_more_than_the_record_is_refused():
+    with pytest.raises(ValueError, match=r"over 20 s: the record is 9\.99 s long"):
+        averaging(20.0, TIME)
+    with pytest.raises(ValueError, match="1 samples"):
+        averaging(0.02, TIME[:1])
 
 
 @pytest.mark.parametrize("cutoff", [-1.0, 0.0, 50.0, 60.0, np.nan])

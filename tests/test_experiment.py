@@ -1,10 +1,12 @@
 """Weighted errors of a test, and what a fit takes from them: laws of weights and losses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from records import SAMPLES, UNIT, case_of, config, found_in, recording, several
 
-from exfit.conditioning import Conditioning
+from exfit.conditioning import Conditioning, LowPass, Median, MovingAverage
 from exfit.experiment import Channel
 from exfit.knowledge import knowledge
 from exfit.residuals import noise_of
@@ -67,6 +69,74 @@ def test_what_is_left_out_does_not_tell_the_noise(lost):
     spoiled = np.where(kept, measured, lost)
     without = noise_of(Channel("vt", measured[kept]))
     assert noise_of(Channel("vt", spoiled, conditioning=Conditioning(time, kept))) == without
+
+
+WINDOW = 0.1  # s: so wide that what it does is far above rounding
+
+
+def averaged(trial, filter=None, kept=None):
+    """Return a trial whose record holds averages already."""
+    time = trial.record.time
+    kept = np.ones(len(time), dtype=bool) if kept is None else kept
+    alike = Conditioning(time, kept, filter, MovingAverage(WINDOW))
+    channels = tuple(replace(one, conditioning=alike) for one in trial.channels)
+    return replace(trial, experiment=replace(trial.experiment, channels=channels))
+
+
+def averaged_case(folder, filter=None, lost=0):
+    """Return the case of the step up, and its trial with a record of averages."""
+    content = several(
+        recording("up"), free={name: found_in(*where) for name, where in NEAR.items()}
+    )
+    content["records"][0]["test"]["vt0"] = 1.0
+    content["parameters"]["fixed"] |= {name: UNIT[name] for name in UNIT if name not in NEAR}
+    case = case_of(content, folder)
+    trial = fitted_trials(case)[0].secured(case.values())
+    kept = np.ones(len(trial.record.time), dtype=bool)
+    kept[100 : 100 + lost] = False
+    return case, averaged(trial, filter, kept)
+
+
+NEAR = {name: (UNIT[name], UNIT[name] / 5, UNIT[name] * 5) for name in ("KA", "TE", "KF")}
+
+
+def test_a_record_of_averages_is_held_against_the_averaged_simulation(tmp_path):
+    case, trial = averaged_case(tmp_path)
+    values = case.values()
+    vt = trial.response(values).signals["vt"]
+    time = trial.record.time
+    average = Conditioning(time, np.ones(len(time), dtype=bool), averaged=MovingAverage(WINDOW))
+    recorded = [replace(trial.channels[0], measured=average.shown(vt))]
+    there = replace(trial, experiment=replace(trial.experiment, channels=tuple(recorded)))
+    assert there.experiment.errors(values)[0] == pytest.approx(np.zeros(len(time)), abs=1e-12)
+    plain = replace(recorded[0], conditioning=None)
+    off = replace(trial.experiment, channels=(plain,)).errors(values)[0]
+    assert np.abs(off).max() > 1e-4
+
+
+@pytest.mark.parametrize("lost", [0, 30])
+@pytest.mark.parametrize("filter", [None, LowPass(5.0), Median(5)], ids=str)
+def test_the_derivatives_of_averaged_simulations_are_exact(tmp_path, filter, lost):
+    case, trial = averaged_case(tmp_path, filter, lost)
+    residuals = residuals_of(case, [trial])
+    theta = residuals.start
+    # central differences of a limited response: some 1e-6 of the largest derivative
+    central = residuals.central(theta)
+    scale = np.abs(central).max()
+    assert residuals.exact(theta) == pytest.approx(central, abs=1e-5 * scale)
+
+
+def test_what_is_drawn_is_what_is_compared(tmp_path):
+    case, trial = averaged_case(tmp_path, lost=30)
+    values = case.values()
+    start = {**values, "KA": 0.5 * values["KA"]}
+    found = trial.compare("up", values, start)
+    vt = found.overlays["vt"]
+    errors = trial.channels[0].weight * (vt.simulated - vt.measured)
+    assert 0.5 * np.nansum(errors**2) == pytest.approx(found.cost, rel=1e-12)
+    assert np.isnan(errors).sum() == 30
+    first = trial.compare("up", start).overlays["vt"].simulated
+    assert np.array_equal(vt.start, first, equal_nan=True)
 
 
 def test_one_record_that_is_not_described_is_not_made_up_for_by_another(tmp_path):
