@@ -25,9 +25,9 @@ UNEVEN = 0.01  # of a sampling step
 REVERSED = 0.2  # of the positive sequence: a unit shows 0.02, one that lost a phase 0.5
 DEAD = 0.1  # of the largest voltage: below it noise turns the phase
 DRIFT = 1.0  # Hz: beyond it the window is no whole cycle to 2 %
-HARMONICS = 40  # orders that the window takes out, as far as IEC 61000-3-6 counts them
+HARMONICS = 40  # orders that the window takes out, as far as IEC 61000-3-2 counts them
 NEAR_NYQUIST = 0.9  # of half the sampling rate: beyond it the samples show no harmonic
-UNBALANCE = 0.05  # of the mean: IEC 60034-1 has generators run at 0.01
+UNBALANCE = 0.05  # of the mean: IEC 60034-1 has machines made for a system of 0.01
 SPIKES = 0.01  # of the samples: so many may lie off without a wrong column
 
 
@@ -76,9 +76,10 @@ def vt_of_rms(phases: Array, base: float, connection: Connection) -> Array:
 def mean_rms(phases: Array) -> Array:
     """Return the mean (M,) of three RMS values (M, 3), nan where one of them is.
 
-    It exceeds the positive sequence by less than the square of the unbalance.
+    It exceeds the positive sequence by less than the square of what negative and zero sequence
+    are to it.
 
-    Source: IEC 60034-1 (unbalance of generators); Fortescue 1918.
+    Source: Fortescue 1918.
 
     Raises:
         ValueError: one phase is off the mean by more than 5 % in more than 1 % of the samples.

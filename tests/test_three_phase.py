@@ -203,6 +203,14 @@ def test_of_three_rms_values_the_mean_is_the_voltage():
     assert np.array_equal(mean_rms(phases), phases.mean(axis=1))
 
 
+@pytest.mark.parametrize("angle", np.linspace(0.0, 2.0 * pi, 7))
+def test_the_mean_of_rms_values_is_nearly_the_positive_sequence(angle):
+    negative, zero = 0.02, 0.015
+    others = negative * np.exp(1j * (2.0 * BEHIND + angle)) + zero * np.exp(1j * (BEHIND + 1.0))
+    excess = mean_rms(np.abs(1.0 + others)[None, :])[0] - 1.0
+    assert 0.0 <= excess < (negative + zero) ** 2
+
+
 def test_a_missing_rms_value_leaves_a_gap():
     phases = np.full((10, 3), 9.0)
     phases[3, 1] = np.nan
