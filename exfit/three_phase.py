@@ -22,7 +22,7 @@ FREQUENCIES = (40.0, 70.0)  # Hz: systems of 50 and 60 Hz, and units that run of
 FEWEST_PER_CYCLE = 8  # samples: fewer do not show the third harmonic
 FEWEST_CYCLES = 3  # beside the window: fewer do not tell the frequency
 UNEVEN = 0.01  # of a sampling step
-REVERSED = 0.2  # of the positive sequence: a unit shows 0.02, one that lost a phase 0.5
+MOST_NEGATIVE = 0.2  # of the positive sequence: a unit shows 0.02, one that lost a phase 0.5
 DEAD = 0.1  # of the largest voltage: below it noise turns the phase
 DRIFT = 1.0  # Hz: beyond it the window is no whole cycle to 2 %
 HARMONICS = 40  # orders that the window takes out, as far as IEC 61000-3-2 counts them
@@ -245,11 +245,11 @@ def _check_balance(time: Array, positive: Array, negative: Array) -> None:
         )
     worst = int(np.argmax(negative / positive))
     share = float(negative[worst] / positive[worst])
-    if share > REVERSED:
+    if share > MOST_NEGATIVE:
         raise ValueError(
             f"at {time[worst]:g} s the negative sequence is {100 * share:.3g} % of the positive "
-            f"one, allowed is {100 * REVERSED:g} %: a phase is missing, or a column is another "
-            "signal"
+            f"one, allowed is {100 * MOST_NEGATIVE:g} %: a phase is missing, or a column is "
+            "another signal"
         )
 
 
