@@ -1,0 +1,196 @@
+"""Excel workbooks, by python-calamine: a sheet with a row of names above rows of numbers."""
+
+import hashlib
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime, time, timedelta
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import RecordError
+from exfit.readers.columns import Columns, needed, read_bytes, sound
+from exfit.readers.names import clock_of, is_unit, unit_in
+from exfit.readers.table import Table
+
+if TYPE_CHECKING:
+    from python_calamine import CalamineWorkbook
+
+Row = Sequence[Any]
+
+FEWEST_CELLS = 2  # of a row that holds a sample: the time and one signal
+CELL_SHOWN = 40
+WORKBOOK = "an Excel workbook"
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """A table on a sheet: the column names by place, their units, and where its samples stand."""
+
+    name: str
+    rows: Sequence[Row]
+    places: tuple[int, ...]
+    names: tuple[str, ...]
+    units: dict[str, str]
+    samples: tuple[int, ...]
+
+
+def read_excel(path: Path, sheet: str | None = None) -> Table:
+    """Return the table on a sheet of an Excel workbook (.xlsx, .xlsm, .xlsb, .xls) or an .ods.
+
+    Above the samples stands a row of names, between them perhaps a row of units; what stands
+    higher, as titles do, is left out, and so are blank rows and columns without a name. Timestamps
+    are good to 1 ms, as Excel shows them. A cell with an error, as #DIV/0!, is a missing sample.
+
+    Args:
+        path: the workbook.
+        sheet: the sheet's name; None: the only one with a table.
+
+    Raises:
+        RecordError: a file that is damaged, no table in it, several of them and no sheet named,
+            or the package python-calamine missing.
+    """
+    data = read_bytes(path)
+    found = _tables(path, _workbook(path, data), sheet)
+    several = ", ".join(repr(one.name) for one in found)
+    if len(found) > 1:
+        raise RecordError(f"{path}: name one of the sheets with a table: {several}")
+    if not found:
+        where = "" if sheet is None else f" on the sheet {sheet!r}"
+        raise RecordError(
+            f"{path}: no table{where}: a row of names above rows of numbers, {FEWEST_CELLS} or more"
+        )
+    return _columns(path, hashlib.sha256(data).hexdigest(), found[0], sheet is not None)
+
+
+def _workbook(path: Path, data: bytes) -> "CalamineWorkbook":
+    try:
+        from python_calamine import CalamineWorkbook
+    except ImportError:
+        raise needed(path, "python-calamine", "excel") from None
+    return sound(path, WORKBOOK, lambda: CalamineWorkbook.from_filelike(io.BytesIO(data)))
+
+
+def _tables(path: Path, book: "CalamineWorkbook", sheet: str | None) -> list[_Sheet]:
+    """Return the tables of a workbook, or that of one sheet."""
+    names = book.sheet_names
+    if sheet is not None and sheet not in names:
+        raise RecordError(f"{path}: no sheet {sheet!r}; there are {', '.join(map(repr, names))}")
+    found = []
+    for name in names if sheet is None else [sheet]:
+        rows = sound(path, WORKBOOK, partial(_rows, book, name))
+        table = _table(name, rows)
+        if table is not None:
+            found.append(table)
+    return found
+
+
+def _rows(book: "CalamineWorkbook", name: str) -> list[Row]:
+    return [*book.get_sheet_by_name(name).to_python(skip_empty_area=False)]
+
+
+def _table(name: str, rows: Sequence[Row]) -> _Sheet | None:
+    """Return the first table on a sheet: a row of names right above the first sample."""
+    filled = [at for at, row in enumerate(rows) if any(cell != "" for cell in row)]
+    for place, at in enumerate(filled):
+        if not _is_sample(rows[at]):
+            continue
+        head = filled[max(place - 2, 0) : place]
+        units = head.pop() if len(head) > 1 and _is_units(rows[head[-1]]) else None
+        if head and _names(rows[head[-1]], rows[at]):
+            return _sheet(name, rows, head[-1], units, tuple(filled[place:]))
+    return None
+
+
+def _is_sample(row: Row) -> bool:
+    """Tell whether a row holds a sample: numbers and timestamps, more of them than of texts."""
+    texts = sum(isinstance(cell, str) and cell != "" for cell in row)
+    numbers = sum(not isinstance(cell, str) for cell in row)
+    return numbers >= FEWEST_CELLS and numbers > texts
+
+
+def _is_units(row: Row) -> bool:
+    cells = [cell for cell in row if cell != ""]
+    return all(isinstance(cell, str) and is_unit(cell) for cell in cells)
+
+
+def _names(row: Row, below: Row) -> bool:
+    """Tell whether a row names the columns of the one below: texts over two cells or more."""
+    named = [isinstance(cell, str) and cell.strip() != "" for cell in row]
+    over = sum(name and cell != "" for name, cell in zip(named, below, strict=True))
+    return over >= FEWEST_CELLS and all(isinstance(cell, str) for cell in row)
+
+
+def _sheet(
+    name: str, rows: Sequence[Row], head: int, units: int | None, samples: tuple[int, ...]
+) -> _Sheet:
+    named = {at: cell.strip() for at, cell in enumerate(rows[head]) if cell.strip()}
+    below = rows[units] if units is not None else [""] * len(rows[head])
+    said = {
+        column: below[at].strip(" []()") or unit_in(column) or "" for at, column in named.items()
+    }
+    return _Sheet(
+        name=name,
+        rows=rows,
+        places=tuple(named),
+        names=tuple(named.values()),
+        units={column: unit for column, unit in said.items() if unit},
+        samples=samples,
+    )
+
+
+def _columns(path: Path, sha256: str, sheet: _Sheet, asked: bool) -> Columns:
+    place = f"{path}: sheet {sheet.name!r}, row" if asked else f"{path}: row"
+
+    def where(row: int) -> str:
+        return f"{place} {sheet.samples[row] + 1}"
+
+    def fetch(at: int) -> NDArray[Any]:
+        cells = [sheet.rows[row][sheet.places[at]] for row in sheet.samples]
+        return _column(cells, lambda row: f"{where(row)}, column {sheet.names[at]!r}")
+
+    return Columns(
+        path=path,
+        sha256=sha256,
+        names=sheet.names,
+        units=sheet.units,
+        clock=clock_of(sheet.names),
+        fetch=fetch,
+        where=where,
+    )
+
+
+def _column(cells: Sequence[Any], place: Callable[[int], str]) -> NDArray[Any]:
+    """Return cells of one kind as an array: numbers, timestamps or times of day."""
+    kind = next((_kind(cell) for cell in cells if _kind(cell) not in ("", "text")), "number")
+    for row, cell in enumerate(cells):
+        if _kind(cell) not in ("", kind):
+            shown = repr(cell) if isinstance(cell, str) else str(cell)
+            raise RecordError(f"{place(row)}: {shown[:CELL_SHOWN]} is not a {kind}")
+    if kind == "number":
+        return np.array([np.nan if cell == "" else float(cell) for cell in cells])
+    if kind == "timestamp":
+        return np.array([None if cell == "" else cell for cell in cells], "datetime64[ns]")
+    return np.array([None if cell == "" else _of_day(cell) for cell in cells], "timedelta64[ns]")
+
+
+def _kind(cell: Any) -> str:
+    """Return what a cell holds; of a blank one nothing."""
+    if isinstance(cell, str):
+        return "text" if cell.strip() else ""
+    if isinstance(cell, date | datetime):
+        return "timestamp"
+    return "time of day" if isinstance(cell, time | timedelta) else "number"
+
+
+def _of_day(cell: time | timedelta) -> timedelta:
+    """Return the time since midnight."""
+    if isinstance(cell, timedelta):
+        return cell
+    return timedelta(
+        hours=cell.hour, minutes=cell.minute, seconds=cell.second, microseconds=cell.microsecond
+    )
