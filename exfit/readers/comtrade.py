@@ -35,6 +35,7 @@ MISSING_1991 = -1.0  # 0xFFFF
 NANOSECONDS = 1e-9
 SLOWEST = 1e-6  # Hz: less is no sampling rate
 TEXT_SHOWN = 60
+EMPTY = "an empty cell"
 
 _COUNTS = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*[Aa]\s*,\s*(\d{1,6})\s*[Dd]\s*")
 _SECTION = re.compile(
@@ -314,24 +315,21 @@ def _ascii(parts: _Parts, config: "Cfg") -> _Samples:
     width = 2 + config.analog_count + config.status_count
     data = parts.data.replace(b"\x1a", b"")
     try:
-        cells = _loaded(data)
+        cells = _loaded(data, width)
     except ValueError:
         data = _BLANK_CELL.sub(b"nan", data)
         _find_fault(parts, data, width)
-        cells = _loaded(data)
+        cells = _loaded(data, width)
     if cells.shape[1] != width:
         _find_fault(parts, data, width)
-    if not np.all(np.isfinite(cells[:, 0])):
-        at = int(np.flatnonzero(~np.isfinite(cells[:, 0]))[0])
-        raise RecordError(f"{_place(parts, at)}: it has no number")
     stamp = np.where(np.isnan(cells[:, 1]), MISSING_STAMP, cells[:, 1])
     analog = cells[:, 2 : 2 + config.analog_count]
     return _Samples(cells[:, 0], stamp, analog, cells[:, 2 + config.analog_count :])
 
 
-def _loaded(data: bytes) -> Array:
+def _loaded(data: bytes, width: int) -> Array:
     if not data.strip():
-        return np.empty((0, 0))
+        return np.empty((0, width))
     text = io.TextIOWrapper(io.BytesIO(data), encoding="latin-1")
     return np.loadtxt(text, delimiter=",", comments=None, ndmin=2)
 
@@ -346,9 +344,8 @@ def _find_fault(parts: _Parts, data: bytes, width: int) -> None:
             )
         for cell in cells if line.strip() else ():
             if not _is_number(cell):
-                raise RecordError(
-                    f"{parts.dat}:{at + 1}: {cell.strip()[:TEXT_SHOWN]!r} is not a number"
-                )
+                what = f"{cell.strip()[:TEXT_SHOWN]!r} is not a number"
+                raise RecordError(f"{parts.dat}:{at + 1}: {what if cell.strip() else EMPTY}")
 
 
 def _is_number(cell: str) -> bool:

@@ -16,11 +16,10 @@ _BRACKETS = re.compile(r"(.*\S)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
 _FRACTION = re.compile(r"([^/]*[^/\s])\s*/\s*([^/\s]+)")
 _BEHIND_COMMA = re.compile(r"([^,]*[^,\s])\s*,\s*([^,\s]+)")
 
-_TIMES = frozenset(
-    ("t", "time", "tout", "zeit", "uhrzeit", "timestamp", "zeitstempel", "datetime", "utc")
-    + ("relative_time", "time_of_day", "elapsed_time", "date_time", "time_stamp")
-)
 _WHOLE = frozenset(("timestamp", "zeitstempel", "datetime", "date_time", "time_stamp"))  # no date
+_TIMES = _WHOLE | {
+    "t", "time", "tout", "zeit", "uhrzeit", "utc", "relative_time", "elapsed_time", "time_of_day",
+}  # fmt: skip
 _DATES = frozenset(("date", "datum"))
 
 
