@@ -44,6 +44,7 @@ ORDER = (
     "exfit.readers.columns",
     "exfit.readers.names",
     "exfit.readers.comtrade",
+    "exfit.readers.mat5",
     "exfit.readers.matlab",
     "exfit.readers.excel",
     "exfit.readers.parquet",

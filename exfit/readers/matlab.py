@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
+from exfit.readers import mat5
 from exfit.readers.columns import Columns, read_bytes, sound
 from exfit.readers.names import clock_of
 from exfit.readers.table import Array, Table
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_OFFSET = 512  # of the HDF5 signature in a file of version 7.3
+MATLAB = "a MATLAB file"
 DEEPEST = 8  # structs in structs
 
 Found = tuple[str, NDArray[Any]]
@@ -38,7 +40,7 @@ def read_mat(path: Path) -> Table:
         raise RecordError(
             f"{path}: version 7.3 (HDF5) is not read; in MATLAB: save('{path.name}', '-v7')"
         )
-    found = [one for name, value in _loaded(path).items() for one in _vectors(name, value)]
+    found = [one for name, value in _loaded(path, data).items() for one in _vectors(name, value)]
     names = tuple(name for name, _ in found)
     if not any(_is_real(values) for _, values in found):
         raise RecordError(f"{path}: no vector of numbers in it; objects such as timeseries are not")
@@ -53,13 +55,15 @@ def read_mat(path: Path) -> Table:
     )
 
 
-def _loaded(path: Path) -> dict[str, Any]:
+def _loaded(path: Path, data: bytes) -> dict[str, Any]:
     """Return the variables of the file, in its order."""
     from scipy.io import loadmat
 
+    if mat5.is_mat5(data):
+        sound(path, MATLAB, lambda: mat5.check(data))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of objects that SciPy cannot read
-        variables = sound(path, "a MATLAB file", lambda: loadmat(str(path), appendmat=False))
+        variables = sound(path, MATLAB, lambda: loadmat(str(path), appendmat=False))
     return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 

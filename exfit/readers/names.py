@@ -56,7 +56,8 @@ def _split(name: str) -> tuple[str, str | None]:
         unit = (found[2] or found[3] or "").strip()
         return (found[1], unit) if is_unit(unit) else (name, None)
     if (found := _FRACTION.fullmatch(name)) and is_unit(found[2]) and not is_unit(name):
-        return (name, None) if is_unit(found[1]) else (found[1], found[2])
+        last = found[1].split()[-1]
+        return (name, None) if is_unit(last) else (found[1], found[2])
     if (found := _BEHIND_COMMA.fullmatch(name)) and _TIME_UNIT.fullmatch(found[2]):
         return found[1], found[2]
     return name, None

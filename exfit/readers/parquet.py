@@ -83,17 +83,26 @@ def _fetch(path: Path, opened: "Callable[[], ParquetFile]", field: "pa.Field") -
     if not steps:
         raise RecordError(f"{path}: column {field.name!r} holds {field.type}, not numbers")
 
-    def read() -> NDArray[Any]:
-        from pyarrow.types import is_floating
-
+    def read() -> "pa.ChunkedArray":
         with opened() as file:
-            column = file.read(columns=[field.name]).column(0)
+            return file.read(columns=[field.name]).column(0)
+
+    return _cast(path, field.name, sound(path, PARQUET, read), steps)
+
+
+def _cast(
+    path: Path, name: str, column: "pa.ChunkedArray", steps: "tuple[pa.DataType, ...]"
+) -> NDArray[Any]:
+    from pyarrow import ArrowInvalid
+    from pyarrow.types import is_floating
+
+    try:
         for kind in steps:
             # an integer beyond 2**53 becomes the float64 next to it; a date beyond ns does not
             column = column.cast(kind, safe=not is_floating(kind))
-        return np.asarray(column.to_numpy())
-
-    return sound(path, PARQUET, read)
+    except ArrowInvalid as error:
+        raise RecordError(f"{path}: column {name!r}: {error}") from None
+    return np.asarray(column.to_numpy())
 
 
 def _steps(kind: "pa.DataType") -> "tuple[pa.DataType, ...]":
