@@ -1,10 +1,13 @@
 """MATLAB files, as SciPy writes them: vectors, matrices and structs become columns by name."""
 
 import hashlib
+import warnings
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from hypothesis import HealthCheck, given, settings
 from scipy.io import savemat
 from tables import damage, everything, refused
@@ -144,6 +147,42 @@ def test_a_file_that_is_cut_off_is_refused(mat):
     path = mat({"t": T, "Ut": UT})
     path.write_bytes(path.read_bytes()[:-9])
     refused(lambda: read_mat(path), "bump.mat", "damaged")
+
+
+FLAGS_OF_FIRST = 128 + 16  # behind the head of the file and two tags
+
+
+@pytest.mark.parametrize(
+    ("at", "new"),
+    [(FLAGS_OF_FIRST + 1, b"\x08"), (FLAGS_OF_FIRST + 16, b"\x01\x00\x00\x7f"), (132, b"\xff")],
+    ids=["complex without an imaginary part", "more rows than numbers", "longer than the file"],
+)
+def test_a_layout_that_would_end_python_is_refused(mat, at, new):
+    path = mat({"t": T, "Ut": UT})
+    data = path.read_bytes()
+    path.write_bytes(data[:at] + new + data[at + len(new) :])
+    refused(lambda: read_mat(path), "bump.mat", "damaged")
+
+
+MATLABS_OWN = sorted((Path(scipy.io.__file__).parent / "matlab/tests/data").glob("*.mat"))
+
+
+@pytest.mark.skipif(not MATLABS_OWN, reason="this SciPy came without its tests")
+def test_no_file_of_matlab_that_scipy_reads_is_held_for_damaged():
+    read = 0
+    for path in MATLABS_OWN:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                scipy.io.loadmat(path)
+            except Exception:  # some of them are there because they are damaged
+                continue
+        read += 1
+        with suppress(RecordError):
+            read_mat(path)
+            continue
+        refused(lambda path=path: read_mat(path), "no vector")
+    assert read > 50
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,10 @@ from math import prod
 
 HEAD = 128  # bytes before the first element; their last two tell the order of bytes
 ORDERS = {b"IM": "<", b"MI": ">"}
-INT8, INT32, UINT32, MATRIX, COMPRESSED = 1, 5, 6, 14, 15
+MATRIX, COMPRESSED = 14, 15
+FLAGS = (6,)
+COUNTS = (5, 6)  # int32; other programs than MATLAB write uint32
+NAMES = (1, 16)  # int8; others write UTF-8
 WIDTHS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 CELL, STRUCT, OBJECT, CHARACTERS, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
 NUMBERS = range(6, 16)  # classes from double to uint64
@@ -66,14 +69,14 @@ def _check_matrix(kind: int, data: memoryview, order: str, depth: int = 0) -> No
     if not data:  # an empty array
         return
     parts = _elements(data, order)
-    word = struct.unpack(order + "II", _part(parts, UINT32, 8))[0]
+    word = struct.unpack(order + "II", _part(parts, FLAGS, 8))[0]
     if word & 0xFF == OPAQUE:  # SciPy does not look further into it
         return
-    sizes = _part(parts, INT32)
+    sizes = _part(parts, COUNTS)
     shape = struct.unpack(f"{order}{len(sizes) // 4}i", sizes)
     if len(shape) < 2 or min(shape) < 0:
         raise Damage(f"an array of the size {shape}")
-    _part(parts, INT8)
+    _part(parts, NAMES)
     _check_content(word, prod(shape), parts, order, depth)
 
 
@@ -82,9 +85,9 @@ def _check_content(word: int, count: int, parts: Iterator[Element], order: str, 
     kind = word & 0xFF
     if kind in (STRUCT, OBJECT):
         if kind == OBJECT:
-            _part(parts, INT8)
-        width = struct.unpack(order + "i", _part(parts, INT32, 4))[0]
-        fields = _part(parts, INT8)
+            _part(parts, NAMES)
+        width = struct.unpack(order + "i", _part(parts, COUNTS, 4))[0]
+        fields = _part(parts, NAMES)
         if width <= 0 or len(fields) % width:
             raise Damage(f"{len(fields)} bytes of names of {width} bytes each")
         count *= len(fields) // width
@@ -96,8 +99,8 @@ def _check_content(word: int, count: int, parts: Iterator[Element], order: str, 
             raise Damage(f"{len(arrays)} arrays in an array of {count}")
         return
     if kind == SPARSE:
-        _part(parts, INT32)
-        _part(parts, INT32)
+        _part(parts, COUNTS)
+        _part(parts, COUNTS)
     elif kind not in NUMBERS and kind != CHARACTERS:
         raise Damage(f"an array of class {kind}")
     found = [(inner, len(content)) for inner, content in parts]
@@ -109,9 +112,9 @@ def _check_content(word: int, count: int, parts: Iterator[Element], order: str, 
             raise Damage(f"{size} bytes of type {inner} in an array of {count}")
 
 
-def _part(parts: Iterator[Element], kind: int, size: int | None = None) -> memoryview:
-    """Return the content of the next part, which must be of a type."""
-    found, content = next(parts, (0, memoryview(b"")))
-    if found != kind or size not in (None, len(content)) or len(content) % WIDTHS[kind]:
-        raise Damage(f"{len(content)} bytes of type {found} in the place of type {kind}")
+def _part(parts: Iterator[Element], kinds: tuple[int, ...], size: int | None = None) -> memoryview:
+    """Return the content of the next part, which must be of one of the types."""
+    kind, content = next(parts, (0, memoryview(b"")))
+    if kind not in kinds or size not in (None, len(content)) or len(content) % WIDTHS[kind]:
+        raise Damage(f"{len(content)} bytes of type {kind} in the place of type {kinds[0]}")
     return content
