@@ -49,7 +49,13 @@ def assert_the_record(table):
 
 
 UNITS = ("s", "kV", "A")
-TITLES = [("Unit 1, bump test",), (), ("Rated voltage", 15.75, "kV"), ("Operator", "N. N."), ()]
+TITLES = [
+    ("Unit 1, bump test",),
+    (),
+    ("Operator", "N. N.", "shift", "B", "day"),
+    ("Rated", 15.75, "kV", 120.0, "MVA"),
+    (),
+]
 LAYOUTS = {
     "names": [NAMES, *ROWS],
     "titles": [*TITLES, NAMES, *ROWS],

@@ -19,6 +19,7 @@ UNITS = {
     "f (Hz)": "Hz",
     "Ugen": None,
     "U (L1)": None,
+    "U (S)": None,
     "data[1]": None,
     "Phase, A": None,
     "Ua/Ub": None,

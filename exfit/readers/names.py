@@ -11,6 +11,7 @@ _UNIT = re.compile(
     r"|bar|m/s)",
     re.IGNORECASE,
 )
+PHASE = "S"  # of R, S and T, or the apparent power; s is a second
 _TIME_UNIT = re.compile(r"s|sec|seconds|ms|msec|milliseconds|us|µs|μs|min", re.IGNORECASE)
 _BRACKETS = re.compile(r"(.*\S)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
 _FRACTION = re.compile(r"([^/]*[^/\s])\s*/\s*([^/\s]+)")
@@ -28,7 +29,7 @@ def is_unit(text: str) -> bool:
     text = text.strip()
     if (text[:1], text[-1:]) in (("[", "]"), ("(", ")")):
         text = text[1:-1].strip()
-    return _UNIT.fullmatch(text) is not None
+    return _UNIT.fullmatch(text) is not None and text != PHASE
 
 
 def unit_in(name: str) -> str | None:
