@@ -166,6 +166,8 @@ def _columns(path: Path, sha256: str, sheet: _Sheet, asked: bool) -> Columns:
 
 def _column(cells: Sequence[Any], place: Callable[[int], str]) -> NDArray[Any]:
     """Return cells of one kind as an array: numbers, timestamps or times of day."""
+    if all(type(cell) is float for cell in cells):  # as nearly always: five times as fast
+        return np.array(cells)
     kind = next((_kind(cell) for cell in cells if _kind(cell) not in ("", "text")), "number")
     for row, cell in enumerate(cells):
         if _kind(cell) not in ("", kind):
