@@ -89,7 +89,9 @@ class Channel:
     @property
     def plain(self) -> bool:
         """Whether samples are compared as they stand."""
-        return self.conditioning is None or self.conditioning.filter is None
+        if self.conditioning is None:
+            return True
+        return self.conditioning.filter is None and self.conditioning.averaged is None
 
 
 @dataclass(frozen=True, eq=False)
