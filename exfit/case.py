@@ -35,12 +35,13 @@ from exfit.case_schema import (
     Step,
     Switch,
     Text,
+    TimeColumn,
     Unknown,
     Value,
     known,
 )
 from exfit.errors import CaseError, RecordError
-from exfit.record import Record, read_record
+from exfit.record import Clock, Record, read_record
 from exfit.ties import Ties
 from exfit.yaml_lines import Fault, Place, read_text, read_yaml
 
@@ -234,7 +235,8 @@ class Case(Section):
         }
         path = self.folder / record.file
         missing = record.gaps == "skip"
-        read = read_record(path, record.time, channels, record.window, missing)
+        clock = clock_of(record)
+        read = read_record(path, clock, channels, record.window, missing, record.sheet)
         start, end = read.time[0], read.time[-1]
         if test.begin is not None:
             if test.begin > start:
@@ -282,12 +284,25 @@ class Column(NamedTuple):
     column: str
     scale: float
     offset: float
+    unit: str | None
+    base: float | None
+
+
+def clock_of(record: RecordFile) -> Clock:
+    """Return where the time of a record stands."""
+    if isinstance(record.time, str):
+        return Clock((record.time,))
+    if isinstance(record.time, TimeColumn):
+        return Clock((record.time.column,), record.time.unit)
+    return Clock(record.time)
 
 
 def column_of(channel: Channel) -> Column:
     """Return the column of a channel; where a fit finds scale or offset, with their starts."""
     scale, offset = known(channel.scale), known(channel.offset)
-    return Column(channel.column, 1.0 if scale is None else scale, offset or 0.0)
+    return Column(
+        channel.column, 1.0 if scale is None else scale, offset or 0.0, channel.unit, channel.base
+    )
 
 
 def initial_level(test: BumpTest, record: Record, signal: str) -> float:

@@ -311,9 +311,17 @@ Filter = Annotated[
 
 
 class Channel(Section):
-    """Where a signal stands and how it becomes per unit: column * scale + offset."""
+    """Where a signal stands and how it becomes per unit: column / base * scale + offset."""
 
     column: Text = Field(description="Name of the column.")
+    unit: Text | None = Field(
+        default=None, description="Unit of the column's numbers, such as kV, V, A, MW, pu or %."
+    )
+    base: Positive | None = Field(
+        default=None,
+        description="What 1 pu is, in that unit; of ifd the field current on the air-gap line at "
+        "rated voltage.",
+    )
     scale: Findable = Field(
         default=1.0,
         description="Factor on the column's numbers; or {start, min, max}, and the fit finds it.",
@@ -338,11 +346,36 @@ class Channel(Section):
     )
 
 
+class TimeColumn(Section):
+    """The column with the time, and its unit."""
+
+    column: Text = Field(description="Name of the column.")
+    unit: Literal["s", "ms", "us", "min"] = Field(description="Unit of its numbers.")
+
+
+def _kind_of_clock(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return "[pair]"
+    return "[column]" if isinstance(value, dict | BaseModel) else "[name]"
+
+
+Time = Annotated[
+    Annotated[Text, Tag("[name]")]
+    | Annotated[tuple[Text, Text], Tag("[pair]")]
+    | Annotated[TimeColumn, Tag("[column]")],
+    Discriminator(_kind_of_clock),
+]
+
+
 class RecordFile(Section):
-    """A measured record: a CSV file with a row of column names."""
+    """A measured record: a file as a recorder writes it."""
 
     file: Text = Field(description="Path, relative to the case file.")
-    time: Text = Field(description="Column with the time, s.")
+    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    time: Time = Field(
+        description="Column with the time, s or as the file says; or [date, time of day], two "
+        "columns; or {column, unit}. Timestamps count from the first."
+    )
     channels: Annotated[
         Mapping[
             Signal,

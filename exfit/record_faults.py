@@ -6,6 +6,7 @@ from typing import Any
 from exfit.case_data import Data, is_pair, list_of, numbers_in, section_of, starts_in
 from exfit.case_form import show
 from exfit.plant import DRIVING
+from exfit.readers.units import needs_base
 from exfit.yaml_lines import Fault, Place
 
 TAKEN = (
@@ -92,11 +93,23 @@ def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
         if numbers_in(section_of(channels, signal)).get("scale") == 0.0:
             here = (*place, "channels", signal, "scale")
             yield Fault(here, "0 leaves nothing of the column")
+        yield from _unit_faults((*place, "channels", signal), section_of(channels, signal))
     for signal in NEEDED.get(kind, ()):
         if channels and signal not in channels:
             yield Fault((*place, "channels", signal), f"is missing: plant {kind} needs it")
     if kind == "machine-playback" and channels and not {"vt", "ifd"} & channels.keys():
         yield Fault((*place, "channels"), "neither vt nor ifd: there is nothing to compare")
+
+
+def _unit_faults(place: Place, channel: Data) -> Iterator[Fault]:
+    """Yield a base of no unit, and a unit that nothing makes per unit."""
+    unit = channel.get("unit")
+    if "base" in channel and "unit" not in channel:
+        yield Fault((*place, "unit"), "is missing: in which unit is base?")
+    if "base" in channel or "scale" in channel or not isinstance(unit, str):
+        return
+    if unit and needs_base(unit):
+        yield Fault((*place, "base"), f"is missing: what is 1 pu in {unit}?")
 
 
 def _event_faults(place: Place, test: Data, kind: str) -> Iterator[Fault]:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from exfit.errors import RecordError
-from exfit.record import file_hash, read_columns, read_record
+from exfit.record import Clock, file_hash, read_columns, read_record
 
 
 @dataclass(frozen=True)
@@ -18,8 +18,11 @@ class Channel:
     column: str
     scale: float = 1.0
     offset: float = 0.0
+    unit: str | None = None
+    base: float | None = None
 
 
+T = Clock(("t",))
 VT = {"vt": Channel("vt")}
 GOOD = "t,vt,ifd\n0.0,1.0,1.1\n0.1,1.01,1.2\n0.2,1.02,1.3\n0.3,1.03,1.4\n"
 
@@ -38,13 +41,13 @@ def csv(tmp_path):
 
 def refusal(path, channels=VT, window=None):
     with pytest.raises(RecordError) as caught:
-        read_record(path, "t", channels, window)
+        read_record(path, T, channels, window)
     return str(caught.value)
 
 
 def test_a_signal_is_column_times_scale_plus_offset(csv):
     path = csv(GOOD)
-    record = read_record(path, "t", {"vt": Channel("vt", 2.0, -1.0), "ifd": Channel("ifd")})
+    record = read_record(path, T, {"vt": Channel("vt", 2.0, -1.0), "ifd": Channel("ifd")})
     assert record.time.tolist() == [0.0, 0.1, 0.2, 0.3]
     assert record.signals["vt"].tolist() == [1.0, 2 * 1.01 - 1, 2 * 1.02 - 1, 2 * 1.03 - 1]
     assert record.signals["ifd"].tolist() == [1.1, 1.2, 1.3, 1.4]
@@ -52,7 +55,7 @@ def test_a_signal_is_column_times_scale_plus_offset(csv):
 
 
 def test_the_window_includes_both_its_ends(csv):
-    record = read_record(csv(GOOD), "t", VT, (0.1, 0.2))
+    record = read_record(csv(GOOD), T, VT, (0.1, 0.2))
     assert record.time.tolist() == [0.1, 0.2]
     assert record.signals["vt"].tolist() == [1.01, 1.02]
 
@@ -60,11 +63,11 @@ def test_the_window_includes_both_its_ends(csv):
 def test_the_hash_is_of_the_bytes(csv):
     data = b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode()
     path = csv(data)
-    assert read_record(path, "t", VT).sha256 == hashlib.sha256(data).hexdigest() == file_hash(path)
+    assert read_record(path, T, VT).sha256 == hashlib.sha256(data).hexdigest() == file_hash(path)
 
 
 def test_a_record_cannot_be_changed(csv):
-    record = read_record(csv(GOOD), "t", VT)
+    record = read_record(csv(GOOD), T, VT)
     with pytest.raises(FrozenInstanceError):
         record.time = record.time
     for array in (record.time, record.signals["vt"]):
@@ -90,13 +93,13 @@ def test_a_record_cannot_be_changed(csv):
     ids=["BOM", "CRLF", "CR", "no last end", "blank end", "blank row", "header", "cells", "others"],
 )
 def test_the_same_numbers_in_other_dress_read_the_same(csv, text):
-    record = read_record(csv(text), "t", VT)
+    record = read_record(csv(text), T, VT)
     assert record.time.tolist() == [0.0, 0.1, 0.2, 0.3]
     assert record.signals["vt"].tolist() == [1.0, 1.01, 1.02, 1.03]
 
 
 def test_one_column_may_serve_twice(csv):
-    record = read_record(csv(GOOD), "t", {"vt": Channel("vt"), "efd": Channel("vt", 2.0)})
+    record = read_record(csv(GOOD), T, {"vt": Channel("vt"), "efd": Channel("vt", 2.0)})
     assert np.array_equal(record.signals["efd"], 2 * record.signals["vt"])
 
 
@@ -183,7 +186,7 @@ def test_a_window_with_too_few_samples_is_refused(csv):
 def test_a_gap_outside_the_window_is_left_out_with_the_rest(csv):
     path = csv(GOOD.replace("1.0,", "nan,"))
     assert "bump.csv:2" in refusal(path)
-    assert read_record(path, "t", VT, (0.1, 0.3)).signals["vt"].tolist() == [1.01, 1.02, 1.03]
+    assert read_record(path, T, VT, (0.1, 0.3)).signals["vt"].tolist() == [1.01, 1.02, 1.03]
 
 
 def test_a_scale_that_overflows_is_refused(csv):
@@ -207,7 +210,7 @@ def test_a_sound_file_is_not_read_cell_by_cell(csv, monkeypatch):
 
     monkeypatch.setattr("exfit.record._Table.rows", rows)
     path = csv("t,vt\n" + "".join(f"{at}.25,1.5\n" for at in range(1000)))
-    assert read_record(path, "t", VT).time.size == 1000
+    assert read_record(path, T, VT).time.size == 1000
 
 
 # how a recorder writes that a sample is missing -> the column with one in the third row
@@ -218,7 +221,7 @@ GAPS = ["", "  ", '""', "nan", "NaN", " NAN "]
 def test_a_missing_sample_is_nan_where_it_may_be_missing_and_refused_elsewhere(csv, gap):
     path = csv(GOOD.replace("1.02", gap))
     channels = {"vt": Channel("vt", 2.0, -1.0), "ifd": Channel("ifd")}
-    record = read_record(path, "t", channels, missing=True)
+    record = read_record(path, T, channels, missing=True)
     assert record.time.tolist() == [0.0, 0.1, 0.2, 0.3]
     assert np.isnan(record.signals["vt"]).tolist() == [False, False, True, False]
     assert record.signals["vt"][[0, 1, 3]].tolist() == [1.0, 2 * 1.01 - 1, 2 * 1.03 - 1]
@@ -228,7 +231,7 @@ def test_a_missing_sample_is_nan_where_it_may_be_missing_and_refused_elsewhere(c
 
 def test_allowing_for_missing_samples_changes_nothing_where_none_is(csv):
     path = csv(GOOD)
-    plain, allowed = (read_record(path, "t", VT, missing=missing) for missing in (False, True))
+    plain, allowed = (read_record(path, T, VT, missing=missing) for missing in (False, True))
     assert np.array_equal(plain.time, allowed.time)
     assert np.array_equal(plain.signals["vt"], allowed.signals["vt"])
     assert plain.sha256 == allowed.sha256
@@ -236,7 +239,7 @@ def test_allowing_for_missing_samples_changes_nothing_where_none_is(csv):
 
 def test_samples_missing_at_both_ends_and_in_every_signal_stay_apart(csv):
     path = csv("t,vt,ifd\n0,,1\n1,2,\n2,3,nan\n3,NaN,4\n")
-    record = read_record(path, "t", {"vt": Channel("vt"), "ifd": Channel("ifd")}, missing=True)
+    record = read_record(path, T, {"vt": Channel("vt"), "ifd": Channel("ifd")}, missing=True)
     assert record.signals["vt"].tolist() == pytest.approx([np.nan, 2, 3, np.nan], nan_ok=True)
     assert record.signals["ifd"].tolist() == pytest.approx([1, np.nan, np.nan, 4], nan_ok=True)
 
@@ -278,7 +281,7 @@ FAULTS_BESIDE_GAPS = {
 def test_only_samples_may_be_missing(csv, fault):
     content, named = FAULTS_BESIDE_GAPS[fault]
     with pytest.raises(RecordError) as caught:
-        read_record(csv(content), "t", VT, missing=True)
+        read_record(csv(content), T, VT, missing=True)
     for part in named:
         assert part in str(caught.value)
 
@@ -286,17 +289,17 @@ def test_only_samples_may_be_missing(csv, fault):
 def test_a_signal_missing_from_the_whole_window_is_refused(csv):
     path = csv(GOOD.replace("1.02", "").replace("1.03", ""))
     with pytest.raises(RecordError, match="'vt': every sample is missing"):
-        read_record(path, "t", VT, (0.2, 0.3), missing=True)
+        read_record(path, T, VT, (0.2, 0.3), missing=True)
 
 
 def test_a_scale_of_zero_makes_no_number_of_an_infinite_one(csv):
     with pytest.raises(RecordError, match="inf is not a finite"):
-        read_record(csv(GOOD.replace("1.02", "inf")), "t", {"vt": Channel("vt", 0.0)}, missing=True)
+        read_record(csv(GOOD.replace("1.02", "inf")), T, {"vt": Channel("vt", 0.0)}, missing=True)
 
 
 def test_the_column_of_time_cannot_have_gaps_as_a_signal_either(csv):
     with pytest.raises(RecordError, match=r"bump\.csv:4: column 't': an empty cell"):
-        read_record(csv(GOOD.replace("0.2,", ",")), "t", {"x": Channel("t")}, missing=True)
+        read_record(csv(GOOD.replace("0.2,", ",")), T, {"x": Channel("t")}, missing=True)
 
 
 @settings(max_examples=200, deadline=None)
@@ -318,7 +321,7 @@ def test_no_damage_gives_anything_but_a_record_or_its_refusal(
     path.write_bytes(GOOD.encode()[:at] + data + GOOD.encode()[at + cut :])
     try:
         channels = {"vt": Channel("vt"), "ifd": Channel("ifd")}
-        record = read_record(path, "t", channels, missing=missing)
+        record = read_record(path, T, channels, missing=missing)
     except RecordError:
         return
     assert np.all(np.diff(record.time) > 0)

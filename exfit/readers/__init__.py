@@ -1,1 +1,45 @@
 """Recorders' files, each kind read by a module of its own, all to the same table."""
+
+from pathlib import Path
+
+from exfit.errors import RecordError
+from exfit.readers.table import Table
+from exfit.readers.text import read_text_table
+
+__all__ = ["Table", "open_table"]
+
+COMTRADE = (".cfg", ".cff")
+BESIDE_CFG = (".dat", ".hdr")  # text files too may be called so
+WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
+
+
+def open_table(path: Path, sheet: str | None = None) -> Table:
+    """Return the table of a file of any kind that is known, by its suffix; ``sheet`` of a workbook.
+
+    Raises RecordError for a file that cannot be read, and for a sheet of a file without sheets.
+    """
+    suffix = path.suffix.lower()
+    if suffix in WORKBOOKS:
+        from exfit.readers.excel import read_excel
+
+        return read_excel(path, sheet)
+    if sheet is not None:
+        raise RecordError(f"{path}: has no sheets such as {sheet!r}: a workbook has them")
+    if suffix in COMTRADE or (suffix in BESIDE_CFG and _has_cfg(path)):
+        from exfit.readers.comtrade import read_comtrade
+
+        return read_comtrade(path)
+    if suffix == ".mat":
+        from exfit.readers.matlab import read_mat
+
+        return read_mat(path)
+    if suffix == ".parquet":
+        from exfit.readers.parquet import read_parquet
+
+        return read_parquet(path)
+    return read_text_table(path)
+
+
+def _has_cfg(path: Path) -> bool:
+    """Tell whether the configuration of a COMTRADE record stands beside its data."""
+    return any(path.with_suffix(suffix).exists() for suffix in (".cfg", ".CFG", ".Cfg"))

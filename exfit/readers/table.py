@@ -7,9 +7,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.errors import RecordError
+
 Array = NDArray[np.float64]
 
 NONE: frozenset[str] = frozenset()
+COLUMNS_SHOWN = 30
 
 
 class Table(Protocol):
@@ -50,3 +53,17 @@ class Table(Protocol):
 
     def place(self, row: int) -> str:
         """Return where a sample stands, counted from 0, as messages name it: record.csv:17."""
+
+
+def position(path: Path, names: Sequence[str], name: str) -> int:
+    """Return the position of a column; raises RecordError where it is not there, or there twice."""
+    found = [at for at, known in enumerate(names) if known == name]
+    if not found:
+        known = ", ".join(repr(name) for name in names[:COLUMNS_SHOWN])
+        more = f" and {len(names) - COLUMNS_SHOWN} more"
+        shown = known + (more if len(names) > COLUMNS_SHOWN else "")
+        raise RecordError(f"{path}: no column {name!r}; the columns are {shown}")
+    if len(found) > 1:
+        places = " and ".join(str(at + 1) for at in found)
+        raise RecordError(f"{path}: {name!r} names more than one column: {places}")
+    return found[0]

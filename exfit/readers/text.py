@@ -1,0 +1,322 @@
+"""Delimited text: what recorders, spreadsheets and simulators write as .csv, .txt, .tsv, .dat."""
+
+import hashlib
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import RecordError
+from exfit.readers.clock import seconds_per_unit
+from exfit.readers.decoding import Text, decoded
+from exfit.readers.dialect import (
+    HEAD,
+    NUMBER,
+    SHOWN,
+    Dialect,
+    find_dialect,
+    has_comma,
+    is_comment,
+    is_missing,
+    is_number,
+    split_rows,
+)
+from exfit.readers.table import NONE, Array, position
+from exfit.readers.timestamps import (
+    WIDEST,
+    StampError,
+    has_date,
+    has_time,
+    is_timestamp,
+    seconds_since_first,
+)
+
+CHUNK = 1 << 22  # bytes looked at together
+CLOCK = re.compile(
+    r"t|time|zeit|uhrzeit|zeitstempel|tiempo|hora|temps|tempo|tijd|tid|date|datum|fecha|utc"
+    r"|timestamp|datetime|x_value|(?:rel|abs)\w* ?(?:time|zeit)"
+    r"|(?:time|date)[ _/&+-]*(?:time|stamp)",
+    re.IGNORECASE,
+)
+UNIT_BEHIND = re.compile(r"\s*[\[(/,].*|\s+in\s.*")
+THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
+
+
+@dataclass(frozen=True, eq=False)
+class TextTable:
+    """A delimited text as a Table: what is wanted of it is read when it is asked for."""
+
+    path: Path
+    sha256: str
+    text: Text
+    dialect: Dialect
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns, as the file has them without blanks around; 1, 2 ... where it has none."""
+        return self.dialect.names
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The units in the names or in a row below them, by column."""
+        return self.dialect.units
+
+    @cached_property
+    def clock(self) -> tuple[str, ...]:
+        """The column that holds the time, or those of date and time; empty where none seems to.
+
+        By the cells, else by the name, else the first column if it increases throughout.
+        """
+        _, first = next(self.rows())
+        cells = dict(zip(self.names, first, strict=False))
+        stamps = [name for name, cell in cells.items() if is_timestamp(cell)]
+        dates = [name for name in stamps if not has_time(cells[name])]
+        times = [name for name in stamps if not has_date(cells[name])]
+        whole = [name for name in stamps if name not in dates and name not in times]
+        if whole or stamps:
+            return (whole[0],) if whole else (*dates[:1], *times[:1])
+        for name in self.names:
+            if CLOCK.fullmatch(UNIT_BEHIND.sub("", name)):
+                return (name,)
+        return self.names[:1] if self._increases(self.names[0]) else ()
+
+    def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
+        """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
+
+        Raises RecordError for a column that is not there, and a cell that is no number.
+        """
+        places = {name: position(self.path, self.names, name) for name in names}
+        if not self._even:
+            self._find_fault(places, gappy)
+        data = self._load(places, gappy)
+        return {name: data[:, at] for at, name in enumerate(places)}
+
+    def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
+        """Return the time (M,) in s: numbers as they stand, timestamps since the first of them.
+
+        ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
+        RecordError where it contradicts the file, or a cell is neither number nor timestamp.
+        """
+        places = [position(self.path, self.names, name) for name in columns]
+        _, first = next(self.rows())
+        stamped = len(places) > 1 or (places[0] < len(first) and is_timestamp(first[places[0]]))
+        if not stamped:
+            (name,) = columns
+            factor = seconds_per_unit(self.path, name, self.units.get(name), unit)
+            time = self.numbers([name])[name]
+            return time if factor == 1.0 else time / (1 / factor)  # 1/factor is whole: no rounding
+        if unit is not None:
+            said = f"{first[places[0]].strip()[:SHOWN]!r}"
+            raise RecordError(
+                f"{self.path}: column {columns[0]!r}: {said} is a timestamp, no number of {unit}"
+            )
+        return self._stamps(columns, places)
+
+    def place(self, row: int) -> str:
+        """Return where a sample stands, counted from 0: file and line."""
+        line, _ = next(islice(self.rows(), row, None))
+        return f"{self.path}:{line}"
+
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield line number and cells of each row, one by one: slow, to say where a fault is."""
+        dialect = self.dialect
+        for line, cells in split_rows(
+            self.path, self.text.lines(self._start), dialect.separator, dialect.first_line
+        ):
+            if len(cells) == dialect.cells or not is_comment(cells[0], dialect.separator):
+                yield line, cells
+
+    @cached_property
+    def _start(self) -> int:
+        """The byte at which the rows begin."""
+        return self.text.start_of(self.dialect.first_line)
+
+    @cached_property
+    def _even(self) -> bool:
+        """Whether every line surely has as many cells as the first; if not, some may have."""
+        separator, cells = self.dialect.separator, self.dialect.cells
+        data = self.text.data
+        end = len(data.rstrip(b"\n"))
+        if separator is not None and len(self.names) < cells:
+            ends = data.count(f"{separator}\n".encode(), self._start, end)
+            if ends < data.count(b"\n", self._start, end):
+                return False
+        period = cells if separator is not None else cells + 1
+        phase, blank = 0, True
+        for start in range(self._start, end, CHUNK):
+            letters = np.frombuffer(data, np.uint8, min(CHUNK, end - start), start)
+            ends_line = letters == ord("\n")
+            if separator is not None:
+                marks = ends_line[ends_line | (letters == ord(separator))]
+            else:
+                gap = (letters == ord(" ")) | (letters == ord("\t")) | ends_line
+                begins = ~gap & np.concatenate(([blank], gap[:-1]))
+                blank = bool(gap[-1])
+                marks = ends_line[begins | ends_line]
+            expected = (np.arange(phase, phase + marks.size) % period) == period - 1
+            if not np.array_equal(marks, expected):
+                return False
+            phase = (phase + marks.size) % period
+        return phase == period - 1
+
+    def _lines(self) -> Iterator[str]:
+        """Return the lines of the rows, as NumPy reads them."""
+        lines = self.text.lines(self._start)
+        if self._even:
+            return lines
+        return (line for line in lines if not self._is_skipped(line))
+
+    def _is_skipped(self, line: str) -> bool:
+        """Tell whether a line is a comment, and not a row that begins with its mark."""
+        separator = self.dialect.separator
+        if not is_comment(line, separator):
+            return False
+        _, cells = next(split_rows(self.path, [line], separator, 1))
+        return len(cells) != self.dialect.cells
+
+    def _numeric_lines(self) -> Iterator[str]:
+        """Return the lines of the rows with decimal points; what had one before is no number."""
+        lines = self._lines()
+        if not self.dialect.comma:
+            return lines
+        if self.dialect.separator == ",":
+            quoted = re.compile(r'"([^",\n]*),([^",\n]*)"')
+            return (quoted.sub(r"\1.\2", line.replace(".", ":")) for line in lines)
+        if b"." in self.text.data[self._start :]:
+            return (line.replace(".", ":").replace(",", ".") for line in lines)
+        return (line.replace(",", ".") for line in lines)
+
+    def _load(
+        self, places: Mapping[str, int], gappy: frozenset[str], cell_by_cell: frozenset[str] = NONE
+    ) -> Array:
+        """Return the columns as NumPy's C reader reads them; where it stumbles, say where and why.
+
+        Where only missing cells of the ``gappy`` columns stopped it, these are read one by one.
+        """
+        converters = {places[name]: _number_or_nan for name in cell_by_cell if name in places}
+        try:
+            return self._loaded(
+                self._numeric_lines(), tuple(places.values()), float, converters=converters
+            )
+        except ValueError as error:
+            self._find_fault(places, gappy)
+            if cell_by_cell != gappy:
+                return self._load(places, gappy, gappy)
+            raise RecordError(f"{self.path}: {error}") from None
+
+    def _loaded(
+        self,
+        lines: Iterable[str],
+        places: Sequence[int],
+        kind: Any,
+        converters: Mapping[int, Callable[[str], float]] | None = None,
+    ) -> NDArray[Any]:
+        return np.loadtxt(
+            lines,
+            dtype=kind,
+            delimiter=self.dialect.separator,
+            quotechar='"',
+            comments=(),
+            usecols=tuple(places),
+            ndmin=2,
+            converters=dict(converters or {}),
+        )
+
+    def _find_fault(self, places: Mapping[str, int], gappy: frozenset[str]) -> None:
+        """Raise a RecordError for the first row that is ragged or holds text in a number."""
+        comma = self.dialect.comma
+        for line, row in self.rows():
+            self._check_width(line, row)
+            for name, place in places.items():
+                cell = row[place].strip()
+                if is_number(cell, comma) or (name in gappy and is_missing(cell)):
+                    continue
+                self._refuse(line, name, _why_not(cell, comma))
+
+    def _check_width(self, line: int, row: Sequence[str]) -> None:
+        """Raise a RecordError for a row of more or fewer cells than there are columns."""
+        named = len(self.names)
+        if len(row) == self.dialect.cells and not any(cell.strip() for cell in row[named:]):
+            return
+        cells = len(row) - (named < self.dialect.cells and not row[-1].strip())
+        raise RecordError(f"{self.path}:{line}: cells in this row: {cells}, columns: {named}")
+
+    def _stamps(self, columns: Sequence[str], places: Sequence[int]) -> Array:
+        """Return timestamps of one column, or of two, in s since the first."""
+        if not self._even:
+            for line, row in self.rows():
+                self._check_width(line, row)
+        try:
+            cells = self._loaded(self._lines(), places, f"S{WIDEST}")
+        except ValueError as error:
+            for line, row in self.rows():
+                for name, place in zip(columns, places, strict=True):
+                    if not is_timestamp(row[place]):
+                        self._refuse(line, name, f"{row[place].strip()[:SHOWN]!r} is no timestamp")
+            raise RecordError(f"{self.path}: {error}") from None
+        try:
+            return seconds_since_first([np.ascontiguousarray(one) for one in cells.T])
+        except StampError as error:
+            raise RecordError(
+                f"{self.place(error.row)}: column {columns[error.column]!r}: {error}"
+            ) from None
+
+    def _increases(self, name: str) -> bool:
+        try:
+            column = self.numbers([name])[name]
+        except RecordError:
+            return False
+        return bool(np.all(np.diff(column) > 0))
+
+    def _refuse(self, line: int, name: str, what: str) -> NoReturn:
+        raise RecordError(f"{self.path}:{line}: column {name!r}: {what}")
+
+
+def read_text_table(path: Path) -> TextTable:
+    """Return the table of a delimited text file; how it is written, its first lines tell.
+
+    Raises RecordError for a file that cannot be read, is no text, has no rows of numbers, or could
+    be read in two ways.
+    """
+    data = read_bytes(path)
+    text = decoded(path, data)
+    if not text.data.strip():
+        raise RecordError(f"{path}: the file is empty: a row of column names belongs there")
+    dialect = find_dialect(path, [*islice(text.lines(), HEAD)])
+    table = TextTable(path, hashlib.sha256(data).hexdigest(), text, dialect)
+    if dialect.comma is None and b"," in text.data:
+        comma = has_comma(cells for _, cells in table.rows())
+        return replace(table, dialect=replace(dialect, comma=comma))
+    return table
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the bytes of a file; raises RecordError where it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # a name with a null character
+        raise RecordError(f"{path}: cannot be read: {error}") from None
+
+
+def _number_or_nan(cell: str) -> float:
+    return np.nan if is_missing(cell) else float(cell)
+
+
+def _why_not(cell: str, comma: bool | None) -> str:
+    """Return why a cell is no number."""
+    if not cell:
+        return "an empty cell"
+    what = f"{cell[:SHOWN]!r} is not a number"
+    if THOUSANDS.fullmatch(cell):
+        return f"{what}; thousands may not be set apart"
+    if comma and NUMBER.fullmatch(cell):
+        return f"{what} with a decimal comma, as others are"
+    return what

@@ -1,0 +1,241 @@
+"""Timestamps: cells such as 2015-09-20T10:51:42.8589222Z or 20.09.2015, 10:51:42 AM, to seconds.
+
+Every cell of one form is read by the same slices of its characters, so that millions take NumPy
+a second. Seconds and their fraction stay whole numbers until the first instant is taken off:
+no digit of the file is lost.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Whole = NDArray[np.int64]
+Cells = NDArray[np.bytes_]
+
+WIDEST = 40  # characters of a timestamp; one with all digits and a zone has 38
+MOST_DIGITS = 12  # of a second's fraction
+CHUNK = 1 << 16  # cells read at a time
+DAY = 86_400  # s
+CENTURY = 2000  # of a year in two digits
+TO_ZERO = np.array([ord("0") if chr(at).isdigit() and at < 128 else at for at in range(256)], "u1")
+FORM = re.compile(
+    r"[ \t]*"
+    r"(?:(?P<year>\d{4})(?P<iso>[-/.])(?P<month>\d{1,2})(?P=iso)(?P<day>\d{1,2})"
+    r"|(?P<one>\d{1,2})(?P<mark>[-/.])(?P<two>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2}))?"
+    r"(?P<between>(?(year)(?:T|[ \t]+)|(?(one)[ \t]+|))"
+    r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
+    r"(?:[ \t]*(?P<half>[AaPp])\.?[ \t]?[Mm]\.?)?"
+    r"[ \t]*(?P<zone>Z|(?P<sign>[+-])(?P<zonehour>\d{2}):?(?P<zoneminute>\d{2}))?)?"
+    r"[ \t]*",
+    re.ASCII,
+)
+
+
+class StampError(ValueError):
+    """What is wrong with the timestamps of a row, counted from 0."""
+
+    def __init__(self, row: int, column: int, text: str) -> None:
+        super().__init__(text)
+        self.row, self.column = row, column
+
+
+@dataclass(frozen=True)
+class _Stamps:
+    """Cells of one kind, each part (M,): a date as three numbers, seconds of the day, fraction."""
+
+    date: Whole | None  # (M, 3)
+    order: str  # ymd, dmy, or ??? where the first two may be either
+    second: Whole | None
+    fraction: Whole  # in units of the last of MOST_DIGITS digits
+    digits: int
+
+
+def is_timestamp(cell: str) -> bool:
+    """Tell whether a cell has the form of a date, a time of day, or both."""
+    return bool(cell.strip()) and FORM.fullmatch(cell) is not None
+
+
+def has_date(cell: str) -> bool:
+    """Tell whether a timestamp has a date."""
+    found = FORM.fullmatch(cell)
+    return found is not None and (found["year"] or found["one"]) is not None
+
+
+def has_time(cell: str) -> bool:
+    """Tell whether a timestamp has a time of day."""
+    found = FORM.fullmatch(cell)
+    return found is not None and found["hour"] is not None
+
+
+def seconds_since_first(columns: Sequence[Cells]) -> NDArray[np.float64]:
+    """Return the instants (M,) in s since the first, of one column or of date and time in two.
+
+    Raises StampError for a cell that is no timestamp, has another form than the first, or could
+    be two instants.
+    """
+    stamps = [_read(at, cells) for at, cells in enumerate(columns)]
+    if len(stamps) == 2:
+        stamps = [_joined(columns, *stamps)]
+    (one,) = stamps
+    second = np.zeros(len(columns[0]), np.int64) if one.second is None else one.second
+    second = second - second[0]
+    if one.date is not None:
+        days = _days(one, second)
+        second += (days - days[0]) * DAY
+    else:
+        _refuse_midnight(second)
+    unit = 10**one.digits
+    fraction = one.fraction // 10 ** (MOST_DIGITS - one.digits)
+    if np.abs(second).max() > np.iinfo(np.int64).max // (2 * unit):
+        row = int(np.abs(second).argmax())
+        raise StampError(row, 0, f"{second[row] / DAY:.0f} days lie between it and the first")
+    instants: NDArray[np.float64] = (second * unit + (fraction - fraction[0])) / unit
+    return instants
+
+
+def _read(column: int, cells: Cells) -> _Stamps:
+    """Return the cells of a column as numbers."""
+    first = _form(column, 0, bytes(cells[0]))
+    kind = _kind(first)
+    date = np.zeros((len(cells), 3), np.int64) if kind[0] else None
+    second = np.zeros(len(cells), np.int64) if kind[2] else None
+    fraction = np.zeros(len(cells), np.int64)
+    digits = 0
+    letters = cells.view(np.uint8).reshape(len(cells), -1)
+    for start in range(0, len(cells), CHUNK):
+        part = letters[start : start + CHUNK]
+        shapes = TO_ZERO[part]
+        todo = np.ones(len(part), bool)
+        while todo.any():
+            at = int(todo.argmax())
+            form = _form(column, start + at, bytes(cells[start + at]))
+            if _kind(form) != kind:
+                what = f"{_shown(cells[start + at])} has another form than {_shown(cells[0])}"
+                raise StampError(start + at, column, f"{what}, the first")
+            same = np.flatnonzero(todo & (shapes == shapes[at]).all(axis=1))
+            todo[same] = False
+            rows, values = start + same, part[same] - ord("0")
+            if date is not None:
+                date[rows] = _date(values, form)
+            if second is not None:
+                found, wrong = _second(values, form)
+                if wrong.any():
+                    row = int(rows[wrong.argmax()])
+                    raise StampError(row, column, f"{_shown(cells[row])} is no time of day")
+                second[rows] = found
+                own = len(form["fraction"] or "")
+                fraction[rows] = _number(values, form, "fraction") * 10 ** (MOST_DIGITS - own)
+                digits = max(digits, own)
+    return _Stamps(date, kind[1], second, fraction, digits)
+
+
+def _form(column: int, row: int, cell: bytes) -> re.Match[str]:
+    found = FORM.fullmatch(cell.decode("latin-1")) if cell.strip() else None
+    if found is None:
+        what = f"{_shown(cell)} is no timestamp" if cell.strip() else "an empty cell"
+        raise StampError(row, column, what)
+    return found
+
+
+def _kind(form: re.Match[str]) -> tuple[bool, str, bool, bool, bool]:
+    """Return what all timestamps of a column have in common."""
+    dated = form["year"] is not None or form["one"] is not None
+    order = "ymd" if form["year"] else "dmy" if form["mark"] == "." else "???" if dated else ""
+    return dated, order, form["hour"] is not None, form["half"] is not None, bool(form["zone"])
+
+
+def _number(values: NDArray[np.uint8], form: re.Match[str], part: str) -> Whole:
+    """Return the whole numbers (M,) that stand in a part of the form, 0 where it has none."""
+    start, end = form.span(part)
+    powers = 10 ** np.arange(end - start - 1, -1, -1, dtype=np.int64)
+    return values[:, max(start, 0) : max(end, 0)].astype(np.int64) @ powers
+
+
+def _date(values: NDArray[np.uint8], form: re.Match[str]) -> Whole:
+    """Return year, then the two others in the order of the file."""
+    if form["year"]:
+        parts = [_number(values, form, part) for part in ("year", "month", "day")]
+    else:
+        parts = [_number(values, form, part) for part in ("last", "one", "two")]
+        parts[0] += CENTURY if len(form["last"]) == 2 else 0
+    return np.stack(parts, axis=1)
+
+
+def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, NDArray[np.bool_]]:
+    """Return the seconds of the day at Greenwich where a zone is given; and which are none."""
+    hour, minute, second = (_number(values, form, part) for part in ("hour", "minute", "second"))
+    wrong = (minute > 59) | (second > 59)
+    if form["half"]:
+        wrong |= (hour < 1) | (hour > 12)
+        hour = hour % 12 + (12 if form["half"] in "pP" else 0)
+    wrong |= hour > 23
+    zone = _number(values, form, "zonehour") * 60 + _number(values, form, "zoneminute")
+    zone *= -1 if form["sign"] == "-" else 1
+    return hour * 3600 + minute * 60 + second - zone * 60, wrong
+
+
+def _joined(columns: Sequence[Cells], date: _Stamps, time: _Stamps) -> _Stamps:
+    """Return dates and times of day of two columns as timestamps."""
+    if date.date is None or date.second is not None:
+        raise StampError(0, 0, f"{_shown(columns[0][0])} is no date without a time of day")
+    if time.second is None or time.date is not None:
+        raise StampError(0, 1, f"{_shown(columns[1][0])} is no time of day without a date")
+    return _Stamps(date.date, date.order, time.second, time.fraction, time.digits)
+
+
+def _days(stamps: _Stamps, second: Whole) -> Whole:
+    """Return the days (M,) since 1970; the order of day and month is told by the dates.
+
+    Where nothing tells it and the date changes, it is the order in which every change is to the
+    next day. ``second`` is that of the day, from the first.
+    """
+    assert stamps.date is not None
+    year, one, two = stamps.date.T
+    if stamps.order == "ymd":
+        return _valid_days(year, one, two)
+    if stamps.order == "dmy":
+        return _valid_days(year, two, one)
+    late = [int(np.argmax(part > 12)) if (part > 12).any() else -1 for part in (one, two)]
+    if late[0] >= 0:
+        return _valid_days(year, two, one)
+    if late[1] >= 0:
+        return _valid_days(year, one, two)
+    changes = np.flatnonzero(np.any(np.diff(stamps.date, axis=0) != 0, axis=1))
+    readings = [_valid_days(year, two, one), _valid_days(year, one, two)]
+    if not changes.size:
+        return readings[0]
+    daily = [days for days in readings if (np.diff(days)[changes] == 1).all()]
+    if len(daily) == 1:
+        return daily[0]
+    row = int(changes[0]) + 1
+    raise StampError(
+        row, 0, f"{one[row]}, {two[row]} could be day and month, or month and day; write ISO dates"
+    )
+
+
+def _valid_days(year: Whole, month: Whole, day: Whole) -> Whole:
+    wrong = (month < 1) | (month > 12) | (day < 1)
+    months = ((year - 1970) * 12 + np.where(wrong, 1, month) - 1).astype("datetime64[M]")
+    first = months.astype("datetime64[D]").astype(np.int64)
+    length = (months + 1).astype("datetime64[D]").astype(np.int64) - first
+    wrong |= day > length
+    if wrong.any():
+        row = int(wrong.argmax())
+        raise StampError(row, 0, f"year {year[row]}, month {month[row]}, day {day[row]} is no date")
+    return first + day - 1
+
+
+def _refuse_midnight(second: Whole) -> None:
+    """Raise StampError where times of day without a date begin anew."""
+    back = np.flatnonzero(np.diff(second) < -DAY // 2)
+    if back.size:
+        raise StampError(
+            int(back[0]) + 1, 0, "the time of day passes midnight, and there is no date beside it"
+        )
+
+
+def _shown(cell: bytes) -> str:
+    return repr(cell.decode("latin-1")[:WIDEST].strip())
