@@ -101,8 +101,8 @@ def split_rows(
             if row:
                 yield first_line + reader.line_num - 1, row
     except csv.Error as error:
-        line = first_line + reader.line_num - 1
-        raise RecordError(f"{path}:{line}: cannot be read: {error}") from None
+        at = first_line + reader.line_num - 1
+        raise RecordError(f"{path}:{at}: cannot be read: {error}") from None
 
 
 def is_comment(text: str, separator: str | None) -> bool:

@@ -30,6 +30,7 @@ from exfit.readers.dialect import (
 from exfit.readers.table import NONE, Array, position
 from exfit.readers.timestamps import (
     WIDEST,
+    WIDEST_OF_TWO,
     StampError,
     has_date,
     has_time,
@@ -220,7 +221,7 @@ class TextTable:
         return np.loadtxt(
             lines,
             dtype=kind,
-            delimiter=self.dialect.separator,
+            delimiter=self.dialect.separator,  # type: ignore[arg-type]
             quotechar='"',
             comments=(),
             usecols=tuple(places),
@@ -253,7 +254,9 @@ class TextTable:
             for line, row in self.rows():
                 self._check_width(line, row)
         try:
-            cells = self._loaded(self._lines(), places, f"S{WIDEST}")
+            cells = self._loaded(
+                self._lines(), places, f"S{WIDEST if len(places) == 1 else WIDEST_OF_TWO}"
+            )
         except ValueError as error:
             for line, row in self.rows():
                 for name, place in zip(columns, places, strict=True):
@@ -261,7 +264,7 @@ class TextTable:
                         self._refuse(line, name, f"{row[place].strip()[:SHOWN]!r} is no timestamp")
             raise RecordError(f"{self.path}: {error}") from None
         try:
-            return seconds_since_first([np.ascontiguousarray(one) for one in cells.T])
+            return seconds_since_first(cells)
         except StampError as error:
             raise RecordError(
                 f"{self.place(error.row)}: column {columns[error.column]!r}: {error}"

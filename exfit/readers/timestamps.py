@@ -6,7 +6,6 @@ no digit of the file is lost.
 """
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ Whole = NDArray[np.int64]
 Cells = NDArray[np.bytes_]
 
 WIDEST = 40  # characters of a timestamp; one with all digits and a zone has 38
+WIDEST_OF_TWO = 28  # of a time of day alone, or a date
 MOST_DIGITS = 12  # of a second's fraction
 CHUNK = 1 << 16  # cells read at a time
 DAY = 86_400  # s
@@ -46,7 +46,7 @@ class StampError(ValueError):
 class _Stamps:
     """Cells of one kind, each part (M,): a date as three numbers, seconds of the day, fraction."""
 
-    date: Whole | None  # (M, 3)
+    date: NDArray[np.int32] | None  # (M, 3)
     order: str  # ymd, dmy, or ??? where the first two may be either
     second: Whole | None
     fraction: Whole  # in units of the last of MOST_DIGITS digits
@@ -70,17 +70,15 @@ def has_time(cell: str) -> bool:
     return found is not None and found["hour"] is not None
 
 
-def seconds_since_first(columns: Sequence[Cells]) -> NDArray[np.float64]:
-    """Return the instants (M,) in s since the first, of one column or of date and time in two.
+def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
+    """Return the instants (M,) in s since the first, of cells (M, 1), or (M, 2) of date and time.
 
     Raises StampError for a cell that is no timestamp, has another form than the first, or could
     be two instants.
     """
-    stamps = [_read(at, cells) for at, cells in enumerate(columns)]
-    if len(stamps) == 2:
-        stamps = [_joined(columns, *stamps)]
-    (one,) = stamps
-    second = np.zeros(len(columns[0]), np.int64) if one.second is None else one.second
+    stamps = [_read(cells, column) for column in range(cells.shape[1])]
+    one = stamps[0] if len(stamps) == 1 else _joined(cells[0], *stamps)
+    second = np.zeros(len(cells), np.int64) if one.second is None else one.second
     second = second - second[0]
     if one.date is not None:
         days = _days(one, second)
@@ -96,15 +94,17 @@ def seconds_since_first(columns: Sequence[Cells]) -> NDArray[np.float64]:
     return instants
 
 
-def _read(column: int, cells: Cells) -> _Stamps:
+def _read(all_cells: Cells, column: int) -> _Stamps:
     """Return the cells of a column as numbers."""
+    cells = all_cells[:, column]
     first = _form(column, 0, bytes(cells[0]))
     kind = _kind(first)
-    date = np.zeros((len(cells), 3), np.int64) if kind[0] else None
+    date = np.zeros((len(cells), 3), np.int32) if kind[0] else None
     second = np.zeros(len(cells), np.int64) if kind[2] else None
     fraction = np.zeros(len(cells), np.int64)
     digits = 0
-    letters = cells.view(np.uint8).reshape(len(cells), -1)
+    width = cells.itemsize
+    letters = all_cells.view(np.uint8)[:, column * width : (column + 1) * width]
     for start in range(0, len(cells), CHUNK):
         part = letters[start : start + CHUNK]
         shapes = TO_ZERO[part]
@@ -177,12 +177,12 @@ def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, NDAr
     return hour * 3600 + minute * 60 + second - zone * 60, wrong
 
 
-def _joined(columns: Sequence[Cells], date: _Stamps, time: _Stamps) -> _Stamps:
+def _joined(first: Cells, date: _Stamps, time: _Stamps) -> _Stamps:
     """Return dates and times of day of two columns as timestamps."""
     if date.date is None or date.second is not None:
-        raise StampError(0, 0, f"{_shown(columns[0][0])} is no date without a time of day")
+        raise StampError(0, 0, f"{_shown(first[0])} is no date without a time of day")
     if time.second is None or time.date is not None:
-        raise StampError(0, 1, f"{_shown(columns[1][0])} is no time of day without a date")
+        raise StampError(0, 1, f"{_shown(first[1])} is no time of day without a date")
     return _Stamps(date.date, date.order, time.second, time.fraction, time.digits)
 
 
@@ -193,7 +193,7 @@ def _days(stamps: _Stamps, second: Whole) -> Whole:
     next day. ``second`` is that of the day, from the first.
     """
     assert stamps.date is not None
-    year, one, two = stamps.date.T
+    year, one, two = (part.astype(np.int64) for part in stamps.date.T)
     if stamps.order == "ymd":
         return _valid_days(year, one, two)
     if stamps.order == "dmy":
