@@ -200,7 +200,9 @@ class TextTable:
 
         Where only missing cells of the ``gappy`` columns stopped it, these are read one by one.
         """
-        converters = {places[name]: _number_or_nan for name in cell_by_cell if name in places}
+        converters: dict[int | str, Callable[[str], float]] = {
+            places[name]: _number_or_nan for name in cell_by_cell if name in places
+        }
         try:
             return self._loaded(
                 self._numeric_lines(), tuple(places.values()), float, converters=converters
@@ -216,17 +218,17 @@ class TextTable:
         lines: Iterable[str],
         places: Sequence[int],
         kind: Any,
-        converters: Mapping[int, Callable[[str], float]] | None = None,
+        converters: Mapping[int | str, Callable[[str], float]] | None = None,
     ) -> NDArray[Any]:
         return np.loadtxt(
             lines,
             dtype=kind,
-            delimiter=self.dialect.separator,  # type: ignore[arg-type]
+            delimiter=self.dialect.separator,
             quotechar='"',
             comments=(),
             usecols=tuple(places),
             ndmin=2,
-            converters=dict(converters or {}),
+            converters=converters,
         )
 
     def _find_fault(self, places: Mapping[str, int], gappy: frozenset[str]) -> None:
@@ -254,9 +256,8 @@ class TextTable:
             for line, row in self.rows():
                 self._check_width(line, row)
         try:
-            cells = self._loaded(
-                self._lines(), places, f"S{WIDEST if len(places) == 1 else WIDEST_OF_TWO}"
-            )
+            width = WIDEST if len(places) == 1 else WIDEST_OF_TWO
+            cells = self._loaded(self._lines(), places, f"S{width}")
         except ValueError as error:
             for line, row in self.rows():
                 for name, place in zip(columns, places, strict=True):
