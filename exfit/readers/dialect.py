@@ -160,8 +160,7 @@ def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout |
     plain = [row for row in rows if not row.comment]
     if not plain:
         return None
-    counts = Counter(len(row.cells) for row in plain)
-    cells = max(counts, key=lambda count: (counts[count], count == len(plain[-1].cells)))
+    cells = _width(plain)
     own = [row for row in plain if len(row.cells) == cells]
     columns = _value_columns(own[len(own) // 2 :], cells)
     full = [at for at, row in enumerate(rows) if _is_full(row, cells, columns)]
@@ -196,6 +195,23 @@ def _row(line: int, cells: list[str], text: str, separator: str | None) -> Row:
         first = cells[0].lstrip().removeprefix(mark)
         cells = [first, *cells[1:]] if first or separator is not None else cells[1:]
     return Row(line, tuple(cell.strip() for cell in cells), text, comment)
+
+
+def _width(rows: Sequence[Row]) -> int:
+    """Return how many cells most rows of numbers have; there may be more rows of titles above."""
+    shares = [_share_of_full(row) for row in rows]
+    for least in (0.5, 0.0, -1.0):
+        widths = [len(row.cells) for row, share in zip(rows, shares, strict=True) if share > least]
+        if widths:
+            break
+    counts = Counter(widths)
+    return max(counts, key=lambda width: (counts[width], width == len(rows[-1].cells)))
+
+
+def _share_of_full(row: Row) -> float:
+    """Return the share of values in those cells of a row that hold something."""
+    full = [is_value(cell) for cell in row.cells if not is_missing(cell)]
+    return sum(full) / len(full) if full else 0.0
 
 
 def _value_columns(rows: Sequence[Row], cells: int) -> list[int]:

@@ -37,6 +37,7 @@ from exfit.readers.timestamps import (
     is_timestamp,
     seconds_since_first,
 )
+from exfit.readers.units import symbol
 
 CHUNK = 1 << 22  # bytes looked at together
 CLOCK = re.compile(
@@ -109,13 +110,14 @@ class TextTable:
         stamped = len(places) > 1 or (places[0] < len(first) and is_timestamp(first[places[0]]))
         if not stamped:
             (name,) = columns
-            factor = seconds_per_unit(self.path, name, self.units.get(name), unit)
+            said = self.units.get(name)
+            factor = seconds_per_unit(self.path, name, said and symbol(said), unit)
             time = self.numbers([name])[name]
             return time if factor == 1.0 else time / (1 / factor)  # 1/factor is whole: no rounding
         if unit is not None:
-            said = f"{first[places[0]].strip()[:SHOWN]!r}"
+            shown = repr(first[places[0]].strip()[:SHOWN])
             raise RecordError(
-                f"{self.path}: column {columns[0]!r}: {said} is a timestamp, no number of {unit}"
+                f"{self.path}: column {columns[0]!r}: {shown} is a timestamp, no number of {unit}"
             )
         return self._stamps(columns, places)
 

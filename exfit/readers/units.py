@@ -53,8 +53,12 @@ def needs_base(unit: str) -> bool:
     return _folded(unit) not in PLAIN
 
 
+def symbol(unit: str) -> str:
+    """Return a unit that is written as a word by its symbol: Volts is V."""
+    return WORDS.get(unit.strip().casefold(), unit.strip())
+
+
 def _folded(unit: str) -> str:
-    unit = unit.strip()
-    unit = WORDS.get(unit.casefold(), unit)
+    unit = symbol(unit)
     milli_or_mega = unit[:1] in ("m", "M") and len(unit) > 1
     return unit[0] + unit[1:].casefold() if milli_or_mega else unit.casefold()
