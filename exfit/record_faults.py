@@ -93,7 +93,8 @@ def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
         if numbers_in(section_of(channels, signal)).get("scale") == 0.0:
             here = (*place, "channels", signal, "scale")
             yield Fault(here, "0 leaves nothing of the column")
-        yield from _unit_faults((*place, "channels", signal), section_of(channels, signal))
+        here = (*place, "channels", signal)
+        yield from _unit_faults(here, section_of(channels, signal), kind)
     for signal in NEEDED.get(kind, ()):
         if channels and signal not in channels:
             yield Fault((*place, "channels", signal), f"is missing: plant {kind} needs it")
@@ -101,14 +102,14 @@ def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
         yield Fault((*place, "channels"), "neither vt nor ifd: there is nothing to compare")
 
 
-def _unit_faults(place: Place, channel: Data) -> Iterator[Fault]:
-    """Yield a base of no unit, and a unit that nothing makes per unit."""
+def _unit_faults(place: Place, channel: Data, kind: str) -> Iterator[Fault]:
+    """Yield a base of no unit, and a unit that nothing makes per unit, as a machine's must be."""
     unit = channel.get("unit")
     if "base" in channel and "unit" not in channel:
         yield Fault((*place, "unit"), "is missing: in which unit is base?")
     if "base" in channel or "scale" in channel or not isinstance(unit, str):
         return
-    if unit and needs_base(unit):
+    if unit and kind != "none" and needs_base(unit):
         yield Fault((*place, "base"), f"is missing: what is 1 pu in {unit}?")
 
 

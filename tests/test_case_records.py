@@ -68,6 +68,8 @@ TEST = ("records", 0, "test")
 AT = (*TEST, "vref", 0, "at")
 SIZE = (*TEST, "vref", 0, "step")
 VT = ("records", 0, "record", "channels", "vt")
+TIME = ("records", 0, "record", "time")
+CHANNEL = {"column": "vt", "unit": "kV"}
 DOWN = ("records", 1, "record")
 NETWORK = ("records", 1, "plant", "network")
 FREE = ("parameters", "free")
@@ -128,6 +130,20 @@ FORM = {
         "lowpass",
         (*VT, "filter"),
         "'lowpass' is not a mapping",
+    ),
+    "number for a time": (TIME, 5, TIME, "5 is not text"),
+    "date without time": (TIME, ["Date"], (*TIME, 1), "is missing"),
+    "three columns of time": (TIME, ["a", "b", "c"], TIME, "3 entries; at most 2 allowed"),
+    "time without unit": (TIME, {"column": "t"}, (*TIME, "unit"), "is missing"),
+    "unit of no time": (TIME, {"column": "t", "unit": "kV"}, (*TIME, "unit"), "'kV' is not poss"),
+    "empty sheet": ((*TIME[:-1], "sheet"), "", (*TIME[:-1], "sheet"), "is empty"),
+    "number for a unit": ((*VT, "unit"), 5, (*VT, "unit"), "5 is not text"),
+    "base of nothing": (VT, CHANNEL | {"base": 0}, (*VT, "base"), "0 is not above 0"),
+    "base to be found": (
+        VT,
+        CHANNEL | {"base": {"start": 1, "min": 0.5, "max": 2}},
+        (*VT, "base"),
+        "a mapping is not a number",
     ),
     "empty filter": ((*VT, "filter"), {}, (*VT, "filter", "lowpass"), "is missing"),
     "cutoff of nothing": (
@@ -275,6 +291,9 @@ MEANING = {
         ("validate", 0, "record", "channels", "vt", "filter", "median"),
         "4 is not an odd number",
     ),
+    "base of no unit": (VT, {"column": "vt", "base": 15.75}, (*VT, "unit"), "in which unit"),
+    "unit without base": (VT, {"column": "vt", "unit": "kV"}, (*VT, "base"), "what is 1 pu in kV"),
+    "per cent without base": (VT, {"column": "vt", "unit": "%"}, (*VT, "base"), "is 1 pu in %"),
     "mask backwards": ((*DOWN, "mask"), [[3, 2]], (*DOWN, "mask", 0), "3 is not below end 2"),
     "name twice": (("records", 1, "name"), "UP", ("records", 1, "name"), "'UP' is taken by 'up'"),
     "name of a validation": (
@@ -430,6 +449,12 @@ def test_the_schema_takes_what_the_case_takes():
         ((*FIXED, "VAMIN"), -14.5),
         ((*VT, "filter"), {"lowpass": 8}),
         (VT, "vt"),
+        (VT, CHANNEL | {"base": 15.75}),
+        (VT, CHANNEL | {"scale": 0.0635}),
+        (VT, CHANNEL | {"unit": "pu"}),
+        (TIME, ["Date", "Time"]),
+        (TIME, {"column": "t", "unit": "ms"}),
+        ((*TIME[:-1], "sheet"), "Data"),
         (("records", 1, "plant"), {"type": "open-circuit"}),
         ((*DOWN, "mask"), []),
     ):
@@ -581,6 +606,9 @@ def test_the_example_can_be_fitted(beside_a_record):
 
 PLACES = [
     AT,
+    TIME,
+    (*VT, "unit"),
+    (*VT, "base"),
     (*AT, "start"),
     (*AT, "min"),
     (*AT, "max"),

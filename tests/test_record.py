@@ -119,6 +119,45 @@ def test_one_column_may_serve_twice(csv):
     assert np.array_equal(record.signals["efd"], 2 * record.signals["vt"])
 
 
+def test_engineering_units_become_per_unit_by_their_base(csv):
+    """The field current's base is on the air-gap line: at no load it reads more than 1 pu."""
+    path = csv("Zeit/ms;Ugen [kV];If\n0;15,75;550\n5;16,5375;600\n")
+    record = read_record(
+        path,
+        Clock(("Zeit/ms",)),
+        {
+            "vt": Channel("Ugen [kV]", unit="KV", base=15.75),
+            "ifd": Channel("If", 2.0, -1.0, unit="A", base=500.0),
+        },
+    )
+    assert record.time.tolist() == [0.0, 0.005]
+    assert record.signals["vt"].tolist() == [1.0, pytest.approx(1.05)]
+    assert record.signals["ifd"].tolist() == [pytest.approx(1.2), pytest.approx(1.4)]
+
+
+def test_a_unit_that_the_file_contradicts_is_refused(csv):
+    path = csv("t,Ugen [V]\n0,15750\n1,15760\n")
+    message = refusal(path, {"vt": Channel("Ugen [V]", unit="kV", base=15.75)})
+    assert message.endswith("bump.csv: column 'Ugen [V]' is in V as the file says, not in kV")
+
+
+def test_a_clock_may_have_another_unit_and_stand_in_two_columns(csv):
+    path = csv(GOOD)
+    assert read_record(path, Clock(("t",), "ms"), VT).time[1] == 0.0001
+    path = csv("Date;Time;vt\n20.09.2015;23:59:59,9;1\n21.09.2015;00:00:00,1;2\n")
+    record = read_record(path, Clock(("Date", "Time")), VT, (0.0, 0.2))
+    assert record.time.tolist() == [0.0, 0.2]
+
+
+def test_timestamps_that_repeat_or_go_back_are_refused(csv):
+    path = csv("Time;vt\n10:51:42,1;1\n10:51:42,1;2\n10:51:42,0;3\n")
+    with pytest.raises(RecordError, match=r"bump\.csv:3: column 'Time': time 0\.0 s repeats"):
+        read_record(path, Clock(("Time",)), VT)
+    path = csv("Date;Time;vt\n2020-01-02;10:00;1\n2020-01-01;10:00;2\n")
+    with pytest.raises(RecordError, match=r"csv:3: columns 'Date' and 'Time': .* goes back"):
+        read_record(path, Clock(("Date", "Time")), VT)
+
+
 def test_columns_can_be_read_by_name(csv):
     columns = read_columns(csv(GOOD), ["ifd", "t"])
     assert list(columns) == ["ifd", "t"]
