@@ -168,6 +168,49 @@ def test_a_model_may_be_a_file_beside_the_case(case_file, tmp_path):
     assert load_case(case_file(text)).values() == {"K": 2.0}
 
 
+def test_a_record_in_engineering_units_with_timestamps_is_the_record_per_unit(case_file, tmp_path):
+    rows = [(0.0, 1.0, 1.25), (0.5, 1.01, 1.3), (1.5, 1.05, 1.5), (12.0, 1.04, 1.4)]
+    (tmp_path / "plain.csv").write_text(
+        "t,vt,ifd\n" + "".join(f"{t},{vt},{ifd}\n" for t, vt, ifd in rows)
+    )
+    lines = [
+        f"20.09.2015;23:59:{50 + t:04.1f};{15.75 * vt:.5f};{400 * ifd:.0f}"
+        if t < 10
+        else f"21.09.2015;00:00:{t - 10:04.1f};{15.75 * vt:.5f};{400 * ifd:.0f}"
+        for t, vt, ifd in rows
+    ]
+    heading = "Datum;Uhrzeit;Ugen [kV];Läuferstrom [A]"
+    text = "\r\n".join([heading, *lines]).replace(".", ",").replace("20,09,2015", "20.09.2015")
+    text = text.replace("21,09,2015", "21.09.2015")
+    (tmp_path / "field.csv").write_bytes(text.encode("cp1252"))
+    common = """\
+model: AC1A
+plant: {type: open-circuit, machine: GENROU}
+test: {vref: [{at: 1.0, step: 0.05}]}
+parameters: {free: {KA: {start: 400, min: 10, max: 5000}}}
+"""
+    plain = load_case(
+        case_file(common + "record: {file: plain.csv, time: t, channels: {vt: vt, ifd: ifd}}\n")
+    )
+    field = load_case(
+        case_file(
+            common
+            + """\
+record:
+  file: field.csv
+  time: [Datum, Uhrzeit]
+  channels:
+    vt: {column: "Ugen [kV]", unit: kV, base: 15.75}
+    ifd: {column: "Läuferstrom [A]", unit: A, base: 400}
+"""
+        )
+    )
+    one, other = (case.measure(case.test, case.record) for case in (plain, field))
+    assert np.array_equal(one.time, other.time)
+    for signal in ("vt", "ifd"):
+        assert other.signals[signal] == pytest.approx(one.signals[signal], rel=1e-6)
+
+
 def test_a_case_cannot_be_changed(case_file):
     case = load_case(case_file(EXAMPLE))
     with pytest.raises(ValidationError):

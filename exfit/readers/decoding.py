@@ -77,6 +77,8 @@ def _text(path: Path, data: bytes, encoding: str) -> Text:
 
 
 def _is_utf8(data: bytes) -> bool:
+    if data.isascii():
+        return True
     decoder = codecs.getincrementaldecoder("utf-8")()
     try:
         for at in range(0, len(data), CHUNK):

@@ -145,7 +145,9 @@ class TextTable:
         """Whether every line surely has as many cells as the first; if not, some may have."""
         separator, cells = self.dialect.separator, self.dialect.cells
         data = self.text.data
-        end = len(data.rstrip(b"\n"))
+        end = len(data)
+        while data[end - 1] == ord("\n"):
+            end -= 1
         if separator is not None and len(self.names) < cells:
             ends = data.count(f"{separator}\n".encode(), self._start, end)
             if ends < data.count(b"\n", self._start, end):
@@ -162,8 +164,8 @@ class TextTable:
                 begins = ~gap & np.concatenate(([blank], gap[:-1]))
                 blank = bool(gap[-1])
                 marks = ends_line[begins | ends_line]
-            expected = (np.arange(phase, phase + marks.size) % period) == period - 1
-            if not np.array_equal(marks, expected):
+            due = marks[period - 1 - phase :: period]
+            if not due.all() or np.count_nonzero(marks) != due.size:
                 return False
             phase = (phase + marks.size) % period
         return phase == period - 1
@@ -191,7 +193,7 @@ class TextTable:
         if self.dialect.separator == ",":
             quoted = re.compile(r'"([^",\n]*),([^",\n]*)"')
             return (quoted.sub(r"\1.\2", line.replace(".", ":")) for line in lines)
-        if b"." in self.text.data[self._start :]:
+        if self.text.data.find(b".", self._start) >= 0:
             return (line.replace(".", ":").replace(",", ".") for line in lines)
         return (line.replace(",", ".") for line in lines)
 
@@ -292,7 +294,7 @@ def read_text_table(path: Path) -> TextTable:
     """
     data = read_bytes(path)
     text = decoded(path, data)
-    if not text.data.strip():
+    if not text.data or text.data.isspace():
         raise RecordError(f"{path}: the file is empty: a row of column names belongs there")
     dialect = find_dialect(path, [*islice(text.lines(), HEAD)])
     table = TextTable(path, hashlib.sha256(data).hexdigest(), text, dialect)
