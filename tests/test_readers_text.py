@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from exfit.errors import RecordError
 from exfit.readers import open_table
 from exfit.readers.text import read_text_table
+from exfit.readers.units import alike, unit_in
 
 
 class Seen(NamedTuple):
@@ -776,3 +777,43 @@ def test_damaged_files_are_read_or_refused(tmp_path_factory, text, at, cut, junk
         return
     assert time.shape == vt.shape
     assert np.isfinite(time[1:] - time[0]).all() or not np.isfinite(time).all()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("kV", "KV", True),
+        ("pu", "p.u.", True),
+        ("Volts", "V", True),
+        ("µs", "us", True),
+        ("MW", "mW", False),
+        ("kV", "V", False),
+        ("A", "kA", False),
+    ],
+)
+def test_units_are_compared_as_they_are_meant(one, other, same):
+    assert alike(one, other) == same
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("Ugen [kV]", "kV"),
+        ("If (A)", "A"),
+        ("t/ms", "ms"),
+        ("Voltage in p.u.", "p.u."),
+        ("[s]", "s"),
+        ("U (L1)", None),
+        ("U [2]", None),
+        ("V/f", None),
+        ("vt", None),
+        ("Bus in use", None),
+    ],
+)
+def test_a_unit_in_a_name_is_known_and_nothing_else_taken_for_one(name, unit):
+    assert unit_in(name) == unit
+
+
+def test_windows_letters_beyond_latin_1_are_read(file):
+    table = read_text_table(file("t;Preis €;U\n0;1;2\n1;2;3\n".encode("cp1252")))
+    assert table.names == ("t", "Preis €", "U")
