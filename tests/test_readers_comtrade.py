@@ -421,7 +421,9 @@ def test_a_damaged_single_file_is_refused_by_its_place(tmp_path, fault):
 
 @pytest.mark.parametrize("form", FORMS)
 @given(damage(), st.sampled_from(["cfg", "dat", "cff"]))
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 def test_whatever_is_damaged_only_record_errors_come_out(tmp_path, form, apply, part):
     lines, data = configuration(form, "2013"), samples(form)
     contents = {
