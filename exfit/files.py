@@ -21,6 +21,7 @@ from exfit.result import (
     Comparison,
     FitResult,
     comparison_table,
+    courses_table,
     history_table,
     parameter_file,
     table,
@@ -32,8 +33,10 @@ from exfit.study import Simulation
 Array = NDArray[np.float64]
 
 PARAMETERS = "parameters.yaml"
+ITERATIONS = "iterations.csv"
 FIGURES = (
     "overlay.png",
+    "iterations.png",
     "convergence.png",
     "trajectories.png",
     "sensitivity.png",
@@ -66,9 +69,16 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
     else:
         write_comparisons(result.comparisons, folder, figures)
     write_comparisons(result.validation, folder, figures)
+    for one in result.comparisons:
+        name = ITERATIONS if one.name == SINGLE else f"{one.name}-{ITERATIONS}"
+        (folder / name).unlink(missing_ok=True)
+        if one.courses is not None:
+            write(folder / name, courses_table(one.time, one.courses))
     if figures:
         from exfit import plots
 
+        if any(one.courses is not None for one in result.comparisons):
+            write(folder / "iterations.png", plots.png(plots.iterations(result)))
         if result.comparison.name == SINGLE:
             title = f"{result.name}: {result.model} fitted to {result.comparison.record.name}"
             write(folder / "overlay.png", plots.png(plots.overlay(result.comparison, title)))

@@ -14,6 +14,7 @@ TAKEN = (
     "response",
     "history",
     "overlay",
+    "iterations",
     "convergence",
     "trajectories",
     "sensitivity",

@@ -136,7 +136,11 @@ class Residuals:
     def values(self, theta: Array) -> dict[str, float]:
         """Return every value by name."""
         moved = {one.name: one.value(float(x)) for one, x in zip(self.free, theta, strict=True)}
-        return self.ties.apply({**self.fixed, **moved})
+        return self.completed(moved)
+
+    def completed(self, free: Mapping[str, float]) -> dict[str, float]:
+        """Return every value by name, given those of the free parameters."""
+        return self.ties.apply({**self.fixed, **free})
 
     def __call__(self, theta: Array) -> Array:
         """Return the residuals (samples + priors,)."""

@@ -93,13 +93,27 @@ class Overlay:
         return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread else float("nan")
 
 
+@dataclass(frozen=True, eq=False)
+class Courses:
+    """The response after some iterations of a fit: ``samples`` (K, M) of one signal, per unit.
+
+    ``numbers`` (K,) are those of the iterations, in rising order; 0 is the start. What is left out
+    of the comparison is nan.
+    """
+
+    signal: str
+    numbers: tuple[int, ...]
+    samples: Array
+
+
 @dataclass(frozen=True)
 class Comparison:
     """A simulated response beside a record: ``time`` (M,) in s, one overlay per signal.
 
     ``cost`` is of the weighted residuals of all signals; ``rmse``, ``max_error`` and
     ``fit_percent`` are those of vt, or of the first signal where there is no vt. Features are those
-    of vt after the first step, None where the record does not have it.
+    of vt after the first step, None where the record does not have it. ``courses`` show how a fit
+    came about, None where that is not kept.
     """
 
     name: str
@@ -112,11 +126,17 @@ class Comparison:
     sha256: str
     substeps: int
     rmse_limit: float | None = None
+    courses: Courses | None = None
+
+    @property
+    def judged_by(self) -> str:
+        """The name of the signal that the match is judged by."""
+        return "vt" if "vt" in self.overlays else next(iter(self.overlays))
 
     @property
     def judged(self) -> Overlay:
         """The signal that the match is judged by."""
-        return self.overlays.get("vt", next(iter(self.overlays.values())))
+        return self.overlays[self.judged_by]
 
     @property
     def rmse(self) -> float:
@@ -402,6 +422,12 @@ def comparison_table(comparison: Comparison) -> str:
                 header.append(f"{signal}_{label}")
                 columns.append(samples)
     return table(header, columns)
+
+
+def courses_table(time: Array, courses: Courses) -> str:
+    """Return the response after each iteration that is kept, on the record's clock, as CSV."""
+    header = ["t", *(f"{courses.signal}_{number}" for number in courses.numbers)]
+    return table(header, [time, *courses.samples])
 
 
 def history_table(result: FitResult) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from exfit import __version__, estimate
 from exfit.case import SINGLE, Case, Unknown
 from exfit.condensed import condensed
+from exfit.courses import course_notes, with_courses
 from exfit.errors import CaseError, SimulationError
 from exfit.knowledge import Knowledge, knowledge
 from exfit.notes import (
@@ -86,7 +87,11 @@ def fit(
     values, begin = residuals.values(found.x), residuals.values(residuals.start)
     interrupted = found.stop is estimate.Stop.INTERRUPTED
     known = None if interrupted else told(residuals, found.x, trials)
-    compared = tuple(one.secured(values).compare(one.name, values, begin) for one in trials)
+    secure = [one.secured(values) for one in trials]
+    compared = tuple(
+        with_courses(one.compare(one.name, values, begin), one, residuals, history)
+        for one in secure
+    )
     tried = tuple(tried_on(case, one, values) for one in validations)
     return FitResult(
         case=case.path,
@@ -116,6 +121,7 @@ def fit(
         notes=(
             *_notes(case, residuals, found, trials, compared, tried),
             *(() if known is None else misfit_notes(residuals, known)),
+            *course_notes(compared),
         ),
         validation=tried,
         versions=versions(),

@@ -220,9 +220,9 @@ class Trial:
         first = None if start is None else self.experiment.samples(self.known(start))[0]
         overlays = {
             channel.signal: Overlay(
-                _compared(channel, self.experiment.measured(channel, at)),
-                _compared(channel, channel.shown(samples[:, k])),
-                None if first is None else _compared(channel, channel.shown(first[:, k])),
+                compared(channel, self.experiment.measured(channel, at)),
+                compared(channel, channel.shown(samples[:, k])),
+                None if first is None else compared(channel, channel.shown(first[:, k])),
             )
             for k, channel in enumerate(self.channels)
         }
@@ -255,7 +255,7 @@ class Trial:
         return features(time, signal[kept], inside[0].at, until)
 
 
-def _compared(channel: Channel, samples: Array) -> Array:
+def compared(channel: Channel, samples: Array) -> Array:
     """Return samples (M,) as they are compared, nan where they are left out."""
     if channel.conditioning is None:
         return samples

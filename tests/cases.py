@@ -23,6 +23,8 @@ FILES_OF_A_FIT = {
     "history.csv",
     "response.csv",
     "overlay.png",
+    "iterations.csv",
+    "iterations.png",
     "convergence.png",
     "trajectories.png",
     "sensitivity.png",

@@ -1,5 +1,6 @@
 """Figures of results: functions that return one, and touch nothing else."""
 
+from exfit.plots.iterations import iterations
 from exfit.plots.knowledge import correlation, profiles, sensitivity
 from exfit.plots.overlays import overlay
 from exfit.plots.responses import overview, response
@@ -9,6 +10,7 @@ from exfit.plots.style import png
 __all__ = [
     "convergence",
     "correlation",
+    "iterations",
     "overlay",
     "overview",
     "png",

@@ -1,0 +1,67 @@
+"""How a fit came about: the response after each of its iterations."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.kernel import in_threads
+from exfit.residuals import UNREACHABLE, Residuals
+from exfit.result import Comparison, Courses, Iteration
+from exfit.trial import Trial, compared
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+MOST_COURSES = 40  # colours that an eye still tells apart, and columns of a table
+MOST_SAMPLES = 20_000  # of a record, 20 s at 1 kHz: a table of 9 MB, written within a second
+
+
+def chosen(count: int) -> list[int]:
+    """Return which of so many iterations are kept: evenly some, the first and last among them."""
+    kept = np.linspace(0, count - 1, min(count, MOST_COURSES))
+    return [int(k) for k in np.rint(kept)]
+
+
+def with_courses(
+    comparison: Comparison, trial: Trial, residuals: Residuals, history: Sequence[Iteration]
+) -> Comparison:
+    """Return the comparison of a secured trial with the courses of the fit that led to it.
+
+    Iterations without a finite response are left out. A record of more than MOST_SAMPLES has no
+    courses.
+    """
+    if not history or len(comparison.time) > MOST_SAMPLES:
+        return comparison
+    signal = comparison.judged_by
+    lines = [history[k] for k in chosen(len(history))]
+    found = list(in_threads(lambda line: _course(trial, residuals, signal, line), lines))
+    kept = [(line.number, one) for line, one in zip(lines, found, strict=True) if one is not None]
+    if not kept:
+        return comparison
+    numbers = tuple(number for number, _ in kept)
+    samples = np.stack([one for _, one in kept])
+    return replace(comparison, courses=Courses(signal, numbers, samples))
+
+
+def _course(trial: Trial, residuals: Residuals, signal: str, line: Iteration) -> Array | None:
+    """Return the response (M,) to the values of an iteration, None where there is none."""
+    place = trial.experiment.signals.index(signal)
+    channel = trial.channels[place]
+    try:
+        samples, _ = trial.experiment.samples(residuals.completed(line.values))
+    except UNREACHABLE:
+        return None
+    found = compared(channel, samples[:, place])
+    return found if np.isfinite(found[channel.kept]).all() else None
+
+
+def course_notes(comparisons: Sequence[Comparison]) -> list[str]:
+    """Say of which records the iterations are not kept for their size."""
+    return [
+        f"{one.record.name}: {len(one.time)} samples: the response after each iteration is kept of "
+        f"records up to {MOST_SAMPLES}"
+        for one in comparisons
+        if len(one.time) > MOST_SAMPLES
+    ]
