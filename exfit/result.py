@@ -3,7 +3,7 @@
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -93,6 +93,12 @@ class Overlay:
         return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread else float("nan")
 
 
+def judged_of(signals: Iterable[str]) -> str:
+    """Return the signal that a match is judged by: vt, or the first where there is no vt."""
+    names = tuple(signals)
+    return "vt" if "vt" in names else names[0]
+
+
 @dataclass(frozen=True, eq=False)
 class Courses:
     """The response after some iterations of a fit: ``samples`` (K, M) of one signal, per unit.
@@ -131,7 +137,7 @@ class Comparison:
     @property
     def judged_by(self) -> str:
         """The name of the signal that the match is judged by."""
-        return "vt" if "vt" in self.overlays else next(iter(self.overlays))
+        return judged_of(self.overlays)
 
     @property
     def judged(self) -> Overlay:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from exfit import __version__, estimate
 from exfit.case import SINGLE, Case, Unknown
 from exfit.condensed import condensed
-from exfit.courses import course_notes, with_courses
+from exfit.courses import Sketch, course_notes, sketch, with_courses
 from exfit.errors import CaseError, SimulationError
 from exfit.knowledge import Knowledge, knowledge
 from exfit.notes import (
@@ -62,12 +62,13 @@ def fit(
     strategy: estimate.Method | None = None,
     watch: Callable[[Iteration], None] = lambda _: None,
     progress: Callable[[estimate.Progress], None] = lambda _: None,
+    look: Callable[[Sketch], None] | None = None,
 ) -> FitResult:
     """Fit the free parameters of a case to its records, and try the result on its other records.
 
-    ``watch`` is told every iteration, ``progress`` how far a search from many starts is. An
-    interruption (KeyboardInterrupt) ends the search with the best point so far. Raises ExfitError
-    for input that cannot be used.
+    ``watch`` is told every iteration, ``look`` before it the response that it led to, ``progress``
+    how far a search from many starts is. An interruption (KeyboardInterrupt) ends the search with
+    the best point so far. Raises ExfitError for input that cannot be used.
     """
     began = clock.perf_counter()
     given = case.values()
@@ -79,6 +80,9 @@ def fit(
 
     def announce(line: estimate.Iteration) -> None:
         history.append(_iteration(line, residuals))
+        seen = None if look is None else sketch(trials[0], residuals, line.x)
+        if look is not None and seen is not None:
+            look(seen)
         watch(history[-1])
 
     found, minima = search(case, residuals, method, announce, progress)

@@ -132,6 +132,7 @@ ORDER = (
     "exfit.overview",
     "exfit.files",
     "exfit.show.terminal",
+    "exfit.show.sketch",
     "exfit.show.progress",
     "exfit.show.matches",
     "exfit.show.fits",

@@ -64,8 +64,9 @@ def fit(
             with show.Bar(console).running() as progress:
                 result = study.fit(loaded, strategy, progress=progress)
         else:
-            with show.Watch(console, show.task(loaded, strategy)).running() as watch:
-                result = study.fit(loaded, strategy, watch)
+            title, most = show.task(loaded, strategy), loaded.estimate.iterations
+            with show.Watch(console, title, most).running() as watch:
+                result = study.fit(loaded, strategy, watch, look=watch.look)
         files.write_fit(result, folder, plots)
         show.fit(console, result, folder)
     done = result.success and not result.interrupted
