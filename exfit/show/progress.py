@@ -1,13 +1,13 @@
 """A search while it runs."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Console
 from rich.live import Live
 from rich.progress import TaskID
-from rich.table import Table
 from rich.text import Text
 
 from exfit.case import Case
@@ -15,16 +15,16 @@ from exfit.courses import Sketch
 from exfit.estimate import Progress
 from exfit.result import Iteration
 from exfit.show.sketch import LEAST_HEIGHT, LEAST_WIDTH, sketched
-from exfit.show.terminal import plain_table
 
 LINES = 12  # of the history that stay in sight
 FEWEST = 4  # of them beside a plot
-TABLE = 64  # columns of the history
+TABLE = 63  # characters of the history
 GAP = 2  # columns between the history and a plot beside it
 AROUND = 5  # lines beside the history: title, what is hidden, names of columns, progress, cursor
 HIGHEST = (20, 14)  # lines of a plot beside the history and below it
 WIDEST = 100  # columns of a plot
 SHARE = 0.03  # of the time of a fit: so much may be spent on showing it
+FORMS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>5}", "{:>5}")
 HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "inner", "nfev")
 
 
@@ -70,10 +70,9 @@ class Watch:
         if len(self.lines) == 1:
             self.console.print(self.title, markup=False)
         if self._live is None:
-            heading = "{:>4} {:5} {:>10} {:>9} {:>9} {:>9} {:>5} {:>5}"
             if len(self.lines) == 1:
-                self.console.print(heading.format(*HISTORY), soft_wrap=True)
-            self.console.print(heading.format(*_cells(line)), soft_wrap=True)
+                self.console.print(_row(HISTORY), soft_wrap=True)
+            self.console.print(_row(_cells(line)), soft_wrap=True)
         else:
             self._draw(self._live)
 
@@ -86,29 +85,33 @@ class Watch:
         ended = time.perf_counter()
         self._next = ended + (ended - began) / SHARE
 
-    def _picture(self) -> RenderableType:
+    def _picture(self) -> Text:
         """Return the table, and the plot where there is room for it: beside or below."""
         width, height = self.console.size
         free, beside, below = height - AROUND, width - TABLE - GAP, height - AROUND - FEWEST
-        high = max(1, min(free, LINES))
         if self._sketch is not None and beside >= LEAST_WIDTH and free >= LEAST_HEIGHT:
-            grid = Table.grid(padding=(0, GAP, 0, 0))
-            lines = sketched(self._sketch, min(beside, WIDEST), min(free, HIGHEST[0]))
-            grid.add_row(self._table(high), Text("\n").join(lines))
-            return Group(grid, self._progress())
-        if self._sketch is not None and below >= LEAST_HEIGHT and width >= LEAST_WIDTH:
-            lines = sketched(self._sketch, min(width - 1, WIDEST), min(below, HIGHEST[1]))
-            rows = min(free - len(lines), LINES)
-            return Group(self._table(rows), self._progress(), *lines)
-        return Group(self._table(high), self._progress())
+            plot = sketched(self._sketch, min(beside, WIDEST), min(free, HIGHEST[0]))
+            table = [Text(line.plain.ljust(TABLE + GAP), line.style) for line in self._table(free)]
+            blank = Text(" " * (TABLE + GAP))
+            both = zip_longest(table, plot)
+            lines = [(left or blank) + (right or Text()) for left, right in both]
+            return _joined([*lines, self._progress()])
+        if self._sketch is not None and below >= LEAST_HEIGHT and width > LEAST_WIDTH:
+            plot = sketched(self._sketch, min(width - 1, WIDEST), min(below, HIGHEST[1]))
+            return _joined([*self._table(free - len(plot)), self._progress(), *plot])
+        return _joined([*self._table(max(free, 1)), self._progress()])
 
-    def _table(self, rows: int) -> RenderableType:
-        table = plain_table(*HISTORY, numbers=[name for name in HISTORY if name != "phase"])
-        for line in self.lines[-rows:]:
-            table.add_row(*_cells(line))
+    def _table(self, room: int) -> list[Text]:
+        """Return the last lines of the history, in no more than so many beside its head."""
+        rows, columns = min(room, LINES), _fitting(self.console.width)
         hidden = len(self.lines) - rows
-        above = Text(f"({hidden} earlier iterations)", style="dim") if hidden > 0 else Text("")
-        return Group(above, table)
+        above = f"({hidden} earlier iterations)" if hidden > 0 else ""
+        head = Text(_row(HISTORY[:columns]), style="bold")
+        return [
+            Text(above, style="dim"),
+            head,
+            *(Text(_row(_cells(line)[:columns])) for line in self.lines[-rows:]),
+        ]
 
     def _progress(self) -> Text:
         first, last = self.lines[0], self.lines[-1]
@@ -116,7 +119,24 @@ class Watch:
         share = last.cost / first.cost if first.cost > 0.0 else 1.0
         cost = f"cost {last.cost:.4e}, {100.0 * share:.3g} % of the start's"
         text = f"iteration {last.number}{limit}: {cost}"
-        return Text(text, style="dim", no_wrap=True, overflow="ellipsis")
+        return Text(text, style="dim")
+
+
+def _joined(lines: Iterable[Text]) -> Text:
+    """Return lines below each other; what is wider than the terminal is cut off."""
+    found = Text("\n").join(lines)
+    found.no_wrap, found.overflow = True, "crop"
+    return found
+
+
+def _row(cells: Sequence[str]) -> str:
+    """Return the first cells of a line of the history, each in its column."""
+    return " ".join(form.format(cell) for form, cell in zip(FORMS, cells, strict=False))
+
+
+def _fitting(width: int) -> int:
+    """Return how many columns of the history a terminal has room for: none is cut in two."""
+    return max(k for k in range(1, len(HISTORY) + 1) if k == 1 or len(_row(HISTORY[:k])) <= width)
 
 
 def _cells(line: Iteration) -> tuple[str, ...]:
