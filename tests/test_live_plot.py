@@ -11,7 +11,6 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from exfit import show, study
-from exfit.case import load_case
 from exfit.courses import Sketch
 from exfit.experiment import Experiment
 from exfit.result import Iteration
