@@ -13,6 +13,7 @@ from exfit.cli.catalogue import models, schema
 from exfit.cli.exchange import export, import_
 from exfit.cli.fitting import check, fit, simulate, validate
 from exfit.cli.knowing import identify, profile
+from exfit.cli.options import Refusal
 from exfit.errors import ExfitError
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
@@ -21,15 +22,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 # a look for circles of dead objects at every 700 new ones takes a twentieth of a short fit
 gc.set_threshold(100_000)
-
-
-class Refusal(click.ClickException):
-    """Input that cannot be used: its faults on standard error, exit code 1."""
-
-    def show(self, file: Any = None) -> None:
-        """Print the message, all faults of a case under each other."""
-        lines = self.message.splitlines()
-        click.echo("Error: " + "\n       ".join(lines), err=True, file=file)
 
 
 class Commands(click.Group):

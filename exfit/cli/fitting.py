@@ -17,6 +17,7 @@ from exfit.cli.options import (
     plots_option,
     quiet_option,
 )
+from exfit.cli.watched import fit_again_and_again, fit_in_sight
 
 if TYPE_CHECKING:
     from exfit.estimate import Method
@@ -29,6 +30,7 @@ STRATEGIES = ("gn", "dgn", "lm", "lm-then-dgn", "auto", "robust")
 @output_option
 @click.option("--strategy", type=click.Choice(STRATEGIES), help="In place of the case's own.")
 @plots_option
+@click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
 @quiet_option
 @json_option
 def fit(
@@ -36,15 +38,26 @@ def fit(
     output: Path | None,
     strategy: "Method | None",
     plots: bool,
+    watch: bool,
     quiet: bool,
     as_json: bool,
 ) -> None:
     """Fit the free parameters of CASE to its record.
 
-    Writes result.json, parameters.yaml, history.csv, response.csv and figures to runs/CASE-fit, or
-    to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad input; 3: not
-    converged, no match at all, or a validation beyond the limit that the case accepts.
+    Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
+    runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad
+    input; 3: not converged, no match at all, or a validation beyond the limit that the case
+    accepts.
+
+    With --watch it fits again when CASE, its model file or one of its records changes, and shows
+    the values of the fit before beside the new ones; a case with a fault waits for the next change.
+    Ctrl-C ends that with exit code 0.
     """
+    if watch:
+        if quiet or as_json:
+            raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
+        fit_again_and_again(case, output or folder_of(case, "fit"), strategy, plots)
+        return
     from exfit import files, study
     from exfit.result import to_json
 
@@ -57,18 +70,7 @@ def fit(
         if as_json:
             click.echo(to_json(result.as_json()), nl=False)
     else:
-        from exfit import show
-
-        console = show.console()
-        if loaded.estimate.starts > 1:
-            with show.Bar(console).running() as progress:
-                result = study.fit(loaded, strategy, progress=progress)
-        else:
-            title, most = show.task(loaded, strategy), loaded.estimate.iterations
-            with show.Watch(console, title, most).running() as watch:
-                result = study.fit(loaded, strategy, watch, look=watch.look)
-        files.write_fit(result, folder, plots)
-        show.fit(console, result, folder)
+        result = fit_in_sight(loaded, folder, strategy, plots)
     done = result.success and not result.interrupted
     if not (done and result.accepted and result.describes):
         raise SystemExit(NOT_CONVERGED)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -36,6 +36,15 @@ file_option = click.option(
     help="File to write; without it, to the terminal.",
 )
 force_option = click.option("--force", is_flag=True, help="Write over a file that exists.")
+
+
+class Refusal(click.ClickException):
+    """Input that cannot be used: its faults on standard error, exit code 1."""
+
+    def show(self, file: Any = None) -> None:
+        """Print the message, all faults of a case under each other."""
+        lines = self.message.splitlines()
+        click.echo("Error: " + "\n       ".join(lines), err=True, file=file)
 
 
 def load(case: Path) -> "Case":

@@ -6,11 +6,12 @@ from exfit.show.knowledge import design, profiles
 from exfit.show.matches import comparisons
 from exfit.show.progress import Bar, Watch, task
 from exfit.show.sheets import catalogue, machine, model
-from exfit.show.terminal import console, notes, written
+from exfit.show.terminal import again, console, notes, waiting, written
 
 __all__ = [
     "Bar",
     "Watch",
+    "again",
     "catalogue",
     "check",
     "comparisons",
@@ -22,5 +23,6 @@ __all__ = [
     "notes",
     "profiles",
     "task",
+    "waiting",
     "written",
 ]

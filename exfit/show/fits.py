@@ -14,10 +14,13 @@ from exfit.show.terminal import error_of, notes, number, plain_table, remarks, w
 MINIMA = 5  # columns of minima that fit beside each other
 
 
-def fit(console: Console, result: FitResult, folder: Path) -> None:
-    """Show what a fit found, how well it is known, and where its files are."""
+def fit(console: Console, result: FitResult, folder: Path, before: FitResult | None = None) -> None:
+    """Show what a fit found, how well it is known, and where its files are.
+
+    The values of a fit ``before`` stand beside the new ones.
+    """
     console.print()
-    console.print(fitted_table(result))
+    console.print(fitted_table(result, before))
     console.print()
     outcome = "converged" if result.success else "NOT CONVERGED"
     style = "green" if result.success else "bold red"
@@ -46,9 +49,10 @@ def fit(console: Console, result: FitResult, folder: Path) -> None:
     written(console, folder)
 
 
-def fitted_table(result: FitResult) -> Table:
+def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
     """Return the fitted values with their intervals; what belongs to a record stands last."""
-    numbers = ("start", "fitted", "95 % interval", "error")
+    former = () if before is None else ("before",)
+    numbers = ("start", *former, "fitted", "95 % interval", "error")
     table = plain_table("parameter", *numbers, "unit", "", numbers=numbers)
     for name, one in result.parameters.items():
         style = "yellow" if one.at_bound else ""
@@ -60,7 +64,8 @@ def fitted_table(result: FitResult) -> Table:
             if known.interval is not None:
                 interval = " ... ".join(number(limit) for limit in known.interval)
             error = error_of(known, one.of_record)
-        cells = (number(one.start), number(one.value), interval, error, one.unit, mark)
+        was = () if before is None else (number(before.values.get(name)),)
+        cells = (number(one.start), *was, number(one.value), interval, error, one.unit, mark)
         table.add_row(name, *cells, style=style)
     return table
 

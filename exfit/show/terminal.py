@@ -1,6 +1,7 @@
 """The terminal, and what all that is shown on it shares."""
 
 from collections.abc import Iterable, Sequence
+from datetime import datetime
 from pathlib import Path
 
 from rich.console import Console
@@ -31,6 +32,20 @@ def plain_table(*columns: str, numbers: Sequence[str] = ()) -> Table:
 def number(value: float | None, digits: int = 5) -> str:
     """Return a number in a few digits, a dash for None."""
     return "-" if value is None else f"{value:.{digits}g}"
+
+
+def waiting(console: Console, paths: Iterable[Path]) -> None:
+    """Say which files are watched."""
+    names = ", ".join(path.name for path in paths)
+    console.print()
+    console.print(f"watching {names}; Ctrl-C ends", markup=False, style="dim")
+
+
+def again(console: Console, paths: Iterable[Path]) -> None:
+    """Draw a line between two runs, with what has changed and when."""
+    names = ", ".join(path.name for path in paths)
+    console.print()
+    console.rule(Text(f"{names} changed, {datetime.now():%H:%M:%S}"))
 
 
 def written(console: Console, folder: Path) -> None:

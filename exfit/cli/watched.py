@@ -1,0 +1,62 @@
+"""Fits in sight: one, or one after the other as the files of a case change."""
+
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from exfit.cli.options import Refusal, load
+from exfit.errors import ExfitError
+
+if TYPE_CHECKING:
+    from exfit.case import Case
+    from exfit.estimate import Method
+    from exfit.result import FitResult
+
+
+def fit_in_sight(
+    case: "Case",
+    folder: Path,
+    strategy: "Method | None",
+    plots: bool,
+    before: "FitResult | None" = None,
+) -> "FitResult":
+    """Fit a case, show its iterations and its result beside a former one, write its files."""
+    from exfit import files, show, study
+
+    console = show.console()
+    if case.estimate.starts > 1:
+        with show.Bar(console).running() as progress:
+            result = study.fit(case, strategy, progress=progress)
+    else:
+        title, most = show.task(case, strategy), case.estimate.iterations
+        with show.Watch(console, title, most).running() as watch:
+            result = study.fit(case, strategy, watch, look=watch.look)
+    files.write_fit(result, folder, plots)
+    show.fit(console, result, folder, before)
+    return result
+
+
+def fit_again_and_again(case: Path, folder: Path, strategy: "Method | None", plots: bool) -> None:
+    """Fit a case, and again whenever a file of it changes, until Ctrl-C.
+
+    Raises ExfitError where there is no such file, or no place for the results: a change of the
+    case would not help.
+    """
+    from exfit import files, show
+    from exfit.watching import changed, stamps_of
+    from exfit.yaml_lines import read_text
+
+    read_text(case)
+    files.refuse_unwritable(folder)
+    console, before = show.console(), None
+    with suppress(KeyboardInterrupt):
+        while True:
+            stamps = stamps_of(case)
+            try:
+                before = fit_in_sight(load(case), folder, strategy, plots, before)
+            except ExfitError as fault:
+                Refusal(str(fault)).show()
+            if before is not None and before.interrupted:
+                return
+            show.waiting(console, stamps)
+            show.again(console, changed(stamps))
