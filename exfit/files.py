@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case import SINGLE
+from exfit.compare import Agreement
 from exfit.design import Design
 from exfit.engine.kernel import cache_folder
 from exfit.errors import CaseError, ExfitError
@@ -154,6 +155,25 @@ def write_simulation(simulation: Simulation, name: str, folder: Path, figures: b
         if simulation.comparison is not None:
             title = f"{name}: simulated and {simulation.comparison.record.name}"
             write(folder / "overlay.png", plots.png(plots.overlay(simulation.comparison, title)))
+
+
+def write_agreement(found: Agreement, folder: Path, figures: bool) -> None:
+    """Write how two responses differ as JSON, their samples on each clock, and a figure."""
+    write(folder / "compare.csv", agreement_table(found))
+    if figures:
+        from exfit import plots
+
+        write(folder / "compare.png", plots.png(plots.agreement(found)))
+    write(folder / "compare.json", to_json(found.as_json()))
+
+
+def agreement_table(found: Agreement) -> str:
+    """Return both responses and their difference on their common clock, as CSV."""
+    header, columns = ["t"], [found.between[0].time]
+    for one in found.between:
+        header += [f"{one.signal}_A", f"{one.signal}_B", f"{one.signal}_difference"]
+        columns += [*one.values, one.error]
+    return table(header, columns)
 
 
 def last_fit(case: Path) -> Path:

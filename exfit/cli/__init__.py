@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from exfit.cli.catalogue import models, schema
+from exfit.cli.comparing import compare
 from exfit.cli.exchange import export, import_
 from exfit.cli.fitting import check, fit, simulate, validate
 from exfit.cli.knowing import identify, profile
@@ -41,6 +42,18 @@ def main() -> None:
     """Find the parameters of a generator's excitation system from a recorded bump test."""
 
 
-COMMANDS = (fit, simulate, validate, check, profile, identify, import_, export, models, schema)
+COMMANDS = (
+    fit,
+    simulate,
+    validate,
+    compare,
+    check,
+    profile,
+    identify,
+    import_,
+    export,
+    models,
+    schema,
+)
 for command in COMMANDS:
     main.add_command(command)

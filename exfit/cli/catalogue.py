@@ -4,9 +4,11 @@ from pathlib import Path
 
 import click
 
+from exfit.cli import completion
+
 
 @click.command(short_help="List the models, or describe one.")
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=completion.models)
 @click.option(
     "--plot",
     "folder",

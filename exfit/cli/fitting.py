@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from exfit.cli import completion
 from exfit.cli.options import (
     NOT_CONVERGED,
     assignments,
@@ -78,7 +79,14 @@ def fit(
 
 @click.command()
 @case_argument
-@click.option("--set", "changes", multiple=True, metavar="KA=400", help="Value of a parameter.")
+@click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="KA=400",
+    help="Value of a parameter.",
+    shell_complete=completion.assigned_parameters,
+)
 @parameters_option
 @output_option
 @plots_option

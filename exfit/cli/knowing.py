@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from exfit.cli import completion
 from exfit.cli.options import (
     NOT_CONVERGED,
     assignments,
@@ -19,7 +20,12 @@ from exfit.cli.options import (
 
 @click.command(short_help="Show how far each parameter can move with the others following.")
 @case_argument
-@click.argument("parameters", nargs=-1, metavar="[PARAM]...")
+@click.argument(
+    "parameters",
+    nargs=-1,
+    metavar="[PARAM]...",
+    shell_complete=completion.free_parameters,
+)
 @output_option
 @plots_option
 @quiet_option
@@ -67,7 +73,11 @@ def profile(
 @click.command(short_help="Show what a planned test would tell of the parameters.")
 @case_argument
 @click.option(
-    "--noise", multiple=True, metavar="vt=1e-4", help="Noise of a signal, pu; may be repeated."
+    "--noise",
+    multiple=True,
+    metavar="vt=1e-4",
+    help="Noise of a signal, pu; may be repeated.",
+    shell_complete=completion.noises,
 )
 @output_option
 @plots_option

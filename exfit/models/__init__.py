@@ -75,6 +75,8 @@ STABILISERS = Catalogue(
     "STAB1",
 )
 
+MACHINE_NAMES = ("GENROU", "GENROE", "GENSAL", "GENSAE", "ONE_AXIS")  # known without their files
+
 
 def find(name: str, folder: Path) -> Model:
     """Return the model of a catalogue name, an alias, or a .py file relative to ``folder``.

@@ -1,5 +1,6 @@
 """Figures of results: functions that return one, and touch nothing else."""
 
+from exfit.plots.agreement import agreement
 from exfit.plots.iterations import iterations
 from exfit.plots.knowledge import correlation, profiles, sensitivity
 from exfit.plots.overlays import overlay
@@ -8,6 +9,7 @@ from exfit.plots.search import convergence, trajectories, waterfall
 from exfit.plots.style import png
 
 __all__ = [
+    "agreement",
     "convergence",
     "correlation",
     "iterations",

@@ -1,5 +1,6 @@
 """What the terminal shows: tables and lines, with rich."""
 
+from exfit.show.agreement import agreement
 from exfit.show.checks import check
 from exfit.show.fits import fit
 from exfit.show.knowledge import design, profiles
@@ -12,6 +13,7 @@ __all__ = [
     "Bar",
     "Watch",
     "again",
+    "agreement",
     "catalogue",
     "check",
     "comparisons",

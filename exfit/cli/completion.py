@@ -1,0 +1,58 @@
+"""What a shell completes: names of models and of parameters.
+
+A shell asks at every press of a key: nothing heavy is imported, and nothing can fail.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+
+SIGNALS = ("vt", "efd", "ifd", "p", "q")
+
+
+def models(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    """Return the names of exciters, machines and stabilisers, in upper or lower case."""
+    from exfit.models import MACHINE_NAMES, MODELS, STABILISERS
+
+    return _beginning((*MODELS, *MACHINE_NAMES, *STABILISERS), incomplete.upper())
+
+
+def free_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
+    """Return the free parameters of the case, but for those that are given already."""
+    from exfit.glance import free_of
+
+    given = ctx.params.get("parameters") or ()
+    found = () if (case := _case(ctx)) is None else free_of(case)
+    return _beginning((name for name in found if name not in given), incomplete)
+
+
+def assigned_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
+    """Return the parameters that the case names, each ready for its value."""
+    from exfit.glance import parameters_of
+
+    found = () if (case := _case(ctx)) is None else parameters_of(case)
+    return _beginning((f"{name}=" for name in found), incomplete)
+
+
+def noises(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    """Return the signals, each ready for its noise."""
+    return _beginning((f"{signal}=" for signal in SIGNALS), incomplete)
+
+
+def _case(ctx: click.Context) -> Path | None:
+    """Return the case that is given already; the shell leaves a home folder as it is typed."""
+    case = ctx.params.get("case")
+    if case is None:
+        # behind an option that still lacks its value, click has not yet named the arguments
+        case = next((word for word in ctx.args if not word.startswith("-")), None)
+    if case is None:
+        return None
+    try:
+        return Path(case).expanduser()
+    except RuntimeError:  # there is no such user
+        return None
+
+
+def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]
