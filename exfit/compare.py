@@ -186,7 +186,7 @@ def compare(
         found += [_difference(name, measured, one) for one in curves[:2] for name in known]
     judged = judged_of(shared)
     steps = {one.name: _step_of(one, judged) for one in curves if judged in one.signals}
-    onset = next((step for step in reversed(steps.values()) if step is not None), None)
+    onset = steps.get("record") or steps.get("A") or steps.get("B")
     at = step_at if step_at is not None or onset is None else onset.at
     return Agreement(
         tuple(curves),
@@ -225,9 +225,16 @@ def _table_of(source: Path) -> Path:
         return source
     if (folder / "response.csv").is_file():
         return folder / "response.csv"
-    others = sorted(path.name for path in folder.glob("*.csv"))
+    others = [path.name for path in sorted(folder.glob("*.csv")) if _holds_response(path)]
     several = f"; name one of its files: {', '.join(others)}" if others else ""
-    raise RecordError(f"{source}: no response.csv beside or in it{several}")
+    raise RecordError(f"{folder}: no response.csv in it{several}")
+
+
+def _holds_response(path: Path) -> bool:
+    try:
+        return any(name.endswith(SIMULATED) for name in column_names(path))
+    except RecordError:
+        return False
 
 
 def _clock(path: Path, header: Sequence[str], asked: str | None) -> str:
@@ -280,9 +287,8 @@ def _difference(signal: str, first: Curve, second: Curve) -> Difference:
     read = [_at(time, one.time, one.signals[signal]) for one in (first, second)]
     values = np.stack([samples for samples, _ in read])
     if not np.isfinite(values).all(axis=0).any():
-        raise RecordError(
-            f"{first.path} and {second.path}: {signal}: no instant has a value of both"
-        )
+        both = f"{first.path} and {second.path}"
+        raise RecordError(f"{both}: {signal}: at no instant there are samples of both")
     return Difference(signal, first.name, second.name, time, values, max(own for _, own in read))
 
 
@@ -313,7 +319,7 @@ def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:
 def _durations(time: Array) -> Array:
     """Return how long each instant (M,) stands for: half the way to its neighbours, s."""
     steps = np.diff(time)
-    return 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+    return np.asarray(0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)))
 
 
 def _step_of(curve: Curve, signal: str) -> Onset | None:

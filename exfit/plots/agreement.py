@@ -33,7 +33,7 @@ def agreement(found: Agreement) -> Figure:
 
 def _curves(axes: Axes, curves: tuple[Curve, ...], signal: str, between: Difference) -> None:
     begin, end = between.time[0], between.time[-1]
-    for one in reversed(curves):  # the record below the lines
+    for one in sorted(curves, key=lambda one: one.name in LINES):  # the record below the lines
         if signal not in one.signals:
             continue
         inside = (one.time >= begin) & (one.time <= end)

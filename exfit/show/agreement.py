@@ -26,18 +26,23 @@ def agreement(console: Console, found: Agreement) -> None:
         f"compared over {between.time[0]:g} ... {between.time[-1]:g} s at {len(between.time)} "
         "instants"
     )
+    worst = max(found.differences, key=lambda one: one.interpolation)
+    if worst.interpolation:
+        console.print(
+            f"between samples: a cubic, up to {worst.interpolation:.1e} pu from a straight line "
+            f"({worst.signal})"
+        )
 
 
 def _differences(found: Agreement) -> Table:
-    numbers = ("rms", "largest", "at", "final", "final ", "interpolation")
-    table = plain_table("signal", "difference (pu)", *numbers, numbers=numbers)
+    numbers = ("rms", "largest", "at")
+    table = plain_table("signal", "pu", *numbers, "final values", numbers=numbers)
     for one in found.differences:
         value, at = one.largest
-        finals = (f"{one.first} {number(one.finals[0])}", f"{one.second} {number(one.finals[1])}")
-        error = f"{one.interpolation:.1e}" if one.interpolation else "none"
+        finals = ", ".join(number(value) for value in reversed(one.finals))
         name = f"{one.second} - {one.first}"
         cells = (f"{one.rms:.3e}", f"{value:+.3e}", f"{at:.4g} s")
-        table.add_row(one.signal, name, *cells, *finals, error)
+        table.add_row(one.signal, name, *cells, finals)
     return table
 
 
