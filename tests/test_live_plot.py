@@ -2,11 +2,10 @@
 
 import unicodedata
 from io import StringIO
-from pathlib import Path
 
 import numpy as np
 import pytest
-from records import case_of, config
+from records import case_of, config, recording, several
 from rich.cells import cell_len
 from rich.console import Console
 
@@ -16,9 +15,8 @@ from exfit.experiment import Experiment
 from exfit.result import Iteration
 from exfit.show import progress
 from exfit.show import sketch as drawing
+from exfit.trial import residuals_of
 
-ROOT = Path(__file__).parent.parent
-CASE = ROOT / "configs" / "first_order.yaml"
 TIME = np.linspace(0.0, 10.0, 1001)
 RISE = np.where(TIME < 1.0, 1.0, 1.05 - 0.05 * np.exp(1.0 - TIME))
 SKETCH = Sketch("vt", TIME, RISE, RISE + 0.002)
@@ -203,3 +201,14 @@ def test_a_look_at_a_record_with_gaps_leaves_them_out(tmp_path):
     study.fit(case_of(content, tmp_path), look=seen.append)
     assert not np.any((seen[0].time >= 3.0) & (seen[0].time <= 4.0))
     assert len(seen[0].time) == len(seen[0].measured) == len(seen[0].simulated)
+
+
+def test_a_look_elsewhere_than_the_last_evaluation_is_simulated_there(tmp_path):
+    case = case_of(several(recording("up"), recording("down")), tmp_path)
+    residuals = residuals_of(case, study.fitted(case))
+    start = residuals.start
+    whole = residuals(start)
+    first = sum(residuals.experiments[0].sizes)
+    np.testing.assert_array_equal(residuals.first_errors(start), whole[:first])
+    residuals(start + 0.1)
+    np.testing.assert_array_equal(residuals.first_errors(start), whole[:first])

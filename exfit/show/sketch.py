@@ -1,6 +1,6 @@
 """A small plot of measured against simulated, in the characters of a terminal.
 
-Each is a braille cell of two by four dots. A plotting package would take longer to import than
+Each is a braille cell of two by four dots. A package that plots would take as long to import as
 most fits take.
 """
 
