@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from exfit.errors import RecordError
 from exfit.features import TAIL, Features, features
 from exfit.onset import Onset, find_step
-from exfit.record import column_names, file_hash, read_columns
+from exfit.readers import Table, open_table
 from exfit.result import judged_of
 
 Array = NDArray[np.float64]
 
 SIGNALS = ("vt", "efd", "ifd", "p", "q")
 SIMULATED, MEASURED = "_simulated", "_measured"  # behind a signal in the table of a fit
-CLOCKS = ("t", "time")  # names of the time without its unit
 FEWEST = 2  # instants in common
 SAME = 1e-9  # s: instants that near are one, whatever the digits of a file
 APART = 0.05  # s: steps found closer than this may differ by the shape of the rise alone
@@ -28,7 +27,7 @@ APART = 0.05  # s: steps found closer than this may differ by the shape of the r
 class Curve:
     """A response: signals (M,) per unit at ``time`` (M,) in s, which increases; ``name`` is A, B.
 
-    A sample that is left out is nan.
+    A sample that is left out is nan. ``columns`` are all of the file.
     """
 
     name: str
@@ -36,6 +35,7 @@ class Curve:
     sha256: str
     time: Array
     signals: Mapping[str, Array]
+    columns: tuple[str, ...]
     repeated: int = 0
 
 
@@ -154,7 +154,7 @@ def compare(
 ) -> Agreement:
     """Return how two responses, and a record, differ.
 
-    Each is the folder or the result.json of a run, or a CSV file with a row of column names. All
+    Each is the folder or the result.json of a run, or a file of any kind that records have. All
     signals that A and B share are compared over the time that they share, on the finer of their
     clocks; between the samples of the coarser one stands a cubic (Akima 1970). A record is never
     interpolated: what is simulated is read at its instants.
@@ -200,22 +200,21 @@ def compare(
 
 
 def _curve(name: str, source: Path, asked: Asked, ending: str, shift: float = 0.0) -> Curve:
-    """Return a curve of a run's folder, its result.json, or a CSV file."""
+    """Return a curve of a run's folder, its result.json, or a file of another program."""
     path = _table_of(source)
-    # the one place where a file is read
-    header = column_names(path)
-    clock = _clock(path, header, asked.time)
+    table = open_table(path)
+    header, clock = table.names, _clock(table, asked.time)
     places = {signal: column for signal, column in asked.columns.items() if column in header}
     for signal in SIGNALS:
         convention = [column for column in (signal, signal + ending) if column in header]
         if convention:
             places.setdefault(signal, convention[0])
-    columns = read_columns(path, [clock, *places.values()])
-    time = columns[clock] + shift
-    _check_clock(path, clock, time)
+    columns = table.numbers(places.values(), frozenset(places.values()))
+    time = table.instants(clock) + shift
+    _check_clock(table, clock, time)
     last = np.append(np.diff(time) > 0.0, True)  # of instants that repeat, what holds from then on
     signals = {signal: columns[column][last] for signal, column in places.items()}
-    return Curve(name, path, file_hash(path), time[last], signals, int(np.sum(~last)))
+    return Curve(name, path, table.sha256, time[last], signals, header, int(np.sum(~last)))
 
 
 def _table_of(source: Path) -> Path:
@@ -232,38 +231,40 @@ def _table_of(source: Path) -> Path:
 
 def _holds_response(path: Path) -> bool:
     try:
-        return any(name.endswith(SIMULATED) for name in column_names(path))
+        return any(name.endswith(SIMULATED) for name in open_table(path).names)
     except RecordError:
         return False
 
 
-def _clock(path: Path, header: Sequence[str], asked: str | None) -> str:
-    """Return the column with the time: the one asked for, else one that is named so."""
-    if asked is not None and asked in header:
-        return asked
-    for column in header:
-        plain = column.lower().replace(" ", "").removesuffix("(s)").removesuffix("[s]")
-        if plain in CLOCKS:
-            return column
-    listed = ", ".join(repr(column) for column in header[:12])
-    raise RecordError(f"{path}: no column of time among {listed}; name it with --time COLUMN")
+def _clock(table: Table, asked: str | None) -> tuple[str, ...]:
+    """Return the columns with the time: the one asked for, else those that seem to hold it."""
+    if asked is not None and asked in table.names:
+        return (asked,)
+    if not table.clock:
+        listed = ", ".join(repr(column) for column in table.names[:12])
+        text = f"no column of time among {listed}; name it with --time COLUMN"
+        raise RecordError(f"{table.path}: {text}")
+    return table.clock
 
 
-def _check_clock(path: Path, column: str, time: Array) -> None:
+def _check_clock(table: Table, clock: Sequence[str], time: Array) -> None:
     """Raise a RecordError where time is not finite or goes back; an instant may repeat."""
-    if not np.isfinite(time).all():
-        raise RecordError(f"{path}: column {column!r}: not a finite number in every row")
+    named = f"column {' and '.join(map(repr, clock))}"
+    lost = np.flatnonzero(~np.isfinite(time))
+    if len(lost):
+        raise RecordError(f"{table.place(int(lost[0]))}: {named}: the time is not a finite number")
     back = np.flatnonzero(np.diff(time) < 0.0)
     if len(back):
         before, now = time[back[0]], time[back[0] + 1]
         raise RecordError(
-            f"{path}: column {column!r}: time {now:g} s goes back behind the {before:g} s before it"
+            f"{table.place(int(back[0]) + 1)}: {named}: time {now:g} s goes back behind the "
+            f"{before:g} s before it"
         )
 
 
 def _refuse_unknown(asked: Asked, curves: Sequence[Curve]) -> None:
     """Raise a RecordError for what is asked for by name and is in no file."""
-    headers = {name for one in curves for name in column_names(one.path)}
+    headers = {name for one in curves for name in one.columns}
     wanted = [*asked.columns.values(), *(() if asked.time is None else (asked.time,))]
     for column in wanted:
         if column not in headers:

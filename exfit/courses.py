@@ -34,8 +34,11 @@ class Sketch:
 def sketch(trial: Trial, residuals: Residuals, theta: Array) -> Sketch | None:
     """Return the judged signal of the first trial at scaled parameters theta (N,).
 
-    It mostly costs no simulation. None where there is no response.
+    It mostly costs no simulation. None where there is no response, and of a record of more than
+    MOST_SAMPLES.
     """
+    if len(trial.record.time) > MOST_SAMPLES:
+        return None
     signals = trial.experiment.signals
     place = signals.index(judged_of(signals))
     channel, begin = trial.channels[place], sum(trial.experiment.sizes[:place])
@@ -84,7 +87,7 @@ def _course(trial: Trial, residuals: Residuals, signal: str, line: Iteration) ->
         samples, _ = trial.experiment.samples(residuals.completed(line.values))
     except UNREACHABLE:
         return None
-    found = compared(channel, samples[:, place])
+    found = compared(channel, channel.shown(samples[:, place]))
     return found if np.isfinite(found[channel.kept]).all() else None
 
 

@@ -110,11 +110,6 @@ def read_record(
     return Record(_frozen(time[kept]), MappingProxyType(signals), path, table.sha256)
 
 
-def column_names(path: Path) -> tuple[str, ...]:
-    """Return the names of a CSV file's columns; raises RecordError where it cannot be read."""
-    return _read_table(path).names
-
-
 def read_columns(path: Path, names: Iterable[str]) -> dict[str, Array]:
     """Return columns of a file by name, as they stand; raises RecordError like read_record."""
     columns = open_table(path).numbers(names)
