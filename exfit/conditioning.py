@@ -181,7 +181,7 @@ class Conditioning:
         return np.asarray(sosfiltfilt(self._sections, values, axis=0))
 
 
-def outliers(time: Array, samples: Array, limit: float) -> Mask:
+def outliers(time: Array, samples: Array, limit: float, scatter: float | None = None) -> Mask:
     """Return which samples (M,) lie off the line through the medians of their neighbours.
 
     The line is the repeated median over seven samples, which three spikes do not move and along
@@ -192,6 +192,7 @@ def outliers(time: Array, samples: Array, limit: float) -> Mask:
         time: (M,), s, increasing.
         samples: (M,), finite.
         limit: in standard deviations.
+        scatter: the noise of the record where it is known, else it is told from the samples.
 
     Source: Hampel 1974 (the rule); Siegel 1982 (the line).
 
@@ -204,7 +205,7 @@ def outliers(time: Array, samples: Array, limit: float) -> Mask:
     place = np.arange(len(samples))
     window = np.clip(place - WINDOW // 2, 0, len(samples) - WINDOW)
     away = np.abs(from_line[window, place - window])
-    scale = np.maximum(spread(from_line), noise(samples))
+    scale = np.maximum(spread(from_line), noise(samples) if scatter is None else scatter)
     return np.asarray(away > limit * scale[window])
 
 

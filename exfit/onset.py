@@ -59,6 +59,32 @@ def find_step(time: Array, samples: Array) -> Onset:
         ValueError: nothing stands out of the noise or lasts, the record is at rest for fewer than
             ten samples before it moves, or it has fewer than twenty samples.
     """
+    return _step(time, samples)[0]
+
+
+def find_steps(time: Array, samples: Array) -> tuple[Onset, ...]:
+    """Return all steps of a reference from its response (M,), the first as ``find_step`` does.
+
+    The next one is looked for where the response to the one before has settled. It must change the
+    response by a tenth of all that changes in the record; what is slower than a fifth of the step
+    before it passes for the settling. Raises ValueError like ``find_step``.
+    """
+    least = DEPARTS[0] * float(np.ptp(_running_median(samples))) if len(samples) > SMOOTHED else 0.0
+    onset, rest = _step(time, samples)
+    found = [onset]
+    while True:
+        time, samples = time[rest:], samples[rest:]
+        try:
+            onset, rest = _step(time, samples)
+        except ValueError:
+            return tuple(found)
+        if abs(onset.size) < least:
+            return tuple(found)
+        found.append(onset)
+
+
+def _step(time: Array, samples: Array) -> tuple[Onset, int]:
+    """Return the first step, and where the response to it has settled."""
     if len(samples) < 2 * BEFORE:
         raise ValueError(f"{len(samples)} samples: a step shows from {2 * BEFORE} on")
     scatter, smooth = noise(samples), _running_median(samples)
@@ -75,7 +101,7 @@ def find_step(time: Array, samples: Array) -> Onset:
     at, spread = _fitted(time, clean, left, gone)
     if at < time[BEFORE - 1]:
         raise _early(time)
-    return Onset(at, size, level, spread)
+    return Onset(at, size, level, spread), start
 
 
 def _early(time: Array) -> ValueError:
