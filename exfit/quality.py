@@ -13,7 +13,7 @@ Places = NDArray[np.intp]
 
 EXCERPT, STRETCHES = 200_000, 20  # samples that tell noise well enough, of as many stretches
 SPIKE = 6.0  # times the noise
-JUMPS = 4.0  # times the noise: a spike begins with a jump, and 1 in 200 samples of white noise does
+JUMPS = 4.5  # times the noise: a spike begins or ends with one; of white noise 1 in 700 does
 REPEATED = 0.05  # of a step: numbers farther off its grid are not rounded to it
 LONGER_RUN, FEWEST_STUCK = 3.0, 20  # times what chance makes of it, and samples
 MAINS = (40.0, 70.0)  # Hz
@@ -32,7 +32,7 @@ def spikes(time: Array, samples: Array, scatter: float) -> Places:
     """Return the places of the spikes of a channel (M,), given its noise.
 
     They are the outliers at six standard deviations of the noise that begin or end with a jump of
-    four; the others are not looked at, which makes long records quick.
+    four and a half; the others are not looked at, which makes long records quick.
     """
     jumps = np.flatnonzero(np.abs(np.diff(samples)) > JUMPS * scatter)
     if len(samples) < WINDOW or not len(jumps):
