@@ -1,10 +1,10 @@
 """The case file that a unit of a PSS/E dynamics file makes: to be read, run, and edited."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 from exfit.errors import DynamicsError
-from exfit.models.sheet import Sheet
+from exfit.models.sheet import Parameter, Sheet
 from exfit.psse import Part, Unit, read_unit, text_of
 from exfit.result import yaml_number
 
@@ -31,10 +31,10 @@ def case_text(unit: Unit, file: str) -> str:
     lines = [*_heading(unit, file), *_exciter_name(unit.exciter), *_plant(unit.machine)]
     if unit.stabiliser is not None:
         name = unit.stabiliser.definition.model.name
-        lines += ["stabiliser:", _commented(f"  model: {name}", _origin(unit.stabiliser))]
+        lines += ["stabiliser:", commented(f"  model: {name}", _origin(unit.stabiliser))]
         lines += ["  parameters:", *_values(unit.stabiliser, "    ")]
     lines += [*TEST.splitlines(), "parameters:"]
-    lines += [_commented("  fixed:", "what a fit shall find goes under free")]
+    lines += [commented("  fixed:", "what a fit shall find goes under free")]
     lines += _values(unit.exciter, "    ")
     return "\n".join(lines) + "\n"
 
@@ -46,33 +46,37 @@ def _heading(unit: Unit, file: str) -> Iterator[str]:
 
 
 def _exciter_name(exciter: Part) -> Iterator[str]:
-    yield _commented(f"model: {exciter.definition.model.name}", _origin(exciter))
+    yield commented(f"model: {exciter.definition.model.name}", _origin(exciter))
     if {"E1", "SE1", "E2", "SE2"} <= exciter.values.keys():
-        yield _commented("saturation: quadratic", "as PSS/E")
+        yield commented("saturation: quadratic", "as PSS/E")
 
 
 def _plant(machine: Part) -> Iterator[str]:
     yield "plant:"
     yield "  type: open-circuit"
-    yield _commented(f"  machine: {machine.definition.model.name}", _origin(machine))
+    yield commented(f"  machine: {machine.definition.model.name}", _origin(machine))
     yield "  parameters:"
     yield from _values(machine, "    ")
 
 
 def _values(part: Part, indent: str) -> Iterator[str]:
     rows: Sheet = part.definition.model.sheet
-    values: Mapping[str, float] = part.values
     for row in rows:
-        text = f"{indent}{row.symbol}: {yaml_number(values[row.symbol])}"
-        typical = "" if row.symbol in part.definition.names else "; typical, not in the file"
-        yield _commented(text, f"{row.unit}, {row.meaning}{typical}")
+        remark = "" if row.symbol in part.definition.names else "; typical, not in the file"
+        yield parameter_line(row, yaml_number(part.values[row.symbol]), indent, remark)
+
+
+def parameter_line(row: Parameter, value: str, indent: str, remark: str = "") -> str:
+    """Return the line of a parameter, with its unit and meaning as a comment."""
+    return commented(f"{indent}{row.symbol}: {value}", f"{row.unit}, {row.meaning}{remark}")
 
 
 def _origin(part: Part) -> str:
     return f"{part.definition.record.name} on line {part.line}"
 
 
-def _commented(text: str, comment: str) -> str:
+def commented(text: str, comment: str) -> str:
+    """Return a line of a case with a comment, at one place where the line is short."""
     return f"{text:{MEANING_AT}}# {comment}" if len(text) < MEANING_AT else f"{text}  # {comment}"
 
 

@@ -15,6 +15,7 @@ from exfit.compare import Agreement
 from exfit.design import Design
 from exfit.engine.kernel import cache_folder
 from exfit.errors import CaseError, ExfitError
+from exfit.inspection import Inspection
 from exfit.knowledge import Knowledge
 from exfit.profiles import Profiles
 from exfit.result import (
@@ -141,6 +142,15 @@ def write_design(found: Design, folder: Path, figures: bool) -> None:
     if figures:
         write_knowledge_figures(found.own, found.name, folder)
     write(folder / "identify.json", to_json(found.as_json()))
+
+
+def write_inspection(found: Inspection, folder: Path, figures: bool) -> None:
+    """Write what a recorder's file holds as JSON and as a figure."""
+    if figures:
+        from exfit import plots
+
+        write(folder / "inspect.png", plots.png(plots.inspection(found, found.path.name)))
+    write(folder / "inspect.json", to_json(found.as_json()))
 
 
 def write_simulation(simulation: Simulation, name: str, folder: Path, figures: bool) -> None:

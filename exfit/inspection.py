@@ -26,6 +26,7 @@ SAME_STEP = 0.25  # s: as far apart may channels show one step, beside their sta
 ERRORS = 3.0  # standard errors
 LEVELS = 12  # that a switched signal has, at most
 SETTLED = 0.1  # of a record, at its end
+MARGIN = 0.005  # of a stretch between two steps
 NOISELESS = 1e-6  # of the range: with less noise a channel at rest stands still, as simulated ones
 LASTS = 3.0  # times the noise: a smaller change of a channel is none
 SMALL_CHANGE = 8.0  # times the noise: what moves from the beginning by less has no step there
@@ -99,10 +100,19 @@ class Channel:
 
 @dataclass(frozen=True)
 class Phases:
-    """Three columns that are one voltage: its waveforms, or their effective values."""
+    """Three columns that are one voltage: its waveforms, or their effective values.
+
+    ``level`` is the effective value at rest, in the unit of the columns.
+    """
 
     columns: tuple[str, ...]
     kind: str
+    level: float
+
+    @property
+    def name(self) -> str:
+        """The name under which their common course is told."""
+        return ", ".join(self.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +174,9 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
     columns = tuple(clock or table.clock)
     if not columns:
         names = ", ".join(table.names)
-        raise RecordError(f"{table.path}: no column seems to be the time; --time names one: {names}")
+        raise RecordError(
+            f"{table.path}: no column seems to be the time; --time names one: {names}"
+        )
     stamps = table.instants(columns)
     if len(stamps) < FEWEST:
         raise RecordError(f"{table.path}: {len(stamps)} samples; at least {FEWEST} are needed")
@@ -180,37 +192,33 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
     samples = {name: column if forward.all() else column[forward] for name, column in read.items()}
     units = {name: _unit(table, name) for name in samples}
     known = {name: unit for name, (unit, _) in units.items() if unit}
-    changes = {name: _changes(time, column) for name, column in samples.items()}
+    groups = _phases(time, samples, known)
+    courses = samples | {group.name: _effective(samples, group.columns) for group in groups}
+    changes = {name: _changes(time, column) for name, column in courses.items()}
     steps = _together(changes)
     if not steps:
-        changes |= _from_start(time, samples, changes)
+        changes |= _from_start(time, courses, changes)
         steps = _together(changes)
     described = tuple(
         _described(name, *units[name], time, column, changes[name], steps)
         for name, column in samples.items()
     )
-    steps = _with_sizes(steps, described, time, samples)
-    described = tuple(_settled(one, steps) for one in described)
     waves = {one.name for one in described if one.frequency}
-    groups = tuple(
-        Phases(group, "waveform" if waves >= {*group} else "rms")
-        for group in three_phases([one.name for one in described], known)
-        if waves >= {*group} or not waves & {*group}
-    )
-    inspected = Inspection(
+    moving = {name: column for name, column in courses.items() if name not in waves}
+    steps = _with_sizes(steps, moving, time)
+    return Inspection(
         table.path,
         table.sha256,
         columns,
         sampling,
         tuple(table.place(row) for row in sampling.backward[:FIRST_PLACES]),
-        _with_signals(described, groups, known),
+        _with_signals(tuple(_settled(one, steps) for one in described), groups, known),
         groups,
         steps,
         unreadable,
         time,
         samples,
     )
-    return _with_phases(inspected) if groups and not steps else inspected
 
 
 def _numbers(table: Table, names: Sequence[str]) -> tuple[dict[str, Array], dict[str, str]]:
@@ -297,16 +305,23 @@ def _with_signals(
     )
 
 
-def _with_phases(inspected: Inspection) -> Inspection:
-    """Return what a file holds with the steps that its three-phase voltages show together."""
-    amplitudes = {
-        ", ".join(group.columns): _changes(
-            inspected.time,
-            np.sqrt(np.mean([inspected.samples[name] ** 2 for name in group.columns], axis=0)),
-        )
-        for group in inspected.phases
-    }
-    return replace(inspected, steps=_together(amplitudes))
+def _phases(
+    time: Array, samples: Mapping[str, Array], units: Mapping[str, str]
+) -> tuple[Phases, ...]:
+    """Return the three-phase voltages among the columns."""
+    found = []
+    for group in three_phases(tuple(samples), units):
+        waves = {mains_frequency(time, samples[name]) is not None for name in group}
+        if len(waves) == 1:
+            effective = _effective(samples, group)
+            level = float(np.nanmedian(effective[: max(len(effective) // 10, 1)]))
+            found.append(Phases(group, "waveform" if waves == {True} else "rms", level))
+    return tuple(found)
+
+
+def _effective(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
+    """Return the effective value (M,) of three phases, waveforms or effective values each."""
+    return np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0))
 
 
 # ---- steps
@@ -436,27 +451,29 @@ def _step(shown: Mapping[str, Change]) -> Step:
 
 
 def _with_sizes(
-    steps: tuple[Step, ...],
-    channels: Sequence[Channel],
-    time: Array,
-    samples: Mapping[str, Array],
+    steps: tuple[Step, ...], courses: Mapping[str, Array], time: Array
 ) -> tuple[Step, ...]:
     """Return the steps with the change of each channel: between the ends of what lies before and
     behind."""
     edges = [float(time[0]), *(one.at for one in steps), float(time[-1])]
+    noises = {name: _noise(column) for name, column in courses.items()} if steps else {}
     found = []
     for k, step in enumerate(steps):
         sizes = {}
-        for one in channels:
-            if one.frequency or one.constant or not len(samples[one.name]):
-                continue
-            column = samples[one.name]
-            before = one.level if k == 0 else _end(time, column, edges[k], edges[k + 1])
+        for name, column in courses.items():
+            begins = step.from_start and k == 0
+            before = float(column[0]) if begins else _end(time, column, edges[k], edges[k + 1])
             size = _end(time, column, edges[k + 1], edges[k + 2]) - before
-            if abs(size) > LASTS * one.noise:
-                sizes[one.name] = size
+            if abs(size) > LASTS * noises[name]:
+                sizes[name] = size
         found.append(replace(step, sizes=sizes))
     return tuple(found)
+
+
+def _noise(column: Array) -> float:
+    """Return the noise of a channel, none where it switches."""
+    seen = column[np.isfinite(column)]
+    return 0.0 if not len(seen) or _switches(seen) else noise_of(seen)
 
 
 def _settled(channel: Channel, steps: Sequence[Step]) -> Channel:
@@ -469,8 +486,12 @@ def _settled(channel: Channel, steps: Sequence[Step]) -> Channel:
 
 
 def _end(time: Array, column: Array, start: float, end: float) -> float:
-    """Return the level of a channel at the end of a stretch, nan where it has no samples there."""
-    first, last = np.searchsorted(time, [end - SETTLED * (end - start), end])
+    """Return the level of a channel at the end of a stretch, nan where it has no samples there.
+
+    The samples nearest to the end are left out: a step may come a little before it is seen.
+    """
+    length = end - start
+    first, last = np.searchsorted(time, [end - SETTLED * length, end - MARGIN * length])
     there = column[first : max(last, first + 1)]
     seen = there[np.isfinite(there)]
     return float(np.median(seen)) if len(seen) else float("nan")
@@ -514,5 +535,5 @@ def _of_channel(one: Channel) -> Iterable[str]:
         yield f"{one.name}: stands still from {first:.6g} to {last:.6g} s"
     if one.signal == "vt" and one.unit in (None, "pu"):
         low, high = AT_REST_PU
-        if not one.constant and one.level > high or 0.0 < one.level < low:
+        if one.level > high or 0.0 < one.level < low:
             yield f"{one.name}: {one.level:.5g} at rest is no voltage in pu: what is its unit?"

@@ -15,6 +15,7 @@ from exfit.cli.exchange import export, import_
 from exfit.cli.fitting import check, fit, simulate, validate
 from exfit.cli.knowing import identify, profile
 from exfit.cli.options import Refusal
+from exfit.cli.records import inspect_, new
 from exfit.errors import ExfitError
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
@@ -42,18 +43,9 @@ def main() -> None:
     """Find the parameters of a generator's excitation system from a recorded bump test."""
 
 
-COMMANDS = (
-    fit,
-    simulate,
-    validate,
-    compare,
-    check,
-    profile,
-    identify,
-    import_,
-    export,
-    models,
-    schema,
-)
+OF_RECORDS = (inspect_, new)
+OF_CASES = (fit, simulate, validate, check, profile, identify)
+OF_RESULTS = (compare, import_, export)
+COMMANDS = (*OF_RECORDS, *OF_CASES, *OF_RESULTS, models, schema)
 for command in COMMANDS:
     main.add_command(command)

@@ -6,6 +6,7 @@ from exfit.show.fits import fit
 from exfit.show.knowledge import design, profiles
 from exfit.show.matches import comparisons
 from exfit.show.progress import Bar, Watch, task
+from exfit.show.records import inspection
 from exfit.show.sheets import catalogue, machine, model
 from exfit.show.terminal import again, console, notes, waiting, written
 
@@ -20,6 +21,7 @@ __all__ = [
     "console",
     "design",
     "fit",
+    "inspection",
     "machine",
     "model",
     "notes",

@@ -1,0 +1,126 @@
+"""The commands inspect and new."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli.options import (
+    file_option,
+    folder_of,
+    force_option,
+    json_option,
+    output_option,
+    plots_option,
+    quiet_option,
+    refuse_existing,
+    write_text,
+)
+
+if TYPE_CHECKING:
+    from exfit.inspection import Inspection
+
+time_option = click.option(
+    "--time",
+    "clock",
+    multiple=True,
+    metavar="COLUMN",
+    help="Column of the time; given twice, of date and time. Default: as the file tells.",
+)
+sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel file.")
+
+
+@click.command("inspect", short_help="Show what a recorder's file holds.")
+@click.argument("file", type=click.Path(path_type=Path))
+@time_option
+@sheet_option
+@output_option
+@plots_option
+@quiet_option
+@json_option
+def inspect_(
+    file: Path,
+    clock: tuple[str, ...],
+    sheet: str | None,
+    output: Path | None,
+    plots: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Show what FILE, a record, holds: channels, sampling, gaps, noise, spikes, steps.
+
+    Suggests the record and test sections of a case; what is guessed is marked. Writes inspect.json
+    and inspect.png to runs/FILE-inspect, or to DIR.
+    """
+    from exfit import files
+    from exfit.result import to_json
+    from exfit.suggestion import bump_section, record_section
+
+    folder = output or folder_of(file, "inspect")
+    files.refuse_unwritable(folder)
+    found = _inspected(file, clock, sheet)
+    files.write_inspection(found, folder, plots)
+    if as_json:
+        click.echo(to_json(found.as_json()), nl=False)
+    elif not quiet:
+        from exfit import show
+
+        console = show.console()
+        show.inspection(
+            console, found, [*record_section(found, file.as_posix()), *bump_section(found)]
+        )
+        show.written(console, folder)
+
+
+@click.command(short_help="Make a case of a model and a record to start from.")
+@click.option("--model", required=True, metavar="NAME", help="Exciter, or the file of a model.")
+@click.option(
+    "--machine", default="GENROU", metavar="NAME", help="Machine model (default: GENROU)."
+)
+@click.option(
+    "--record",
+    "file",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Record of the bump test.",
+)
+@time_option
+@sheet_option
+@file_option
+@force_option
+def new(
+    model: str,
+    machine: str,
+    file: Path,
+    clock: tuple[str, ...],
+    sheet: str | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Make a commented case of a model and a record: steps found, typical values as starts.
+
+    Gains and time constants are free; see `exfit models NAME` for what is typical. What the record
+    does not tell is left to be filled in, and the case is refused until it is.
+    """
+    from exfit.models import find
+    from exfit.models.machines import find_machine
+    from exfit.starting_case import starting_case
+    from exfit.suggestion import relative
+
+    if output is not None:
+        refuse_existing(output, force)
+    folder = Path() if output is None else output.parent
+    exciter, around = find(model, Path()), find_machine(machine)
+    name = relative(Path(model), folder) if model.endswith(".py") else exciter.name
+    text = starting_case(exciter, name, around, _inspected(file, clock, sheet), folder)
+    write_text(text, output, ())
+    if output is not None:
+        click.echo(f"written to {output}; next: exfit check {output}")
+
+
+def _inspected(file: Path, clock: tuple[str, ...], sheet: str | None) -> "Inspection":
+    from exfit.inspection import inspect
+    from exfit.plain_table import open_table
+
+    return inspect(open_table(file, sheet), clock or None)

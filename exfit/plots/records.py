@@ -1,0 +1,111 @@
+"""What a recorder's file holds, as a figure."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from exfit.inspection import Channel, Inspection, Step
+from exfit.plots.style import LIMIT, SIMULATED, START, WIDTH, tidy
+
+Array = NDArray[np.float64]
+
+MOST_PANELS = 10  # of one figure that are still readable
+POINTS = 2000  # of a line: more than a figure has dots across
+SMALL = 8  # points
+RINGED = 200  # spikes
+SHADE = "#d7dbe0"
+
+
+def inspection(found: Inspection, title: str) -> Figure:
+    """Return each channel in a panel of its own: steps marked, gaps shaded, spikes ringed.
+
+    Of many channels those with a signal come first, then those that move; the rest are named.
+    """
+    order = sorted(found.channels, key=lambda one: (one.signal is None, one.constant))
+    shown = order[:MOST_PANELS]
+    left_out = [one.name for one in order[MOST_PANELS:]]
+    figure = Figure(figsize=(WIDTH, 1.2 + 1.5 * len(shown)), layout="constrained")
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, one in zip(panels, shown, strict=True):
+        _channel(axes, found, one)
+    _steps(panels[0], found.steps)
+    panels[-1].set_xlabel("time (s)" + _rest(left_out))
+    figure.align_ylabels()
+    figure.suptitle(title, fontsize=11)
+    return figure
+
+
+def envelope(time: Array, samples: Array, points: int = POINTS) -> tuple[Array, Array]:
+    """Return a line that looks like a long one: least and largest sample of each stretch."""
+    block = -(-2 * len(time) // points)
+    if block < 3:
+        return time, samples
+    whole = len(time) // block * block
+    rows = np.where(np.isfinite(samples[:whole]), samples[:whole], np.nan).reshape(-1, block)
+    empty = np.isnan(rows).all(axis=1)
+    least, largest = (
+        np.where(empty, np.nan, pick(np.where(np.isnan(rows), beyond, rows), axis=1))
+        for pick, beyond in ((np.min, np.inf), (np.max, -np.inf))
+    )
+    middle = np.mean(time[:whole].reshape(-1, block), axis=1)
+    line = np.ravel(np.column_stack([least, largest]))
+    return (
+        np.concatenate([np.repeat(middle, 2), time[whole:]]),
+        np.concatenate([line, samples[whole:]]),
+    )
+
+
+def _channel(axes: Axes, found: Inspection, one: Channel) -> None:
+    time, column = found.time, found.samples[one.name]
+    for gap in found.sampling.gaps:
+        axes.axvspan(gap.start, gap.end, color=SHADE, linewidth=0.0)
+    broken = np.searchsorted(time, [gap.end for gap in found.sampling.gaps])
+    line = np.insert(column, broken, np.nan), np.insert(time, broken, time[broken])
+    axes.plot(*envelope(line[1], line[0]), color=START, linewidth=0.9)
+    for first, last in one.stuck:
+        axes.axvspan(first, last, color=LIMIT, alpha=0.25, linewidth=0.0)
+    at = np.array(one.spikes_at[:RINGED])
+    if len(at):
+        places = np.searchsorted(time, at)
+        axes.plot(at, column[places], "o", color=SIMULATED, fillstyle="none", markersize=7)
+    for step in found.steps:
+        seen = one.name in step.sizes or one.name in step.seen_in
+        axes.axvline(step.at, color=SIMULATED, linewidth=1.0, linestyle="-" if seen else ":")
+    signal = f"\n{one.signal}" if one.signal and one.signal != one.name else ""
+    axes.set_ylabel(f"{_short(one.name)}{signal}\n({one.unit or 'unit?'})", fontsize=SMALL)
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize=SMALL)
+    tidy(axes)
+
+
+def _steps(axes: Axes, steps: Sequence[Step]) -> None:
+    """Write the instants of the steps above the panels."""
+    for step in steps:
+        axes.annotate(
+            f"{step.at:.4g} s",
+            (step.at, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            color=SIMULATED,
+            fontsize=SMALL,
+        )
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 20 else name[:19] + "…"
+
+
+def _rest(names: Sequence[str]) -> str:
+    """Return the names of what is not drawn, as many as fit."""
+    if not names:
+        return ""
+    text = ", ".join(names[:6])
+    more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+    return f"   (not drawn: {text}{more})"
