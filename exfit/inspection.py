@@ -24,6 +24,7 @@ COARSE = 20_000  # samples in which the steps of a longer record are looked for 
 AROUND = 50  # of those samples, before and behind a step, in which its instant is then told
 SAME_STEP = 0.25  # s: as far apart may channels show one step, beside their standard errors
 ERRORS = 3.0  # standard errors
+SHAPE = 0.1 * 3.0**-0.5  # of a rise: as far may its shape move the instant, evenly up to a tenth
 LEVELS = 12  # that a switched signal has, at most
 SETTLED = 0.1  # of a record, at its end
 MARGIN = 0.005  # of a stretch between two steps
@@ -31,6 +32,7 @@ NOISELESS = 1e-6  # of the range: with less noise a channel at rest stands still
 LASTS = 3.0  # times the noise: a smaller change of a channel is none
 SMALL_CHANGE = 8.0  # times the noise: what moves from the beginning by less has no step there
 FIRST_PLACES = 5  # of spikes that are told one by one
+ABOVE = 1.01  # times what rounding leaves: noise of its own
 ROUNDING = 12.0**-0.5  # standard deviation of what is uniform, over its width
 AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a step
 
@@ -39,7 +41,8 @@ AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a ste
 class Change:
     """A step of one channel: its instant and standard error (s), its size and level before it.
 
-    Where the channel moves from its first sample on, the step was made there or before it.
+    Where the channel moves from its first sample on, the step was made there or before it; where it
+    jumps between levels, it is no response.
     """
 
     at: float
@@ -47,6 +50,7 @@ class Change:
     size: float
     level: float
     from_start: bool = False
+    jumps: bool = False
 
 
 @dataclass(frozen=True)
@@ -269,7 +273,9 @@ def _described(
     off = np.zeros(0, np.intp) if frequency or not scatter else spikes(t, y, scatter)
     first = steps[0].at if steps else time[-1]
     before = y[:1] if steps and steps[0].from_start else y[t < first]
-    noisy = scatter > NOISELESS * float(np.ptp(y))
+    rounding = quantum(y)
+    # what is rounded more coarsely than its noise stands still most of the time
+    noisy = scatter > max(NOISELESS * float(np.ptp(y)), ABOVE * ROUNDING * (rounding or 0.0))
     still = stuck(y) if noisy and not frequency else ()
     return Channel(
         name=name,
@@ -279,7 +285,7 @@ def _described(
         high=float(np.max(y)),
         level=float(np.median(before if len(before) else y)),
         noise=scatter,
-        quantum=quantum(y),
+        quantum=rounding,
         missing=missing,
         spikes=len(off),
         spikes_at=tuple(float(t[k]) for k in off[:FIRST_PLACES]),
@@ -321,7 +327,7 @@ def _phases(
 
 def _effective(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
     """Return the effective value (M,) of three phases, waveforms or effective values each."""
-    return np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0))
+    return np.asarray(np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0)))
 
 
 # ---- steps
@@ -360,7 +366,7 @@ def _coarse(time: Array, samples: Array, block: int) -> tuple[Array, Array]:
 
 def _finer(time: Array, samples: Array, found: Onset, block: int) -> Change:
     """Return a step whose instant is told from fewer, whole samples around it."""
-    coarse = Change(found.at, found.spread, found.size, found.level)
+    coarse = Change(found.at, _error(found), found.size, found.level)
     if block == 1:
         return coarse
     at, far = int(np.searchsorted(time, found.at)), AROUND * block
@@ -371,7 +377,12 @@ def _finer(time: Array, samples: Array, found: Onset, block: int) -> Change:
     except ValueError:
         return coarse
     same = abs(onset.at - found.at) <= 0.5 * (time[near][-1] - time[near][0])
-    return replace(coarse, at=onset.at, error=onset.spread) if same else coarse
+    return replace(coarse, at=onset.at, error=_error(onset)) if same else coarse
+
+
+def _error(onset: Onset) -> float:
+    """Return the standard error of an instant: what noise leaves, and the shape of the rise."""
+    return float(np.hypot(onset.spread, SHAPE * onset.rise))
 
 
 def _switches(samples: Array) -> bool:
@@ -389,6 +400,7 @@ def _switched(time: Array, samples: Array) -> tuple[Change, ...]:
             error=float(time[k + 1] - time[k]) * ROUNDING,
             size=float(samples[k + 1] - samples[k]),
             level=float(samples[k]),
+            jumps=True,
         )
         for k in np.flatnonzero(np.diff(samples))
     )
@@ -436,10 +448,12 @@ def _step(shown: Mapping[str, Change]) -> Step:
     """Return the step that channels show, its instant their mean, weighted by standard errors.
 
     Where they scatter more than these say, so much more is the error of the mean (Birge 1932).
+    A reference that was recorded tells it alone: it does not respond, it jumps.
     """
-    at = np.array([one.at for one in shown.values()])
+    told = {name: one for name, one in shown.items() if one.jumps} or shown
+    at = np.array([one.at for one in told.values()])
     # an error of nothing at all is one that the clock cannot show
-    errors = np.maximum([one.error for one in shown.values()], 1e-9 + 1e-12 * np.abs(at))
+    errors = np.maximum([one.error for one in told.values()], 1e-9 + 1e-12 * np.abs(at))
     weights = errors**-2.0
     mean = float(weights @ at / np.sum(weights))
     error = float(np.sum(weights) ** -0.5)
@@ -462,8 +476,11 @@ def _with_sizes(
         sizes = {}
         for name, column in courses.items():
             begins = step.from_start and k == 0
-            before = float(column[0]) if begins else _end(time, column, edges[k], edges[k + 1])
-            size = _end(time, column, edges[k + 1], edges[k + 2]) - before
+            rest = 1.0 if k == 0 else SETTLED
+            before = (
+                float(column[0]) if begins else _end(time, column, edges[k], edges[k + 1], rest)
+            )
+            size = _end(time, column, edges[k + 1], edges[k + 2], SETTLED) - before
             if abs(size) > LASTS * noises[name]:
                 sizes[name] = size
         found.append(replace(step, sizes=sizes))
@@ -485,13 +502,13 @@ def _settled(channel: Channel, steps: Sequence[Step]) -> Channel:
     return replace(channel, steps=tuple(changes))
 
 
-def _end(time: Array, column: Array, start: float, end: float) -> float:
-    """Return the level of a channel at the end of a stretch, nan where it has no samples there.
+def _end(time: Array, column: Array, start: float, end: float, share: float) -> float:
+    """Return the level of a channel in the last share of a stretch, nan without samples there.
 
     The samples nearest to the end are left out: a step may come a little before it is seen.
     """
     length = end - start
-    first, last = np.searchsorted(time, [end - SETTLED * length, end - MARGIN * length])
+    first, last = np.searchsorted(time, [end - share * length, end - MARGIN * length])
     there = column[first : max(last, first + 1)]
     seen = there[np.isfinite(there)]
     return float(np.median(seen)) if len(seen) else float("nan")

@@ -32,13 +32,14 @@ class Onset:
 
     ``at`` is its instant (s), ``size`` the change of the response that lasts, with its sign, and
     ``level`` where the response stood before, both in its unit. ``spread`` is the standard error
-    (s) that noise leaves in ``at``.
+    (s) that noise leaves in ``at``; it is told from the first ``rise`` (s) of the response.
     """
 
     at: float
     size: float
     level: float
     spread: float
+    rise: float
 
 
 def find_step(time: Array, samples: Array) -> Onset:
@@ -101,7 +102,7 @@ def _step(time: Array, samples: Array) -> tuple[Onset, int]:
     at, spread = _fitted(time, clean, left, gone)
     if at < time[BEFORE - 1]:
         raise _early(time)
-    return Onset(at, size, level, spread), start
+    return Onset(at, size, level, spread, float(time[gone] - time[left])), start
 
 
 def _early(time: Array) -> ValueError:
@@ -156,7 +157,8 @@ def _fitted(time: Array, samples: Array, left: int, gone: int) -> tuple[float, f
 
     rise = float(time[gone] - time[left])
     first = min(int(np.searchsorted(time, time[gone] - SEEN * rise)), max(left - BEFORE, 0))
-    t, y = time[first : gone + 1], samples[first : gone + 1]
+    origin = time[left]  # differences lose digits where the clock began long ago
+    t, y = time[first : gone + 1] - origin, samples[first : gone + 1]
     y = y / np.ptp(y)
 
     def misfit(guess: Array) -> Array:
@@ -171,7 +173,7 @@ def _fitted(time: Array, samples: Array, left: int, gone: int) -> tuple[float, f
     variance = 2.0 * found.cost / max(len(t) - FITTED, 1)
     covariance = variance * np.linalg.pinv(slopes.T @ slopes)
     # where the whole rise lies between two samples, its place is no worse known than it is long
-    return float(found.x[0]), min(float(np.sqrt(covariance[0, 0])), rise)
+    return float(found.x[0] + origin), min(float(np.sqrt(covariance[0, 0])), rise)
 
 
 def _misfit(time: Array, samples: Array, at: float, lag: float) -> Array:

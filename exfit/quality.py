@@ -59,21 +59,29 @@ def quantum(samples: Array) -> float | None:
 def stuck(samples: Array) -> tuple[tuple[int, int], ...]:
     """Return first and last place of each stretch that stands still for longer than by chance.
 
-    Rounded noise repeats a number with a probability p; then the longest of the runs among M
-    samples is about log(M (1 - p)) / log(1/p) long (Schilling 1990). Told is what is three times
-    as long.
+    Rounded noise repeats its most frequent number with a probability p; then the longest of the
+    runs among M samples is about log(M (1 - p)) / log(1/p) long (Schilling 1990). Told is what is
+    three times as long.
     """
     starts = np.concatenate([[0], np.flatnonzero(np.diff(samples)) + 1])
     lengths = np.diff(np.concatenate([starts, [len(samples)]]))
     if len(starts) == 1:
         return ((0, len(samples) - 1),)
-    short = np.sort(lengths)[:-1]
-    repeats = float(np.sum(short - 1)) / float(np.sum(short))
-    likely = (
-        max(log(max(len(samples) * (1.0 - repeats), 1.0)) / -log(repeats), 1.0) if repeats else 1.0
-    )
+    repeats = _repeats(samples, starts, lengths)
+    chances = len(samples) * (1.0 - repeats)
+    likely = log(max(chances, 1.0)) / -log(repeats) if repeats > 0.0 else 1.0
     long = np.flatnonzero(lengths > max(LONGER_RUN * likely, FEWEST_STUCK))
     return tuple((int(starts[k]), int(starts[k] + lengths[k] - 1)) for k in long)
+
+
+def _repeats(samples: Array, starts: Places, lengths: Places) -> float:
+    """Return how probably a sample repeats the one before, the longest run left out."""
+    longest = int(np.argmax(lengths))
+    others = np.delete(samples, slice(starts[longest], starts[longest] + lengths[longest]))
+    _, counts = np.unique(others, return_counts=True)
+    share = float(np.max(counts)) / len(others)
+    runs = np.delete(lengths, longest)
+    return max(share if np.max(counts) > 1 else 0.0, float(np.sum(runs - 1)) / len(others))
 
 
 def mains_frequency(time: Array, samples: Array) -> float | None:

@@ -20,8 +20,8 @@ DIGITS = 4
 HINTS = {
     "vt": "rated, line to line",
     "vref": "rated, line to line",
-    "efd": "at rated vt, air-gap line",
-    "ifd": "at rated vt, air-gap line",
+    "efd": "air-gap line",
+    "ifd": "air-gap line",
     "p": "rated MVA",
     "q": "rated MVA",
 }
@@ -146,12 +146,11 @@ def _about_phases(found: Inspection, group: Phases) -> Iterator[str]:
 def _about(one: Channel) -> str:
     """Return what to check of a channel."""
     why = f"{one.signal} by {one.why}"
-    unit = one.unit or "unit not told"
     if in_per_unit(one):
         return f"{why}; {'pu' if one.unit else 'taken for pu'}, {one.level:.5g} at rest"
     if one.unit == "%":
         return f"{why}; {one.level:.5g} % at rest"
-    return f"{why}; {one.level:.5g} at rest ({unit}); base: {HINTS[str(one.signal)]}"
+    return f"{why}; {one.level:.5g} {one.unit or '?'} at rest; base: {HINTS[str(one.signal)]}"
 
 
 def _channel(one: Channel, noisy: bool) -> str:

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 MOST_PANELS = 10  # of one figure that are still readable
 POINTS = 2000  # of a line: more than a figure has dots across
+FEWEST_POINTS = 100  # of a stretch between two gaps
 SMALL = 8  # points
 RINGED = 200  # spikes
 SHADE = "#d7dbe0"
@@ -64,8 +65,9 @@ def _channel(axes: Axes, found: Inspection, one: Channel) -> None:
     for gap in found.sampling.gaps:
         axes.axvspan(gap.start, gap.end, color=SHADE, linewidth=0.0)
     broken = np.searchsorted(time, [gap.end for gap in found.sampling.gaps])
-    line = np.insert(column, broken, np.nan), np.insert(time, broken, time[broken])
-    axes.plot(*envelope(line[1], line[0]), color=START, linewidth=0.9)
+    share = max(POINTS // (len(broken) + 1), FEWEST_POINTS)
+    for t, y in zip(np.split(time, broken), np.split(column, broken), strict=True):
+        axes.plot(*envelope(t, y, share), color=START, linewidth=0.9)
     for first, last in one.stuck:
         axes.axvspan(first, last, color=LIMIT, alpha=0.25, linewidth=0.0)
     at = np.array(one.spikes_at[:RINGED])
