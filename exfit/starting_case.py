@@ -67,7 +67,7 @@ def starting_case(
     lines = [
         f"# {model.name} on the record {_plain(found.path.name)}: a case to start from.",
         "# Values are typical: put those of the unit in their place. `exfit check` tries",
-        "# the case, `exfit identify` tells what its test leaves open, `exfit fit` fits it.",
+        "# the case, `exfit identify` tells what its test leaves open, `exfit fit` fits.",
         *(f"# Look: {_plain(text)}." for text in found.findings),
         f"model: {name}",
         *_plant(model, machine, found),
@@ -138,11 +138,13 @@ def _level(found: Inspection, signal: str) -> str:
 def _parameters(model: Model) -> Iterator[str]:
     free = free_of(model)
     yield "parameters:"
-    yield commented("  fixed:", "stays as it is; what a fit shall find goes under free")
+    if len(free) < len(model.sheet):
+        yield commented("  fixed:", "stays as it is; what a fit shall find goes under free")
     for row in model.sheet:
         if row not in free:
             yield parameter_line(row, yaml_number(row.typical), "    ")
-    yield commented("  free:", "found between a tenth and ten times the typical value")
+    if free:
+        yield commented("  free:", "found between a tenth and ten times the typical value")
     for row in free:
         low, high = bounds_of(row)
         yield f"    # {row.unit}, {row.meaning}"
