@@ -209,7 +209,9 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
     )
     waves = {one.name for one in described if one.frequency}
     moving = {name: column for name, column in courses.items() if name not in waves}
-    steps = _with_sizes(steps, moving, time)
+    noises = {one.name: one.noise for one in described}
+    noises |= {group.name: noise_of(courses[group.name]) for group in groups}
+    steps = _with_sizes(steps, moving, noises, time)
     return Inspection(
         table.path,
         table.sha256,
@@ -465,12 +467,14 @@ def _step(shown: Mapping[str, Change]) -> Step:
 
 
 def _with_sizes(
-    steps: tuple[Step, ...], courses: Mapping[str, Array], time: Array
+    steps: tuple[Step, ...],
+    courses: Mapping[str, Array],
+    noises: Mapping[str, float],
+    time: Array,
 ) -> tuple[Step, ...]:
     """Return the steps with the change of each channel: between the ends of what lies before and
     behind."""
     edges = [float(time[0]), *(one.at for one in steps), float(time[-1])]
-    noises = {name: _noise(column) for name, column in courses.items()} if steps else {}
     found = []
     for k, step in enumerate(steps):
         sizes = {}
@@ -481,16 +485,10 @@ def _with_sizes(
                 float(column[0]) if begins else _end(time, column, edges[k], edges[k + 1], rest)
             )
             size = _end(time, column, edges[k + 1], edges[k + 2], SETTLED) - before
-            if abs(size) > LASTS * noises[name]:
+            if abs(size) > LASTS * noises.get(name, 0.0):
                 sizes[name] = size
         found.append(replace(step, sizes=sizes))
     return tuple(found)
-
-
-def _noise(column: Array) -> float:
-    """Return the noise of a channel, none where it switches."""
-    seen = column[np.isfinite(column)]
-    return 0.0 if not len(seen) or _switches(seen) else noise_of(seen)
 
 
 def _settled(channel: Channel, steps: Sequence[Step]) -> Channel:

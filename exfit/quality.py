@@ -67,6 +67,8 @@ def stuck(samples: Array) -> tuple[tuple[int, int], ...]:
     lengths = np.diff(np.concatenate([starts, [len(samples)]]))
     if len(starts) == 1:
         return ((0, len(samples) - 1),)
+    if np.max(lengths) <= FEWEST_STUCK:
+        return ()
     repeats = _repeats(samples, starts, lengths)
     chances = len(samples) * (1.0 - repeats)
     likely = log(max(chances, 1.0)) / -log(repeats) if repeats > 0.0 else 1.0
