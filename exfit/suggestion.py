@@ -8,9 +8,10 @@ from pathlib import Path
 import yaml
 
 from exfit.case_writer import commented
-from exfit.inspection import AT_REST_PU, Channel, Inspection, Phases, Step
+from exfit.inspection import AT_REST_PU, Channel, Inspection, Phases
 from exfit.naming import quantity_of
 from exfit.result import yaml_number
+from exfit.steps import Step
 
 FILL_IN = '"?"'  # no number: a case that holds it is refused by place
 AROUND = 0.25  # s: how far the instant of a step may be from where the record shows it

@@ -110,6 +110,16 @@ def test_a_recorded_reference_tells_its_steps_to_the_sample(name):
     assert [step["step"] for step in suggested] == pytest.approx([0.05, -0.05], rel=1e-6)
 
 
+def test_a_trigger_is_no_step_of_the_reference():
+    columns = dict(sample(SAMPLES / "ac1a_up.csv").content)
+    columns["trigger"] = np.where(columns["t"] > 1.12, 1.0, 0.0)
+    found = inspect(Columns(columns))
+    (step,) = found.steps
+    assert step.at == pytest.approx(1.0, abs=WITHIN)
+    assert "trigger" not in step.seen_in
+    assert next(one for one in found.channels if one.name == "trigger").steps == ()
+
+
 @pytest.mark.parametrize("record", [name for name in RECORDS if not name.startswith("first")])
 def test_the_channels_of_a_sample_record_are_recognised(record):
     found = inspect(sample(SAMPLES / f"{record}.csv"))

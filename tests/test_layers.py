@@ -62,6 +62,7 @@ ORDER = (
     "exfit.conditioning",
     "exfit.sampling",
     "exfit.quality",
+    "exfit.steps",
     "exfit.naming",
     "exfit.plain_table",
     "exfit.inspection",

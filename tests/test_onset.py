@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from exfit.onset import find_step
+from exfit.onset import find_step, find_steps
 from exfit.record import read_columns
 
 HERE = Path(__file__).parent
@@ -146,6 +146,7 @@ def test_the_unit_of_the_signal_and_the_origin_of_time_do_not_matter():
     plain, scaled = find_step(time, vt), find_step(time + 300.0, -13.8 * vt)
     # a minimum is flat: its place rounds at the root of what the samples round at
     assert scaled.at - 300.0 == pytest.approx(plain.at, abs=1e-5)
+    assert find_step(time + 1e6, vt).at - 1e6 == pytest.approx(plain.at, abs=1e-4)
     assert scaled.spread == pytest.approx(plain.spread, rel=1e-3)
     assert scaled.size == pytest.approx(-13.8 * plain.size, rel=1e-12)
     assert scaled.level == pytest.approx(-13.8 * plain.level, rel=1e-12)
@@ -163,6 +164,22 @@ def test_of_several_steps_the_first_is_found_with_its_own_size(reference, steps)
     onset = find_step(time, vt)
     assert onset.at == pytest.approx(3.0, abs=0.04)
     assert onset.size == pytest.approx(steps[0], rel=0.01)
+
+
+@every_reference
+@pytest.mark.parametrize(
+    "steps", [(0.05, -0.05), (0.02, -0.1), (0.05, 0.05, -0.1), (0.05,), (0.1, -0.03)], ids=str
+)
+def test_all_steps_are_found_in_their_order_and_no_others(reference, steps):
+    time = np.arange(0.0, 4.0 + 10.0 * len(steps), 0.01)
+    vt = 1.0 + np.random.default_rng(9).normal(0.0, 1e-4, time.size)
+    instants = 3.0 + 10.0 * np.arange(len(steps))
+    for step, at in zip(steps, instants, strict=True):
+        vt = vt + response(time, reference, step, at)
+    found = find_steps(time, vt)
+    assert [onset.at for onset in found] == pytest.approx(instants, abs=0.04)
+    assert [onset.size for onset in found] == pytest.approx(steps, rel=0.03)
+    assert found[0] == find_step(time, vt)
 
 
 def test_a_slow_drift_before_the_step_is_not_the_step():

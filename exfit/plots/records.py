@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from exfit.inspection import Channel, Inspection, Step
+from exfit.inspection import Channel, Inspection
 from exfit.plots.style import LIMIT, SIMULATED, START, WIDTH, tidy
+from exfit.steps import Step
 
 Array = NDArray[np.float64]
 
@@ -18,15 +19,20 @@ POINTS = 2000  # of a line: more than a figure has dots across
 FEWEST_POINTS = 100  # of a stretch between two gaps
 SMALL = 8  # points
 RINGED = 200  # spikes
+NAMED = 4  # channels that are not drawn
 SHADE = "#d7dbe0"
 
 
 def inspection(found: Inspection, title: str) -> Figure:
     """Return each channel in a panel of its own: steps marked, gaps shaded, spikes ringed.
 
-    Of many channels those with a signal come first, then those that move; the rest are named.
+    Of many channels those with a signal come first, then those that show a step; the rest are
+    named.
     """
-    order = sorted(found.channels, key=lambda one: (one.signal is None, one.constant))
+    shows = {name for step in found.steps for name in step.sizes}
+    order = sorted(
+        found.channels, key=lambda one: (one.signal is None, one.name not in shows, one.constant)
+    )
     shown = order[:MOST_PANELS]
     left_out = [one.name for one in order[MOST_PANELS:]]
     figure = Figure(figsize=(WIDTH, 1.2 + 1.5 * len(shown)), layout="constrained")
@@ -108,6 +114,6 @@ def _rest(names: Sequence[str]) -> str:
     """Return the names of what is not drawn, as many as fit."""
     if not names:
         return ""
-    text = ", ".join(names[:6])
-    more = f" and {len(names) - 6} more" if len(names) > 6 else ""
-    return f"   (not drawn: {text}{more})"
+    text = ", ".join(map(_short, names[:NAMED]))
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"\nnot drawn: {text}{more}"
