@@ -18,6 +18,7 @@ from exfit.naming import guessed, three_phases, unit_of
 from exfit.quality import quantum, spikes, stuck
 from exfit.record import read_columns
 from exfit.sampling import sampling_of
+from exfit.steps import Change, together
 from exfit.suggestion import bump_section, record_section
 
 HERE = Path(__file__).parent
@@ -457,3 +458,15 @@ def test_an_envelope_keeps_every_extreme():
     assert len(t) == len(y) < 5000
     assert (y.min(), y.max()) == (samples.min(), samples.max())
     assert np.all(np.diff(t) >= 0.0)
+
+
+def test_one_step_in_several_channels_is_told_by_the_mean_of_least_variance():
+    shown = {"a": (Change(1.0, 0.001, 0.1, 0.0),), "b": (Change(1.002, 0.002, 0.2, 0.0),)}
+    (step,) = together(shown)
+    assert step.at == pytest.approx((4.0 * 1.0 + 1.002) / 5.0)
+    assert step.error == pytest.approx(0.002 / 5.0**0.5)  # they scatter less than they err
+    (alone,) = together({**shown, "ref": (Change(1.01, 0.005, 0.1, 0.0, jumps=True),)})
+    assert (alone.at, alone.error) == (1.01, 0.005)
+    assert alone.seen_in == ("a", "b", "ref")
+    far = {"a": (Change(1.0, 0.001, 0.1, 0.0), Change(1.1, 0.001, 0.1, 0.0))}
+    assert len(together(far)) == 2  # of one channel, two are two
