@@ -66,11 +66,9 @@ def find_step(time: Array, samples: Array) -> Onset:
 def find_steps(time: Array, samples: Array) -> tuple[Onset, ...]:
     """Return all steps of a reference from its response (M,), the first as ``find_step`` does.
 
-    The next one is looked for where the response to the one before has settled. It must change the
-    response by a tenth of all that changes in the record; what is slower than a fifth of the step
-    before it passes for the settling. Raises ValueError like ``find_step``.
+    The next one is looked for where the response to the one before has settled; what is slower than
+    a fifth of that one passes for its settling. Raises ValueError like ``find_step``.
     """
-    least = DEPARTS[0] * float(np.ptp(_running_median(samples))) if len(samples) > SMOOTHED else 0.0
     onset, rest = _step(time, samples)
     found = [onset]
     while True:
@@ -78,8 +76,6 @@ def find_steps(time: Array, samples: Array) -> tuple[Onset, ...]:
         try:
             onset, rest = _step(time, samples)
         except ValueError:
-            return tuple(found)
-        if abs(onset.size) < least:
             return tuple(found)
         found.append(onset)
 
