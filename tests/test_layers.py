@@ -64,7 +64,6 @@ ORDER = (
     "exfit.quality",
     "exfit.steps",
     "exfit.naming",
-    "exfit.plain_table",
     "exfit.inspection",
     "exfit.loss",
     "exfit.yaml_lines",

@@ -121,6 +121,6 @@ def new(
 
 def _inspected(file: Path, clock: tuple[str, ...], sheet: str | None) -> "Inspection":
     from exfit.inspection import inspect
-    from exfit.plain_table import open_table
+    from exfit.readers import open_table
 
     return inspect(open_table(file, sheet), clock or None)
