@@ -26,6 +26,7 @@ from exfit.case_schema import (
     OnLine,
     OpenCircuit,
     Parameters,
+    Phases,
     Playback,
     RecordFile,
     Recording,
@@ -41,7 +42,7 @@ from exfit.case_schema import (
     known,
 )
 from exfit.errors import CaseError, RecordError
-from exfit.record import Clock, Record, read_record
+from exfit.record import ChannelLike, Clock, Record, ThreePhases, read_record
 from exfit.ties import Ties
 from exfit.yaml_lines import Fault, Place, read_text, read_yaml
 
@@ -230,13 +231,15 @@ class Case(Section):
 
     def measure(self, test: BumpTest, record: RecordFile) -> Record:
         """Return the record of a test; raises RecordError where its steps lie outside it."""
-        channels: dict[str, Column] = {
-            signal: column_of(channel) for signal, channel in record.channels.items()
+        channels: dict[str, ChannelLike | ThreePhases] = {
+            signal: source_of(channel) for signal, channel in record.channels.items()
         }
         path = self.folder / record.file
         missing = record.gaps == "skip"
         clock = clock_of(record)
-        read = read_record(path, clock, channels, record.window, missing, record.sheet)
+        read = read_record(
+            path, clock, channels, record.window, missing, record.sheet, record.resample
+        )
         start, end = read.time[0], read.time[-1]
         if test.begin is not None:
             if test.begin > start:
@@ -302,6 +305,20 @@ def column_of(channel: Channel) -> Column:
     scale, offset = known(channel.scale), known(channel.offset)
     return Column(
         channel.column, 1.0 if scale is None else scale, offset or 0.0, channel.unit, channel.base
+    )
+
+
+def source_of(channel: Channel | Phases) -> Column | ThreePhases:
+    """Return where a signal stands: in a column, or in three."""
+    if isinstance(channel, Channel):
+        return column_of(channel)
+    return ThreePhases(
+        channel.phases,
+        channel.kind,
+        channel.unit,
+        channel.base,
+        channel.connection,
+        channel.cycles,
     )
 
 

@@ -310,7 +310,32 @@ Filter = Annotated[
 ]
 
 
-class Channel(Section):
+class Compared(Section):
+    """How the record of a signal counts."""
+
+    weight: Positive = Field(default=1.0, description="Weight of the signal in the fit.")
+    noise: Positive | None = Field(
+        default=None,
+        description="Standard deviation of its noise, pu, in place of a weight; all channels that "
+        "are compared, or none.",
+    )
+    filter: Filter | None = Field(
+        default=None, description="{lowpass: Hz} or {median: samples}; simulation and record alike."
+    )
+    outliers: Positive | None = Field(
+        default=None,
+        description="Leave out samples farther from the running median than so many standard "
+        "deviations of the noise.",
+    )
+    averaged: Positive | None = Field(
+        default=None,
+        description="Over how long the recorder averages about each instant, s: the simulation is "
+        "averaged alike. A mean over the time before it is late by half of this: give that as "
+        "delay.",
+    )
+
+
+class Channel(Compared):
     """Where a signal stands and how it becomes per unit: column / base * scale + offset."""
 
     column: Text = Field(description="Name of the column.")
@@ -330,20 +355,37 @@ class Channel(Section):
         default=0.0,
         description="What is added after scaling, pu; or {start, min, max}, and the fit finds it.",
     )
-    weight: Positive = Field(default=1.0, description="Weight of the signal in the fit.")
-    noise: Positive | None = Field(
-        default=None,
-        description="Standard deviation of its noise, pu, in place of a weight; all channels that "
-        "are compared, or none.",
+
+
+class Phases(Compared):
+    """The terminal voltage from three phases: that of the positive sequence."""
+
+    phases: tuple[Text, Text, Text] = Field(
+        description="Columns of the three phases, in their order."
     )
-    filter: Filter | None = Field(
-        default=None, description="{lowpass: Hz} or {median: samples}; simulation and record alike."
+    kind: Literal["waveform", "rms"] = Field(
+        description="waveform: instantaneous values, of which the positive sequence is taken; rms: "
+        "RMS values, of which the mean is taken."
     )
-    outliers: Positive | None = Field(
-        default=None,
-        description="Leave out samples farther from the running median than so many standard "
-        "deviations of the noise.",
+    unit: Text = Field(description="Unit of the columns and of base, such as V or kV.")
+    base: Positive = Field(description="Rated voltage, RMS, line to line, in that unit.")
+    connection: Literal["phase-to-ground", "phase-to-phase"] = Field(
+        description="Between what the voltages are recorded: a factor of sqrt(3)."
     )
+    cycles: Count = Field(
+        default=1, description="Length of the window, in whole cycles; of waveforms."
+    )
+
+
+def _kind_of_channel(value: Any) -> str:
+    phases = isinstance(value, Phases) or (isinstance(value, dict) and "phases" in value)
+    return "[phases]" if phases else "[column]"
+
+
+Entry = Annotated[
+    Annotated[Channel, Tag("[column]")] | Annotated[Phases, Tag("[phases]")],
+    Discriminator(_kind_of_channel),
+]
 
 
 class TimeColumn(Section):
@@ -379,7 +421,7 @@ class RecordFile(Section):
     channels: Annotated[
         Mapping[
             Signal,
-            Annotated[Channel, BeforeValidator(_channel, json_schema_input_type=Text | Channel)],
+            Annotated[Entry, BeforeValidator(_channel, json_schema_input_type=Text | Entry)],
         ],
         Field(min_length=1),
         AfterValidator(MappingProxyType),
@@ -393,6 +435,11 @@ class RecordFile(Section):
     )
     gaps: Literal["refuse", "skip"] = Field(
         default="refuse", description="What to do where a channel has no number."
+    )
+    resample: Positive | None = Field(
+        default=None,
+        description="Rate of a slower, even clock that the record is put on through an anti-alias "
+        "filter, Hz; default: as recorded.",
     )
     delay: Findable = Field(
         default=0.0,

@@ -2,10 +2,10 @@
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple, NoReturn, Protocol
+from typing import Literal, NamedTuple, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from exfit.readers import open_table
 from exfit.readers.table import NONE, Table
 from exfit.readers.text import read_bytes
 from exfit.readers.units import alike
+from exfit.resampling import resampled
+from exfit.three_phase import Connection, PhasorCourse, vt_of_rms, vt_of_waveforms
 
 Array = NDArray[np.float64]
 
@@ -58,56 +60,119 @@ class ChannelLike(Protocol):
         """What 1 pu is in that unit; None: the numbers are taken as they stand."""
 
 
+class ThreePhases(NamedTuple):
+    """Where the three phases of the terminal voltage stand, and how they become one, per unit.
+
+    ``base`` is the rated line-to-line RMS voltage in ``unit``, ``cycles`` the window of waveforms.
+    """
+
+    columns: tuple[str, str, str]
+    kind: Literal["waveform", "rms"]
+    unit: str
+    base: float
+    connection: Connection
+    cycles: int
+
+
 @dataclass(frozen=True, eq=False)
 class Record:
     """Signals in per unit, each (M,) like ``time`` in s, which increases; arrays are read-only.
 
-    A sample that is missing is nan, in a signal and only where ``read_record`` was told so.
+    A sample that is missing is nan, in a signal and only where ``read_record`` was told so. What
+    was taken from waveforms is ``averaged`` over a window (s) about each instant, by signal.
     """
 
     time: Array
     signals: Mapping[str, Array]
     source: Path
     sha256: str
+    averaged: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_record(
     path: Path,
     clock: Clock,
-    channels: Mapping[str, ChannelLike],
+    channels: Mapping[str, ChannelLike | ThreePhases],
     window: tuple[float, float] | None = None,
     missing: bool = False,
     sheet: str | None = None,
+    rate: float | None = None,
 ) -> Record:
     """Return the record of a file: each signal is ``column / base * scale + offset``.
 
     Args:
         path: a recorder's file of any kind that ``open_table`` knows.
         clock: where the time stands; timestamps become s since the first of them.
-        channels: signal name -> column, its unit and base, scale and offset. The base of a field
-            current is that of the air-gap line: what gives 1 pu voltage without saturation.
+        channels: signal name -> column, its unit and base, scale and offset, or three phases. The
+            base of a field current is that of the air-gap line: what gives 1 pu voltage without
+            saturation.
         window: first and last instant kept, s, both included; what lies outside may hold gaps.
         missing: whether a sample may be missing from a signal: an empty cell or nan becomes nan.
         sheet: of a workbook.
+        rate: Hz, of a slower, even clock; None: the record's own.
 
     Raises:
         RecordError: a file that cannot be read, a column that is missing or in another unit, a cell
-            that is no finite number, time that does not increase, fewer than two samples, or a
-            signal without any.
+            that is no finite number, time that does not increase, fewer than two samples, a signal
+            without any, waveforms that are none, or a record that cannot be resampled.
     """
     table = open_table(path, sheet)
     _check_units(table, channels.values())
     time = table.instants(clock.columns, clock.unit)
     _check_time(table, clock, time)
-    names = [channel.column for channel in channels.values()]
+    names = [name for channel in channels.values() for name in _columns(channel)]
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
     columns = table.numbers(dict.fromkeys(names), gappy)
-    kept = _kept(path, time, window)
+    courses = {
+        name: _of_phases(path, time, columns, channel)
+        for name, channel in channels.items()
+        if isinstance(channel, ThreePhases)
+    }
+    known = np.ones(len(time), dtype=bool)
+    for voltage, course in courses.values():
+        if course is not None:
+            known &= np.isfinite(voltage)
+    kept = _kept(path, time, known, window)
     signals = {
-        name: _signal(table, channel, columns[channel.column], kept, missing)
+        name: _frozen(courses[name][0][kept])
+        if isinstance(channel, ThreePhases)
+        else _signal(table, channel, columns[channel.column], kept, missing)
         for name, channel in channels.items()
     }
-    return Record(_frozen(time[kept]), MappingProxyType(signals), path, table.sha256)
+    averaged = {name: one.window for name, (_, one) in courses.items() if one is not None}
+    time = time[kept]
+    if rate is not None:
+        try:
+            time, signals = resampled(time, signals, rate)
+        except ValueError as fault:
+            raise RecordError(f"{path}: resample: {fault}") from None
+    frozen = {name: _frozen(signal) for name, signal in signals.items()}
+    return Record(_frozen(time), MappingProxyType(frozen), path, table.sha256, averaged)
+
+
+def _columns(channel: ChannelLike | ThreePhases) -> tuple[str, ...]:
+    """Return the columns that a channel is read from."""
+    return channel.columns if isinstance(channel, ThreePhases) else (channel.column,)
+
+
+def _of_phases(
+    path: Path, time: Array, columns: Mapping[str, Array], channel: ThreePhases
+) -> tuple[Array, PhasorCourse | None]:
+    """Return the voltage (M,) of three phases per unit, and what was found of their waveforms.
+
+    Raises RecordError where the columns are not the three phases of one voltage.
+    """
+    phases = np.stack([columns[name] for name in channel.columns], axis=1)
+    try:
+        if channel.kind == "rms":
+            return vt_of_rms(phases, channel.base, channel.connection), None
+        course = vt_of_waveforms(time, phases, channel.base, channel.connection, channel.cycles)
+    except ValueError as fault:
+        named = ", ".join(map(repr, channel.columns))
+        raise RecordError(f"{path}: columns {named}: {fault}") from None
+    voltage = np.full(len(time), np.nan)
+    voltage[course.kept] = course.voltage
+    return voltage, course
 
 
 def read_columns(path: Path, names: Iterable[str]) -> dict[str, Array]:
@@ -121,15 +186,16 @@ def file_hash(path: Path) -> str:
     return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
-def _check_units(table: Table, channels: Iterable[ChannelLike]) -> None:
+def _check_units(table: Table, channels: Iterable[ChannelLike | ThreePhases]) -> None:
     """Raise a RecordError for a column that the file says to be in another unit."""
     for channel in channels:
-        said = table.units.get(channel.column)
-        if said is not None and channel.unit is not None and not alike(said, channel.unit):
-            raise RecordError(
-                f"{table.path}: column {channel.column!r} is in {said} as the file says, "
-                f"not in {channel.unit}"
-            )
+        for column in _columns(channel):
+            said = table.units.get(column)
+            if said is not None and channel.unit is not None and not alike(said, channel.unit):
+                raise RecordError(
+                    f"{table.path}: column {column!r} is in {said} as the file says, "
+                    f"not in {channel.unit}"
+                )
 
 
 def _check_time(table: Table, clock: Clock, time: Array) -> None:
@@ -144,10 +210,12 @@ def _check_time(table: Table, clock: Clock, time: Array) -> None:
         _refuse(table, back[0] + 1, f"{clock.label}: time {now} s {kind} the {before} s before it")
 
 
-def _kept(path: Path, time: Array, window: tuple[float, float] | None) -> NDArray[np.intp]:
-    """Return the positions of the samples in the window."""
+def _kept(
+    path: Path, time: Array, known: NDArray[np.bool_], window: tuple[float, float] | None
+) -> NDArray[np.intp]:
+    """Return the positions of the samples in the window, of those that are known."""
     start, end = window or (time[0], time[-1])
-    kept = np.flatnonzero((time >= start) & (time <= end))
+    kept = np.flatnonzero((time >= start) & (time <= end) & known)
     if kept.size < FEWEST_SAMPLES:
         place = f" in the window {start:g} ... {end:g} s" if window else ""
         raise RecordError(

@@ -96,6 +96,7 @@ def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
             yield Fault(here, "0 leaves nothing of the column")
         here = (*place, "channels", signal)
         yield from _unit_faults(here, section_of(channels, signal), kind)
+        yield from _phase_faults(here, section_of(channels, signal), signal)
     for signal in NEEDED.get(kind, ()):
         if channels and signal not in channels:
             yield Fault((*place, "channels", signal), f"is missing: plant {kind} needs it")
@@ -112,6 +113,18 @@ def _unit_faults(place: Place, channel: Data, kind: str) -> Iterator[Fault]:
         return
     if unit and kind != "none" and needs_base(unit):
         yield Fault((*place, "base"), f"is missing: what is 1 pu in {unit}?")
+
+
+def _phase_faults(place: Place, channel: Data, signal: str) -> Iterator[Fault]:
+    """Yield three phases of what is no voltage of the machine, and what goes with one kind only."""
+    if "phases" not in channel:
+        return
+    if signal != "vt":
+        yield Fault((*place, "phases"), "only of vt")
+    if channel.get("kind") == "rms" and "cycles" in channel:
+        yield Fault((*place, "cycles"), "only with kind: waveform")
+    if channel.get("kind") == "waveform" and "averaged" in channel:
+        yield Fault((*place, "averaged"), "waveforms have a window of their own: cycles")
 
 
 def _event_faults(place: Place, test: Data, kind: str) -> Iterator[Fault]:
@@ -173,6 +186,9 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
     begin = numbers_in(test).get("begin")
     if begin is not None and "vt0" not in test:
         yield Fault((*place, "test", "vt0"), "is missing: with begin it says where to start")
+    if "resample" in record and record.get("gaps") == "skip":
+        text = "does not go with gaps: skip: a filter needs all samples"
+        yield Fault((*place, "record", "resample"), text)
     for index, stretch in enumerate(list_of(record, "mask")):
         if is_pair(stretch) and stretch[0] >= stretch[1]:
             text = f"start {show(stretch[0])} is not below end {show(stretch[1])}"

@@ -30,7 +30,7 @@ from exfit.case import (
     known,
 )
 from exfit.case_schema import Filter, Signal
-from exfit.conditioning import Conditioning, LowPass, Median, outliers
+from exfit.conditioning import Conditioning, LowPass, Median, MovingAverage, outliers
 from exfit.engine.system import System, trace
 from exfit.errors import CaseError, ModelError, RecordError, SimulationError
 from exfit.experiment import Channel, Experiment
@@ -379,15 +379,20 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> 
             f"filter: median: {entry.filter.median} samples; at most {most}, a tenth of the record"
         )
         raise RecordError(f"{record.source}: {signal}: {text}")
+    window = record.averaged.get(signal, entry.averaged)
     conditioning = None
-    if entry.filter is not None or not kept.all():
+    if entry.filter is not None or window is not None or not kept.all():
+        average = None if window is None else MovingAverage(window)
         try:
-            conditioning = Conditioning(record.time, kept, _filter(entry.filter))
+            conditioning = Conditioning(record.time, kept, _filter(entry.filter), average)
         except ValueError as fault:
-            raise RecordError(f"{record.source}: {signal}: filter: {fault}") from fault
+            what = "filter" if window is None else "filter or average"
+            raise RecordError(f"{record.source}: {signal}: {what}: {fault}") from fault
     weight = entry.weight if entry.noise is None else finest_noise(case, entry.noise) / entry.noise
-    column = column_of(entry)
-    return Channel(signal, samples, weight, conditioning, entry.noise, column.scale, column.offset)
+    if not isinstance(entry, case_schema.Channel):
+        return Channel(signal, samples, weight, conditioning, entry.noise)
+    own = column_of(entry)
+    return Channel(signal, samples, weight, conditioning, entry.noise, own.scale, own.offset)
 
 
 def _filter(chosen: Filter | None) -> LowPass | Median | None:

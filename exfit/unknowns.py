@@ -162,7 +162,7 @@ def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[
     kinds: tuple[Literal["scale", "offset"], ...] = ("scale", "offset")
     for signal, channel in file.channels.items():
         for kind in kinds:
-            value = getattr(channel, kind)
+            value = getattr(channel, kind, None)
             if isinstance(value, Unknown):
                 yield Nuisance(f"{prefix}{signal}.{kind}", kind, signal=signal), value
 
