@@ -14,11 +14,14 @@ from exfit.case_faults import contradictions
 from exfit.case_form import form_faults, show
 from exfit.case_parts import Part, Parts, parts_of, ties_of, with_network
 from exfit.case_schema import (
+    ABOUT,
     BumpTest,
     Channel,
     Estimate,
+    Fact,
     FindableStep,
     Free,
+    Frozen,
     InfiniteBus,
     Limit,
     MachinePlayback,
@@ -76,6 +79,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 class Case(Section):
     """A study of exfit: a model, its plant, a test, its record, and what is to be found."""
 
+    about: Frozen[Fact] = ABOUT
     model: Text | None = Field(
         default=None,
         description="Model of the catalogue, in upper or lower case, or path of a .py file; none "

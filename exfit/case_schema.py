@@ -56,6 +56,10 @@ def _is_percent(value: Any) -> str:
     return "[percent]" if isinstance(value, str) else "[number]"
 
 
+def _is_text(value: Any) -> str:
+    return "[number]" if isinstance(value, float) else "[text]"
+
+
 def _is_word(value: Any) -> str:
     return "[auto]" if isinstance(value, str) else "[number]"
 
@@ -68,6 +72,10 @@ def _is_unknown(value: Any) -> str:
 Given = Annotated[
     Annotated[Number, Tag("[number]")] | Annotated[str, Field(pattern="^="), Tag("[tie]")],
     Discriminator(_is_tie),
+]
+Fact = Annotated[
+    Annotated[Number, Tag("[number]")] | Annotated[Text, Tag("[text]")],
+    Discriminator(_is_text),
 ]
 Start = Annotated[
     Annotated[Number, Tag("[number]")] | Annotated[Literal["auto"], Tag("[auto]")],
@@ -138,6 +146,11 @@ def known(value: "float | Unknown | None") -> float | None:
     return None if start == "auto" else start
 
 
+ABOUT = Field(
+    default_factory=_nothing,
+    description="What identifies unit and test in a report, under names of your own, such as "
+    "Plant, Unit, Rated, Test date, Tested by.",
+)
 MACHINE = Field(description="Machine model: GENROU, GENROE, GENSAL, GENSAE or ONE_AXIS.")
 MACHINE_DATA = Field(
     default_factory=_nothing,

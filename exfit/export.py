@@ -1,24 +1,19 @@
 """The PSS/E records of a fit: its result.json, read back and written as a dynamics file."""
 
-import json
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
-from typing import Any
 
 from exfit import __version__
-from exfit.case_form import near, show, show_value
+from exfit.case_form import near, show
 from exfit.errors import ExfitError
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.psse import Definition, alternatives, definitions, record_text
-
-Data = Mapping[str, Any]
+from exfit.saved import Saved, read_saved
 
 WIDTH = 80  # columns
-WHOLE_FIT = "result.json"
 NO_LIMIT = 99.0  # pu: data sheets write limits that never act as 99 or 999
 
 
@@ -46,9 +41,9 @@ def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Ex
     ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
     file is no result of a fit, or its model has no record.
     """
-    source = path / WHOLE_FIT if path.is_dir() else path
-    result = _Result(source)
-    warnings = [*result.warnings()]
+    result = read_saved(path)
+    source = result.path
+    warnings = [*_of_fit(result)]
     written = [
         *_machine(result, warnings),
         *_exciter(result, name),
@@ -58,77 +53,23 @@ def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Ex
         raise ExfitError(f"{source}: {result.text('model')} has no PSS/E record")
     for one in written:
         warnings += _warnings(one)
-    comments = [*_origin(result), *(f"{text}." for text in result.warnings())]
+    comments = [*_origin(result), *(f"{text}." for text in _of_fit(result))]
     comments += [text for one in written for text in _comments(one)]
     lines = [line for text in comments for line in _wrapped(text)]
     lines += [record_text(one.definition, one.values, bus, machine_id) for one in written]
     return Exported("\n".join(lines) + "\n", tuple(f"{source}: {text}" for text in warnings))
 
 
-class _Result:
-    """A result.json, its parts checked when they are asked for."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        try:
-            content = json.loads(path.read_bytes())
-        except OSError as error:
-            raise ExfitError(f"{path}: cannot be read: {error.strerror}") from None
-        except (ValueError, RecursionError) as error:
-            raise ExfitError(f"{path}: not JSON: {error}") from None
-        self.content: Data = content if isinstance(content, dict) else {}
-        if not {"model", "parameters", "fixed"} <= self.content.keys():
-            raise ExfitError(f"{path}: not the result of a fit: model, parameters or fixed missing")
-
-    def text(self, key: str) -> str | None:
-        """Return a text, None where there is none."""
-        found = self.content.get(key)
-        return found if isinstance(found, str) else None
-
-    def mapping(self, key: str) -> Data:
-        """Return a mapping, an empty one where there is none."""
-        found = self.content.get(key)
-        return found if isinstance(found, dict) else {}
-
-    def fitted(self) -> dict[str, float]:
-        """Return the fitted values under the names of the fit."""
-        found = self.mapping("parameters")
-        return {
-            name: self._number(f"parameters.{name}.value", one.get("value"))
-            for name, one in found.items()
-            if isinstance(one, dict)
-        }
-
-    def values(self, key: str, prefix: str) -> dict[str, float]:
-        """Return the values of a part: those that stayed, and over them those that were fitted."""
-        kept = {
-            name: self._number(f"{key}.{name}", value) for name, value in self.mapping(key).items()
-        }
-        return {**kept, **self.fitted_of(prefix)}
-
-    def fitted_of(self, prefix: str) -> dict[str, float]:
-        """Return the fitted values of a part; its prefix is empty for the exciter."""
-        return {
-            name.removeprefix(prefix): value
-            for name, value in self.fitted().items()
-            if name.startswith(prefix) and "." not in name.removeprefix(prefix)
-        }
-
-    def warnings(self) -> Iterator[str]:
-        """Yield what of the fit itself must be known."""
-        if self.content.get("success") is False:
-            yield f"the fit did not converge: {self.text('message')}"
-        form = self.text("saturation") or "quadratic"
-        if form != "quadratic":
-            yield f"fitted with saturation: {form}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
-
-    def _number(self, place: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise ExfitError(f"{self.path}: {place}: {show_value(value)} is not a number")
-        return float(value)
+def _of_fit(result: Saved) -> Iterator[str]:
+    """Yield what of the fit itself must be known."""
+    if result.content.get("success") is False:
+        yield f"the fit did not converge: {result.text('message')}"
+    form = result.text("saturation") or "quadratic"
+    if form != "quadratic":
+        yield f"fitted with saturation: {form}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
 
 
-def _exciter(result: _Result, name: str | None) -> Iterator[Written]:
+def _exciter(result: Saved, name: str | None) -> Iterator[Written]:
     model_name = result.text("model") or ""
     if model_name == result.text("machine_model"):  # it stood alone
         if name is not None:
@@ -148,7 +89,7 @@ def _exciter(result: _Result, name: str | None) -> Iterator[Written]:
     yield _written(result, known[wanted], "fixed", "")
 
 
-def _machine(result: _Result, warnings: list[str]) -> Iterator[Written]:
+def _machine(result: Saved, warnings: list[str]) -> Iterator[Written]:
     name = result.text("machine_model")
     known = alternatives(MACHINES[name]) if name in MACHINES else []
     if not known:
@@ -158,7 +99,7 @@ def _machine(result: _Result, warnings: list[str]) -> Iterator[Written]:
     yield _written(result, known[0], "machine", "machine.")
 
 
-def _stabiliser(result: _Result, warnings: list[str]) -> Iterator[Written]:
+def _stabiliser(result: Saved, warnings: list[str]) -> Iterator[Written]:
     name = result.text("stabiliser_model")
     if name is None:
         return
@@ -169,7 +110,7 @@ def _stabiliser(result: _Result, warnings: list[str]) -> Iterator[Written]:
     yield _written(result, known[0], "stabiliser", "stabiliser.")
 
 
-def _written(result: _Result, definition: Definition, key: str, prefix: str) -> Written:
+def _written(result: Saved, definition: Definition, key: str, prefix: str) -> Written:
     """Return a record with the values of a result; raises ExfitError where one is missing."""
     values, fitted = result.values(key, prefix), result.fitted_of(prefix)
     missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
@@ -209,7 +150,7 @@ def _matters(symbol: str, value: float) -> bool:
     return value != 0.0
 
 
-def _origin(result: _Result) -> Iterator[str]:
+def _origin(result: Saved) -> Iterator[str]:
     record = result.mapping("fit").get("record")
     rmse = result.content.get("rmse")
     to = f" to {record}" if isinstance(record, str) else ""

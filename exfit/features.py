@@ -12,6 +12,16 @@ BAND = 0.02  # of the step: within it the response has settled
 RISE = (0.1, 0.9)  # of the step
 
 
+LABELS = (
+    ("initial value", "initial_value", "pu"),
+    ("final value", "final_value", "pu"),
+    ("rise time 10-90 %", "rise_time", "s"),
+    ("overshoot", "overshoot_percent", "%"),
+    ("peak time", "peak_time", "s"),
+    ("settling time 2 %", "settling_time", "s"),
+)  # of the features, with name and unit
+
+
 @dataclass(frozen=True)
 class Features:
     """Features of the response to one step: voltages per unit, times in s after the step.

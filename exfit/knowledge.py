@@ -57,6 +57,7 @@ class Knowledge:
             "confidence": self.confidence.as_json(),
             "identifiability": self.identifiability.as_json(),
             "not_linear": list(self.bent),
+            "sentences": list(self.sentences),
         }
 
     @property

@@ -5,6 +5,8 @@ import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -237,7 +239,7 @@ class FitResult:
     ``parameters`` holds the fitted ones, ``fixed`` all others of every part, those that follow
     others by ``ties`` too, under their names in the system: KA, machine.Tpd0. ``cost`` is what the
     fit made small, ``comparisons`` are with each record, ``knowledge`` is what they tell of the
-    parameters, None where that is not known.
+    parameters, None where that is not known; ``about`` is what identifies the unit and the test.
     """
 
     case: Path
@@ -268,6 +270,7 @@ class FitResult:
     validation: tuple[Comparison, ...]
     versions: Mapping[str, str]
     inputs: Mapping[str, str]
+    about: Mapping[str, float | str] = field(default_factory=dict)
 
     @property
     def comparison(self) -> Comparison:
@@ -311,6 +314,7 @@ class FitResult:
         """Return what ``--json`` prints: everything but history and samples."""
         return {
             "case": str(self.case),
+            "about": dict(self.about),
             "model": self.model,
             "strategy": self.strategy,
             "saturation": self.saturation,

@@ -130,6 +130,7 @@ def fit(
         validation=tried,
         versions=versions(),
         inputs=inputs(case, *trials, *validations),
+        about=case.about,
     )
 
 

@@ -122,6 +122,7 @@ ORDER = (
     "exfit.case_writer",
     "exfit.suggestion",
     "exfit.starting_case",
+    "exfit.saved",
     "exfit.export",
     "exfit.unknowns",
     "exfit.trial",

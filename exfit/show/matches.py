@@ -5,20 +5,12 @@ from collections.abc import Iterator, Sequence
 from rich.console import Console
 from rich.table import Table
 
-from exfit.features import Features
+from exfit.features import LABELS, Features
 from exfit.result import Comparison
 from exfit.show.terminal import number, plain_table
 
 GAP = 2  # between columns
 LABELLED = 25  # columns that the names and units of the features take
-FEATURES = (
-    ("initial value", "initial_value", "pu"),
-    ("final value", "final_value", "pu"),
-    ("rise time 10-90 %", "rise_time", "s"),
-    ("overshoot", "overshoot_percent", "%"),
-    ("peak time", "peak_time", "s"),
-    ("settling time 2 %", "settling_time", "s"),
-)
 
 
 def comparisons(console: Console, found: Sequence[Comparison]) -> None:
@@ -71,7 +63,7 @@ def _match_table(found: Sequence[Comparison]) -> Table:
 def _feature_table(found: Sequence[Comparison]) -> Table:
     headings = [f"{one.name}\n{kind}" for one in found for kind in ("measured", "simulated")]
     table = _folding(plain_table("step of vt", "unit", *headings, numbers=headings))
-    for label, name, unit in FEATURES:
+    for label, name, unit in LABELS:
         cells = [_feature(one, name) for pair in found for one in (pair.measured, pair.simulated)]
         table.add_row(label, unit, *cells)
     return table
