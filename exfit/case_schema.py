@@ -57,7 +57,8 @@ def _is_percent(value: Any) -> str:
 
 
 def _is_text(value: Any) -> str:
-    return "[number]" if isinstance(value, float) else "[text]"
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return "[number]" if number else "[text]"
 
 
 def _is_word(value: Any) -> str:
