@@ -16,6 +16,7 @@ from exfit.cli.fitting import check, fit, simulate, validate
 from exfit.cli.knowing import identify, profile
 from exfit.cli.options import Refusal
 from exfit.cli.records import inspect_, new
+from exfit.cli.reporting import report
 from exfit.errors import ExfitError
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
@@ -47,5 +48,18 @@ OF_RECORDS = (inspect_, new)
 OF_CASES = (fit, simulate, validate, check, profile, identify)
 OF_RESULTS = (compare, import_, export)
 COMMANDS = (*OF_RECORDS, *OF_CASES, *OF_RESULTS, models, schema)
+COMMANDS = (
+    fit,
+    simulate,
+    validate,
+    check,
+    profile,
+    identify,
+    report,
+    import_,
+    export,
+    models,
+    schema,
+)
 for command in COMMANDS:
     main.add_command(command)

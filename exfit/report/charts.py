@@ -1,0 +1,299 @@
+"""Charts as data, and where their lines, ticks and labels lie: a template draws them as SVG.
+
+Measured on this program's own figures, matplotlib takes two seconds to import and to draw those of
+a report; these take a tenth of one, and their text follows the style sheet of the page.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, floor, log10
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Range = tuple[float, float]
+
+LEFT, RIGHT, TOP, BOTTOM = 74.0, 16.0, 26.0, 42.0  # room around the panels for their labels
+WIDE, SMALL = 720.0, 300.0  # units of a drawing; the page scales it
+ROOM = 0.06  # of the range, above and below the lines
+NARROW = 0.05  # of its level: the range of a signal that rests
+RESTS = 1e-6  # of its level: a signal that moves by less would fill its axis with rounding errors
+FEWEST = 0.1  # pu: the level of a signal that rests at zero
+MOST_DECADES = 7  # ticks of a logarithmic axis
+UNIT_STEPS = (1.0, 2.0, 5.0, 10.0)  # of ticks, times a power of ten
+
+
+@dataclass(frozen=True)
+class Series:
+    """A line of a chart, or dots: ``style`` is a class of the style sheet."""
+
+    label: str
+    x: Array
+    y: Array
+    style: str
+    dots: bool = False
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A straight line across a panel at a level of y, or of x, and what it says."""
+
+    at: float
+    label: str = ""
+    upright: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel of a chart: what its y axis shows, its lines, its height."""
+
+    title: str
+    series: tuple[Series, ...]
+    height: float
+    logarithmic: bool = False
+    rules: tuple[Rule, ...] = ()
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Panels above each other on one x axis; ``text`` says what a reader would see there.
+
+    ``key`` begins the ids of the drawing; it must be its alone on a page.
+    """
+
+    key: str
+    title: str
+    text: str
+    x_title: str
+    panels: tuple[Panel, ...]
+    logarithmic: bool = False
+    width: float = WIDE
+    x_range: Range | None = None
+    whole: bool = False
+
+    @property
+    def legend(self) -> tuple[Series, ...]:
+        """A line of each kind, where there is more than one."""
+        kinds = {one.label: one for panel in self.panels for one in panel.series if one.label}
+        return tuple(kinds.values()) if len(kinds) > 1 else ()
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A mark of an axis: its place on the drawing, and its label."""
+
+    at: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A line on the drawing: the d of its path, its class."""
+
+    path: str
+    style: str
+
+
+@dataclass(frozen=True)
+class Label:
+    """A text on the drawing."""
+
+    x: float
+    y: float
+    text: str
+    end: bool
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A panel with places on the drawing, from its top left corner down and to the right."""
+
+    title: str
+    top: float
+    height: float
+    y_ticks: tuple[Tick, ...]
+    marks: tuple[Mark, ...]
+    rules: tuple[Mark, ...]
+    labels: tuple[Label, ...]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A chart with places on the drawing."""
+
+    chart: Chart
+    height: float
+    inner: float
+    x_ticks: tuple[Tick, ...]
+    panels: tuple[Drawn, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A range of values along a length of the drawing; a logarithmic one is of log10."""
+
+    low: float
+    high: float
+    length: float
+    logarithmic: bool = False
+
+    def places(self, values: Array) -> Array:
+        """Return how far from the low end values lie on the drawing."""
+        shown = _log(values) if self.logarithmic else values
+        return np.asarray((shown - self.low) / (self.high - self.low) * self.length)
+
+    def place(self, value: float) -> float:
+        """Return how far from the low end a value lies on the drawing."""
+        return float(self.places(np.array([value]))[0])
+
+
+def drawing(chart: Chart) -> Drawing:
+    """Return where all of a chart lies."""
+    inner = chart.width - LEFT - RIGHT
+    lines = [one for panel in chart.panels for one in panel.series]
+    x_range = chart.x_range or _span((one.x for one in lines), chart.logarithmic)
+    across = Axis(*x_range, inner, chart.logarithmic)
+    panels, top = [], TOP
+    for panel in chart.panels:
+        panels.append(_drawn(panel, across, top))
+        top += panel.height + TOP
+    height = top - TOP + BOTTOM
+    most = max(3, int(inner // 80))
+    return Drawing(chart, height, inner, ticks(across, most, chart.whole), tuple(panels))
+
+
+def ticks(axis: Axis, most: int, whole: bool = False) -> tuple[Tick, ...]:
+    """Return marks at round values, at most so many; on a logarithmic axis at powers of ten."""
+    if axis.logarithmic:
+        return tuple(_decades(axis))
+    step = _round_step((axis.high - axis.low) / most)
+    step = max(step, 1.0) if whole else step
+    first, last = ceil(axis.low / step - 1e-9), floor(axis.high / step + 1e-9)
+    values = [k * step for k in range(first, last + 1)]
+    return tuple(Tick(axis.place(value), _number(value, step)) for value in values)
+
+
+def envelope(x: Array, y: Array, bins: int) -> tuple[Array, Array]:
+    """Return a line thinned to the least and the greatest of each of so many stretches.
+
+    What is drawn looks the same: a stretch is no wider than what a screen shows.
+    """
+    rows = kept_rows([y], bins)
+    return x[rows], y[rows]
+
+
+def kept_rows(signals: Sequence[Array], bins: int) -> NDArray[np.intp]:
+    """Return the rows that hold the least and greatest of each signal (M,) in each of the bins."""
+    count = len(signals[0])
+    if count <= 2 * bins * len(signals):
+        return np.arange(count)
+    edges = np.linspace(0, count, bins + 1).astype(np.intp)
+    rows = {0, count - 1}
+    for signal in signals:
+        low, high = np.nan_to_num(signal, nan=np.inf), np.nan_to_num(signal, nan=-np.inf)
+        for first, last in pairwise(edges):
+            rows |= {
+                first + int(np.argmin(low[first:last])),
+                first + int(np.argmax(high[first:last])),
+            }
+    return np.array(sorted(rows), dtype=np.intp)
+
+
+def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:
+    levels = [one.y for one in panel.series]
+    fixed = [np.array([rule.at]) for rule in panel.rules if not rule.upright]
+    low, high = _span([*levels, *fixed], panel.logarithmic)
+    room = ROOM * (high - low)
+    upward = Axis(low - room, high + room, panel.height, panel.logarithmic)
+    y_ticks = ticks(upward, max(2, int(panel.height // 38)))
+    return Drawn(
+        panel.title,
+        top,
+        panel.height,
+        tuple(Tick(panel.height - tick.at, tick.label) for tick in y_ticks),
+        tuple(_mark(one, across, upward) for one in panel.series),
+        tuple(_rule(one, across, upward) for one in panel.rules),
+        tuple(_label(one, across, upward) for one in panel.rules if one.label),
+    )
+
+
+def _mark(one: Series, across: Axis, upward: Axis) -> Mark:
+    x, y = across.places(one.x), upward.length - upward.places(one.y)
+    seen = np.isfinite(x) & np.isfinite(y)
+    if one.dots:
+        path = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x[seen], y[seen], strict=True))
+    else:
+        path = "".join(_strokes(x, y, seen))
+    return Mark(path, one.style + (" dots" if one.dots else ""))
+
+
+def _strokes(x: Array, y: Array, seen: NDArray[np.bool_]) -> Iterator[str]:
+    """Yield the strokes of a line: a gap in the values is one on the drawing."""
+    pen = "M"
+    for a, b, drawn in zip(x.tolist(), y.tolist(), seen.tolist(), strict=True):
+        if drawn:
+            yield f"{pen}{a:.1f} {b:.1f}"
+        pen = "L" if drawn else "M"
+
+
+def _rule(one: Rule, across: Axis, upward: Axis) -> Mark:
+    if one.upright:
+        return Mark(f"M{across.place(one.at):.1f} 0v{upward.length:.1f}", "rule")
+    return Mark(f"M0 {upward.length - upward.place(one.at):.1f}h{across.length:.1f}", "rule")
+
+
+def _label(one: Rule, across: Axis, upward: Axis) -> Label:
+    """Return where a rule says what it is: above a level, at the foot of an upright one."""
+    if not one.upright:
+        level = upward.length - upward.place(one.at)
+        return Label(across.length - 4.0, level - 4.0, one.label, True)
+    x = across.place(one.at)
+    end = x > 0.6 * across.length
+    return Label(x - 5.0 if end else x + 5.0, upward.length - 7.0, one.label, end)
+
+
+def _span(lines: Iterable[Array], logarithmic: bool) -> Range:
+    """Return the range of some lines, of their log10 on a logarithmic axis."""
+    values = np.concatenate([*lines, np.zeros(0)])
+    values = _log(values) if logarithmic else values
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return 0.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    level = max(abs(low), abs(high))
+    if logarithmic and high - low < 1.0:
+        return floor(low), floor(low) + max(1.0, ceil(high) - floor(low))
+    if high - low <= RESTS * level or high == low:
+        around = NARROW * max(level, FEWEST)
+        return low - around, high + around
+    return low, high
+
+
+def _log(values: Array) -> Array:
+    """Return log10; what has none, as a vanished gradient, is a gap."""
+    return np.log10(np.where(values > 0.0, values, np.nan))
+
+
+def _decades(axis: Axis) -> Iterator[Tick]:
+    first, last = ceil(axis.low - 1e-9), floor(axis.high + 1e-9)
+    every = max(1, ceil((last - first + 1) / MOST_DECADES))
+    for power in range(first, last + 1, every):
+        label = f"{10.0**power:g}" if -3 <= power <= 3 else f"1e{power}"
+        yield Tick(axis.place(10.0**power), label)
+
+
+def _round_step(least: float) -> float:
+    """Return the smallest round number that is no less."""
+    power = 10.0 ** floor(log10(least))
+    return power * next(step for step in UNIT_STEPS if step * power >= least * (1.0 - 1e-9))
+
+
+def _number(value: float, step: float) -> str:
+    """Return the label of a tick: as many decimals as its step has."""
+    decimals = max(0, -floor(log10(step) + 1e-9))
+    if decimals > 5 or abs(value) >= 1e6:
+        return f"{value:.3g}"
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
