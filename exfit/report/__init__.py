@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from exfit.errors import ExfitError
-from exfit.report.content import Report, content
+from exfit.report.content import Report, report_of
 from exfit.report.page import html, is_page
 from exfit.result import write
 from exfit.saved import read_saved
 
-__all__ = ["Report", "content", "html", "write_report"]
+__all__ = ["Report", "html", "report_of", "write_report"]
 
 PAGE = "report.html"
 
@@ -26,5 +26,5 @@ def write_report(
         raise ExfitError(f"{place}: cannot be written: it is a folder")
     if place.exists() and not force and not is_page(place):
         raise ExfitError(f"{place}: exists already, and is no report; --force writes over it")
-    write(place, html(content(result, case)))
+    write(place, html(report_of(result, case)))
     return place

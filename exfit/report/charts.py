@@ -1,7 +1,7 @@
 """Charts as data, and where their lines, ticks and labels lie: a template draws them as SVG.
 
-Measured on this program's own figures, matplotlib takes two seconds to import and to draw those of
-a report; these take a tenth of one, and their text follows the style sheet of the page.
+matplotlib would take two seconds to be imported and to draw those of a report, these a tenth of
+one; and their text follows the style sheet of the page, so that it can be read on a telephone.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 
-LEFT, RIGHT, TOP, BOTTOM = 74.0, 16.0, 26.0, 42.0  # room around the panels for their labels
+LEFT, RIGHT, TOP, BOTTOM = 74.0, 16.0, 30.0, 48.0  # room around the panels for their labels
 WIDE, SMALL = 720.0, 300.0  # units of a drawing; the page scales it
 ROOM = 0.06  # of the range, above and below the lines
 NARROW = 0.05  # of its level: the range of a signal that rests
 RESTS = 1e-6  # of its level: a signal that moves by less would fill its axis with rounding errors
 FEWEST = 0.1  # pu: the level of a signal that rests at zero
-MOST_DECADES = 7  # ticks of a logarithmic axis
+PER_TICK = (80.0, 22.0)  # of an axis, across and upward: closer labels would touch
 UNIT_STEPS = (1.0, 2.0, 5.0, 10.0)  # of ticks, times a power of ten
 
 
@@ -43,6 +43,7 @@ class Rule:
     at: float
     label: str = ""
     upright: bool = False
+    style: str = "rule"
 
 
 @dataclass(frozen=True)
@@ -160,14 +161,14 @@ def drawing(chart: Chart) -> Drawing:
         panels.append(_drawn(panel, across, top))
         top += panel.height + TOP
     height = top - TOP + BOTTOM
-    most = max(3, int(inner // 80))
+    most = max(3, int(inner // PER_TICK[0]))
     return Drawing(chart, height, inner, ticks(across, most, chart.whole), tuple(panels))
 
 
 def ticks(axis: Axis, most: int, whole: bool = False) -> tuple[Tick, ...]:
     """Return marks at round values, at most so many; on a logarithmic axis at powers of ten."""
     if axis.logarithmic:
-        return tuple(_decades(axis))
+        return tuple(_decades(axis, most))
     step = _round_step((axis.high - axis.low) / most)
     step = max(step, 1.0) if whole else step
     first, last = ceil(axis.low / step - 1e-9), floor(axis.high / step + 1e-9)
@@ -207,7 +208,7 @@ def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:
     low, high = _span([*levels, *fixed], panel.logarithmic)
     room = ROOM * (high - low)
     upward = Axis(low - room, high + room, panel.height, panel.logarithmic)
-    y_ticks = ticks(upward, max(2, int(panel.height // 38)))
+    y_ticks = ticks(upward, max(3, int(panel.height // PER_TICK[1])))
     return Drawn(
         panel.title,
         top,
@@ -240,8 +241,8 @@ def _strokes(x: Array, y: Array, seen: NDArray[np.bool_]) -> Iterator[str]:
 
 def _rule(one: Rule, across: Axis, upward: Axis) -> Mark:
     if one.upright:
-        return Mark(f"M{across.place(one.at):.1f} 0v{upward.length:.1f}", "rule")
-    return Mark(f"M0 {upward.length - upward.place(one.at):.1f}h{across.length:.1f}", "rule")
+        return Mark(f"M{across.place(one.at):.1f} 0v{upward.length:.1f}", one.style)
+    return Mark(f"M0 {upward.length - upward.place(one.at):.1f}h{across.length:.1f}", one.style)
 
 
 def _label(one: Rule, across: Axis, upward: Axis) -> Label:
@@ -276,9 +277,9 @@ def _log(values: Array) -> Array:
     return np.log10(np.where(values > 0.0, values, np.nan))
 
 
-def _decades(axis: Axis) -> Iterator[Tick]:
+def _decades(axis: Axis, most: int) -> Iterator[Tick]:
     first, last = ceil(axis.low - 1e-9), floor(axis.high + 1e-9)
-    every = max(1, ceil((last - first + 1) / MOST_DECADES))
+    every = max(1, ceil((last - first + 1) / most))
     for power in range(first, last + 1, every):
         label = f"{10.0**power:g}" if -3 <= power <= 3 else f"1e{power}"
         yield Tick(axis.place(10.0**power), label)

@@ -219,7 +219,7 @@ class Report:
     reproduction: Reproduction
 
 
-def content(result: Path, case: Path | None = None) -> Report:
+def report_of(result: Path, case: Path | None = None) -> Report:
     """Return what the report of a fit says, given its result.json or the folder that holds it.
 
     ``case`` is the case file where it lies elsewhere than the result says. Raises ExfitError where
@@ -266,7 +266,7 @@ def _verdict(
         else f"all {len(own)} parameters determined"
     )
     word, text, good = _judged(saved, fits, validations)
-    return Verdict(word, f"{text}; rmse {rmse}; {determined}.", good)
+    return Verdict(word, f"{text[:1].upper()}{text[1:]}; rmse {rmse}; {determined}.", good)
 
 
 def _judged(
@@ -274,22 +274,26 @@ def _judged(
 ) -> tuple[str, str, bool | None]:
     message = str(saved.at("message"))
     if saved.at("interrupted"):
-        return "Interrupted", "the search was interrupted: these are its best values so far", False
+        return "Interrupted", "the values are the best until the search was interrupted", False
     if not saved.at("success"):
-        return "Not converged", f"the search did not converge: {message}", False
+        return "Not converged", f"the search ended before a minimum: {message}", False
     missed = [one.name for one in fits for signal in _judging(one) if not _describes(signal)]
     if missed:
         names = listed(missed)
-        return "No match", f"converged, but no better than a constant on {names}", False
+        return "No match", f"the response matches {names} no better than a constant would", False
     beyond = [one.name for one in validations if not one.accepted]
     limits = [one.limit for one in validations if one.limit is not None]
     if beyond:
-        return "Not accepted", f"converged; beyond rmse {limits[0]:g} pu on {listed(beyond)}", False
+        return "Not accepted", f"beyond rmse {limits[0]:g} pu on {listed(beyond)}", False
     if not validations:
-        return "Converged", "converged; no record was kept for a validation", None
+        return "Converged", "no record was kept for a validation", None
     if not limits:
-        return "Converged", "converged; the case sets no limit for its validations", None
-    return "Accepted", f"converged; every validation is within rmse {limits[0]:g} pu", True
+        return "Converged", "the case sets no limit for its validations", None
+    return (
+        "Accepted",
+        f"the search converged, and every validation is within rmse {limits[0]:g} pu",
+        True,
+    )
 
 
 def _judging(match: Match) -> Sequence[Signal]:
@@ -329,6 +333,8 @@ def _tested(case: Case, recording: Recording, trial: Trial, role: str) -> Tested
 
 def _done(test: BumpTest) -> Iterator[str]:
     """Yield what was done to the unit, in words."""
+    if test.vt0 is not None:
+        yield f"vt0 {_known(test.vt0, 'g')} pu"
     for signal in ("vref", "vs", "E"):
         for step in getattr(test, signal):
             yield f"{signal} {_known(step.step, '+g')} pu at {_known(step.at, 'g')} s"

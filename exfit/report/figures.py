@@ -37,6 +37,7 @@ PHASES: Mapping[str, str] = {
     "gn": "Gauss-Newton",
 }
 TIME = "time (s)"
+ZERO, HALF_TURN = Rule(0.0, style="level"), Rule(-180.0, style="level")
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ def overlay(key: str, match: Match, signal: Signal, bins: int = BINS) -> Chart:
         x_title=TIME,
         panels=(
             Panel(LABELS.get(signal.name, signal.name), tuple(lines), TALL),
-            Panel("simulated - measured (1e-3 pu)", (error,), LOW, rules=(Rule(0.0),)),
+            Panel("simulated - measured (1e-3 pu)", (error,), LOW, rules=(ZERO,)),
         ),
         x_range=(float(time[0]), float(time[-1])),
     )
@@ -181,8 +182,8 @@ def iterations(key: str, one: Courses) -> Chart:
     return Chart(
         key=key,
         title=f"{one.name}: the response after each iteration",
-        text=f"Measured {one.signal}, and simulated after iterations {numbers[0]} to "
-        f"{numbers[-1]}: the responses come nearer to the record.",
+        text=f"Measured {one.signal}, and simulated with the values after iterations "
+        f"{', '.join(map(str, numbers))}; 0 is the start.",
         x_title=TIME,
         panels=(Panel(LABELS.get(one.signal, one.signal), tuple(lines), TALL),),
         x_range=(float(one.time[0]), float(one.time[-1])),
@@ -202,7 +203,7 @@ def sensitivity(key: str, one: Moved) -> Chart:
         title=f"What 1 % more of each parameter does to {one.label}",
         text=f"Largest change of {one.label} in 1e-3 pu for 1 % more of each parameter: {told}.",
         x_title=TIME,
-        panels=(Panel(f"change of {one.label} (1e-3 pu)", lines, TALL, rules=(Rule(0.0),)),),
+        panels=(Panel(f"change of {one.label} (1e-3 pu)", lines, TALL, rules=(ZERO,)),),
         x_range=(float(one.time[0]), float(one.time[-1])),
     )
 
@@ -213,7 +214,7 @@ def _bodes(key: str, small: Small) -> Iterator[Chart]:
     found = small.found
     names = listed_names(small)
     if found.open is not None:
-        rules: tuple[tuple[Rule, ...], tuple[Rule, ...]] = ((Rule(0.0),), (Rule(-180.0),))
+        rules: tuple[tuple[Rule, ...], tuple[Rule, ...]] = ((ZERO,), (HALF_TURN,))
         text = "Gain and phase of the open loop over the frequency; no margin was found."
         if found.margins is not None:
             told = found.margins
@@ -239,7 +240,7 @@ def _bodes(key: str, small: Small) -> Iterator[Chart]:
         f"{found.peak:.2f} dB, bandwidth "
         + ("none." if found.bandwidth is None else f"{found.bandwidth:.3g} Hz.")
     )
-    rules = ((Rule(0.0),), ())
+    rules = ((ZERO,), ())
     yield _bode(
         f"{key}-closed",
         f"Closed loop from {source} to {output}, {names}",
@@ -272,7 +273,7 @@ def _bode(
     gain = 20.0 * np.log10(np.abs(found.response))
     phase = np.degrees(np.unwrap(np.angle(found.response)))
     panels = tuple(
-        Panel(name, (Series("", *envelope(found.frequency, values, BINS // 2), "start"),), 150.0,
+        Panel(name, (Series("", *envelope(found.frequency, values, BINS // 2), "p0"),), 150.0,
               rules=marked)
         for name, values, marked in zip(
             ("gain (dB)", "phase (degrees)"), (gain, phase), rules, strict=True

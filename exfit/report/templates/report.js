@@ -32,8 +32,10 @@
     const plot = Bokeh.Plotting.figure({
       height, x_range: range(one), sizing_mode: "stretch_width", output_backend: "canvas",
       tools: [new Bokeh.PanTool(), box, wheel, new Bokeh.ResetTool()],
-      active_drag: null, toolbar_location: "above", x_axis_label: null, y_axis_label: label, min_border_right: 12,
+      active_drag: null, toolbar_location: "above", x_axis_label: null, y_axis_label: null, min_border_left: 60, min_border_right: 12,
     });
+    plot.title.text = label;
+    plot.title.text_font_style = "normal";
     plot.toolbar.logo = null;
     plot.toolbar.active_drag = touch ? null : box;
     plot.toolbar.active_scroll = wheel;
