@@ -133,6 +133,13 @@ ORDER = (
     "exfit.profiles",
     "exfit.design",
     "exfit.check",
+    "exfit.report.sources",
+    "exfit.report.simulated",
+    "exfit.report.content",
+    "exfit.report.charts",
+    "exfit.report.figures",
+    "exfit.report.page",
+    "exfit.report",
     "exfit.plots.style",
     "exfit.plots.overlays",
     "exfit.plots.search",
@@ -164,6 +171,7 @@ ORDER = (
     "exfit.cli.exchange",
     "exfit.cli.records",
     "exfit.cli.catalogue",
+    "exfit.cli.reporting",
     "exfit.cli",
 )
 FORBIDDEN_ABOVE_CASE = {"yaml", "click", "rich", "matplotlib", "pydantic"}

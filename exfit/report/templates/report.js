@@ -83,7 +83,22 @@
     }
   }
 
+  // without scripts a long history stands open, and so it is printed
+  function fold() {
+    const every = [...document.querySelectorAll("details.long")];
+    let shut = [];
+    for (const one of every) one.open = false;
+    window.addEventListener("beforeprint", () => {
+      shut = every.filter((one) => !one.open);
+      for (const one of shut) one.open = true;
+    });
+    window.addEventListener("afterprint", () => {
+      for (const one of shut) one.open = false;
+    });
+  }
+
   async function main() {
+    fold();
     if (typeof Bokeh === "undefined") return;
     Bokeh.logger?.set_level?.("warn");
     const every = JSON.parse(document.getElementById("samples").textContent);
