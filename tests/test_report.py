@@ -275,7 +275,7 @@ def test_the_verdict_is_that_of_the_validation(tmp_path, accept, down, word):
     report = report_of(run)
     assert report.verdict.word == word
     assert report.verdict.good is (None if accept is None else word == "Accepted")
-    assert "all 2 parameters determined" in report.verdict.sentence
+    assert "every parameter determined" in report.verdict.sentence
     if not down:
         assert "no record for a validation" in Page(html(report)).text
 
@@ -383,7 +383,7 @@ def test_the_command_writes_the_page_and_says_where(own, capsys):
 def test_a_long_record_makes_no_long_page(tmp_path):
     folder = tmp_path / "case"
     folder.mkdir()
-    time = np.linspace(0.0, 300.0, 100_001)
+    time = np.linspace(0.0, 60.0, 20_001)
     truth = np.where(time < 0.5, 0.0, 2.0 - 2.0 * np.exp(-2.0 * (time - 0.5)))
     np.savetxt(
         folder / "up.csv",

@@ -33,7 +33,7 @@ FLAGS = (
     "--disable-sync",
 )
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-CASES = ("ac1a_typical", "ac8b_unit1", "several")
+CASES = ("ac1a_typical", "ac8b_unit1", "ac8b_on_line", "several")
 WIDTHS = (390, 1280)  # of a telephone and of a desk, px
 BLANK = 0.02  # spread of the pixels, of white: a page of text and lines has ten times that
 WHEEL = -400.0  # towards the reader
@@ -183,6 +183,20 @@ def test_dragging_zooms_all_panels_of_a_record_alike(opened):
     assert after[0] == after[1] != before[0]
     assert after[0][1] - after[0][0] < 0.5 * (before[0][1] - before[0][0])
     assert after[2:] == before[2:]
+
+
+def test_the_signals_of_a_record_are_zoomed_together(opened):
+    page = opened("ac8b_on_line")
+    before = ranges(page)
+    x, y = middle(page, 1)
+    page.mouse.move(x - 100, y - 50)
+    page.mouse.down()
+    page.mouse.move(x + 100, y + 50, steps=5)
+    page.mouse.up()
+    after = ranges(page)
+    assert len(after) == 8
+    assert all(one == after[0] for one in after)
+    assert after[0] != before[0]
 
 
 def test_the_wheel_zooms_with_ctrl_and_scrolls_without(opened):

@@ -263,7 +263,7 @@ def _verdict(
     determined = (
         f"{len(vague)} of {len(own)} parameters not determined: {listed(vague)}"
         if vague
-        else f"all {len(own)} parameters determined"
+        else "every parameter determined"
     )
     word, text, good = _judged(saved, fits, validations)
     return Verdict(word, f"{text[:1].upper()}{text[1:]}; rmse {rmse}; {determined}.", good)

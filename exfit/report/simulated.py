@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from exfit.check import FLAT_DRIFT, flat_drift
 from exfit.errors import SimulationError
 from exfit.experiment import Experiment
-from exfit.inference import sensitivity
-from exfit.knowledge import linearisation
+from exfit.knowledge import knowledge
 from exfit.report.sources import Sources
 from exfit.residuals import UNREACHABLE, Residuals
 from exfit.study import names_of_records
@@ -106,7 +105,7 @@ def simulated(found: Sources) -> Simulated:
         flat=tuple(_flat(experiments, values)),
         small=tuple(_small(experiments, values)),
         limited=tuple(_limited((*trials, *unseen), values)),
-        courses=tuple(_courses(found, residuals)),
+        courses=tuple(_courses(found, residuals, values)),
     )
 
 
@@ -119,15 +118,13 @@ def _flat(experiments: Sequence[Experiment], values: Values) -> Iterator[Flat]:
 def _moved(residuals: Residuals, theta: Array, trials: Sequence[Trial]) -> Iterator[Moved]:
     """Yield what 1 % more of each parameter does; what belongs to a record is left out."""
     try:
-        linear = linearisation(residuals, theta, names_of_records(trials))
+        known = knowledge(residuals, theta, names_of_records(trials))
     except SimulationError:
         return
-    shown = [k for k, of_record in enumerate(linear.nuisances) if not of_record]
-    names = tuple(linear.names[k] for k in shown)
-    moved = PERCENT * sensitivity(linear)[:, shown]
-    times = [trial.record.time[one.kept] for trial in trials for one in trial.channels]
-    for channel, time in zip(linear.channels, times, strict=True):
-        yield Moved(channel.label, time, names, moved[channel.rows])
+    shown = [k for k, of_record in enumerate(known.linear.nuisances) if not of_record]
+    names = tuple(known.linear.names[k] for k in shown)
+    for one in known.sensitivity:
+        yield Moved(one.label, one.time, names, PERCENT * one.moved[:, shown])
 
 
 def _small(experiments: Sequence[Experiment], values: Values) -> Iterator[Small]:
@@ -159,7 +156,7 @@ def _limited(trials: Sequence[Trial], values: Values) -> Iterator[Limited]:
         yield Limited(one.name, limits_hit(simulator, parameters))
 
 
-def _courses(found: Sources, residuals: Residuals) -> Iterator[Courses]:
+def _courses(found: Sources, residuals: Residuals, values: Values) -> Iterator[Courses]:
     """Yield how the response to each fitted test went from the start to the fit."""
     history = found.saved.entries("history")
     rows = np.unique(np.geomspace(1, max(len(history), 1), MOST_COURSES).round().astype(int) - 1)
@@ -175,5 +172,5 @@ def _courses(found: Sources, residuals: Residuals) -> Iterator[Courses]:
                 samples[number] = trial.experiment.samples(at)[0][:, column]
             except UNREACHABLE:  # a search may pass through values that have no response
                 continue
-        measured = trial.channels[column].measured
+        measured = trial.experiment.measured(trial.channels[column], values)
         yield Courses(trial.name, signals[column], trial.record.time, measured, samples)

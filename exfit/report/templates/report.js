@@ -10,13 +10,20 @@
     return Float64Array.from(values, (value) => (value === null ? NaN : value));
   }
 
-  // the tests of a record share one axis of time
+  // the overlays of a record are documents of their own, and follow each other along the time
   function range(one) {
-    if (!ranges.has(one.group)) {
-      const start = one.time[0], end = one.time[one.time.length - 1];
-      ranges.set(one.group, new Bokeh.Range1d({start, end, bounds: [start, end]}));
-    }
-    return ranges.get(one.group);
+    const start = one.time[0], end = one.time[one.time.length - 1];
+    const own = new Bokeh.Range1d({start, end, bounds: [start, end]});
+    const alike = ranges.get(one.group) ?? [];
+    ranges.set(one.group, [...alike, own]);
+    own.change.connect(() => {
+      for (const other of ranges.get(one.group)) {
+        if (other.start !== own.start || other.end !== own.end) {
+          other.setv({start: own.start, end: own.end});
+        }
+      }
+    });
+    return own;
   }
 
   function source(one) {
@@ -26,11 +33,11 @@
     return new Bokeh.ColumnDataSource({data});
   }
 
-  function panel(one, height, label) {
+  function panel(time, height, label) {
     const wheel = new Bokeh.WheelZoomTool({modifiers: {ctrl: true}, zoom_on_axis: false});
     const box = new Bokeh.BoxZoomTool();
     const plot = Bokeh.Plotting.figure({
-      height, x_range: range(one), sizing_mode: "stretch_width", output_backend: "canvas",
+      height, x_range: time, sizing_mode: "stretch_width", output_backend: "canvas",
       tools: [new Bokeh.PanTool(), box, wheel, new Bokeh.ResetTool()],
       active_drag: null, toolbar_location: "above", x_axis_label: null, y_axis_label: null, min_border_left: 60, min_border_right: 12,
     });
@@ -53,8 +60,8 @@
   }
 
   function draw(one, place) {
-    const from = source(one), time = {field: "time"};
-    const upper = panel(one, 300, one.label);
+    const from = source(one), time = {field: "time"}, shared = range(one);
+    const upper = panel(shared, 300, one.label);
     const names = ["measured", ...(one.start ? ["start"] : []), "simulated"];
     upper.scatter(time, {field: "measured"}, {source: from, size: 3, color: COLOURS.measured, line_color: null});
     if (one.start) {
@@ -62,7 +69,7 @@
     }
     const line = upper.line(time, {field: "simulated"}, {source: from, color: COLOURS.simulated, line_width: 2});
     hover(upper, line, names);
-    const lower = panel(one, 150, "simulated - measured (1e-3 pu)");
+    const lower = panel(shared, 150, "simulated - measured (1e-3 pu)");
     lower.toolbar_location = null;
     const error = lower.line(time, {field: "residual"}, {source: from, color: COLOURS.simulated});
     hover(lower, error, ["residual"]);
