@@ -112,6 +112,29 @@ def test_the_case_holds_what_the_file_says(case_file):
     assert validation.test.vref[0].step == -0.05
 
 
+def test_what_identifies_the_unit_is_text_or_a_number_under_any_name(case_file):
+    given = "about: {Plant: Höhe 7, Unit: 2, Test date: 2024-05-03, Rated MVA: 120.5}\n"
+    case = load_case(case_file(given + EXAMPLE))
+    told = {"Plant": "Höhe 7", "Unit": 2, "Test date": "2024-05-03", "Rated MVA": 120.5}
+    assert case.about == told
+    assert load_case(case_file(EXAMPLE)).about == {}
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("[1]", "a list is not text; in quotes it would be"),
+        ("true", "true is not text; in quotes it would be"),
+        (".inf", "inf is not a finite number"),
+        ("''", "is empty"),
+        ("", "has no value"),
+    ],
+)
+def test_what_identifies_the_unit_is_nothing_else(case_file, value, text):
+    path = case_file(f"about: {{Plant: {value}}}\n{EXAMPLE}")
+    assert faults_of(path) == (f"{path}:1: about.Plant: {text}",)
+
+
 def test_what_may_be_missing_has_a_default(case_file):
     case = load_case(case_file(SHORTEST_CASE))
     assert case.saturation == "quadratic"
