@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -460,11 +460,15 @@ def _matches(found: Sources, key: str) -> Iterator[Match]:
 
 
 def _features(saved: Saved, *place: str | int) -> Features | None:
-    found = saved.at(*place)
-    if found is None:
+    if saved.at(*place) is None:
         return None
     return Features(
-        **{one.name: saved.number_or_none(*place, one.name) for one in fields(Features)}  # type: ignore[arg-type]
+        initial_value=saved.number(*place, "initial_value"),
+        final_value=saved.number(*place, "final_value"),
+        rise_time=saved.number_or_none(*place, "rise_time"),
+        overshoot_percent=saved.number(*place, "overshoot_percent"),
+        peak_time=saved.number_or_none(*place, "peak_time"),
+        settling_time=saved.number_or_none(*place, "settling_time"),
     )
 
 

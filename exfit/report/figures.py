@@ -12,13 +12,16 @@ from exfit.report.content import Fitted, Iteration, Match, Report, Signal
 from exfit.report.simulated import Courses, Moved, Small
 
 if TYPE_CHECKING:
-    from exfit.small_signal import Bode
+    from exfit.small_signal import Bode, Margins
 
 Array = NDArray[np.float64]
+Rules = tuple[Rule, ...]
 
 MILLI = 1e3
-TALL, LOW = 220.0, 90.0  # of a panel of signals, and of their errors
+TALL, HALF, LOW = 220.0, 150.0, 90.0  # of panels: of signals, of gain and phase, of errors
 BINS = 600  # stretches of a line: about as many as a print or a screen shows
+FEWEST_BINS = 50  # a step can still be seen
+PER_BIN = 8  # points of an overlay: the least and the greatest of its four lines
 MOST_POINTS = 40_000  # drawn in all overlays: 400 KB
 MOST_SENT = 16_000  # samples for the interactive overlays: 600 KB
 DIGITS = 7  # of a sample: beyond what a recorder resolves
@@ -96,7 +99,7 @@ def figures(report: Report) -> Figures:
 def _overlays(report: Report) -> Iterator[Overlaid]:
     matches = (*report.fits, *report.validations)
     count = sum(len(one.samples.overlays) for one in matches if one.samples is not None)
-    bins = max(50, min(BINS, MOST_POINTS // (8 * max(count, 1))))
+    bins = max(FEWEST_BINS, min(BINS, MOST_POINTS // (PER_BIN * max(count, 1))))
     for k, one in enumerate(matches):
         for signal in one.signals:
             if one.samples is not None and signal.name in one.samples.overlays:
@@ -209,76 +212,56 @@ def sensitivity(key: str, one: Moved) -> Chart:
 
 
 def _bodes(key: str, small: Small) -> Iterator[Chart]:
-    if small.found is None:
+    """Yield the Bode figures of the voltage loop, where there is one, and of the closed loop."""
+    found, names = small.found, ", ".join(small.names)
+    if found is None:
         return
-    found = small.found
-    names = listed_names(small)
     if found.open is not None:
-        rules: tuple[tuple[Rule, ...], tuple[Rule, ...]] = ((ZERO,), (HALF_TURN,))
-        text = "Gain and phase of the open loop over the frequency; no margin was found."
-        if found.margins is not None:
-            told = found.margins
-            gain = (
-                ()
-                if told.gain is None or told.gain_at is None
-                else (_gain(told.gain, told.gain_at),)
-            )
-            phase = (
-                ()
-                if told.phase is None or told.phase_at is None
-                else (_phase(told.phase, told.phase_at),)
-            )
-            rules = ((*rules[0], *phase), (*rules[1], *gain))
-            both = [rule.label for rule in (*gain, *phase)]
-            text = "Gain and phase of the open loop over the frequency: " + (
-                f"{' and '.join(both)}." if both else "it has no margin to cross."
-            )
-        yield _bode(f"{key}-open", f"Open voltage loop, {names}", text, found.open, rules)
+        gain, phase = _margins(found.margins)
+        told = [rule.label for rule in (*gain, *phase)]
+        yield _bode(
+            f"{key}-open",
+            f"Open voltage loop, {names}",
+            "Gain and phase of the open voltage loop over the frequency: "
+            f"{' and '.join(told) or 'there is no crossover'}.",
+            found.open,
+            ((ZERO, *phase), (HALF_TURN, *gain)),
+        )
     source, output = found.path
-    text = (
-        f"Gain and phase from {source} to {output} over the frequency: peak "
-        f"{found.peak:.2f} dB, bandwidth "
-        + ("none." if found.bandwidth is None else f"{found.bandwidth:.3g} Hz.")
-    )
-    rules = ((ZERO,), ())
+    width = "none" if found.bandwidth is None else f"{found.bandwidth:.3g} Hz"
     yield _bode(
         f"{key}-closed",
         f"Closed loop from {source} to {output}, {names}",
-        text,
+        f"Gain and phase from {source} to {output} over the frequency: peak {found.peak:.2f} dB, "
+        f"bandwidth {width}.",
         found.closed,
-        rules,
+        ((ZERO,), ()),
     )
 
 
-def listed_names(small: Small) -> str:
-    """Return the names of the tests of a small-signal view."""
-    return ", ".join(small.names)
+def _margins(found: "Margins | None") -> tuple[Rules, Rules]:
+    """Return where the gain margin and the phase margin are, nothing where there is none."""
+    gain: Rules = ()
+    phase: Rules = ()
+    if found is not None and found.gain is not None and found.gain_at is not None:
+        text = f"gain margin {found.gain:.1f} dB at {found.gain_at:.3g} Hz"
+        gain = (Rule(found.gain_at, text, upright=True),)
+    if found is not None and found.phase is not None and found.phase_at is not None:
+        text = f"phase margin {found.phase:.1f}° at {found.phase_at:.3g} Hz"
+        phase = (Rule(found.phase_at, text, upright=True),)
+    return gain, phase
 
 
-def _gain(margin: float, at: float) -> Rule:
-    return Rule(at, f"gain margin {margin:.1f} dB at {at:.3g} Hz", upright=True)
-
-
-def _phase(margin: float, at: float) -> Rule:
-    return Rule(at, f"phase margin {margin:.1f}° at {at:.3g} Hz", upright=True)
-
-
-def _bode(
-    key: str,
-    title: str,
-    text: str,
-    found: "Bode",
-    rules: tuple[tuple[Rule, ...], tuple[Rule, ...]],
-) -> Chart:
+def _bode(key: str, title: str, text: str, found: "Bode", rules: tuple[Rules, Rules]) -> Chart:
+    """Return gain and phase over the frequency, each with its rules."""
     gain = 20.0 * np.log10(np.abs(found.response))
     phase = np.degrees(np.unwrap(np.angle(found.response)))
     panels = tuple(
-        Panel(name, (Series("", *envelope(found.frequency, values, BINS // 2), "p0"),), 150.0,
-              rules=marked)
+        Panel(name, (Series("", found.frequency, values, "p0"),), HALF, rules=marked)
         for name, values, marked in zip(
             ("gain (dB)", "phase (degrees)"), (gain, phase), rules, strict=True
         )
-    )  # fmt: skip
+    )
     return Chart(key, title, text, "frequency (Hz)", panels, logarithmic=True)
 
 
