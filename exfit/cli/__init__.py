@@ -46,20 +46,7 @@ def main() -> None:
 
 OF_RECORDS = (inspect_, new)
 OF_CASES = (fit, simulate, validate, check, profile, identify)
-OF_RESULTS = (compare, import_, export)
+OF_RESULTS = (report, compare, import_, export)
 COMMANDS = (*OF_RECORDS, *OF_CASES, *OF_RESULTS, models, schema)
-COMMANDS = (
-    fit,
-    simulate,
-    validate,
-    check,
-    profile,
-    identify,
-    report,
-    import_,
-    export,
-    models,
-    schema,
-)
 for command in COMMANDS:
     main.add_command(command)

@@ -4,7 +4,7 @@ from rich.console import Console
 from rich.table import Table
 
 from exfit.compare import Agreement
-from exfit.show.matches import FEATURES
+from exfit.features import LABELS
 from exfit.show.terminal import notes, number, plain_table
 
 
@@ -49,7 +49,7 @@ def _differences(found: Agreement) -> Table:
 def _features(found: Agreement) -> Table:
     names = tuple(found.features)
     table = plain_table("", "unit", *names, numbers=names)
-    for label, name, unit in FEATURES:
+    for label, name, unit in LABELS:
         cells = [number(getattr(one, name)) for one in found.features.values()]
         table.add_row(label, unit, *cells)
     return table
