@@ -451,15 +451,6 @@ def test_the_figure_marks_steps_gaps_and_spikes():
     plots.png(figure)
 
 
-def test_an_envelope_keeps_every_extreme():
-    time = np.linspace(0.0, 1.0, 123_457)
-    samples = RNG.normal(0.0, 1.0, time.size)
-    t, y = plots.records.envelope(time, samples)
-    assert len(t) == len(y) < 5000
-    assert (y.min(), y.max()) == (samples.min(), samples.max())
-    assert np.all(np.diff(t) >= 0.0)
-
-
 def test_one_step_in_several_channels_is_told_by_the_mean_of_least_variance():
     shown = {"a": (Change(1.0, 0.001, 0.1, 0.0),), "b": (Change(1.002, 0.002, 0.2, 0.0),)}
     (step,) = together(shown)

@@ -15,6 +15,7 @@ ORDER = (
     "exfit",
     "exfit.errors",
     "exfit.atomic",
+    "exfit.envelope",
     "exfit.engine",
     "exfit.engine.trace",
     "exfit.engine.system",

@@ -22,8 +22,6 @@ from exfit.report.charts import (
     Panel,
     Series,
     drawing,
-    envelope,
-    kept_rows,
     ticks,
 )
 
@@ -396,23 +394,6 @@ def test_a_long_record_makes_no_long_page(tmp_path):
     record = {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}
     run = made(folder, {**FIRST_ORDER, "record": record})
     assert len(html(report_of(run)).encode()) < MOST
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_thinning_keeps_the_extremes_the_ends_and_the_gaps(seed):
-    rng = np.random.default_rng(seed)
-    y = rng.standard_normal(20_000)
-    y[5_000:6_000] = np.nan
-    x = np.arange(len(y), dtype=float)
-    rows = kept_rows([y], 500)
-    assert len(rows) <= 2 * 500 + 2
-    assert (rows[0], rows[-1]) == (0, len(y) - 1)
-    assert np.all(np.diff(rows) > 0)
-    seen_x, seen_y = envelope(x, y, 500)
-    assert np.nanmax(seen_y) == np.nanmax(y)
-    assert np.nanmin(seen_y) == np.nanmin(y)
-    assert np.isnan(seen_y[(seen_x > 5_100) & (seen_x < 5_900)]).all()
-    assert np.array_equal(envelope(x[:900], y[:900], 500)[1], y[:900])
 
 
 @pytest.mark.parametrize("low", [-3.0, 0.0, 0.99997, 1e4])

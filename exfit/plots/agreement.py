@@ -4,6 +4,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.compare import Agreement, Curve, Difference
+from exfit.envelope import envelope
 from exfit.plots.style import LABELS, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
 
 LINES = {"A": (START, "-"), "B": (SIMULATED, "--")}
@@ -40,9 +41,9 @@ def _curves(axes: Axes, curves: tuple[Curve, ...], signal: str, between: Differe
         time, samples = one.time[inside], one.signals[signal][inside]
         if one.name in LINES:
             color, style = LINES[one.name]
-            axes.plot(time, samples, style, color=color, linewidth=1.4, label=one.name)
+            axes.plot(*envelope(time, samples), style, color=color, linewidth=1.4, label=one.name)
         else:
-            axes.plot(time, samples, ".", color=MEASURED, markersize=3, label=one.name)
+            axes.plot(*envelope(time, samples), ".", color=MEASURED, markersize=3, label=one.name)
     axes.set_ylabel(LABELS.get(signal, f"{signal} (pu)"))
     axes.legend(loc="best", frameon=False)
     value, at = between.largest
@@ -57,7 +58,7 @@ def _differences(axes: Axes, own: list[Difference]) -> None:
         color = LINES[one.second][0] if one.first == "record" else "black"
         width = 0.6 if one.first == "record" else 1.1
         label = f"{one.second} - {one.first}"
-        axes.plot(one.time, MILLI * one.error, color=color, linewidth=width, label=label)
+        axes.plot(*envelope(one.time, MILLI * one.error), color=color, linewidth=width, label=label)
     axes.set_ylabel("difference\n(1e-3 pu)" if len(own) > 1 else "B - A\n(1e-3 pu)")
     if len(own) > 1:
         axes.legend(loc="best", frameon=False, ncols=len(own), fontsize=8)

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from exfit.envelope import envelope
 from exfit.knowledge import Knowledge
 from exfit.plots.style import COLORS, LIMIT, MILLI, SIMULATED, START, STYLES, WIDTH, tidy
 from exfit.profiles import Profiles
@@ -25,8 +26,7 @@ def sensitivity(known: Knowledge, title: str) -> Figure:
     for axes, course in zip(panels, courses, strict=True):
         for place, k in enumerate(shown):
             axes.plot(
-                course.time,
-                PERCENT * MILLI * course.moved[:, k],
+                *envelope(course.time, PERCENT * MILLI * course.moved[:, k]),
                 STYLES[place // len(COLORS) % len(STYLES)],
                 color=COLORS[place % len(COLORS)],
                 linewidth=1.3,

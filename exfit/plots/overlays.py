@@ -3,6 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from exfit.envelope import envelope
 from exfit.plots.style import LABELS, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
 from exfit.result import Comparison, Overlay
 
@@ -24,11 +25,13 @@ def overlay(comparison: Comparison, title: str) -> Figure:
 
 def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> None:
     time = comparison.time
-    axes.plot(time, one.measured, ".", color=MEASURED, markersize=3, label="measured")
+    axes.plot(*envelope(time, one.measured), ".", color=MEASURED, markersize=3, label="measured")
     if one.start is not None:
-        axes.plot(time, one.start, "--", color=START, linewidth=1.2, label="start values")
+        axes.plot(
+            *envelope(time, one.start), "--", color=START, linewidth=1.2, label="start values"
+        )
     label = "fitted" if one.start is not None else "simulated"
-    axes.plot(time, one.simulated, "-", color=SIMULATED, linewidth=1.4, label=label)
+    axes.plot(*envelope(time, one.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
     axes.set_ylabel(LABELS[signal])
     axes.legend(loc="best", frameon=False)
     text = f"rmse {one.rmse:.3g} pu, fit {one.fit_percent:.2f} %"
@@ -38,6 +41,6 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> No
 
 def _error(axes: Axes, comparison: Comparison, one: Overlay) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
-    axes.plot(comparison.time, MILLI * one.error, color=SIMULATED, linewidth=0.7)
+    axes.plot(*envelope(comparison.time, MILLI * one.error), color=SIMULATED, linewidth=0.7)
     axes.set_ylabel("simulated\n- measured\n(1e-3 pu)")
     tidy(axes)

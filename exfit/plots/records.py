@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from exfit.envelope import PIXELS, envelope
 from exfit.inspection import Channel, Inspection
 from exfit.plots.style import LIMIT, SIMULATED, START, WIDTH, tidy
 from exfit.steps import Step
@@ -15,8 +16,7 @@ from exfit.steps import Step
 Array = NDArray[np.float64]
 
 MOST_PANELS = 10  # of one figure that are still readable
-POINTS = 2000  # of a line: more than a figure has dots across
-FEWEST_POINTS = 100  # of a stretch between two gaps
+FEWEST = 50  # bins of a stretch between two gaps
 SMALL = 8  # points
 RINGED = 200  # spikes
 NAMED = 4  # channels that are not drawn
@@ -46,34 +46,14 @@ def inspection(found: Inspection, title: str) -> Figure:
     return figure
 
 
-def envelope(time: Array, samples: Array, points: int = POINTS) -> tuple[Array, Array]:
-    """Return a line that looks like a long one: least and largest sample of each stretch."""
-    block = -(-2 * len(time) // points)
-    if block < 3:
-        return time, samples
-    whole = len(time) // block * block
-    rows = np.where(np.isfinite(samples[:whole]), samples[:whole], np.nan).reshape(-1, block)
-    empty = np.isnan(rows).all(axis=1)
-    least, largest = (
-        np.where(empty, np.nan, pick(np.where(np.isnan(rows), beyond, rows), axis=1))
-        for pick, beyond in ((np.min, np.inf), (np.max, -np.inf))
-    )
-    middle = np.mean(time[:whole].reshape(-1, block), axis=1)
-    line = np.ravel(np.column_stack([least, largest]))
-    return (
-        np.concatenate([np.repeat(middle, 2), time[whole:]]),
-        np.concatenate([line, samples[whole:]]),
-    )
-
-
 def _channel(axes: Axes, found: Inspection, one: Channel) -> None:
     time, column = found.time, found.samples[one.name]
     for gap in found.sampling.gaps:
         axes.axvspan(gap.start, gap.end, color=SHADE, linewidth=0.0)
     broken = np.searchsorted(time, [gap.end for gap in found.sampling.gaps])
-    share = max(POINTS // (len(broken) + 1), FEWEST_POINTS)
+    bins = max(PIXELS // (len(broken) + 1), FEWEST)
     for t, y in zip(np.split(time, broken), np.split(column, broken), strict=True):
-        axes.plot(*envelope(t, y, share), color=START, linewidth=0.9)
+        axes.plot(*envelope(t, y, bins), color=START, linewidth=0.9)
     for first, last in one.stuck:
         axes.axvspan(first, last, color=LIMIT, alpha=0.25, linewidth=0.0)
     at = np.array(one.spikes_at[:RINGED])

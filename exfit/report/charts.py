@@ -4,9 +4,8 @@ matplotlib would take two seconds to be imported and to draw those of a report, 
 one; and their text follows the style sheet of the page, so that it can be read on a telephone.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from math import ceil, floor, log10
 
 import numpy as np
@@ -174,32 +173,6 @@ def ticks(axis: Axis, most: int, whole: bool = False) -> tuple[Tick, ...]:
     first, last = ceil(axis.low / step - 1e-9), floor(axis.high / step + 1e-9)
     values = [k * step for k in range(first, last + 1)]
     return tuple(Tick(axis.place(value), _number(value, step)) for value in values)
-
-
-def envelope(x: Array, y: Array, bins: int) -> tuple[Array, Array]:
-    """Return a line thinned to the least and the greatest of each of so many stretches.
-
-    What is drawn looks the same: a stretch is no wider than what a screen shows.
-    """
-    rows = kept_rows([y], bins)
-    return x[rows], y[rows]
-
-
-def kept_rows(signals: Sequence[Array], bins: int) -> NDArray[np.intp]:
-    """Return the rows that hold the least and greatest of each signal (M,) in each of the bins."""
-    count = len(signals[0])
-    if count <= 2 * bins * len(signals):
-        return np.arange(count)
-    edges = np.linspace(0, count, bins + 1).astype(np.intp)
-    rows = {0, count - 1}
-    for signal in signals:
-        low, high = np.nan_to_num(signal, nan=np.inf), np.nan_to_num(signal, nan=-np.inf)
-        for first, last in pairwise(edges):
-            rows |= {
-                first + int(np.argmin(low[first:last])),
-                first + int(np.argmax(high[first:last])),
-            }
-    return np.array(sorted(rows), dtype=np.intp)
 
 
 def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.report.charts import SMALL, Chart, Panel, Rule, Series, envelope, kept_rows
+from exfit.envelope import envelope, kept_rows
+from exfit.report.charts import SMALL, Chart, Panel, Rule, Series
 from exfit.report.content import Fitted, Iteration, Match, Report, Signal
 from exfit.report.simulated import Courses, Moved, Small
 

@@ -1,0 +1,38 @@
+"""Long lines drawn with few points: what is seen of them stays the same."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PIXELS = 2000  # stretches of a line: a figure has no more dots across
+
+
+def envelope(x: Array, y: Array, bins: int = PIXELS) -> tuple[Array, Array]:
+    """Return a line (M,) thinned to the least and greatest of each of so many stretches.
+
+    A line with no more points than that stays as it is; a gap (nan) as long as a stretch stays one.
+    """
+    rows = kept_rows([y], bins)
+    return x[rows], y[rows]
+
+
+def kept_rows(signals: Sequence[Array], bins: int) -> NDArray[np.intp]:
+    """Return the rows that hold the least and greatest of each signal (M,) in each of the bins.
+
+    The first and last row are always among them, and all where they are not many more than these.
+    """
+    count = len(signals[0])
+    if count <= 2 * bins * len(signals):
+        return np.arange(count)
+    size = -(-count // bins)
+    starts = np.arange(0, count, size)
+    kept = [np.array([0, count - 1])]
+    for signal in signals:
+        for pick, beyond in ((np.argmin, np.inf), (np.argmax, -np.inf)):
+            filled = np.full(len(starts) * size, beyond)
+            filled[:count] = np.where(np.isnan(signal), beyond, signal)
+            kept.append(starts + pick(filled.reshape(-1, size), axis=1))
+    return np.unique(np.concatenate(kept))
