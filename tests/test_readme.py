@@ -63,14 +63,14 @@ def test_the_case_of_the_readme_is_valid_and_its_records_can_be_read(folder):
 
 def test_the_records_of_the_readme_are_a_valid_part_of_a_case(folder):
     machine = "model: AC1A\nplant: {type: open-circuit, machine: GENROU}\n"
-    (folder / "case.yaml").write_text(machine + block("yaml", 1), encoding="utf-8")
+    (folder / "case.yaml").write_text(machine + block("yaml", 2), encoding="utf-8")
     case = load_case(folder / "case.yaml")
     assert [one.name for one in case.recordings] == ["up", "on-line"]
     assert case.on_load
 
 
 def test_the_unit_on_load_of_the_readme_can_be_simulated(folder):
-    (folder / "case.yaml").write_text("model: AC1A\n" + block("yaml", 2), encoding="utf-8")
+    (folder / "case.yaml").write_text("model: AC1A\n" + block("yaml", 3), encoding="utf-8")
     response = study.simulate(load_case(folder / "case.yaml"), {}).response
     assert response.signals["p"][0] == pytest.approx(0.8, rel=1e-9)
     assert response.signals["vt"][0] == pytest.approx(1.0, rel=1e-9)
