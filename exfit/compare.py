@@ -12,6 +12,7 @@ from exfit.errors import RecordError
 from exfit.features import TAIL, Features, features
 from exfit.onset import Onset, find_step
 from exfit.readers import Table, open_table
+from exfit.readers.table import listed
 from exfit.result import judged_of
 
 Array = NDArray[np.float64]
@@ -241,9 +242,9 @@ def _clock(table: Table, asked: str | None) -> tuple[str, ...]:
     if asked is not None and asked in table.names:
         return (asked,)
     if not table.clock:
-        listed = ", ".join(repr(column) for column in table.names[:12])
-        text = f"no column of time among {listed}; name it with --time COLUMN"
-        raise RecordError(f"{table.path}: {text}")
+        raise RecordError(
+            f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
+        )
     return table.clock
 
 

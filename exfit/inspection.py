@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.naming import Guess, guessed, known_unit, three_phases, unit_of
+from exfit.naming import Guess, guessed, three_phases
 from exfit.quality import mains_frequency, noise_of, quantum, spikes, stuck
-from exfit.readers.table import Table
+from exfit.readers.table import Table, listed
+from exfit.readers.units import unit_in, usual
 from exfit.sampling import Sampling, increasing, sampling_of
 from exfit.steps import (
     ROUNDING,
@@ -146,9 +147,8 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
     """
     columns = tuple(clock or table.clock)
     if not columns:
-        names = ", ".join(table.names)
         raise RecordError(
-            f"{table.path}: no column seems to be the time; --time names one: {names}"
+            f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
         )
     stamps = table.instants(columns)
     if len(stamps) < FEWEST:
@@ -216,10 +216,10 @@ def _numbers(table: Table, names: Sequence[str]) -> tuple[dict[str, Array], dict
 def _unit(table: Table, name: str) -> tuple[str | None, str]:
     """Return the unit of a column and where it is from."""
     given = table.units.get(name)
-    if given:
-        return known_unit(given) or given, "file"
-    unit = unit_of(name)
-    return unit, "name" if unit else ""
+    if given is not None:
+        return usual(given), "file"
+    unit = unit_in(name)
+    return (None, "") if unit is None else (usual(unit), "name")
 
 
 def _described(

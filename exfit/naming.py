@@ -4,24 +4,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-QUANTITIES: Mapping[str, tuple[str, ...]] = {
-    "voltage": ("uV", "mV", "V", "kV"),
-    "current": ("mA", "A", "kA"),
-    "power": ("W", "kW", "MW"),
-    "reactive": ("var", "kvar", "Mvar"),
-}
-PER_UNIT = ("pu", "p.u.", "%")
-UNITS: Mapping[str, str] = {
-    **{unit.lower(): unit for units in QUANTITIES.values() for unit in units if unit[0] != "m"},
-    **{unit.lower(): "pu" for unit in PER_UNIT if unit != "%"},
-    "%": "%", "mvar": "Mvar", "mw": "MW", "kva": "kVA", "mva": "MVA", "hz": "Hz",
-}  # fmt: skip
-SMALL = ("mV", "mA")  # told from MV and MA by their case
-IN_NAME = (
-    re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\])}>]+)[\])}>]\s*$"),
-    re.compile(r"^(?P<name>.+?)\s*/\s*(?P<unit>\S+)$"),
-    re.compile(r"^(?P<name>.+?)(?:\s+in\s+|\s+|_)(?P<unit>\S+)$"),
-)
+from exfit.readers.units import bare, quantity_of
 
 # signal -> the quantity of its unit, and the words that stand for it, the surest first
 WORDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
@@ -65,35 +48,6 @@ class Guess:
 
     signal: str
     why: str
-
-
-def unit_of(name: str) -> str | None:
-    """Return the unit that stands in the name of a column, as ``Ugen [kV]``; None without one."""
-    for pattern in IN_NAME:
-        match = pattern.match(name)
-        if match and (unit := known_unit(match["unit"])):
-            return unit
-    return None
-
-
-def known_unit(text: str) -> str | None:
-    """Return a unit in its usual spelling, None where it is none that is known."""
-    text = text.strip()
-    return text if text in SMALL else UNITS.get(text.lower())
-
-
-def bare(name: str) -> str:
-    """Return the name of a column without its unit."""
-    for pattern in IN_NAME:
-        match = pattern.match(name)
-        if match and known_unit(match["unit"]) and match["name"]:
-            return match["name"]
-    return name
-
-
-def quantity_of(unit: str | None) -> str | None:
-    """Return what a unit measures: voltage, current, power, reactive; None for others."""
-    return next((name for name, units in QUANTITIES.items() if unit in units), None)
 
 
 def guessed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Guess]:

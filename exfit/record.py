@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.readers import open_table
-from exfit.readers.table import NONE, Table
-from exfit.readers.text import read_bytes
+from exfit.readers.table import NONE, Table, read_bytes
 from exfit.readers.units import alike
 from exfit.resampling import resampled
 from exfit.three_phase import Connection, PhasorCourse, vt_of_rms, vt_of_waveforms

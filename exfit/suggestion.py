@@ -9,7 +9,7 @@ import yaml
 
 from exfit.case_writer import commented
 from exfit.inspection import AT_REST_PU, Channel, Inspection, Phases
-from exfit.naming import quantity_of
+from exfit.readers.units import quantity_of
 from exfit.result import yaml_number
 from exfit.steps import Step
 

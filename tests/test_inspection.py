@@ -14,8 +14,9 @@ from hypothesis.extra.numpy import arrays
 from exfit import plots
 from exfit.errors import RecordError
 from exfit.inspection import inspect
-from exfit.naming import guessed, three_phases, unit_of
+from exfit.naming import guessed, three_phases
 from exfit.quality import quantum, spikes, stuck
+from exfit.readers.units import unit_in
 from exfit.record import read_columns
 from exfit.sampling import sampling_of
 from exfit.steps import Change, together
@@ -334,18 +335,9 @@ NAMES = {
     ("name", "signal"), [(name, signal) for signal, names in NAMES.items() for name in names]
 )
 def test_a_name_tells_its_signal(name, signal):
-    units = {name: unit} if (unit := unit_of(name)) else {}
+    units = {name: unit} if (unit := unit_in(name)) else {}
     found = guessed([name], units)
     assert (found[name].signal if found else None) == signal
-
-
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [("Ugen [kV]", "kV"), ("If (A)", "A"), ("Ugen/kV", "kV"), ("P in MW", "MW"), ("U_kV", "kV"),
-     ("vt (p.u.)", "pu"), ("Vref (%)", "%"), ("I [mA]", "mA"), ("q", None), ("U L1", None)],
-)  # fmt: skip
-def test_a_name_tells_its_unit(name, unit):
-    assert unit_of(name) == unit
 
 
 def test_each_signal_goes_to_the_surest_name_once():
@@ -395,7 +387,7 @@ def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency
 @pytest.mark.parametrize(
     ("table", "text"),
     [
-        (Columns({"a": np.ones(3)}, clock=()), "--time names one: a"),
+        (Columns({"a": np.ones(3)}, clock=()), "--time names one: 'a'"),
         (Columns({"t": np.arange(1.0), "vt": np.ones(1)}), "1 samples; at least 2"),
         (Columns({"t": np.arange(3.0), "vt": "words"}), "no column of numbers"),
         (Columns({"t": np.array([0.0, np.nan, 1.0]), "vt": np.ones(3)}), "record.csv:3: no time"),

@@ -64,7 +64,7 @@ LAYOUTS = {
     "titles and units": [*TITLES, NAMES, UNITS, *ROWS],
     "blank rows": [(), NAMES, (), *ROWS[:1], (), *ROWS[1:], ()],
     "names with blanks": [[f" {name} " for name in NAMES], *ROWS],
-    "nameless columns": [(*NAMES, None, ""), *((*row, 1.0, "x") for row in ROWS)],
+    "blank columns": [(*NAMES, None, ""), *((*row, None, "") for row in ROWS)],
 }
 
 
@@ -89,6 +89,12 @@ def test_a_table_may_stand_anywhere_below_merged_titles(tmp_path):
     table = read_excel(tmp_path / "bump.xlsx")
     assert_the_record(table)
     assert table.place(0).endswith("bump.xlsx: row 5")
+
+
+def test_a_column_without_a_name_is_called_by_its_number(book):
+    table = read_excel(book(Data=[("", *NAMES, None), *((7.0, *row, "x") for row in ROWS)]))
+    assert table.names == ("1", *NAMES, "5")
+    assert table.numbers(["1"])["1"].tolist() == [7.0, 7.0, 7.0]
 
 
 def test_units_stand_in_the_names_too(book):
@@ -152,7 +158,7 @@ def test_a_blank_cell_is_a_missing_sample(book, cell):
     table = read_excel(book(Data=with_cell(cell)))
     found = table.numbers(["Ut"], frozenset(["Ut"]))["Ut"]
     assert np.isnan(found).tolist() == [False, True, False]
-    refused(lambda: table.numbers(["Ut"]), "bump.xlsx: row 9, column 'Ut'", "missing")
+    refused(lambda: table.numbers(["Ut"]), "bump.xlsx: row 9: column 'Ut'", "missing")
 
 
 @pytest.mark.parametrize("cell", ["15,8", "15.8", "over", datetime(2015, 9, 20)], ids=str)
@@ -160,14 +166,14 @@ def test_a_cell_that_is_no_number_is_refused_by_row_and_column(book, cell):
     table = read_excel(book(Data=with_cell(cell)))
     shown = repr(cell) if isinstance(cell, str) else "2015-09-20"
     refused(
-        lambda: table.numbers(["Ut"]), "bump.xlsx: row 9, column 'Ut'", shown, "is not a number"
+        lambda: table.numbers(["Ut"]), "bump.xlsx: row 9: column 'Ut'", shown, "is not a number"
     )
     assert table.numbers(["If"])["If"].tolist() == [700, 701, 702]
 
 
 def test_a_second_table_below_is_refused(book):
     table = read_excel(book(Data=[NAMES, *ROWS, (), NAMES, *ROWS]))
-    refused(lambda: table.numbers(["Ut"]), "bump.xlsx: row 6, column 'Ut'", "'Ut'")
+    refused(lambda: table.numbers(["Ut"]), "bump.xlsx: row 6: column 'Ut'", "'Ut'")
 
 
 NO_TABLE = {

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from exfit.errors import RecordError
 from exfit.readers import open_table
 from exfit.readers.text import read_text_table
-from exfit.readers.units import alike, unit_in
 
 
 class Seen(NamedTuple):
@@ -361,6 +360,9 @@ FILES = {
     ),
     "minutes, asked for": Seen(
         form("Zeit;P", "0;1", "0,5;2", "1;3"), ("Zeit",), [0, 30, 60], {"P": [1, 2, 3]}, {}, "min"
+    ),
+    "a first column without a name": Seen(
+        form(",vt,", "0.5,1.0,7", "1.0,1.1,8"), ("1",), [0.5, 1.0], {"vt": [1.0, 1.1]}, {}
     ),
     "uneven sampling": Seen(
         form("t,vt", "0,1.0", "0.0046,1.1", "0.0096,1.2", "0.0142,1.3", "7.5,1.4"),
@@ -777,41 +779,6 @@ def test_damaged_files_are_read_or_refused(tmp_path_factory, text, at, cut, junk
         return
     assert time.shape == vt.shape
     assert np.isfinite(time[1:] - time[0]).all() or not np.isfinite(time).all()
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "same"),
-    [
-        ("kV", "KV", True),
-        ("pu", "p.u.", True),
-        ("Volts", "V", True),
-        ("µs", "us", True),
-        ("MW", "mW", False),
-        ("kV", "V", False),
-        ("A", "kA", False),
-    ],
-)
-def test_units_are_compared_as_they_are_meant(one, other, same):
-    assert alike(one, other) == same
-
-
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        ("Ugen [kV]", "kV"),
-        ("If (A)", "A"),
-        ("t/ms", "ms"),
-        ("Voltage in p.u.", "p.u."),
-        ("[s]", "s"),
-        ("U (L1)", None),
-        ("U [2]", None),
-        ("V/f", None),
-        ("vt", None),
-        ("Bus in use", None),
-    ],
-)
-def test_a_unit_in_a_name_is_known_and_nothing_else_taken_for_one(name, unit):
-    assert unit_in(name) == unit
 
 
 def test_windows_letters_beyond_latin_1_are_read(file):

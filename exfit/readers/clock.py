@@ -1,33 +1,61 @@
-"""The units of a time column."""
+"""The time: which columns seem to hold it, and in which unit."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from exfit.errors import RecordError
+from exfit.readers.table import Array, fault
+from exfit.readers.units import SECONDS, alike, bare, usual
 
-SECONDS: Mapping[str, float] = {
-    "s": 1.0, "sec": 1.0, "seconds": 1.0,
-    "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3,
-    "us": 1e-6, "µs": 1e-6, "μs": 1e-6,
-    "min": 60.0,
-}  # fmt: skip
+WHOLE = frozenset(  # date and time of day in one
+    ("timestamp", "zeitstempel", "zeitpunkt", "datetime", "date_time", "date_&_time",
+     "date_+_time", "date+time", "time_stamp", "time_date")
+)  # fmt: skip
+DATES = frozenset(("date", "datum", "fecha"))
+TIMES = re.compile(
+    r"t|time|tout|zeit|uhrzeit|tiempo|hora|temps|tempo|tijd|tid|utc|x_value|time_of_day"
+    r"|(?:rel|abs|elapsed)[a-z]*_?(?:time|zeit)"
+)
+BETWEEN = re.compile(r"[\s\-/.]+")
 
 
-def seconds_per_unit(path: Path, column: str, said: str | None, asked: str | None) -> float:
-    """Return the factor from a time column to s.
+def clock_of(names: Sequence[str], increases: Callable[[str], bool]) -> tuple[str, ...]:
+    """Return the column that seems to hold the time, or those of date and time of day, or none.
+
+    The names tell it, else what stands behind the last dot in them, as in s.time; else it is the
+    first column if it ``increases`` throughout.
+    """
+    for ends in (names, [name.rpartition(".")[2] for name in names]):
+        called = [BETWEEN.sub("_", bare(end).casefold()) for end in ends]
+        named = _named(names, called)
+        if named:
+            return named
+    return tuple(names[:1]) if names and increases(names[0]) else ()
+
+
+def _named(names: Sequence[str], called: Sequence[str]) -> tuple[str, ...]:
+    pairs = [*zip(names, called, strict=True)]
+    whole = [name for name, one in pairs if one in WHOLE]
+    dates = [name for name, one in pairs if one in DATES]
+    times = [name for name, one in pairs if TIMES.fullmatch(one)]
+    return tuple(whole[:1] or dates[:1] + times[:1])
+
+
+def in_seconds(
+    path: Path, column: str, numbers: Array, said: str | None, asked: str | None
+) -> Array:
+    """Return the numbers (M,) of a time column in s.
 
     ``said`` is the unit that the file itself gives, ``asked`` the one that the reader is told;
     without either it is s. Raises RecordError for a unit that is none of time, and where the two
     contradict each other.
     """
-    for unit in (said, asked):
-        if unit is not None and unit.lower() not in SECONDS:
-            raise RecordError(
-                f"{path}: column {column!r}: {unit} is no unit of time: s, ms, us, min"
-            )
-    factors = [SECONDS[unit.lower()] for unit in (said, asked) if unit is not None]
-    if len(set(factors)) > 1:
-        raise RecordError(
-            f"{path}: column {column!r} is in {said} as the file says, not in {asked}"
-        )
-    return factors[0] if factors else 1.0
+    units = [unit for unit in (said, asked) if unit is not None]
+    for unit in units:
+        if usual(unit) not in SECONDS:
+            raise fault(path, column, f"{unit} is no unit of time: {', '.join(SECONDS)}")
+    if said is not None and asked is not None and not alike(said, asked):
+        raise fault(path, column, f"is in {said} as the file says, not in {asked}")
+    factor = SECONDS[usual(units[0])] if units else 1.0
+    # one over it is whole: no digit of 5 ms is lost
+    return numbers / round(1.0 / factor) if factor < 1.0 else numbers * factor

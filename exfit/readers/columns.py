@@ -2,19 +2,19 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.readers.clock import seconds_per_unit
-from exfit.readers.table import NONE, Array
+from exfit.readers.clock import clock_of, in_seconds
+from exfit.readers.table import NONE, Array, fault, increases, position, refuse_uneven
 
 T = TypeVar("T")
 
-COLUMNS_SHOWN = 30
 SECOND = np.timedelta64(1, "s")
 
 
@@ -24,16 +24,22 @@ class Columns:
 
     ``fetch`` returns float64, or datetime64[ns] for timestamps and timedelta64[ns] for times of
     day, nan or NaT where a sample is missing; it raises RecordError for a column of anything else.
-    ``where`` names the place of a sample, counted from 0.
+    ``where`` names the place of a sample, counted from 0. ``said`` are the columns of the time
+    where the kind of file itself says so.
     """
 
     path: Path
     sha256: str
     names: tuple[str, ...]
     units: Mapping[str, str]
-    clock: tuple[str, ...]
     fetch: Callable[[int], NDArray[Any]]
     where: Callable[[int], str]
+    said: tuple[str, ...] = ()
+
+    @cached_property
+    def clock(self) -> tuple[str, ...]:
+        """The column that holds the time, or those of date and time; empty where none seems to."""
+        return self.said or clock_of(self.names, lambda name: increases(self, name))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
@@ -42,7 +48,7 @@ class Columns:
         lacks one, and for columns that are not equally long.
         """
         columns = {name: self._numbers(name, name in gappy) for name in names}
-        self._refuse_uneven(columns)
+        refuse_uneven(self.path, columns)
         return columns
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
@@ -52,13 +58,12 @@ class Columns:
         min. Raises RecordError where it contradicts the file, and where a sample is missing.
         """
         found = {name: self._whole(name) for name in columns}
-        self._refuse_uneven(found)
+        refuse_uneven(self.path, found)
         first = columns[0]
         if len(found) == 1 and found[first].dtype.kind == "f":
-            factor = seconds_per_unit(self.path, first, self.units.get(first), unit)
-            return np.asarray(found[first] * factor, np.float64)
+            return in_seconds(self.path, first, found[first], self.units.get(first), unit)
         if unit is not None:
-            self._refuse(first, f"holds timestamps: they have no unit such as {unit}")
+            raise fault(self.path, first, f"timestamps, no numbers of {unit}")
         ticks = self._ticks(found)
         return np.asarray((ticks - ticks[0]) / SECOND, np.float64)
 
@@ -67,18 +72,17 @@ class Columns:
         return self.where(row)
 
     def _numbers(self, name: str, gappy: bool) -> Array:
-        column = self.fetch(self._position(name)) if gappy else self._whole(name)
+        column = self.fetch(position(self.path, self.names, name)) if gappy else self._whole(name)
         if column.dtype.kind != "f":
-            self._refuse(name, "holds timestamps, not numbers")
+            raise fault(self.path, name, "timestamps, not numbers")
         return np.asarray(column, np.float64)
 
     def _whole(self, name: str) -> NDArray[Any]:
         """Return a column that lacks no sample."""
-        column = self.fetch(self._position(name))
+        column = self.fetch(position(self.path, self.names, name))
         lost = np.flatnonzero(np.isnan(column))  # NaT too
         if lost.size:
-            place = self.where(int(lost[0]))
-            raise RecordError(f"{place}, column {name!r}: the sample is missing")
+            raise fault(self.where(int(lost[0])), name, "the sample is missing")
         return column
 
     def _ticks(self, found: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
@@ -89,49 +93,6 @@ class Columns:
             raise RecordError(f"{self.path}: columns {names} are not a date and a time of day")
         first, *rest = found.values()
         return first + rest[0] if rest else first
-
-    def _position(self, name: str) -> int:
-        found = [at for at, known in enumerate(self.names) if known == name]
-        if not found:
-            raise RecordError(f"{self.path}: no column {name!r}{_near(name, self.names)}")
-        if len(found) > 1:
-            places = " and ".join(str(at + 1) for at in found)
-            raise RecordError(f"{self.path}: {name!r} names more than one column: {places}")
-        return found[0]
-
-    def _refuse_uneven(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        sizes = {name: column.size for name, column in columns.items()}
-        if len(set(sizes.values())) > 1:
-            first, *rest = sizes
-            other = next(name for name in rest if sizes[name] != sizes[first])
-            raise RecordError(
-                f"{self.path}: column {first!r} has {sizes[first]} samples, {other!r} has "
-                f"{sizes[other]}"
-            )
-
-    def _refuse(self, name: str, what: str) -> NoReturn:
-        raise RecordError(f"{self.path}: column {name!r} {what}")
-
-
-def _near(name: str, names: Sequence[str]) -> str:
-    """Return which columns there are, those first that read alike."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(name, names)
-    meant = f"; is {' or '.join(map(repr, near))} meant" if near else ""
-    known = ", ".join(map(repr, names[:COLUMNS_SHOWN]))
-    more = f" and {len(names) - COLUMNS_SHOWN} more" if len(names) > COLUMNS_SHOWN else ""
-    return f"{meant}; the columns are {known}{more}"
-
-
-def read_bytes(path: Path) -> bytes:
-    """Return the bytes of a file; raises RecordError where it cannot be read."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a name with a null character
-        raise RecordError(f"{path}: cannot be read: {error}") from None
 
 
 def needed(path: Path, package: str, extra: str) -> RecordError:

@@ -1,8 +1,6 @@
 """How a delimited text is written: separator, decimal mark, where the names, units and rows stand.
 
-The names of columns stay as the file has them, without blanks around them: ``Ut [kV]``, not
-``Ut``; a unit in it, or in a row of its own below the names, is known beside it. Without a row of
-names the columns are called 1, 2, 3 ... What could be read in two ways is refused.
+Without a row of names the columns are called 1, 2, 3 ... What could be read in two ways is refused.
 """
 
 import csv
@@ -15,18 +13,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from exfit.errors import RecordError
+from exfit.readers.cells import INFINITE, NUMBER, SHOWN, is_missing
+from exfit.readers.heads import is_units, names_of, units_of
 from exfit.readers.timestamps import is_timestamp
-from exfit.readers.units import unit_in, unit_of
 
 HEAD = 300  # lines in which the first row of numbers must stand
-SHOWN = 40  # characters of a cell in a message
 SEPARATORS: Mapping[str | None, str] = {
     ";": "semicolons", "\t": "tabs", ",": "commas", None: "blanks"
 }  # fmt: skip
 COMMENTS = ("//", "#", "%", "!", "'", ";")
-NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*|,[0-9]+)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
-INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
-MISSING = re.compile(r"|[+-]?nan|-+|\*+", re.IGNORECASE)
 OPTIONAL = ("", "comment")  # names of a last column that rows may leave out; LabVIEW's is Comment
 TOKEN = re.compile(r'"[^"]*"|\S+')
 TOKEN_WITH_UNIT = re.compile(r'"[^"]*"|\S+(?:[ \t]+(?:\[[^\[\]]*\]|\([^()]*\)))?')
@@ -65,19 +60,6 @@ class _Layout:
     share: float
     named: bool
     fault: str | None = None
-
-
-def is_number(cell: str, comma: bool | None) -> bool:
-    """Tell whether a cell is a number with that decimal mark, ASCII, not 1_000; nan and inf too."""
-    cell = cell.strip()
-    if NUMBER.fullmatch(cell):
-        return ("." if comma else ",") not in cell
-    return bool(INFINITE.fullmatch(cell)) or cell.lstrip("+-").lower() == "nan"
-
-
-def is_missing(cell: str) -> bool:
-    """Tell whether a cell says that there is no sample: empty, nan, dashes, stars."""
-    return MISSING.fullmatch(cell.strip()) is not None
 
 
 def is_value(cell: str) -> bool:
@@ -174,12 +156,13 @@ def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout |
     names, units, fault = _heading(above, body, cells, columns, separator, ends_empty)
     if ends_empty and names[-1:] == ("",):
         names = names[:-1]
+    names = names_of(names)
     below = [row for row in plain if row.line >= body.line]
     dialect = Dialect(
         separator,
         has_comma(row.cells for row in below),
         names or tuple(str(at + 1) for at in range(cells)),
-        _units(names, units),
+        units_of(names, units),
         cells,
         body.line,
     )
@@ -251,7 +234,7 @@ def _heading(
         fitted = _fitted(rows[-1], cells, separator, ends_empty) if rows else ()
         if not any(fitted) or any(is_value(fitted[at]) for at in columns):
             continue
-        if len(rows) > 1 and all(cell in ("", "-") or unit_of(cell) for cell in fitted):
+        if len(rows) > 1 and is_units(fitted):
             names = _fitted(rows[-2], cells, separator, ends_empty)
             if any(name and not is_value(name) for name in names):
                 return names, fitted, None
@@ -277,14 +260,6 @@ def _fitted(row: Row, cells: int, separator: str | None, ends_empty: bool) -> tu
     if len(found) == cells - 1 and ends_empty:
         found = (*found, "")
     return found if len(found) == cells else ()
-
-
-def _units(names: Sequence[str], row: Sequence[str]) -> dict[str, str]:
-    """Return the units by column, from a row of their own or out of the names."""
-    found = {name: unit_in(name) for name in names}
-    for name, cell in zip(names, row, strict=False):
-        found[name] = unit_of(cell) or found[name]
-    return {name: unit for name, unit in found.items() if unit and unit != "-"}
 
 
 def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.readers.columns import Columns, needed, read_bytes, sound
-from exfit.readers.names import clock_of, is_unit, unit_in
-from exfit.readers.table import Table
+from exfit.readers.cells import shown
+from exfit.readers.columns import Columns, needed, sound
+from exfit.readers.heads import is_units, names_of, units_of
+from exfit.readers.table import Table, fault, read_bytes
 
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 Row = Sequence[Any]
 
 FEWEST_CELLS = 2  # of a row that holds a sample: the time and one signal
-CELL_SHOWN = 40
 WORKBOOK = "an Excel workbook"
 
 
@@ -43,7 +43,7 @@ def read_excel(path: Path, sheet: str | None = None) -> Table:
     """Return the table on a sheet of an Excel workbook (.xlsx, .xlsm, .xlsb, .xls) or an .ods.
 
     Above the samples stands a row of names, between them perhaps a row of units; what stands
-    higher, as titles do, is left out, and so are blank rows and columns without a name. Timestamps
+    higher, as titles do, is left out, and so are blank rows and columns. Timestamps
     are good to 1 ms, as Excel shows them. A cell with an error, as #DIV/0!, is a missing sample.
 
     Args:
@@ -114,8 +114,7 @@ def _is_sample(row: Row) -> bool:
 
 
 def _is_units(row: Row) -> bool:
-    cells = [cell for cell in row if cell != ""]
-    return all(isinstance(cell, str) and is_unit(cell) for cell in cells)
+    return all(isinstance(cell, str) for cell in row) and is_units(row)
 
 
 def _names(row: Row, below: Row) -> bool:
@@ -128,19 +127,14 @@ def _names(row: Row, below: Row) -> bool:
 def _sheet(
     name: str, rows: Sequence[Row], head: int, units: int | None, samples: tuple[int, ...]
 ) -> _Sheet:
-    named = {at: cell.strip() for at, cell in enumerate(rows[head]) if cell.strip()}
-    below = rows[units] if units is not None else [""] * len(rows[head])
-    said = {
-        column: below[at].strip(" []()") or unit_in(column) or "" for at, column in named.items()
-    }
-    return _Sheet(
-        name=name,
-        rows=rows,
-        places=tuple(named),
-        names=tuple(named.values()),
-        units={column: unit for column, unit in said.items() if unit},
-        samples=samples,
-    )
+    below = rows[head if units is None else units]
+    places = [
+        at for at in range(len(below)) if any(rows[row][at] != "" for row in (head, *samples))
+    ]
+    called = names_of(rows[head])
+    names = tuple(called[at] for at in places)
+    said = () if units is None else [below[at] for at in places]
+    return _Sheet(name, rows, tuple(places), names, units_of(names, said), samples)
 
 
 def _columns(path: Path, sha256: str, sheet: _Sheet, asked: bool) -> Columns:
@@ -151,28 +145,26 @@ def _columns(path: Path, sha256: str, sheet: _Sheet, asked: bool) -> Columns:
 
     def fetch(at: int) -> NDArray[Any]:
         cells = [sheet.rows[row][sheet.places[at]] for row in sheet.samples]
-        return _column(cells, lambda row: f"{where(row)}, column {sheet.names[at]!r}")
+        return _column(cells, sheet.names[at], where)
 
     return Columns(
         path=path,
         sha256=sha256,
         names=sheet.names,
         units=sheet.units,
-        clock=clock_of(sheet.names),
         fetch=fetch,
         where=where,
     )
 
 
-def _column(cells: Sequence[Any], place: Callable[[int], str]) -> NDArray[Any]:
+def _column(cells: Sequence[Any], name: str, where: Callable[[int], str]) -> NDArray[Any]:
     """Return cells of one kind as an array: numbers, timestamps or times of day."""
     if all(type(cell) is float for cell in cells):  # as nearly always: five times as fast
         return np.array(cells)
     kind = next((_kind(cell) for cell in cells if _kind(cell) not in ("", "text")), "number")
     for row, cell in enumerate(cells):
         if _kind(cell) not in ("", kind):
-            shown = repr(cell) if isinstance(cell, str) else str(cell)
-            raise RecordError(f"{place(row)}: {shown[:CELL_SHOWN]} is not a {kind}")
+            raise fault(where(row), name, f"{shown(cell)} is not a {kind}")
     if kind == "number":
         return np.array([np.nan if cell == "" else float(cell) for cell in cells])
     if kind == "timestamp":

@@ -4,7 +4,6 @@ import hashlib
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,9 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.readers import mat5
-from exfit.readers.columns import Columns, read_bytes, sound
-from exfit.readers.names import clock_of
-from exfit.readers.table import Array, Table
+from exfit.readers.columns import Columns, sound
+from exfit.readers.heads import units_of
+from exfit.readers.table import Array, Table, fault, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_OFFSET = 512  # of the HDF5 signature in a file of version 7.3
@@ -48,8 +47,7 @@ def read_mat(path: Path) -> Table:
         path=path,
         sha256=hashlib.sha256(data).hexdigest(),
         names=names,
-        units=MappingProxyType({}),
-        clock=_clock(names),
+        units=units_of(names),
         fetch=lambda at: _numbers(path, *found[at]),
         where=lambda row: f"{path}: sample {row + 1}",
     )
@@ -115,12 +113,6 @@ def _text(value: Any) -> str:
     return ""
 
 
-def _clock(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the column that seems to hold the time: t, time or tout, of all or of a struct."""
-    last = {name.rpartition(".")[2]: name for name in reversed(names)}
-    return tuple(last[one] for one in clock_of(tuple(last))[:1])
-
-
 def _is_real(values: NDArray[Any]) -> bool:
     return values.dtype.kind in "fiub"
 
@@ -128,5 +120,5 @@ def _is_real(values: NDArray[Any]) -> bool:
 def _numbers(path: Path, name: str, values: NDArray[Any]) -> Array:
     if not _is_real(values):
         kind = "complex numbers" if values.dtype.kind == "c" else "text"
-        raise RecordError(f"{path}: column {name!r} holds {kind}")
+        raise fault(path, name, f"{kind}, not numbers")
     return np.asarray(values, np.float64)

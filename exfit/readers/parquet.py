@@ -1,7 +1,7 @@
 """Parquet files, by pyarrow; a column is read when it is asked for."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.readers.columns import Columns, needed, sound
-from exfit.readers.names import clock_of, unit_in
-from exfit.readers.table import Table
+from exfit.readers.heads import stated
+from exfit.readers.table import Table, fault, readable
+from exfit.readers.units import unit_in
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -46,20 +47,14 @@ def read_parquet(path: Path) -> Table:
         sha256=sha256,
         names=names,
         units=_units(schema),
-        clock=clock_of(names),
         fetch=lambda at: _fetch(path, opened, schema.field(at)),
         where=lambda row: f"{path}: row {row + 1}",
     )
 
 
 def _hash(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a name with a null character
-        raise RecordError(f"{path}: cannot be read: {error}") from None
+    with readable(path), path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":
@@ -68,20 +63,23 @@ def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":
 
 
 def _units(schema: "pa.Schema") -> dict[str, str]:
-    units = {}
-    for field in schema:
-        said = [field.metadata[key] for key in UNIT_KEYS if key in (field.metadata or {})]
-        unit = said[0].decode("utf-8", "replace") if said else unit_in(field.name)
-        if unit:
-            units[field.name] = unit
-    return units
+    return stated(
+        {field.name: _said(field.metadata or {}) or unit_in(field.name) for field in schema}
+    )
+
+
+def _said(metadata: Mapping[bytes, bytes]) -> str | None:
+    """Return the unit in the metadata of a column."""
+    return next(
+        (metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if key in metadata), None
+    )
 
 
 def _fetch(path: Path, opened: "Callable[[], ParquetFile]", field: "pa.Field") -> NDArray[Any]:
     """Return a column as float64, datetime64[ns] or timedelta64[ns]."""
     steps = _steps(field.type)
     if not steps:
-        raise RecordError(f"{path}: column {field.name!r} holds {field.type}, not numbers")
+        raise fault(path, field.name, f"{field.type}, not numbers")
 
     def read() -> "pa.ChunkedArray":
         with opened() as file:
@@ -101,7 +99,7 @@ def _cast(
             # an integer beyond 2**53 becomes the float64 next to it; a date beyond ns does not
             column = column.cast(kind, safe=not is_floating(kind))
     except ArrowInvalid as error:
-        raise RecordError(f"{path}: column {name!r}: {error}") from None
+        raise fault(path, name, str(error)) from None
     return np.asarray(column.to_numpy())
 
 

@@ -1,8 +1,9 @@
 """A recorder's file as a table: named columns of numbers, whatever kind of file it is."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +60,66 @@ def position(path: Path, names: Sequence[str], name: str) -> int:
     """Return the position of a column; raises RecordError where it is not there, or there twice."""
     found = [at for at, known in enumerate(names) if known == name]
     if not found:
-        known = ", ".join(repr(name) for name in names[:COLUMNS_SHOWN])
-        more = f" and {len(names) - COLUMNS_SHOWN} more"
-        shown = known + (more if len(names) > COLUMNS_SHOWN else "")
-        raise RecordError(f"{path}: no column {name!r}; the columns are {shown}")
+        raise RecordError(f"{path}: no column {name!r}{_near(name, names)}")
     if len(found) > 1:
         places = " and ".join(str(at + 1) for at in found)
         raise RecordError(f"{path}: {name!r} names more than one column: {places}")
     return found[0]
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return columns as a message lists them, the first of many."""
+    known = ", ".join(map(repr, names[:COLUMNS_SHOWN]))
+    more = f" and {len(names) - COLUMNS_SHOWN} more" if len(names) > COLUMNS_SHOWN else ""
+    return known + more
+
+
+def increases(table: Table, name: str) -> bool:
+    """Tell whether a column, of numbers or of timestamps, increases throughout."""
+    try:
+        instants = table.instants([name])
+    except RecordError:
+        return False
+    return bool(np.all(np.diff(instants) > 0.0))
+
+
+def refuse_uneven(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
+    """Raise a RecordError where columns, or a column and the time, differ in length."""
+    sizes = {name: len(column) for name, column in columns.items()}
+    if len(set(sizes.values())) > 1:
+        first, *rest = sizes
+        other = next(name for name in rest if sizes[name] != sizes[first])
+        raise RecordError(
+            f"{path}: column {first!r} has {sizes[first]} samples, {other!r} has {sizes[other]}"
+        )
+
+
+def fault(place: Path | str, name: str, what: str) -> RecordError:
+    """Return the error of a column, or of a cell of it: where, in which column, what was seen."""
+    return RecordError(f"{place}: column {name!r}: {what}")
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the bytes of a file; raises RecordError where it cannot be read."""
+    with readable(path):
+        return path.read_bytes()
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Raise RecordError for what keeps a file from being read."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:  # a name with a null character
+        raise RecordError(f"{path}: cannot be read: {error}") from None
+
+
+def _near(name: str, names: Sequence[str]) -> str:
+    """Return which columns there are, those first that read alike."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, names)
+    meant = f"; is {' or '.join(map(repr, near))} meant" if near else ""
+    return f"{meant}; the columns are {listed(names)}"

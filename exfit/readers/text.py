@@ -7,47 +7,26 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.readers.clock import seconds_per_unit
+from exfit.readers.cells import is_missing, is_number, shown, why_not
+from exfit.readers.clock import clock_of, in_seconds
 from exfit.readers.decoding import Text, decoded
-from exfit.readers.dialect import (
-    HEAD,
-    NUMBER,
-    SHOWN,
-    Dialect,
-    find_dialect,
-    has_comma,
-    is_comment,
-    is_missing,
-    is_number,
-    split_rows,
-)
-from exfit.readers.table import NONE, Array, position
+from exfit.readers.dialect import HEAD, Dialect, find_dialect, has_comma, is_comment, split_rows
+from exfit.readers.table import NONE, Array, fault, increases, position, read_bytes
 from exfit.readers.timestamps import (
     WIDEST,
     WIDEST_OF_TWO,
     StampError,
-    has_date,
-    has_time,
     is_timestamp,
     seconds_since_first,
 )
-from exfit.readers.units import symbol
 
 CHUNK = 1 << 22  # bytes looked at together
-CLOCK = re.compile(
-    r"t|time|zeit|uhrzeit|zeitstempel|tiempo|hora|temps|tempo|tijd|tid|date|datum|fecha|utc"
-    r"|timestamp|datetime|x_value|(?:rel|abs)\w* ?(?:time|zeit)"
-    r"|(?:time|date)[ _/&+-]*(?:time|stamp)",
-    re.IGNORECASE,
-)
-UNIT_BEHIND = re.compile(r"\s*[\[(/,].*|\s+in\s.*")
-THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,22 +50,8 @@ class TextTable:
 
     @cached_property
     def clock(self) -> tuple[str, ...]:
-        """The column that holds the time, or those of date and time; empty where none seems to.
-
-        By the cells, else by the name, else the first column if it increases throughout.
-        """
-        _, first = next(self.rows())
-        cells = dict(zip(self.names, first, strict=False))
-        stamps = [name for name, cell in cells.items() if is_timestamp(cell)]
-        dates = [name for name in stamps if not has_time(cells[name])]
-        times = [name for name in stamps if not has_date(cells[name])]
-        whole = [name for name in stamps if name not in dates and name not in times]
-        if whole or stamps:
-            return (whole[0],) if whole else (*dates[:1], *times[:1])
-        for name in self.names:
-            if CLOCK.fullmatch(UNIT_BEHIND.sub("", name)):
-                return (name,)
-        return self.names[:1] if self._increases(self.names[0]) else ()
+        """The column that holds the time, or those of date and time; empty where none seems to."""
+        return clock_of(self.names, lambda name: increases(self, name))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
@@ -110,15 +75,11 @@ class TextTable:
         stamped = len(places) > 1 or (places[0] < len(first) and is_timestamp(first[places[0]]))
         if not stamped:
             (name,) = columns
-            said = self.units.get(name)
-            factor = seconds_per_unit(self.path, name, said and symbol(said), unit)
-            time = self.numbers([name])[name]
-            return time if factor == 1.0 else time / (1 / factor)  # 1/factor is whole: no rounding
+            numbers = self.numbers([name])[name]
+            return in_seconds(self.path, name, numbers, self.units.get(name), unit)
         if unit is not None:
-            shown = repr(first[places[0]].strip()[:SHOWN])
-            raise RecordError(
-                f"{self.path}: column {columns[0]!r}: {shown} is a timestamp, no number of {unit}"
-            )
+            what = f"{shown(first[places[0]])} is a timestamp, no number of {unit}"
+            raise fault(self.path, columns[0], what)
         return self._stamps(columns, places)
 
     def place(self, row: int) -> str:
@@ -244,7 +205,7 @@ class TextTable:
                 cell = row[place].strip()
                 if is_number(cell, comma) or (name in gappy and is_missing(cell)):
                     continue
-                self._refuse(line, name, _why_not(cell, comma))
+                raise fault(f"{self.path}:{line}", name, why_not(cell, comma))
 
     def _check_width(self, line: int, row: Sequence[str]) -> None:
         """Raise a RecordError for a row of more or fewer cells than there are columns."""
@@ -266,24 +227,13 @@ class TextTable:
             for line, row in self.rows():
                 for name, place in zip(columns, places, strict=True):
                     if not is_timestamp(row[place]):
-                        self._refuse(line, name, f"{row[place].strip()[:SHOWN]!r} is no timestamp")
+                        what = f"{shown(row[place])} is no timestamp"
+                        raise fault(f"{self.path}:{line}", name, what) from None
             raise RecordError(f"{self.path}: {error}") from None
         try:
             return seconds_since_first(cells)
         except StampError as error:
-            raise RecordError(
-                f"{self.place(error.row)}: column {columns[error.column]!r}: {error}"
-            ) from None
-
-    def _increases(self, name: str) -> bool:
-        try:
-            column = self.numbers([name])[name]
-        except RecordError:
-            return False
-        return bool(np.all(np.diff(column) > 0))
-
-    def _refuse(self, line: int, name: str, what: str) -> NoReturn:
-        raise RecordError(f"{self.path}:{line}: column {name!r}: {what}")
+            raise fault(self.place(error.row), columns[error.column], str(error)) from None
 
 
 def read_text_table(path: Path) -> TextTable:
@@ -304,27 +254,5 @@ def read_text_table(path: Path) -> TextTable:
     return table
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return the bytes of a file; raises RecordError where it cannot be read."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a name with a null character
-        raise RecordError(f"{path}: cannot be read: {error}") from None
-
-
 def _number_or_nan(cell: str) -> float:
     return np.nan if is_missing(cell) else float(cell)
-
-
-def _why_not(cell: str, comma: bool | None) -> str:
-    """Return why a cell is no number."""
-    if not cell:
-        return "an empty cell"
-    what = f"{cell[:SHOWN]!r} is not a number"
-    if THOUSANDS.fullmatch(cell):
-        return f"{what}; thousands may not be set apart"
-    if comma and NUMBER.fullmatch(cell):
-        return f"{what} with a decimal comma, as others are"
-    return what

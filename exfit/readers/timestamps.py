@@ -58,18 +58,6 @@ def is_timestamp(cell: str) -> bool:
     return bool(cell.strip()) and FORM.fullmatch(cell) is not None
 
 
-def has_date(cell: str) -> bool:
-    """Tell whether a timestamp has a date."""
-    found = FORM.fullmatch(cell)
-    return found is not None and (found["year"] or found["one"]) is not None
-
-
-def has_time(cell: str) -> bool:
-    """Tell whether a timestamp has a time of day."""
-    found = FORM.fullmatch(cell)
-    return found is not None and found["hour"] is not None
-
-
 def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
     """Return the instants (M,) in s since the first, of cells (M, 1), or (M, 2) of date and time.
 

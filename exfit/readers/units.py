@@ -1,64 +1,149 @@
-"""Units of columns: what a recorder writes beside a name, or in a row of its own."""
+"""Units of columns: what a recorder writes behind a name, or in a row or a field of its own."""
 
 import re
+from collections.abc import Callable, Mapping
 
-WORDS = {
+# body of a unit, folded -> its usual spelling, and the quantity that it measures
+BODIES: Mapping[str, tuple[str, str]] = {
+    "v": ("V", "voltage"), "a": ("A", "current"), "w": ("W", "power"), "var": ("var", "reactive"),
+    "va": ("VA", "apparent"), "hz": ("Hz", "frequency"), "s": ("s", "time"),
+    "ohm": ("Ω", "resistance"), "ω": ("Ω", "resistance"), "nm": ("Nm", "torque"),
+    "pa": ("Pa", "pressure"),
+}  # fmt: skip
+WORDS: Mapping[str, str] = {
     "volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "amperes": "A",
     "watt": "W", "watts": "W", "hertz": "Hz", "ohm": "Ω", "ohms": "Ω",
     "second": "s", "seconds": "s", "sec": "s", "sek": "s", "seg": "s",
     "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "microseconds": "us",
-    "µs": "us", "μs": "us",
-    "p.u.": "pu", "p.u": "pu", "p. u.": "pu", "percent": "%", "°": "deg", "grad": "deg",
+    "pu": "pu", "p.u.": "pu", "p.u": "pu", "p. u.": "pu", "per unit": "pu",
+    "percent": "%", "deg": "deg", "°": "deg", "grad": "deg", "min": "min", "h": "h",
 }  # fmt: skip
-PLAIN = {"pu", "1", "-"}  # of numbers that need no base
-OTHERS = {"%", "min", "h", "rad", "rpm", "deg", "1/min", "min-1", "°C", "dB", "us", *PLAIN}
-PREFIXED = re.compile(
-    r"[pnuµμmkKMG]?(?:V|A|W|VA|[vV][aA]?[rR]|Hz|HZ|s|Ω|F|H|T|Nm|Pa|v|a)"
-    r"(?:[ _]?(?:dc|ac|DC|AC|rms|RMS|eff))?"
+OTHERS = frozenset(
+    ("%", "‰", "-", "rad", "rad/s", "el.deg", "°C", "K", "rpm", "r/min", "1/min", "min-1", "U/min",
+     "1/s", "m/s", "bar", "dB")
+)  # fmt: skip
+PLAIN = frozenset(("", "-", "1", "pu"))  # of numbers that need no base
+SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+
+# a prefix is told by its case; S is a phase, and so is a small a
+_PREFIXED = re.compile(
+    r"(?P<prefix>[nuµμmkKMG]?)(?P<body>(?i:VA|var|Hz|Ohm)|[VvAWwΩs]|Nm|Pa)"
+    r"(?:[ _]?(?i:dc|ac|rms|eff))?"
+    r"|(?P<small>[mk])(?P<ampere>a)|(?P<milli>M)(?P<second>S)"
 )
-IN_NAME = (
-    re.compile(r".*?\S?\s*\[\s*([^\[\]]+?)\s*\]"),
-    re.compile(r".*?\S?\s*\(\s*([^()]+?)\s*\)"),
-    re.compile(r".*\S\s*/\s*(\S+)"),
-    re.compile(r".*\S\s+in\s+(\S+)"),
-)
-BRACKETS = re.compile(r"[\[(<{]\s*(.*?)\s*[\])>}]")
+_MEGA = re.compile(r"mw|mva|m(?i:var)")  # no generator makes milliwatts in small letters, or mvar
+_PREFIXES: Mapping[str, str] = {"K": "k", "µ": "u", "μ": "u"}
+_BARE = re.compile(r"[\[({<]\s*(.*?)\s*[\])}>]")
+_TIME = re.compile(r"t|time|zeit|tiempo|temps|tempo", re.IGNORECASE)
+_OF_PHASES = re.compile(r"[uve]\w{0,4}|.*(?:volt|spannung|phase|tensi)\w*", re.IGNORECASE)
 
 
 def unit_of(text: str) -> str | None:
-    """Return the unit that a text is, without brackets; None where it is none."""
+    """Return the unit that a text is, as it is written, without brackets; None where it is none."""
     text = text.strip()
-    bare = BRACKETS.fullmatch(text)
-    unit = bare[1] if bare else text
-    known = unit in OTHERS or unit.casefold() in {*WORDS, *OTHERS} or PREFIXED.fullmatch(unit)
-    return unit if known else None
+    found = _BARE.fullmatch(text)
+    unit = found[1] if found else text
+    return unit if unit in OTHERS or unit.casefold() in WORDS or _prefixed(unit) else None
 
 
-def unit_in(name: str) -> str | None:
-    """Return the unit at the end of a name: U [kV], If (A), t/ms, Voltage in p.u.; else None."""
-    for form in IN_NAME:
-        found = form.fullmatch(name)
-        if found and unit_of(found[1]) is not None:
-            return found[1]
-    return None
+def usual(unit: str) -> str:
+    """Return the usual spelling of a unit: V of Volts and Vrms, kV of KV, Mvar of mvar."""
+    unit = unit.strip()
+    word = WORDS.get(unit.casefold())
+    return word or (_prefixed(unit) or (unit, ""))[0]
 
 
 def alike(one: str, other: str) -> bool:
     """Tell whether two texts are the same unit: kV and KV, pu and p.u.; but not MW and mW."""
-    return _folded(one) == _folded(other)
+    return usual(one) == usual(other) or (
+        unit_of(one) is None and one.strip().casefold() == other.strip().casefold()
+    )
+
+
+def quantity_of(unit: str | None) -> str | None:
+    """Return what a unit measures: voltage, current, power, reactive, time ...; None for others."""
+    if unit is None:
+        return None
+    symbol = usual(unit)
+    if symbol in SECONDS or symbol == "h":
+        return "time"
+    found = _prefixed(symbol)
+    return found[1] if found else None
 
 
 def needs_base(unit: str) -> bool:
     """Tell whether numbers of a unit are per unit only after a division by their base."""
-    return _folded(unit) not in PLAIN
+    return usual(unit) not in PLAIN
 
 
-def symbol(unit: str) -> str:
-    """Return a unit that is written as a word by its symbol: Volts is V."""
-    return WORDS.get(unit.strip().casefold(), unit.strip())
+def unit_in(name: str) -> str | None:
+    """Return the unit at the end of a column's name, None without one.
+
+    Ugen [kV], If (A), t/ms, U in V, Time, s and U_kV have one; U (L1), Phase, A, P_min and U (A),
+    where letters are phases and limits, have none.
+    """
+    return _split(name)[1]
 
 
-def _folded(unit: str) -> str:
-    unit = symbol(unit)
-    milli_or_mega = unit[:1] in ("m", "M") and len(unit) > 1
-    return unit[0] + unit[1:].casefold() if milli_or_mega else unit.casefold()
+def bare(name: str) -> str:
+    """Return the name of a column without its unit."""
+    return _split(name)[0]
+
+
+def _split(name: str) -> tuple[str, str | None]:
+    """Return a name without its unit, and the unit."""
+    name = name.strip()
+    for form, holds in FORMS:
+        found = form.fullmatch(name)
+        if found and holds(found["name"], found["unit"]) and name not in OTHERS:
+            return found["name"] or name, found["unit"]
+    return name, None
+
+
+def _in_brackets(name: str, unit: str) -> bool:
+    return unit_of(unit) is not None and not (unit == "A" and _OF_PHASES.fullmatch(name))
+
+
+def _behind_in(_: str, unit: str) -> bool:
+    return unit_of(unit) is not None
+
+
+def _behind_stroke(name: str, unit: str) -> bool:
+    """Tell whether a unit is that of what stands before it, and no part of one, as in V/Hz."""
+    before = quantity_of(name.split()[-1])
+    of_another = unit_of(name.split()[-1]) is not None and before != quantity_of(unit)
+    return _in_brackets(name, unit) and not of_another
+
+
+def _apart(name: str, unit: str) -> bool:
+    """Tell whether a unit stands behind a mark that may also be a part of the name.
+
+    There letters alone are phases, and min is a limit, except behind a time.
+    """
+    quantity = quantity_of(unit)
+    if quantity == "time":
+        return _TIME.fullmatch(name) is not None
+    electric = quantity is not None and len(usual(unit)) > 1 and unit.casefold() not in WORDS
+    return electric or usual(unit) in ("pu", "%")
+
+
+# how a unit is set apart from the name before it, and whether the two are a name and its unit
+FORMS: tuple[tuple[re.Pattern[str], Callable[[str, str], bool]], ...] = (
+    (re.compile(r"(?P<name>.*?)\s*[\[({<]\s*(?P<unit>[^\[\](){}<>]+?)\s*[\])}>]"), _in_brackets),
+    (re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>.*\S)"), _behind_in),
+    (re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S+)"), _behind_stroke),
+    (re.compile(r"(?P<name>.*[^\s_,])(?:\s*,\s*|\s+|_+)(?P<unit>[^\s_,]+)"), _apart),
+)
+
+
+def _prefixed(unit: str) -> tuple[str, str] | None:
+    """Return the usual spelling of a prefix and a unit, and the quantity; None for other texts."""
+    found = _PREFIXED.fullmatch(unit)
+    if found is None:
+        return None
+    prefix = found["prefix"] or found["small"] or (found["milli"] or "").casefold()
+    body = found["body"] or found["ampere"] or found["second"]
+    symbol, quantity = BODIES[body.casefold()]
+    if _MEGA.fullmatch(prefix + body):
+        prefix = "M"
+    return _PREFIXES.get(prefix, prefix) + symbol, quantity

@@ -1,0 +1,41 @@
+"""The cells of a text: what is a number, what a missing sample, and what is neither."""
+
+import re
+
+SHOWN = 40  # characters of a cell in a message
+EMPTY = "an empty cell"
+NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*|,[0-9]+)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
+INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
+MISSING = re.compile(r"|[+-]?nan|-+|\*+", re.IGNORECASE)
+THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
+
+
+def is_number(cell: str, comma: bool | None) -> bool:
+    """Tell whether a cell is a number with that decimal mark, ASCII, not 1_000; nan and inf too."""
+    cell = cell.strip()
+    if NUMBER.fullmatch(cell):
+        return ("." if comma else ",") not in cell
+    return bool(INFINITE.fullmatch(cell)) or cell.lstrip("+-").lower() == "nan"
+
+
+def is_missing(cell: str) -> bool:
+    """Tell whether a cell says that there is no sample: empty, nan, dashes, stars."""
+    return MISSING.fullmatch(cell.strip()) is not None
+
+
+def shown(cell: object) -> str:
+    """Return a cell as a message shows it, text in quotes."""
+    return repr(cell.strip()[:SHOWN]) if isinstance(cell, str) else str(cell)[:SHOWN]
+
+
+def why_not(cell: str, comma: bool | None) -> str:
+    """Return why a cell is no number."""
+    cell = cell.strip()
+    if not cell:
+        return EMPTY
+    what = f"{shown(cell)} is not a number"
+    if THOUSANDS.fullmatch(cell):
+        return f"{what}; thousands may not be set apart"
+    if comma and NUMBER.fullmatch(cell):
+        return f"{what} with a decimal comma, as others are"
+    return what

@@ -1,0 +1,40 @@
+"""The time is known by the names of columns, else a first column that increases is held for it."""
+
+import pytest
+
+from exfit.readers.clock import clock_of
+
+CLOCKS = {
+    ("t", "vt"): ("t",),
+    ("vt", "Time"): ("Time",),
+    ("Time [s]", "vt"): ("Time [s]",),
+    ("t/ms", "vt"): ("t/ms",),
+    ("t_ms", "vt"): ("t_ms",),
+    ("Zeit (s)", "U"): ("Zeit (s)",),
+    ("Tiempo, s", "U"): ("Tiempo, s",),
+    ("Date", "Time", "vt"): ("Date", "Time"),
+    ("Time", "Date", "vt"): ("Date", "Time"),
+    ("Datum", "Uhrzeit", "U"): ("Datum", "Uhrzeit"),
+    ("Fecha", "Hora", "U"): ("Fecha", "Hora"),
+    ("Date", "Timestamp", "vt"): ("Timestamp",),
+    ("Date/Time", "vt"): ("Date/Time",),
+    ("Time stamp", "vt"): ("Time stamp",),
+    ("Relative Time", "vt"): ("Relative Time",),
+    ("Date", "vt"): ("Date",),
+    ("s.vt", "s.time"): ("s.time",),
+    ("s.time", "s.vt", "t"): ("t",),
+    ("vt", "ifd"): (),
+    ("Timer", "T"): ("T",),
+    (): (),
+}
+
+
+@pytest.mark.parametrize("names", CLOCKS, ids=str)
+def test_the_time_is_known_by_its_name(names):
+    assert clock_of(names, lambda name: False) == CLOCKS[names]
+
+
+def test_a_first_column_that_increases_is_the_time_where_no_name_says_so():
+    assert clock_of(("N", "U"), lambda name: name == "N") == ("N",)
+    assert clock_of(("N", "U"), lambda name: name == "U") == ()
+    assert clock_of(("N", "t"), lambda name: True) == ("t",)
