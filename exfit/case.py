@@ -241,8 +241,20 @@ class Case(Section):
         path = self.folder / record.file
         missing = record.gaps == "skip"
         clock = clock_of(record)
+        per_unit = frozenset(
+            signal
+            for signal, channel in record.channels.items()
+            if self.plant.type != "none" and _as_it_stands(channel)
+        )
         read = read_record(
-            path, clock, channels, record.window, missing, record.sheet, record.resample
+            path,
+            clock,
+            channels,
+            record.window,
+            missing,
+            record.sheet,
+            record.resample,
+            per_unit,
         )
         start, end = read.time[0], read.time[-1]
         if test.begin is not None:
@@ -310,6 +322,13 @@ def column_of(channel: Channel) -> Column:
     return Column(
         channel.column, 1.0 if scale is None else scale, offset or 0.0, channel.unit, channel.base
     )
+
+
+def _as_it_stands(channel: Channel | Phases) -> bool:
+    """Tell whether a case takes the numbers of a column for per unit."""
+    if not isinstance(channel, Channel):
+        return False
+    return channel.unit is None and channel.base is None and channel.scale == 1.0
 
 
 def source_of(channel: Channel | Phases) -> Column | ThreePhases:

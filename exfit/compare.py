@@ -12,7 +12,7 @@ from exfit.errors import RecordError
 from exfit.features import TAIL, Features, features
 from exfit.onset import Onset, find_step
 from exfit.readers import Table, open_table
-from exfit.readers.table import listed
+from exfit.readers.table import listed, refuse_uneven
 from exfit.result import judged_of
 
 Array = NDArray[np.float64]
@@ -212,6 +212,7 @@ def _curve(name: str, source: Path, asked: Asked, ending: str, shift: float = 0.
             places.setdefault(signal, convention[0])
     columns = table.numbers(places.values(), frozenset(places.values()))
     time = table.instants(clock) + shift
+    refuse_uneven(path, {clock[0]: time} | columns)
     _check_clock(table, clock, time)
     last = np.append(np.diff(time) > 0.0, True)  # of instants that repeat, what holds from then on
     signals = {signal: columns[column][last] for signal, column in places.items()}

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from exfit.errors import CaseError
+from exfit.siblings import siblings
 from exfit.yaml_lines import read_text, read_yaml
 
 RECORDS = ("record", "records", "validate")
@@ -26,7 +27,8 @@ def files_of(case: Path) -> tuple[Path, ...]:
     model = content.get("model")
     named = [model] if isinstance(model, str) and model.endswith(".py") else []
     named += [file for key in RECORDS for file in _files(content.get(key))]
-    return tuple(dict.fromkeys([case, *(case.parent / name for name in named)]))
+    files = [part for name in named for part in _parts(case.parent / name)]
+    return tuple(dict.fromkeys([case, *files]))
 
 
 def free_of(case: Path) -> tuple[str, ...]:
@@ -57,6 +59,15 @@ def _files(content: Any) -> Iterator[str]:
     if isinstance(content, list):
         for one in content:
             yield from _files(one)
+
+
+def _parts(file: Path) -> Iterator[Path]:
+    """Yield a file, and the other part of a COMTRADE record beside it."""
+    yield file
+    if file.suffix.lower() == ".cfg":
+        yield from siblings(file, ".dat") or [file.with_suffix(".dat")]
+    elif file.suffix.lower() == ".dat":  # without a configuration it is text
+        yield from siblings(file, ".cfg")
 
 
 def _names(content: Mapping[str, Any], free: bool) -> tuple[str, ...]:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from exfit.errors import RecordError
 from exfit.naming import Guess, guessed, three_phases
 from exfit.quality import mains_frequency, noise_of, quantum, spikes, stuck
-from exfit.readers.table import Table, listed
+from exfit.readers.table import Table, listed, refuse_uneven
 from exfit.readers.units import unit_in, usual
+from exfit.record import Clock
 from exfit.sampling import Sampling, increasing, sampling_of
 from exfit.steps import (
     ROUNDING,
@@ -98,7 +99,7 @@ class Inspection:
 
     path: Path
     sha256: str
-    clock: tuple[str, ...]
+    clock: Clock
     sampling: Sampling
     backward_at: tuple[str, ...]
     channels: tuple[Channel, ...]
@@ -123,7 +124,8 @@ class Inspection:
         return {
             "file": str(self.path),
             "sha256": self.sha256,
-            "clock": list(self.clock),
+            "clock": list(self.clock.columns),
+            "clock_unit": self.clock.unit,
             "samples": len(self.time),
             "sampling": {**asdict(sampling), "rate": sampling.rate, "even": sampling.even},
             "channels": [asdict(one) for one in self.channels],
@@ -134,12 +136,15 @@ class Inspection:
         }
 
 
-def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
+def inspect(
+    table: Table, clock: Sequence[str] | None = None, unit: str | None = None
+) -> Inspection:
     """Return what a recorder's file holds.
 
     Args:
         table: the file.
         clock: the columns of the time, or of date and time; None: those that the table tells.
+        unit: of the time's numbers: s, ms, us or min; None: as the file says, else s.
 
     Raises:
         RecordError: no column seems to be the time or it cannot be read, fewer than two samples,
@@ -150,7 +155,7 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
         raise RecordError(
             f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
         )
-    stamps = table.instants(columns)
+    stamps = table.instants(columns, unit)
     if len(stamps) < FEWEST:
         raise RecordError(f"{table.path}: {len(stamps)} samples; at least {FEWEST} are needed")
     if not np.isfinite(stamps).all():
@@ -159,7 +164,8 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
     sampling = sampling_of(stamps)
     forward = increasing(stamps)
     time = stamps[forward]
-    read, unreadable = _numbers(table, [name for name in table.names if name not in columns])
+    own = {columns[0]: stamps}
+    read, unreadable = _numbers(table, [name for name in table.names if name not in columns], own)
     if not read:
         raise RecordError(f"{table.path}: no column of numbers beside the time")
     samples = {name: column if forward.all() else column[forward] for name, column in read.items()}
@@ -186,7 +192,7 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
     return Inspection(
         table.path,
         table.sha256,
-        columns,
+        Clock(columns, unit),
         sampling,
         tuple(table.place(row) for row in sampling.backward[:FIRST_PLACES]),
         tuple(_with_signal(_settled(one, steps), guesses) for one in described),
@@ -198,16 +204,24 @@ def inspect(table: Table, clock: Sequence[str] | None = None) -> Inspection:
     )
 
 
-def _numbers(table: Table, names: Sequence[str]) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return the columns of numbers, and why the others are none."""
+def _numbers(
+    table: Table, names: Sequence[str], time: Mapping[str, Array]
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """Return the columns of numbers, as long as the time, and why the others are none."""
+
+    def numbers(asked: Sequence[str]) -> dict[str, Array]:
+        found = table.numbers(asked, frozenset(asked))
+        refuse_uneven(table.path, {**time, **found})
+        return found
+
     try:
-        return table.numbers(names, frozenset(names)), {}
+        return numbers(names), {}
     except RecordError:
         read: dict[str, Array] = {}
         refused: dict[str, str] = {}
         for name in names:
             try:
-                read |= table.numbers([name], frozenset([name]))
+                read |= numbers([name])
             except RecordError as fault:
                 refused[name] = str(fault)
         return read, refused

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.readers import open_table
-from exfit.readers.table import NONE, Table, read_bytes
-from exfit.readers.units import alike
+from exfit.readers.table import NONE, Table, column_error, read_bytes, refuse_uneven
+from exfit.readers.units import alike, needs_base, unit_of, usual
 from exfit.resampling import resampled
 from exfit.three_phase import Connection, PhasorCourse, vt_of_rms, vt_of_waveforms
 
 Array = NDArray[np.float64]
 
 FEWEST_SAMPLES = 2
+PERCENT = "%"
 
 
 class Clock(NamedTuple):
@@ -96,6 +97,7 @@ def read_record(
     missing: bool = False,
     sheet: str | None = None,
     rate: float | None = None,
+    per_unit: frozenset[str] = NONE,
 ) -> Record:
     """Return the record of a file: each signal is ``column / base * scale + offset``.
 
@@ -109,19 +111,22 @@ def read_record(
         missing: whether a sample may be missing from a signal: an empty cell or nan becomes nan.
         sheet: of a workbook.
         rate: Hz, of a slower, even clock; None: the record's own.
+        per_unit: signals whose columns are taken for per unit: the file must not say otherwise.
 
     Raises:
-        RecordError: a file that cannot be read, a column that is missing or in another unit, a cell
-            that is no finite number, time that does not increase, fewer than two samples, a signal
-            without any, waveforms that are none, or a record that cannot be resampled.
+        RecordError: a file that cannot be read, a column that is missing, in another unit or of
+            another length than the time, a cell that is no finite number, time that does not
+            increase, fewer than two samples, a signal without any, waveforms that are none, or a
+            record that cannot be resampled.
     """
     table = open_table(path, sheet)
-    _check_units(table, channels.values())
+    _check_units(table, channels, per_unit)
     time = table.instants(clock.columns, clock.unit)
     _check_time(table, clock, time)
     names = [name for channel in channels.values() for name in _columns(channel)]
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
     columns = table.numbers(dict.fromkeys(names), gappy)
+    refuse_uneven(path, {clock.columns[0]: time} | columns)
     courses = {
         name: _of_phases(path, time, columns, channel)
         for name, channel in channels.items()
@@ -185,28 +190,45 @@ def file_hash(path: Path) -> str:
     return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
-def _check_units(table: Table, channels: Iterable[ChannelLike | ThreePhases]) -> None:
+def _check_units(
+    table: Table, channels: Mapping[str, ChannelLike | ThreePhases], per_unit: frozenset[str]
+) -> None:
     """Raise a RecordError for a column that the file says to be in another unit."""
-    for channel in channels:
+    for signal, channel in channels.items():
         for column in _columns(channel):
             said = table.units.get(column)
-            if said is not None and channel.unit is not None and not alike(said, channel.unit):
-                raise RecordError(
-                    f"{table.path}: column {column!r} is in {said} as the file says, "
-                    f"not in {channel.unit}"
-                )
+            if said is None:
+                continue
+            if channel.unit is not None and not alike(said, channel.unit):
+                what = f"in {said} as the file says, not in {channel.unit}"
+                raise column_error(table.path, column, what)
+            if signal in per_unit and unit_of(said) and needs_base(said):
+                what = f"in {said} as the file says, and not per unit: give {signal} {_how(said)}"
+                raise column_error(table.path, column, what)
+
+
+def _how(unit: str) -> str:
+    """Return what makes numbers of a unit per unit, as a case has it."""
+    if usual(unit) == PERCENT:
+        return f"scale: 0.01, or unit: {PERCENT!r} and base: 100"
+    return f"unit: {unit} and base: what 1 pu is in {unit}"
 
 
 def _check_time(table: Table, clock: Clock, time: Array) -> None:
     """Raise a RecordError where time is not finite or does not increase."""
-    lost = np.flatnonzero(~np.isfinite(time))
-    if lost.size:
-        _refuse(table, lost[0], f"{clock.label}: {time[lost[0]]} is not a finite number")
+    check_finite(table, clock, time)
     back = np.flatnonzero(time[1:] <= time[:-1])
     if back.size:
         before, now = time[back[0]], time[back[0] + 1]
         kind = "repeats" if now == before else "goes back behind"
         _refuse(table, back[0] + 1, f"{clock.label}: time {now} s {kind} the {before} s before it")
+
+
+def check_finite(table: Table, clock: Clock, time: Array) -> None:
+    """Raise a RecordError where time is not finite."""
+    lost = np.flatnonzero(~np.isfinite(time))
+    if lost.size:
+        _refuse(table, lost[0], f"{clock.label}: {time[lost[0]]} is not a finite number")
 
 
 def _kept(

@@ -170,7 +170,9 @@ def _channel(one: Channel, noisy: bool) -> str:
 
 
 def _clock(found: Inspection) -> str:
-    names = [_text(name) for name in found.clock]
+    names = [_text(name) for name in found.clock.columns]
+    if found.clock.unit is not None:
+        return f"{{column: {names[0]}, unit: {found.clock.unit}}}"
     return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
 
 

@@ -67,8 +67,8 @@ def test_inspect_as_json_prints_what_it_writes(run):  # noqa: F811
 
 
 def test_a_column_of_time_can_be_named(run):  # noqa: F811
-    rows = [f"{k},{k * 0.01:.2f},{1 + 1e-4 * np.sin(9 * k):.6f}" for k in range(50)]
-    Path("odd.csv").write_text("\n".join(["row,clock,vt", *rows]) + "\n")
+    rows = [f"{k % 7},{k * 0.01:.2f},{1 + 1e-4 * np.sin(9 * k):.6f}" for k in range(50)]
+    Path("odd.csv").write_text("\n".join(["tap,clock,vt", *rows]) + "\n")
     code, _, err = run("inspect", "odd.csv", "--no-plots")
     assert code == 1
     assert "--time" in err
@@ -76,6 +76,19 @@ def test_a_column_of_time_can_be_named(run):  # noqa: F811
     assert code == 0
     assert "50 samples by clock, 0 ... 0.49 s" in out
     assert "time: clock" in out
+
+
+def test_the_unit_of_the_time_can_be_told(run):  # noqa: F811
+    rows = [f"{10 * k},{1 + 1e-4 * np.sin(9 * k):.6f}" for k in range(50)]
+    Path("ms.csv").write_text("\n".join(["t,vt", *rows]) + "\n")
+    code, out, _ = run("inspect", "ms.csv", "--no-plots", "--time-unit", "ms")
+    assert code == 0
+    assert "50 samples by t, 0 ... 0.49 s" in out
+    assert suggested(out)["record"]["time"] == {"column": "t", "unit": "ms"}
+    Path("said.csv").write_text("\n".join(["t [ms],vt", *rows]) + "\n")
+    code, _, err = run("inspect", "said.csv", "--no-plots", "--time-unit", "s")
+    assert code == 1
+    assert "is in ms as the file says, not in s" in err
 
 
 @pytest.mark.parametrize(

@@ -398,6 +398,13 @@ def test_what_is_no_record_is_refused_with_its_place(table, text):
         inspect(table)
 
 
+def test_a_column_of_another_length_than_the_time_is_left_out():
+    table = Columns({"t": np.arange(6.0), "vt": np.ones(6), "slow": np.ones(3)})
+    found = inspect(table)
+    assert [one.name for one in found.channels] == ["vt"]
+    assert "'t' has 6 samples, 'slow' has 3" in found.unreadable["slow"]
+
+
 @settings(deadline=None, derandomize=True, max_examples=150)
 @given(
     st.integers(2, 60).flatmap(

@@ -16,6 +16,7 @@ ORDER = (
     "exfit.errors",
     "exfit.atomic",
     "exfit.envelope",
+    "exfit.siblings",
     "exfit.engine",
     "exfit.engine.trace",
     "exfit.engine.system",

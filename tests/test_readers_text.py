@@ -180,6 +180,20 @@ FILES = {
         {"U": [0.5, 0.75]},
         {},
     ),
+    "months in letters, over the end of one": Seen(
+        form("Time,U", "30-Sep-2015 23:59:59.5,1.5", "01-Oct-2015 00:00:00.25,1.6"),
+        ("Time",),
+        [0.0, 0.75],
+        {"U": [1.5, 1.6]},
+        {},
+    ),
+    "months in capitals, a column for the date": Seen(
+        form("Date;Time;U", "9 MAY 15;23:59:59;1,5", "10 MAY 15;00:00:00;1,6"),
+        ("Date", "Time"),
+        [0.0, 1.0],
+        {"U": [1.5, 1.6]},
+        {},
+    ),
     "time of day alone, decimal comma": Seen(
         form("Uhrzeit;Ust", "10:51:42,858;1,001", "10:51:42,863;1,002", "10:51:43;1,003"),
         ("Uhrzeit",),
@@ -553,6 +567,26 @@ FAULTS = {
         form("t,vt", "1:00:00 AM,1", "13:00:00 PM,2"),
         "t",
         [":3", "'t'", "'13:00:00 PM' is no time of day"],
+    ),
+    "a month of no name": (
+        STAMPED.replace("20.09.2015", "20-Sep-2015").replace("20-Sep-2015 10:51:42", "20-Sop-2015"),
+        "Time",
+        [":4", "'Time'", "'20-Sop-2015.5' is no timestamp"],
+    ),
+    "no such day of a month in letters": (
+        form("Time,U", "30-Sep-2015 10:00:00,1", "31-Sep-2015 10:00:01,2"),
+        "Time",
+        [":3", "'Time'", "month 9, day 31 is no date"],
+    ),
+    "minutes and seconds": (
+        form("t,vt", "51:42.5,1.0", "51:43.0,1.1"),
+        "t",
+        [":2", "'t'", "'51:42.5' is not a number", "with their hours only, as 0:51:42.5"],
+    ),
+    "minutes and whole seconds": (
+        form("t,vt", "51:42,1.0", "51:43,1.1"),
+        "t",
+        [":2", "'t'", "'51:42' is no time of day", "minutes and seconds"],
     ),
     "another form of timestamp": (
         STAMPED.replace("20.09.2015 10:51:42", "2015-09-20 10:51:42"),

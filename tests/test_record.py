@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.io import savemat
 
 from exfit.errors import RecordError
 from exfit.record import Clock, file_hash, read_columns, read_record
@@ -139,6 +140,36 @@ def test_a_unit_that_the_file_contradicts_is_refused(csv):
     path = csv("t,Ugen [V]\n0,15750\n1,15760\n")
     message = refusal(path, {"vt": Channel("Ugen [V]", unit="kV", base=15.75)})
     assert message.endswith("bump.csv: column 'Ugen [V]' is in V as the file says, not in kV")
+
+
+@pytest.mark.parametrize(
+    ("unit", "told"),
+    [("kV", "unit: kV and base"), ("MVA", "unit: MVA and base"), ("%", "scale: 0.01"),
+     ("A", "unit: A and base")],
+)  # fmt: skip
+def test_what_is_taken_for_per_unit_must_not_be_in_another_unit(csv, unit, told):
+    path = csv(f"t,x [{unit}]\n0,15.75\n1,15.76\n")
+    channels = {"vt": Channel(f"x [{unit}]")}
+    with pytest.raises(RecordError) as caught:
+        read_record(path, T, channels, per_unit=frozenset({"vt"}))
+    for part in ("bump.csv", f"column 'x [{unit}]'", f"in {unit} as", "give vt", told):
+        assert part in str(caught.value)
+    assert read_record(path, T, channels).signals["vt"].tolist() == [15.75, 15.76]
+
+
+@pytest.mark.parametrize("name", ["vt [pu]", "vt [p.u.]", "vt [1]", "vt [-]", "vt", "vt [L1]"])
+def test_numbers_per_unit_pass_as_they_stand(csv, name):
+    path = csv(f"t,{name}\n0,1.0\n1,1.01\n")
+    record = read_record(path, T, {"vt": Channel(name)}, per_unit=frozenset({"vt"}))
+    assert record.signals["vt"].tolist() == [1.0, 1.01]
+
+
+def test_a_column_is_as_long_as_the_time(tmp_path):
+    path = tmp_path / "bump.mat"
+    savemat(path, {"t": np.arange(6.0), "vt": np.ones(6), "slow": np.ones(3)})
+    assert read_record(path, T, VT).time.size == 6
+    with pytest.raises(RecordError, match=r"bump\.mat: column 't' has 6 samples, 'slow' has 3"):
+        read_record(path, T, {"vt": Channel("slow")})
 
 
 def test_a_clock_may_have_another_unit_and_stand_in_two_columns(csv):

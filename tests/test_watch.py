@@ -188,6 +188,22 @@ def test_a_case_names_its_model_and_all_its_records(place):
 
 
 @pytest.mark.parametrize(
+    ("named", "beside", "found"),
+    [
+        ("a.cfg", "a.DAT", ["a.cfg", "a.DAT"]),
+        ("a.cfg", "b.dat", ["a.cfg", "a.dat"]),
+        ("a.dat", "a.cfg", ["a.dat", "a.cfg"]),
+        ("a.dat", "a.csv", ["a.dat"]),
+        ("there/a.cfg", "a.dat", ["there/a.cfg", "there/a.dat"]),
+    ],
+)
+def test_both_parts_of_a_comtrade_record_are_named(place, named, beside, found):
+    write_case({"record": {"file": named}})
+    Path(beside).write_text("")
+    assert [str(one) for one in files_of(Path("case.yaml"))] == ["case.yaml", *found]
+
+
+@pytest.mark.parametrize(
     "text", ["", "[", "- 1", "record: 3", "parameters: [1]", "parameters: {free: {KA}}", "model: 1"]
 )
 def test_a_glance_at_any_text_does_no_harm(place, text):

@@ -27,12 +27,19 @@ time_option = click.option(
     metavar="COLUMN",
     help="Column of the time; given twice, of date and time. Default: as the file tells.",
 )
+unit_option = click.option(
+    "--time-unit",
+    "unit",
+    type=click.Choice(("s", "ms", "us", "min")),
+    help="Unit of the time's numbers. Default: as the file tells, else s.",
+)
 sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel file.")
 
 
 @click.command("inspect", short_help="Show what a recorder's file holds.")
 @click.argument("file", type=click.Path(path_type=Path))
 @time_option
+@unit_option
 @sheet_option
 @output_option
 @plots_option
@@ -41,6 +48,7 @@ sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel f
 def inspect_(
     file: Path,
     clock: tuple[str, ...],
+    unit: str | None,
     sheet: str | None,
     output: Path | None,
     plots: bool,
@@ -58,7 +66,7 @@ def inspect_(
 
     folder = output or folder_of(file, "inspect")
     files.refuse_unwritable(folder)
-    found = _inspected(file, clock, sheet)
+    found = _inspected(file, clock, unit, sheet)
     files.write_inspection(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
@@ -86,6 +94,7 @@ def inspect_(
     help="Record of the bump test.",
 )
 @time_option
+@unit_option
 @sheet_option
 @file_option
 @force_option
@@ -94,6 +103,7 @@ def new(
     machine: str,
     file: Path,
     clock: tuple[str, ...],
+    unit: str | None,
     sheet: str | None,
     output: Path | None,
     force: bool,
@@ -113,14 +123,16 @@ def new(
     folder = Path() if output is None else output.parent
     exciter, around = find(model, Path()), find_machine(machine)
     name = relative(Path(model), folder) if model.endswith(".py") else exciter.name
-    text = starting_case(exciter, name, around, _inspected(file, clock, sheet), folder)
+    text = starting_case(exciter, name, around, _inspected(file, clock, unit, sheet), folder)
     write_text(text, output, ())
     if output is not None:
         click.echo(f"written to {output}; next: exfit check {output}")
 
 
-def _inspected(file: Path, clock: tuple[str, ...], sheet: str | None) -> "Inspection":
+def _inspected(
+    file: Path, clock: tuple[str, ...], unit: str | None, sheet: str | None
+) -> "Inspection":
     from exfit.inspection import inspect
     from exfit.readers import open_table
 
-    return inspect(open_table(file, sheet), clock or None)
+    return inspect(open_table(file, sheet), clock or None, unit)

@@ -5,6 +5,7 @@ from pathlib import Path
 from exfit.errors import RecordError
 from exfit.readers.table import Table
 from exfit.readers.text import read_text_table
+from exfit.siblings import siblings
 
 __all__ = ["Table", "open_table"]
 
@@ -25,7 +26,7 @@ def open_table(path: Path, sheet: str | None = None) -> Table:
         return read_excel(path, sheet)
     if sheet is not None:
         raise RecordError(f"{path}: has no sheets such as {sheet!r}: a workbook has them")
-    if suffix in COMTRADE or (suffix in BESIDE_CFG and _has_cfg(path)):
+    if suffix in COMTRADE or (suffix in BESIDE_CFG and siblings(path, ".cfg")):
         from exfit.readers.comtrade import read_comtrade
 
         return read_comtrade(path)
@@ -38,8 +39,3 @@ def open_table(path: Path, sheet: str | None = None) -> Table:
 
         return read_parquet(path)
     return read_text_table(path)
-
-
-def _has_cfg(path: Path) -> bool:
-    """Tell whether the configuration of a COMTRADE record stands beside its data."""
-    return any(path.with_suffix(suffix).exists() for suffix in (".cfg", ".CFG", ".Cfg"))

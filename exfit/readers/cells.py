@@ -7,6 +7,7 @@ EMPTY = "an empty cell"
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*|,[0-9]+)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
 INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 MISSING = re.compile(r"|[+-]?nan|-+|\*+", re.IGNORECASE)
+MINUTES = re.compile(r"[0-9]{1,2}:[0-9]{2}[.,][0-9]+")
 THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
 
 
@@ -36,6 +37,8 @@ def why_not(cell: str, comma: bool | None) -> str:
     what = f"{shown(cell)} is not a number"
     if THOUSANDS.fullmatch(cell):
         return f"{what}; thousands may not be set apart"
+    if MINUTES.fullmatch(cell):
+        return f"{what}; minutes and seconds are read with their hours only, as 0:{cell}"
     if comma and NUMBER.fullmatch(cell):
         return f"{what} with a decimal comma, as others are"
     return what

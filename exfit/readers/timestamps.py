@@ -1,4 +1,4 @@
-"""Timestamps: cells such as 2015-09-20T10:51:42.8589222Z or 20.09.2015, 10:51:42 AM, to seconds.
+"""Timestamps: cells such as 2015-09-20T10:51:42.8589222Z or 20-Sep-2015 10:51:42 AM, to seconds.
 
 Every cell of one form is read by the same slices of its characters, so that millions take NumPy
 a second. Seconds and their fraction stay whole numbers until the first instant is taken off:
@@ -19,13 +19,17 @@ WIDEST_OF_TWO = 28  # of a time of day alone, or a date
 MOST_DIGITS = 12  # of a second's fraction
 CHUNK = 1 << 16  # cells read at a time
 DAY = 86_400  # s
+HOURS = ", hours and minutes; minutes and seconds are read with their hours only"
 CENTURY = 2000  # of a year in two digits
 TO_ZERO = np.array([ord("0") if chr(at).isdigit() and at < 128 else at for at in range(256)], "u1")
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 FORM = re.compile(
     r"[ \t]*"
     r"(?:(?P<year>\d{4})(?P<iso>[-/.])(?P<month>\d{1,2})(?P=iso)(?P<day>\d{1,2})"
-    r"|(?P<one>\d{1,2})(?P<mark>[-/.])(?P<two>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2}))?"
-    r"(?P<between>(?(year)(?:T|[ \t]+)|(?(one)[ \t]+|))"
+    r"|(?P<one>\d{1,2})(?P<mark>[-/.])(?P<two>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2})"
+    rf"|(?P<named>\d{{1,2}})(?P<dash>[- ])(?P<name>(?i:{'|'.join(MONTHS)}))"
+    r"(?P=dash)(?P<full>\d{4}|\d{2}))?"
+    r"(?P<between>(?(year)(?:T|[ \t]+)|(?(one)[ \t]+|(?(named)[ \t]+|)))"
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
     r"(?:[ \t]*(?P<half>[AaPp])\.?[ \t]?[Mm]\.?)?"
     r"[ \t]*(?P<zone>Z|(?P<sign>[+-])(?P<zonehour>\d{2}):?(?P<zoneminute>\d{2}))?)?"
@@ -112,7 +116,8 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
                 found, wrong = _second(values, form)
                 if wrong.any():
                     row = int(rows[wrong.argmax()])
-                    raise StampError(row, column, f"{_shown(cells[row])} is no time of day")
+                    what = f"{_shown(cells[row])} is no time of day"
+                    raise StampError(row, column, what + ("" if form["second"] else HOURS))
                 second[rows] = found
                 own = len(form["fraction"] or "")
                 fraction[rows] = _number(values, form, "fraction") * 10 ** (MOST_DIGITS - own)
@@ -130,8 +135,10 @@ def _form(column: int, row: int, cell: bytes) -> re.Match[str]:
 
 def _kind(form: re.Match[str]) -> tuple[bool, str, bool, bool, bool]:
     """Return what all timestamps of a column have in common."""
-    dated = form["year"] is not None or form["one"] is not None
-    order = "ymd" if form["year"] else "dmy" if form["mark"] == "." else "???" if dated else ""
+    dated = any(form[part] is not None for part in ("year", "one", "named"))
+    # a month in letters tells the order, and is the second of the three
+    ordered = form["mark"] == "." or form["named"] is not None
+    order = "ymd" if form["year"] else "dmy" if ordered else "???" if dated else ""
     return dated, order, form["hour"] is not None, form["half"] is not None, bool(form["zone"])
 
 
@@ -146,9 +153,14 @@ def _date(values: NDArray[np.uint8], form: re.Match[str]) -> Whole:
     """Return year, then the two others in the order of the file."""
     if form["year"]:
         parts = [_number(values, form, part) for part in ("year", "month", "day")]
+    elif form["named"]:
+        year, day = (_number(values, form, part) for part in ("full", "named"))
+        month = MONTHS.index(form["name"].capitalize()) + 1
+        parts = [year, day, np.full_like(day, month)]
     else:
         parts = [_number(values, form, part) for part in ("last", "one", "two")]
-        parts[0] += CENTURY if len(form["last"]) == 2 else 0
+    if len(form["last"] or form["full"] or "") == 2:
+        parts[0] += CENTURY
     return np.stack(parts, axis=1)
 
 

@@ -14,7 +14,7 @@ NAME = 22  # letters of a channel's name that leave room for its numbers
 
 def inspection(console: Console, found: Inspection, record: Sequence[str]) -> None:
     """Show what a file holds, and the sections of a case that it suggests."""
-    clock = " and ".join(found.clock)
+    clock = " and ".join(found.clock.columns)
     console.print(
         f"{found.path.name}: {len(found.time)} samples by {clock}, "
         f"{found.sampling.start:.6g} ... {found.sampling.end:.6g} s",

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from exfit.errors import RecordError
 from exfit.readers.table import read_bytes
+from exfit.siblings import siblings
 
 _SECTION = re.compile(
     rb"^--- *file type: *([a-z]+)(?: +([a-z0-9]+))?(?: *: *([0-9]{1,15}))? *---[ \t]*\r?\n",
@@ -60,9 +61,7 @@ def _of_two_files(path: Path) -> Parts:
 
 def _beside(path: Path, suffix: str) -> Path:
     """Return the file of the same name with another suffix, in capitals or not."""
-    wanted = (path.stem + suffix).lower()
-    found = [one for one in sorted(path.parent.iterdir()) if one.name.lower() == wanted]
-    found = [one for one in found if one.stem == path.stem] or found
+    found = siblings(path, suffix)
     if not found:
         raise RecordError(f"{path}: {path.stem}{suffix} is not beside it")
     if len(found) > 1:
