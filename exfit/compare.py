@@ -13,6 +13,7 @@ from exfit.features import TAIL, Features, features
 from exfit.onset import Onset, find_step
 from exfit.readers import Table, open_table
 from exfit.readers.table import listed, refuse_uneven
+from exfit.record import Clock, check_finite
 from exfit.result import judged_of
 
 Array = NDArray[np.float64]
@@ -251,15 +252,13 @@ def _clock(table: Table, asked: str | None) -> tuple[str, ...]:
 
 def _check_clock(table: Table, clock: Sequence[str], time: Array) -> None:
     """Raise a RecordError where time is not finite or goes back; an instant may repeat."""
-    named = f"column {' and '.join(map(repr, clock))}"
-    lost = np.flatnonzero(~np.isfinite(time))
-    if len(lost):
-        raise RecordError(f"{table.place(int(lost[0]))}: {named}: the time is not a finite number")
+    named = Clock(tuple(clock))
+    check_finite(table, named, time)
     back = np.flatnonzero(np.diff(time) < 0.0)
     if len(back):
         before, now = time[back[0]], time[back[0] + 1]
         raise RecordError(
-            f"{table.place(int(back[0]) + 1)}: {named}: time {now:g} s goes back behind the "
+            f"{table.place(int(back[0]) + 1)}: {named.label}: time {now:g} s goes back behind the "
             f"{before:g} s before it"
         )
 

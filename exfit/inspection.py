@@ -14,7 +14,7 @@ from exfit.naming import Guess, guessed, three_phases
 from exfit.quality import mains_frequency, noise_of, quantum, spikes, stuck
 from exfit.readers.table import Table, listed, refuse_uneven
 from exfit.readers.units import unit_in, usual
-from exfit.record import Clock
+from exfit.record import Clock, check_finite
 from exfit.sampling import Sampling, increasing, sampling_of
 from exfit.steps import (
     ROUNDING,
@@ -158,9 +158,7 @@ def inspect(
     stamps = table.instants(columns, unit)
     if len(stamps) < FEWEST:
         raise RecordError(f"{table.path}: {len(stamps)} samples; at least {FEWEST} are needed")
-    if not np.isfinite(stamps).all():
-        row = int(np.flatnonzero(~np.isfinite(stamps))[0])
-        raise RecordError(f"{table.place(row)}: no time: {', '.join(columns)}")
+    check_finite(table, Clock(columns, unit), stamps)
     sampling = sampling_of(stamps)
     forward = increasing(stamps)
     time = stamps[forward]

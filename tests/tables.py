@@ -1,4 +1,4 @@
-"""What the tests of the readers of binary files share."""
+"""What the tests of the readers share."""
 
 from contextlib import suppress
 

@@ -771,6 +771,37 @@ def test_a_record_that_does_not_hold_its_test_is_refused(case_file, tmp_path, ti
         assert part in str(caught.value)
 
 
+IN_KV = """\
+model: {model}
+plant: {{{plant}}}
+test: {{vt0: 1.0, vref: [{{at: 1.0, step: 0.05}}]}}
+record: {{file: up.csv, time: t, channels: {{vt: {vt}}}}}
+"""
+OPEN_CIRCUIT = ("AC1A", "type: open-circuit, machine: GENROU")
+FOUND = "{start: 1.0, min: 0.05, max: 1.5}"
+
+
+@pytest.mark.parametrize(
+    ("model", "vt", "refused"),
+    [
+        (OPEN_CIRCUIT, "'Ut [kV]'", True),
+        (OPEN_CIRCUIT, "{column: 'Ut [kV]', weight: 2.0}", True),
+        (OPEN_CIRCUIT, "{column: 'Ut [kV]', unit: kV, base: 15.75}", False),
+        (OPEN_CIRCUIT, "{column: 'Ut [kV]', scale: 0.0635}", False),
+        (OPEN_CIRCUIT, f"{{column: 'Ut [kV]', scale: {FOUND}}}", False),
+        (("FIRST_ORDER", "type: none"), "'Ut [kV]'", False),
+    ],
+)
+def test_numbers_in_kv_are_not_taken_for_per_unit(case_file, tmp_path, model, vt, refused):
+    (tmp_path / "up.csv").write_text("t,Ut [kV]\n0,15.75\n0.5,15.75\n2,16.5\n")
+    case = load_case(case_file(IN_KV.format(model=model[0], plant=model[1], vt=vt)))
+    if refused:
+        with pytest.raises(RecordError, match=r"up\.csv: column 'Ut \[kV\]': in kV .* unit: kV"):
+            case.measure(case.test, case.record)
+    else:
+        assert len(case.measure(case.test, case.record).time) == 3
+
+
 def test_a_missing_record_is_told_when_it_is_read(case_file):
     case = load_case(case_file(EXAMPLE))
     with pytest.raises(RecordError, match=r"up\.csv: cannot be read"):

@@ -390,7 +390,10 @@ def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency
         (Columns({"a": np.ones(3)}, clock=()), "--time names one: 'a'"),
         (Columns({"t": np.arange(1.0), "vt": np.ones(1)}), "1 samples; at least 2"),
         (Columns({"t": np.arange(3.0), "vt": "words"}), "no column of numbers"),
-        (Columns({"t": np.array([0.0, np.nan, 1.0]), "vt": np.ones(3)}), "record.csv:3: no time"),
+        (
+            Columns({"t": np.array([0.0, np.nan, 1.0]), "vt": np.ones(3)}),
+            "record.csv:3: column 't': nan",
+        ),
     ],
 )
 def test_what_is_no_record_is_refused_with_its_place(table, text):

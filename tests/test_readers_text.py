@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from tables import refused
 
 from exfit.errors import RecordError
 from exfit.readers import open_table
@@ -649,17 +650,13 @@ def read_whole(path, clock, names):
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_damaged_file_is_refused_with_line_and_column(file, fault):
     text, clock, named = FAULTS[fault]
-    with pytest.raises(RecordError) as caught:
-        read_whole(file(text), clock.split("+"), ["vt"])
-    message = str(caught.value)
-    assert "\n" not in message
-    for part in ["record.csv", *named]:
-        assert part in message
+    path = file(text)
+    refused(lambda: read_whole(path, clock.split("+"), ["vt"]), "record.csv", *named)
 
 
 def test_a_unit_is_refused_where_the_file_says_another_one_or_has_timestamps(file):
     path = file(form("t/ms,vt", "0,1", "5,2"))
-    with pytest.raises(RecordError, match="is in ms as the file says, not in s"):
+    with pytest.raises(RecordError, match="in ms as the file says, not in s"):
         read_text_table(path).instants(["t/ms"], "s")
     with pytest.raises(RecordError, match="is a timestamp, no number of ms"):
         read_text_table(file(STAMPED)).instants(["Time"], "ms")

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
+from tables import refused
 
 from exfit.errors import RecordError
 from exfit.record import Clock, file_hash, read_columns, read_record
@@ -41,9 +42,7 @@ def csv(tmp_path):
 
 
 def refusal(path, channels=VT, window=None):
-    with pytest.raises(RecordError) as caught:
-        read_record(path, T, channels, window)
-    return str(caught.value)
+    return refused(lambda: read_record(path, T, channels, window))
 
 
 def test_a_signal_is_column_times_scale_plus_offset(csv):
@@ -139,7 +138,7 @@ def test_engineering_units_become_per_unit_by_their_base(csv):
 def test_a_unit_that_the_file_contradicts_is_refused(csv):
     path = csv("t,Ugen [V]\n0,15750\n1,15760\n")
     message = refusal(path, {"vt": Channel("Ugen [V]", unit="kV", base=15.75)})
-    assert message.endswith("bump.csv: column 'Ugen [V]' is in V as the file says, not in kV")
+    assert message.endswith("bump.csv: column 'Ugen [V]': in V as the file says, not in kV")
 
 
 @pytest.mark.parametrize(
@@ -150,10 +149,8 @@ def test_a_unit_that_the_file_contradicts_is_refused(csv):
 def test_what_is_taken_for_per_unit_must_not_be_in_another_unit(csv, unit, told):
     path = csv(f"t,x [{unit}]\n0,15.75\n1,15.76\n")
     channels = {"vt": Channel(f"x [{unit}]")}
-    with pytest.raises(RecordError) as caught:
-        read_record(path, T, channels, per_unit=frozenset({"vt"}))
-    for part in ("bump.csv", f"column 'x [{unit}]'", f"in {unit} as", "give vt", told):
-        assert part in str(caught.value)
+    named = ("bump.csv", f"column 'x [{unit}]'", f"in {unit} as", "give vt", told)
+    refused(lambda: read_record(path, T, channels, per_unit=frozenset({"vt"})), *named)
     assert read_record(path, T, channels).signals["vt"].tolist() == [15.75, 15.76]
 
 
@@ -244,10 +241,8 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_file_that_cannot_be_used_is_refused_with_place_and_value(csv, fault):
     content, named = FAULTS[fault]
-    message = refusal(csv(content))
-    assert "\n" not in message
-    for part in named:
-        assert part in message
+    path = csv(content)
+    refused(lambda: read_record(path, T, VT), *named)
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
@@ -365,10 +360,8 @@ FAULTS_BESIDE_GAPS = {
 @pytest.mark.parametrize("fault", FAULTS_BESIDE_GAPS)
 def test_only_samples_may_be_missing(csv, fault):
     content, named = FAULTS_BESIDE_GAPS[fault]
-    with pytest.raises(RecordError) as caught:
-        read_record(csv(content), T, VT, missing=True)
-    for part in named:
-        assert part in str(caught.value)
+    path = csv(content)
+    refused(lambda: read_record(path, T, VT, missing=True), *named)
 
 
 def test_a_signal_missing_from_the_whole_window_is_refused(csv):

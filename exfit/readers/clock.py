@@ -55,7 +55,7 @@ def in_seconds(
         if usual(unit) not in SECONDS:
             raise fault(path, column, f"{unit} is no unit of time: {', '.join(SECONDS)}")
     if said is not None and asked is not None and not alike(said, asked):
-        raise fault(path, column, f"is in {said} as the file says, not in {asked}")
+        raise fault(path, column, f"in {said} as the file says, not in {asked}")
     factor = SECONDS[usual(units[0])] if units else 1.0
     # one over it is whole: no digit of 5 ms is lost
     return numbers / round(1.0 / factor) if factor < 1.0 else numbers * factor

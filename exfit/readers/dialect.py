@@ -156,12 +156,11 @@ def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout |
     names, units, fault = _heading(above, body, cells, columns, separator, ends_empty)
     if ends_empty and names[-1:] == ("",):
         names = names[:-1]
-    names = names_of(names)
     below = [row for row in plain if row.line >= body.line]
     dialect = Dialect(
         separator,
         has_comma(row.cells for row in below),
-        names or tuple(str(at + 1) for at in range(cells)),
+        names_of(names or ("",) * cells),
         units_of(names, units),
         cells,
         body.line,
