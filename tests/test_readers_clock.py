@@ -31,10 +31,19 @@ CLOCKS = {
 
 @pytest.mark.parametrize("names", CLOCKS, ids=str)
 def test_the_time_is_known_by_its_name(names):
-    assert clock_of(names, lambda name: False) == CLOCKS[names]
+    assert clock_of(names, (), lambda columns: False) == CLOCKS[names]
 
 
-def test_a_first_column_that_increases_is_the_time_where_no_name_says_so():
-    assert clock_of(("N", "U"), lambda name: name == "N") == ("N",)
-    assert clock_of(("N", "U"), lambda name: name == "U") == ()
-    assert clock_of(("N", "t"), lambda name: True) == ("t",)
+@pytest.mark.parametrize(
+    ("names", "stamps", "increasing", "clock"),
+    [
+        (("N", "U"), (), {("N",)}, ("N",)),
+        (("N", "U"), (), {("U",)}, ()),
+        (("N", "t"), (), {("N",)}, ("t",)),
+        (("N", "When", "U"), ("When",), {("N",), ("When",)}, ("When",)),
+        (("Day", "Clock"), ("Day", "Clock"), {("Day", "Clock")}, ("Day", "Clock")),
+        (("Begin", "End"), ("Begin", "End"), {("Begin",), ("End",)}, ("Begin",)),
+    ],
+)
+def test_where_no_name_says_so_the_time_is_what_increases(names, stamps, increasing, clock):
+    assert clock_of(names, stamps, increasing.__contains__) == clock

@@ -137,6 +137,12 @@ def test_date_and_time_stand_in_two_columns(book):
         np.testing.assert_allclose(table.instants(columns), [0, 0.005, 0.01], rtol=0, atol=1e-9)
 
 
+def test_timestamps_are_the_time_also_behind_a_count(book):
+    rows = [(at, one, 1.0) for at, one in enumerate(instants())]
+    assert read_excel(book(Data=[("N", "When", "Ut"), *rows])).clock == ("When",)
+    assert read_excel(book(Data=[("N", "Ut"), (1, 2.0), (2, 1.0)])).clock == ("N",)
+
+
 def test_midnight_is_passed_where_the_date_says_so(book):
     rows = [(date(2015, 9, 20), time(23, 59, 59), 1.0), (date(2015, 9, 21), time(0, 0, 1), 1.0)]
     table = read_excel(book(Data=[("Date", "Time", "Ut"), *rows]))

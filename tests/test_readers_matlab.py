@@ -96,6 +96,14 @@ def test_a_scalar_signal_may_have_three_dimensions(mat):
     assert np.array_equal(table.numbers(["scope.Ut"])["scope.Ut"], UT)
 
 
+def test_a_first_column_that_increases_is_the_time(mat):
+    assert read_mat(mat({"data": np.column_stack([T, UT])})).clock == ("data(:,1)",)
+
+
+def test_units_stand_in_the_names(mat):
+    assert read_mat(mat({"t": T, "P_MW": UT})).units == {"P_MW": "MW"}
+
+
 def test_milliseconds_are_asked_for_by_their_unit(mat):
     table = read_mat(mat({"t": T * 1e3}))
     np.testing.assert_allclose(table.instants(["t"], "ms"), T, rtol=1e-15)

@@ -110,6 +110,12 @@ def test_date_and_time_stand_in_two_columns(parquet, kind):
     np.testing.assert_allclose(table.instants(table.clock), [0, 0.001, 2.001], rtol=0, atol=1e-9)
 
 
+def test_timestamps_are_the_time_also_behind_a_count(parquet):
+    found = read_parquet(parquet({"N": [1, 2, 3], "When": INSTANTS, "Ut": UT}))
+    assert found.clock == ("When",)
+    assert read_parquet(parquet({"N": [1, 2, 3], "Ut": UT[::-1]})).clock == ("N",)
+
+
 def test_a_missing_instant_is_refused(parquet):
     table = read_parquet(parquet({"ts": [INSTANTS[0], None]}))
     refused(lambda: table.instants(["ts"]), "bump.parquet: row 2", "'ts'", "missing")

@@ -376,6 +376,13 @@ FILES = {
     "minutes, asked for": Seen(
         form("Zeit;P", "0;1", "0,5;2", "1;3"), ("Zeit",), [0, 30, 60], {"P": [1, 2, 3]}, {}, "min"
     ),
+    "timestamps of a name that is not known, beside a count": Seen(
+        form("N;Wann;U", "1;10:00:00,5;7", "2;10:00:01,0;8"),
+        ("Wann",),
+        [0.0, 0.5],
+        {"U": [7.0, 8.0]},
+        {},
+    ),
     "a first column without a name": Seen(
         form(",vt,", "0.5,1.0,7", "1.0,1.1,8"), ("1",), [0.5, 1.0], {"vt": [1.0, 1.1]}, {}
     ),

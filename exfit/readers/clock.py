@@ -19,18 +19,21 @@ TIMES = re.compile(
 BETWEEN = re.compile(r"[\s\-/.]+")
 
 
-def clock_of(names: Sequence[str], increases: Callable[[str], bool]) -> tuple[str, ...]:
+def clock_of(
+    names: Sequence[str], stamps: Sequence[str], increases: Callable[[Sequence[str]], bool]
+) -> tuple[str, ...]:
     """Return the column that seems to hold the time, or those of date and time of day, or none.
 
-    The names tell it, else what stands behind the last dot in them, as in s.time; else it is the
-    first column if it ``increases`` throughout.
+    The names tell it, else what stands behind the last dot in them, as in s.time; else it is what
+    ``increases`` throughout, of the columns that hold ``stamps`` or of all the first.
     """
     for ends in (names, [name.rpartition(".")[2] for name in names]):
         called = [BETWEEN.sub("_", bare(end).casefold()) for end in ends]
         named = _named(names, called)
         if named:
             return named
-    return tuple(names[:1]) if names and increases(names[0]) else ()
+    seeming = (tuple(columns) for columns in (stamps[:2], stamps[:1], names[:1]))
+    return next((columns for columns in seeming if columns and increases(columns)), ())
 
 
 def _named(names: Sequence[str], called: Sequence[str]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,7 +25,7 @@ class Columns:
     ``fetch`` returns float64, or datetime64[ns] for timestamps and timedelta64[ns] for times of
     day, nan or NaT where a sample is missing; it raises RecordError for a column of anything else.
     ``where`` names the place of a sample, counted from 0. ``said`` are the columns of the time
-    where the kind of file itself says so.
+    where the kind of file itself says so, ``stamps`` those known to hold timestamps.
     """
 
     path: Path
@@ -35,11 +35,12 @@ class Columns:
     fetch: Callable[[int], NDArray[Any]]
     where: Callable[[int], str]
     said: tuple[str, ...] = ()
+    stamps: tuple[str, ...] = ()
 
     @cached_property
     def clock(self) -> tuple[str, ...]:
         """The column that holds the time, or those of date and time; empty where none seems to."""
-        return self.said or clock_of(self.names, lambda name: increases(self, name))
+        return self.said or clock_of(self.names, self.stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.

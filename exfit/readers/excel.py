@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 Row = Sequence[Any]
 
 FEWEST_CELLS = 2  # of a row that holds a sample: the time and one signal
+STAMPS = ("timestamp", "time of day")  # kinds of cells
 WORKBOOK = "an Excel workbook"
 
 
@@ -154,6 +155,11 @@ def _columns(path: Path, sha256: str, sheet: _Sheet, asked: bool) -> Columns:
         units=sheet.units,
         fetch=fetch,
         where=where,
+        stamps=tuple(
+            name
+            for name, at in zip(sheet.names, sheet.places, strict=True)
+            if _kind(sheet.rows[sheet.samples[0]][at]) in STAMPS
+        ),
     )
 
 

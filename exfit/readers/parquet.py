@@ -49,6 +49,7 @@ def read_parquet(path: Path) -> Table:
         units=_units(schema),
         fetch=lambda at: _fetch(path, opened, schema.field(at)),
         where=lambda row: f"{path}: row {row + 1}",
+        stamps=tuple(field.name for field in schema if _is_stamp(field.type)),
     )
 
 
@@ -73,6 +74,12 @@ def _said(metadata: Mapping[bytes, bytes]) -> str | None:
     return next(
         (metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if key in metadata), None
     )
+
+
+def _is_stamp(kind: "pa.DataType") -> bool:
+    from pyarrow import types
+
+    return types.is_temporal(kind) and not types.is_interval(kind)
 
 
 def _fetch(path: Path, opened: "Callable[[], ParquetFile]", field: "pa.Field") -> NDArray[Any]:

@@ -74,10 +74,10 @@ def listed(names: Sequence[str]) -> str:
     return known + more
 
 
-def increases(table: Table, name: str) -> bool:
-    """Tell whether a column, of numbers or of timestamps, increases throughout."""
+def increases(table: Table, columns: Sequence[str]) -> bool:
+    """Tell whether columns can be the time, numbers or timestamps that increase throughout."""
     try:
-        instants = table.instants([name])
+        instants = table.instants(columns)
     except RecordError:
         return False
     return bool(np.all(np.diff(instants) > 0.0))

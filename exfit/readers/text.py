@@ -4,7 +4,7 @@ import hashlib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -51,7 +51,9 @@ class TextTable:
     @cached_property
     def clock(self) -> tuple[str, ...]:
         """The column that holds the time, or those of date and time; empty where none seems to."""
-        return clock_of(self.names, lambda name: increases(self, name))
+        _, first = next(self.rows())
+        stamps = [name for name, cell in zip(self.names, first, strict=False) if is_timestamp(cell)]
+        return clock_of(self.names, stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
