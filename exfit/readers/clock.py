@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from exfit.readers.table import Array, fault
+from exfit.readers.table import Array, column_error
 from exfit.readers.units import SECONDS, alike, bare, usual
 
 WHOLE = frozenset(  # date and time of day in one
@@ -56,9 +56,9 @@ def in_seconds(
     units = [unit for unit in (said, asked) if unit is not None]
     for unit in units:
         if usual(unit) not in SECONDS:
-            raise fault(path, column, f"{unit} is no unit of time: {', '.join(SECONDS)}")
+            raise column_error(path, column, f"{unit} is no unit of time: {', '.join(SECONDS)}")
     if said is not None and asked is not None and not alike(said, asked):
-        raise fault(path, column, f"in {said} as the file says, not in {asked}")
+        raise column_error(path, column, f"in {said} as the file says, not in {asked}")
     factor = SECONDS[usual(units[0])] if units else 1.0
     # one over it is whole: no digit of 5 ms is lost
     return numbers / round(1.0 / factor) if factor < 1.0 else numbers * factor

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.readers.clock import clock_of, in_seconds
-from exfit.readers.table import NONE, Array, fault, increases, position, refuse_uneven
+from exfit.readers.table import NONE, Array, column_error, increases, position, refuse_uneven
 
 T = TypeVar("T")
 
@@ -64,7 +64,7 @@ class Columns:
         if len(found) == 1 and found[first].dtype.kind == "f":
             return in_seconds(self.path, first, found[first], self.units.get(first), unit)
         if unit is not None:
-            raise fault(self.path, first, f"timestamps, no numbers of {unit}")
+            raise column_error(self.path, first, f"timestamps, no numbers of {unit}")
         ticks = self._ticks(found)
         return np.asarray((ticks - ticks[0]) / SECOND, np.float64)
 
@@ -75,7 +75,7 @@ class Columns:
     def _numbers(self, name: str, gappy: bool) -> Array:
         column = self.fetch(position(self.path, self.names, name)) if gappy else self._whole(name)
         if column.dtype.kind != "f":
-            raise fault(self.path, name, "timestamps, not numbers")
+            raise column_error(self.path, name, "timestamps, not numbers")
         return np.asarray(column, np.float64)
 
     def _whole(self, name: str) -> NDArray[Any]:
@@ -83,7 +83,7 @@ class Columns:
         column = self.fetch(position(self.path, self.names, name))
         lost = np.flatnonzero(np.isnan(column))  # NaT too
         if lost.size:
-            raise fault(self.where(int(lost[0])), name, "the sample is missing")
+            raise column_error(self.where(int(lost[0])), name, "the sample is missing")
         return column
 
     def _ticks(self, found: Mapping[str, NDArray[Any]]) -> NDArray[Any]:

@@ -16,7 +16,7 @@ from exfit.errors import RecordError
 from exfit.readers.cells import shown
 from exfit.readers.columns import Columns, needed, sound
 from exfit.readers.heads import is_units, names_of, units_of
-from exfit.readers.table import Table, fault, read_bytes
+from exfit.readers.table import Table, column_error, read_bytes
 
 if TYPE_CHECKING:
     from python_calamine import CalamineWorkbook
@@ -170,7 +170,7 @@ def _column(cells: Sequence[Any], name: str, where: Callable[[int], str]) -> NDA
     kind = next((_kind(cell) for cell in cells if _kind(cell) not in ("", "text")), "number")
     for row, cell in enumerate(cells):
         if _kind(cell) not in ("", kind):
-            raise fault(where(row), name, f"{shown(cell)} is not a {kind}")
+            raise column_error(where(row), name, f"{shown(cell)} is not a {kind}")
     if kind == "number":
         return np.array([np.nan if cell == "" else float(cell) for cell in cells])
     if kind == "timestamp":

@@ -13,7 +13,7 @@ from exfit.errors import RecordError
 from exfit.readers import mat5
 from exfit.readers.columns import Columns, sound
 from exfit.readers.heads import units_of
-from exfit.readers.table import Array, Table, fault, read_bytes
+from exfit.readers.table import Array, Table, column_error, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 HDF5_OFFSET = 512  # of the HDF5 signature in a file of version 7.3
@@ -120,5 +120,5 @@ def _is_real(values: NDArray[Any]) -> bool:
 def _numbers(path: Path, name: str, values: NDArray[Any]) -> Array:
     if not _is_real(values):
         kind = "complex numbers" if values.dtype.kind == "c" else "text"
-        raise fault(path, name, f"{kind}, not numbers")
+        raise column_error(path, name, f"{kind}, not numbers")
     return np.asarray(values, np.float64)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from exfit.errors import RecordError
 from exfit.readers.columns import Columns, needed, sound
 from exfit.readers.heads import stated
-from exfit.readers.table import Table, fault, readable
+from exfit.readers.table import Table, column_error, readable
 from exfit.readers.units import unit_in
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def _fetch(path: Path, opened: "Callable[[], ParquetFile]", field: "pa.Field") -
     """Return a column as float64, datetime64[ns] or timedelta64[ns]."""
     steps = _steps(field.type)
     if not steps:
-        raise fault(path, field.name, f"{field.type}, not numbers")
+        raise column_error(path, field.name, f"{field.type}, not numbers")
 
     def read() -> "pa.ChunkedArray":
         with opened() as file:
@@ -106,7 +106,7 @@ def _cast(
             # an integer beyond 2**53 becomes the float64 next to it; a date beyond ns does not
             column = column.cast(kind, safe=not is_floating(kind))
     except ArrowInvalid as error:
-        raise fault(path, name, str(error)) from None
+        raise column_error(path, name, str(error)) from None
     return np.asarray(column.to_numpy())
 
 

@@ -94,7 +94,7 @@ def refuse_uneven(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
         )
 
 
-def fault(place: Path | str, name: str, what: str) -> RecordError:
+def column_error(place: Path | str, name: str, what: str) -> RecordError:
     """Return the error of a column, or of a cell of it: where, in which column, what was seen."""
     return RecordError(f"{place}: column {name!r}: {what}")
 

@@ -17,7 +17,7 @@ from exfit.readers.cells import is_missing, is_number, shown, why_not
 from exfit.readers.clock import clock_of, in_seconds
 from exfit.readers.decoding import Text, decoded
 from exfit.readers.dialect import HEAD, Dialect, find_dialect, has_comma, is_comment, split_rows
-from exfit.readers.table import NONE, Array, fault, increases, position, read_bytes
+from exfit.readers.table import NONE, Array, column_error, increases, position, read_bytes
 from exfit.readers.timestamps import (
     WIDEST,
     WIDEST_OF_TWO,
@@ -81,7 +81,7 @@ class TextTable:
             return in_seconds(self.path, name, numbers, self.units.get(name), unit)
         if unit is not None:
             what = f"{shown(first[places[0]])} is a timestamp, no number of {unit}"
-            raise fault(self.path, columns[0], what)
+            raise column_error(self.path, columns[0], what)
         return self._stamps(columns, places)
 
     def place(self, row: int) -> str:
@@ -207,7 +207,7 @@ class TextTable:
                 cell = row[place].strip()
                 if is_number(cell, comma) or (name in gappy and is_missing(cell)):
                     continue
-                raise fault(f"{self.path}:{line}", name, why_not(cell, comma))
+                raise column_error(f"{self.path}:{line}", name, why_not(cell, comma))
 
     def _check_width(self, line: int, row: Sequence[str]) -> None:
         """Raise a RecordError for a row of more or fewer cells than there are columns."""
@@ -230,12 +230,12 @@ class TextTable:
                 for name, place in zip(columns, places, strict=True):
                     if not is_timestamp(row[place]):
                         what = f"{shown(row[place])} is no timestamp"
-                        raise fault(f"{self.path}:{line}", name, what) from None
+                        raise column_error(f"{self.path}:{line}", name, what) from None
             raise RecordError(f"{self.path}: {error}") from None
         try:
             return seconds_since_first(cells)
         except StampError as error:
-            raise fault(self.place(error.row), columns[error.column], str(error)) from None
+            raise column_error(self.place(error.row), columns[error.column], str(error)) from None
 
 
 def read_text_table(path: Path) -> TextTable:

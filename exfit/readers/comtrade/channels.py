@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from exfit.errors import RecordError
 from exfit.readers.comtrade.data import BITS, MISSING_STAMP, Samples
 from exfit.readers.comtrade.files import Parts
-from exfit.readers.table import Array, fault
+from exfit.readers.table import Array, column_error
 
 if TYPE_CHECKING:
     from comtrade import AnalogChannel, Cfg
@@ -75,5 +75,5 @@ def status_of(parts: Parts, config: "Cfg", samples: Samples, at: int) -> Array:
     wrong = np.flatnonzero(~np.isin(values, (0.0, 1.0)) & ~np.isnan(values))
     if wrong.size:
         name, row = config.status_channels[at].name, int(wrong[0])
-        raise fault(parts.sample(row), name, f"{values[row]:g} is not 0 or 1")
+        raise column_error(parts.sample(row), name, f"{values[row]:g} is not 0 or 1")
     return values
