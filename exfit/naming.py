@@ -39,6 +39,7 @@ TRIPLES = (
     ("l1", "l2", "l3"), ("12", "23", "31"), ("ab", "bc", "ca"), ("rs", "st", "tr"),
     ("a", "b", "c"), ("r", "s", "t"), ("1", "2", "3"),
 )  # fmt: skip
+LINE_TO_LINE = TRIPLES[1:4]
 OF_VOLTAGE = re.compile(r"^(u|v|.*volt|.*spannung)")
 
 
@@ -86,6 +87,15 @@ def three_phases(names: Sequence[str], units: Mapping[str, str]) -> tuple[tuple[
                 found.append(triple)
                 taken |= {*triple}
     return tuple(found)
+
+
+def connection_of(columns: Sequence[str]) -> str:
+    """Return between what three voltages seem to be recorded, by their names: U12, Uab, URS ..."""
+    low = [one.lower() for one in columns]
+    for marks in LINE_TO_LINE:
+        if all(mark in name for mark, name in zip(marks, low, strict=True)):
+            return "phase-to-phase"
+    return "phase-to-ground"
 
 
 def _triples(name: str, names: Sequence[str]) -> Iterator[tuple[str, ...]]:

@@ -69,7 +69,7 @@ def starting_case(
         "# Values are typical: put those of the unit in their place. `exfit check` tries",
         "# the case, `exfit identify` tells what its test leaves open, `exfit fit` fits.",
         *(f"# Look: {_plain(text)}." for text in found.findings),
-        "# about: {Plant: Example, Unit: 1, Rated: 120 MVA 15.75 kV, Tested by: N. N.}  # for reports",
+        "# about: {Plant: ..., Unit: ..., Rated: ..., Tested by: ...}  # for reports",
         f"model: {name}",
         *_plant(model, machine, found),
         *bump_section(found, vt0=model.name == ALONE),

@@ -9,6 +9,7 @@ import yaml
 
 from exfit.case_writer import commented
 from exfit.inspection import AT_REST_PU, Channel, Inspection, Phases
+from exfit.naming import connection_of
 from exfit.readers.units import quantity_of
 from exfit.result import yaml_number
 from exfit.steps import Step
@@ -130,14 +131,15 @@ def _voltage(found: Inspection, channels: list[Channel]) -> tuple[Phases, ...]:
 def _phases(found: Inspection, group: Phases) -> str:
     columns = ", ".join(_text(name) for name in group.columns)
     unit = next(one.unit for one in found.channels if one.name == group.columns[0])
-    shown = f", unit: {unit}" if unit else ""
-    return f"{{phases: [{columns}], kind: {group.kind}{shown}, base: {FILL_IN}}}"
+    known = f"kind: {group.kind}, connection: {connection_of(group.columns)}"
+    return f"{{phases: [{columns}], {known}, unit: {unit or FILL_IN}, base: {FILL_IN}}}"
 
 
 def _about_phases(found: Inspection, group: Phases) -> Iterator[str]:
     first = next(one for one in found.channels if one.name == group.columns[0])
     unit = first.unit or "the unit of the columns"
-    yield f"three phases by their names; base: rated voltage, line to line, in {unit}"
+    yield f"three phases by their names; base: rated voltage, line to line, in {unit};"
+    yield "check connection, a factor of sqrt(3): phase-to-ground or phase-to-phase"
     if group.kind == "rms":
         yield f"{first.name} rests at {first.level:.5g}"
     else:

@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from exfit import plots
 from exfit.errors import RecordError
 from exfit.inspection import inspect
-from exfit.naming import guessed, three_phases
+from exfit.naming import connection_of, guessed, three_phases
 from exfit.quality import quantum, spikes, stuck
 from exfit.readers.units import unit_in
 from exfit.record import read_columns
@@ -359,6 +359,13 @@ def test_three_phases_of_a_voltage_are_recognised(names, grouped):
     assert three_phases(names, dict.fromkeys(names, "A")) == ()
 
 
+@pytest.mark.parametrize("names", ["U12 U23 U31", "Uab Ubc Uca", "U_RS U_ST U_TR"])
+def test_voltages_between_phases_are_told_from_those_to_ground(names):
+    assert connection_of(names.split()) == "phase-to-phase"
+    assert connection_of(["Ua", "Ub", "Uc"]) == connection_of(["UL1", "UL2", "UL3"])
+    assert connection_of(["Ua", "Ub", "Uc"]) == "phase-to-ground"
+
+
 @pytest.mark.parametrize("frequency", [50.02, 60.0])
 def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency):
     clean = reference("reference_ac1a.csv")
@@ -377,7 +384,8 @@ def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency
     assert step.sizes[group.name] / group.level == pytest.approx(0.0495, rel=0.02)
     text = "\n".join(record_section(found, "w.csv"))
     assert yaml.safe_load(text)["record"]["channels"]["vt"] == {
-        "phases": ["UL1", "UL2", "UL3"], "kind": "waveform", "unit": "kV", "base": "?"
+        "phases": ["UL1", "UL2", "UL3"], "kind": "waveform", "connection": "phase-to-ground",
+        "unit": "kV", "base": "?"
     }  # fmt: skip
 
 
