@@ -108,12 +108,12 @@ def test_a_flat_signal_has_different_levels_at_its_axis():
 @pytest.mark.parametrize("iterations", [1, 30])
 def test_a_picture_is_smaller_than_its_terminal(width, height, iterations):
     watch = watching(terminal(width, height), iterations)
-    lines = watch._picture().plain.splitlines()
+    lines = watch.picture().plain.splitlines()
     # beside it there is the title, and the line that the cursor stands on
     assert len(lines) <= height - 2
-    shown = watch.console.render_lines(watch._picture(), pad=False)
+    shown = watch.console.render_lines(watch.picture(), pad=False)
     assert len(shown) == len(lines)
-    assert str(iterations - 1) in watch._picture().plain
+    assert str(iterations - 1) in watch.picture().plain
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_a_picture_is_smaller_than_its_terminal(width, height, iterations):
     [((60, 15), None), ((80, 24), "below"), ((120, 40), "beside"), ((120, 15), "beside")],
 )
 def test_a_plot_stands_where_there_is_room_for_it(size, where):
-    text = watching(terminal(*size))._picture().plain
+    text = watching(terminal(*size)).picture().plain
     rows = [row for row in text.splitlines() if "dgn" in row]
     heads = [row for row in text.splitlines() if "simulated" in row]
     assert len(heads) == (0 if where is None else 1)
@@ -131,7 +131,7 @@ def test_a_plot_stands_where_there_is_room_for_it(size, where):
 
 def test_no_column_of_the_history_is_cut_in_two():
     for width in range(20, 80):
-        text = watching(terminal(width, 12), sketch=None)._picture().plain
+        text = watching(terminal(width, 12), sketch=None).picture().plain
         (head,) = [row for row in text.splitlines() if row.lstrip().startswith("it ")]
         assert len(head) <= max(width, 20)
         assert tuple(head.split()) == progress.HISTORY[: len(head.split())]
@@ -147,14 +147,14 @@ def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):
     """A drawing takes 10 ms, an iteration 1 ms: all but 3 % is left to the fit."""
     now = {"at": 0.0, "drawn": 0.0}
     monkeypatch.setattr(progress.time, "perf_counter", lambda: now["at"])
-    whole = show.Watch._picture
+    whole = show.Watch.picture
 
     def slow(self):
         now["at"] += 0.01
         now["drawn"] += 0.01
         return whole(self)
 
-    monkeypatch.setattr(show.Watch, "_picture", slow)
+    monkeypatch.setattr(show.Watch, "picture", slow)
     with show.Watch(terminal(80, 24), "case", 100).running() as watch:
         for number in range(900):
             now["at"] += 0.001
@@ -163,7 +163,7 @@ def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):
     # the first drawing is not yet paid for by the time after it
     assert within - 0.01 <= progress.SHARE * now["at"]
     assert within > 0.01
-    assert "iteration 899" in watch._picture().plain
+    assert "iteration 899" in watch.picture().plain
 
 
 @pytest.mark.parametrize("jacobian", ["exact", "central"])

@@ -53,7 +53,7 @@ class Watch:
                 yield self
             finally:
                 if self.lines:
-                    self._live.update(self._picture(), refresh=True)
+                    self._live.update(self.picture(), refresh=True)
 
     @property
     def look(self) -> Callable[[Sketch], None] | None:
@@ -81,11 +81,11 @@ class Watch:
         began = time.perf_counter()
         if began < self._next:
             return
-        live.update(self._picture(), refresh=True)
+        live.update(self.picture(), refresh=True)
         ended = time.perf_counter()
         self._next = ended + (ended - began) / SHARE
 
-    def _picture(self) -> Text:
+    def picture(self) -> Text:
         """Return the table, and the plot where there is room for it: beside or below."""
         width, height = self.console.size
         free, beside, below = height - AROUND, width - TABLE - GAP, height - AROUND - FEWEST

@@ -1,0 +1,319 @@
+"""The gallery of the README: what the commands draw and print of the sample records.
+
+    python tests/gallery.py
+
+runs the commands, writes sample_data/gallery and puts the pictures with their captions into the
+README. A picture that has only changed by what another machine would change stays as it is.
+"""
+
+import io
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, chdir, contextmanager
+from dataclasses import dataclass, replace
+from html import unescape
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+from field_record import FILE, field_record
+from matplotlib.figure import Figure
+from PIL import Image
+from rich.console import CONSOLE_SVG_FORMAT, Console
+from rich.terminal_theme import DEFAULT_TERMINAL_THEME
+
+from exfit import plots, show
+from exfit.cli import main
+
+ROOT = Path(__file__).parent.parent
+README = ROOT / "README.md"
+GALLERY = "sample_data/gallery"
+BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
+
+DPI = 84  # of the figures: 756 points wide, nearly twice what a column of the README shows
+COLOURS = 256  # of a figure; its lines have a few, each with shades to white
+HEIGHT = 40  # lines of the terminal
+SECONDS = 0.09  # that a fit takes, which no two runs share; README.md, Speed
+FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that is seen
+# fonts of a server: a picture of its own has none
+FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
+
+BLOCK = 6  # points: edges of letters and lines differ by the versions of Matplotlib and FreeType
+APART = 24.0  # of 255, the largest mean difference over a block
+DIGITS = 2e-2  # relative, of a printed number
+VANISHED = 1e-6  # a gradient or a step below it is what rounding leaves, and another machine rounds
+NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]\d+)?")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A file of the gallery: a figure that a command leaves in its folder, or its terminal."""
+
+    name: str
+    caption: str
+    source: str | None = None
+
+
+@dataclass(frozen=True)
+class Run:
+    """A command and its pictures; ``columns`` are those of the terminal."""
+
+    command: str
+    pictures: tuple[Picture, ...] = ()
+    columns: int = 80
+
+    @property
+    def terminal(self) -> Picture | None:
+        return next((one for one in self.pictures if one.source is None), None)
+
+    @property
+    def figures(self) -> set[str]:
+        """The figures that become pictures, as the command names their files."""
+        return {one.source for one in self.pictures if one.source}
+
+    @property
+    def folder(self) -> Path:
+        """Where the command leaves its files."""
+        words = self.command.split()
+        stem = f"{Path(words[2]).stem}-" if words[1] != "compare" else ""
+        return Path("runs") / f"{stem}{words[1]}"
+
+
+FIT, BOTH, FIELD = (f"configs/{name}.yaml" for name in ("ac1a_typical", "ac1a_both", "field_record"))
+RECORD = FILE.relative_to(ROOT).as_posix()
+RUNS = (
+    Run(
+        f"exfit fit {FIT}",
+        (
+            Picture("fit.svg", "the iterations with the response, then the values and what is open"),
+            Picture("overlay.png", "measured, start values and fitted", "overlay.png"),
+            Picture("iterations.png", "how the fit came about", "iterations.png"),
+            Picture("convergence.png", "cost, gradient and damping", "convergence.png"),
+            Picture("sensitivity.png", "what each parameter does", "sensitivity.png"),
+            Picture("correlation.png", "which parameters move together", "correlation.png"),
+        ),
+        columns=126,
+    ),
+    Run(
+        f"exfit profile {FIT} KA KC KD",
+        (Picture("profile.png", "how far each can move, the others fitted", "profile.png"),),
+    ),
+    Run(
+        f"exfit identify {FIT}",
+        (Picture("identify.svg", "what a planned test would tell"),),
+    ),
+    Run(
+        f"exfit inspect {RECORD}",
+        (
+            Picture("inspect.svg", "what a recorder's file holds, and the case that it suggests"),
+            Picture("inspect.png", "its step, spikes and gap", "inspect.png"),
+        ),
+    ),
+    Run(
+        f"exfit fit {FIELD}",
+        (Picture("field_overlay.png", "voltage and field current in one fit", "overlay.png"),),
+    ),
+    Run(
+        f"exfit simulate {FIT}",
+        (Picture("response.png", "every signal and state", "response.png"),),
+    ),
+    Run(
+        "exfit compare runs/ac1a_typical-simulate runs/ac1a_typical-fit sample_data/ac1a_up.csv",
+        (Picture("compare.png", "two responses beside a record", "compare.png"),),
+    ),
+)
+# rows of the table, two pictures each; the first picture stands above it
+WIDE = "fit.svg"
+ROWS = (
+    ("overlay.png", "iterations.png"),
+    ("inspect.svg", "field_overlay.png"),
+    ("inspect.png", "compare.png"),
+    ("identify.svg", "sensitivity.png"),
+    ("correlation.png", "profile.png"),
+    ("convergence.png", "response.png"),
+)
+# what a command draws beside its pictures
+DRAWN = (
+    "overlay", "iterations", "convergence", "trajectories", "sensitivity", "correlation", "response"
+)  # fmt: skip
+
+
+class Still(show.Watch):
+    """Shows the iterations of a fit once, when it is done."""
+
+    @contextmanager
+    def running(self) -> Iterator["Still"]:
+        yield self
+        self.console.print(self.title, markup=False)
+        self.console.print(self.picture())
+
+    def __call__(self, line):
+        self.lines.append(line)
+
+
+def drawn() -> dict[str, bytes]:
+    """Return every picture by its name, of commands that run in a copy of cases and records."""
+    found: dict[str, bytes] = {}
+    with tempfile.TemporaryDirectory() as room, chdir(room):
+        shutil.copytree(ROOT / "configs", "configs")
+        shutil.copytree(ROOT / "sample_data", "sample_data", ignore=lambda *_: ["gallery"])
+        for run in RUNS:
+            shown = ran(run)
+            for one in run.pictures:
+                source = run.folder / one.source if one.source else None
+                found[one.name] = smaller(source.read_bytes()) if source else shown
+    return found
+
+
+def ran(run: Run) -> bytes:
+    """Run a command; return its terminal as SVG, which is empty where no picture is made of it."""
+    console = Console(
+        record=True,
+        file=io.StringIO(),
+        force_terminal=True,
+        color_system="truecolor",
+        no_color=False,
+        highlight=False,
+        legacy_windows=False,
+        width=run.columns,
+        height=HEIGHT,
+    )
+    console.print(f"$ {run.command}", style="bold", soft_wrap=True)
+    words = run.command.split()[1:]
+    with ExitStack() as changes:
+        changes.enter_context(patch.object(plots.style, "DPI", DPI))
+        changes.enter_context(patch.object(show, "console", lambda: console))
+        changes.enter_context(patch.object(show, "Watch", Still))
+        changes.enter_context(patch.object(show, "fit", in_no_time(show.fit)))
+        for name in DRAWN:
+            if f"{name}.png" not in run.figures:
+                changes.enter_context(patch.object(plots, name, lambda *_: Figure()))
+        main([*words, *([] if run.terminal else ["-q"])], "exfit", standalone_mode=False)
+    if run.terminal is None:
+        return b""
+    console.print()  # below the last line letters would be cut off
+    name = Path(run.terminal.name).stem
+    svg = console.export_svg(
+        title="", theme=DEFAULT_TERMINAL_THEME, code_format=FORMAT, unique_id=name
+    )
+    return svg.replace(*FRAME).encode()
+
+
+def in_no_time(shown):
+    """Return what shows a fit, with the same seconds for each."""
+    return lambda console, result, *others: shown(
+        console, replace(result, seconds=SECONDS), *others
+    )
+
+
+def smaller(png: bytes) -> bytes:
+    """Return a figure in a few colours."""
+    out = io.BytesIO()
+    image = Image.open(io.BytesIO(png)).convert("RGB")
+    image.quantize(COLOURS, Image.Quantize.MAXCOVERAGE).save(out, "PNG", optimize=True)
+    return out.getvalue()
+
+
+def same(one: bytes, other: bytes) -> bool:
+    """Tell whether two pictures differ by no more than another machine or version makes of one."""
+    if one.startswith(b"\x89PNG") and other.startswith(b"\x89PNG"):
+        return same_figure(one, other)
+    return same_words(one, other)
+
+
+def same_figure(one: bytes, other: bytes) -> bool:
+    """Tell whether two figures are alike, compared block by block."""
+    first, second = (
+        np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float) for png in (one, other)
+    )
+    if first.shape != second.shape:
+        return False
+    return float(np.max(np.abs(blocks(first - second)))) <= APART
+
+
+def blocks(image: np.ndarray) -> np.ndarray:
+    """Return the means of an image (height, width, 3) over square blocks."""
+    down, across = (np.arange(0, length, BLOCK) for length in image.shape[:2])
+    sums = np.add.reduceat(np.add.reduceat(image, down, axis=0), across, axis=1)
+    return sums / BLOCK**2
+
+
+def same_words(one: bytes, other: bytes) -> bool:
+    """Tell whether two terminals say the same, numbers up to a few of their digits."""
+    first, second = words_of(one), words_of(other)
+    return len(first) == len(second) and all(map(same_word, first, second))
+
+
+def words_of(svg: bytes) -> list[str]:
+    """Return the words of a terminal; the braille of a plot is one for each line."""
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", svg.decode())
+    return " ".join(unescape(text) for text in texts).split()
+
+
+def same_word(one: str, other: str) -> bool:
+    if one == other:
+        return True
+    if not (NUMBER.fullmatch(one) and NUMBER.fullmatch(other)):
+        return False
+    first, second = float(one), float(other)
+    return abs(first - second) <= max(DIGITS * abs(first), VANISHED)
+
+
+def section() -> str:
+    """Return the gallery of the README."""
+    made = {one.name: (run, one) for run in RUNS for one in run.pictures}
+    return "\n".join(
+        [
+            BEGIN,
+            *(f"{line}\n" for line in (captioned(*made[WIDE]), shown(made[WIDE][1]))),
+            "| | |",
+            "|---|---|",
+            *(
+                line
+                for row in ROWS
+                for line in (
+                    f"| {' | '.join(shown(made[name][1]) for name in row)} |",
+                    f"| {' | '.join(captioned(*made[name]) for name in row)} |",
+                )
+            ),
+            END,
+        ]
+    )
+
+
+def shown(one: Picture) -> str:
+    return f"![{one.caption}]({GALLERY}/{one.name})"
+
+
+def captioned(run: Run, one: Picture) -> str:
+    return f"`{run.command}`: {one.caption}"
+
+
+def with_section(readme: str) -> str:
+    """Return the README with the gallery in its place."""
+    before, _, rest = readme.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{section()}{after}"
+
+
+def write() -> None:
+    """Write the gallery and its section of the README; what is no part of it any more goes."""
+    folder = ROOT / GALLERY
+    folder.mkdir(exist_ok=True)
+    pictures = drawn()
+    for path in folder.iterdir():
+        if path.name not in pictures:
+            path.unlink()
+    for name, content in pictures.items():
+        path = folder / name
+        if not (path.exists() and same(path.read_bytes(), content)):
+            path.write_bytes(content)
+            print(f"{path}: {len(content) / 1e3:.0f} kB")
+    README.write_text(with_section(README.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    FILE.write_text(field_record(), encoding="utf-8")
+    write()
