@@ -13,14 +13,17 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, chdir, contextmanager
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from html import unescape
+from importlib.metadata import version
 from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
 from field_record import FILE, field_record
 from matplotlib.figure import Figure
-from PIL import Image
+from matplotlib.ft2font import __freetype_version__
+from PIL import Image, PngImagePlugin
 from rich.console import CONSOLE_SVG_FORMAT, Console
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 
@@ -40,9 +43,13 @@ FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that
 # fonts of a server: a picture of its own has none
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
 
-BLOCK = 6  # points: edges of letters and lines differ by the versions of Matplotlib and FreeType
-APART = 24.0  # of 255, the largest mean difference over a block
-DIGITS = 2e-2  # relative, of a printed number
+# largest mean difference, of 255, over blocks of so many points: between processors there is none,
+# a line of 1.0 in place of 1.4 points makes 26 and a changed letter 54
+POINTS, APART = 4, 12.0
+# the same between versions of Matplotlib or FreeType, which set letters and so axes a point or two
+# apart: other hinting of the letters makes 32
+OTHER_POINTS, OTHER_APART = 32, 48.0
+DRAWN_BY = f"Matplotlib {version('matplotlib').rpartition('.')[0]}, FreeType {__freetype_version__}"
 VANISHED = 1e-6  # a gradient or a step below it is what rounding leaves, and another machine rounds
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]\d+)?")
 
@@ -81,13 +88,17 @@ class Run:
         return Path("runs") / f"{stem}{words[1]}"
 
 
-FIT, BOTH, FIELD = (f"configs/{name}.yaml" for name in ("ac1a_typical", "ac1a_both", "field_record"))
+FIT, BOTH, FIELD = (
+    f"configs/{name}.yaml" for name in ("ac1a_typical", "ac1a_both", "field_record")
+)
 RECORD = FILE.relative_to(ROOT).as_posix()
 RUNS = (
     Run(
         f"exfit fit {FIT}",
         (
-            Picture("fit.svg", "the iterations with the response, then the values and what is open"),
+            Picture(
+                "fit.svg", "the iterations with the response, then the values and what is open"
+            ),
             Picture("overlay.png", "measured, start values and fitted", "overlay.png"),
             Picture("iterations.png", "how the fit came about", "iterations.png"),
             Picture("convergence.png", "cost, gradient and damping", "convergence.png"),
@@ -128,11 +139,11 @@ RUNS = (
 WIDE = "fit.svg"
 ROWS = (
     ("overlay.png", "iterations.png"),
-    ("inspect.svg", "field_overlay.png"),
-    ("inspect.png", "compare.png"),
-    ("identify.svg", "sensitivity.png"),
-    ("correlation.png", "profile.png"),
-    ("convergence.png", "response.png"),
+    ("convergence.png", "correlation.png"),
+    ("identify.svg", "profile.png"),
+    ("sensitivity.png", "compare.png"),
+    ("inspect.svg", "inspect.png"),
+    ("field_overlay.png", "response.png"),
 )
 # what a command draws beside its pictures
 DRAWN = (
@@ -209,45 +220,54 @@ def in_no_time(shown):
 
 
 def smaller(png: bytes) -> bytes:
-    """Return a figure in a few colours."""
-    out = io.BytesIO()
-    image = Image.open(io.BytesIO(png)).convert("RGB")
-    image.quantize(COLOURS, Image.Quantize.MAXCOVERAGE).save(out, "PNG", optimize=True)
+    """Return a figure in its most frequent colours, with what it was drawn by."""
+    out, about = io.BytesIO(), PngImagePlugin.PngInfo()
+    about.add_text("Software", DRAWN_BY)
+    image = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=np.int64)
+    found, place, counts = np.unique(
+        image @ (1 << 16, 1 << 8, 1), return_inverse=True, return_counts=True
+    )
+    colours = np.stack([found >> 16, found >> 8 & 255, found & 255], axis=1)
+    kept = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
+    nearest = np.argmin(np.sum((colours[:, None] - kept) ** 2, axis=2), axis=1)
+    few = Image.fromarray(nearest[place].reshape(image.shape[:2]).astype(np.uint8))
+    few.putpalette(kept.astype(np.uint8).tobytes())
+    few.save(out, "PNG", optimize=True, pnginfo=about)
     return out.getvalue()
 
 
 def same(one: bytes, other: bytes) -> bool:
     """Tell whether two pictures differ by no more than another machine or version makes of one."""
-    if one.startswith(b"\x89PNG") and other.startswith(b"\x89PNG"):
-        return same_figure(one, other)
-    return same_words(one, other)
+    figures = [content.startswith(b"\x89PNG") for content in (one, other)]
+    return same_figure(one, other) if all(figures) else same_words(one, other)
 
 
 def same_figure(one: bytes, other: bytes) -> bool:
     """Tell whether two figures are alike, compared block by block."""
-    first, second = (
-        np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float) for png in (one, other)
-    )
-    if first.shape != second.shape:
+    first, second = (Image.open(io.BytesIO(png)) for png in (one, other))
+    if first.size != second.size:
         return False
-    return float(np.max(np.abs(blocks(first - second)))) <= APART
+    alike = first.text == second.text
+    points, apart = (POINTS, APART) if alike else (OTHER_POINTS, OTHER_APART)
+    difference = np.subtract(*(np.asarray(it.convert("RGB"), float) for it in (first, second)))
+    return bool(np.all(np.abs(means(difference, points)) <= apart))
 
 
-def blocks(image: np.ndarray) -> np.ndarray:
+def means(image: np.ndarray, points: int) -> np.ndarray:
     """Return the means of an image (height, width, 3) over square blocks."""
-    down, across = (np.arange(0, length, BLOCK) for length in image.shape[:2])
+    down, across = (np.arange(0, length, points) for length in image.shape[:2])
     sums = np.add.reduceat(np.add.reduceat(image, down, axis=0), across, axis=1)
-    return sums / BLOCK**2
+    return sums / points**2
 
 
 def same_words(one: bytes, other: bytes) -> bool:
-    """Tell whether two terminals say the same, numbers up to a few of their digits."""
+    """Tell whether two terminals say the same, numbers up to one of their last digit."""
     first, second = words_of(one), words_of(other)
     return len(first) == len(second) and all(map(same_word, first, second))
 
 
 def words_of(svg: bytes) -> list[str]:
-    """Return the words of a terminal; the braille of a plot is one for each line."""
+    """Return the words of a terminal."""
     texts = re.findall(r"<text[^>]*>([^<]*)</text>", svg.decode())
     return " ".join(unescape(text) for text in texts).split()
 
@@ -257,8 +277,11 @@ def same_word(one: str, other: str) -> bool:
         return True
     if not (NUMBER.fullmatch(one) and NUMBER.fullmatch(other)):
         return False
-    first, second = float(one), float(other)
-    return abs(first - second) <= max(DIGITS * abs(first), VANISHED)
+    first, second = Decimal(one), Decimal(other)
+    if max(abs(first), abs(second)) < VANISHED:
+        return True
+    last = max(Decimal((0, (1,), number.as_tuple().exponent)) for number in (first, second))
+    return abs(first - second) <= last
 
 
 def section() -> str:
@@ -288,7 +311,7 @@ def shown(one: Picture) -> str:
 
 
 def captioned(run: Run, one: Picture) -> str:
-    return f"`{run.command}`: {one.caption}"
+    return f"{one.caption[0].upper()}{one.caption[1:]}:<br>`{run.command}`"
 
 
 def with_section(readme: str) -> str:

@@ -16,6 +16,7 @@ from exfit.errors import RecordError
 from exfit.inspection import inspect
 from exfit.naming import connection_of, guessed, three_phases
 from exfit.quality import quantum, spikes, stuck
+from exfit.readers import open_table
 from exfit.readers.units import unit_in
 from exfit.record import read_columns
 from exfit.sampling import sampling_of
@@ -24,6 +25,7 @@ from exfit.suggestion import bump_section, record_section
 
 HERE = Path(__file__).parent
 SAMPLES = HERE.parent / "sample_data"
+FIELD = "field_record"
 WITHIN = 0.02  # s
 SHARE = 0.05  # of the size
 
@@ -56,6 +58,8 @@ class Columns:
 
 
 def sample(path):
+    if path.stem == FIELD:
+        return open_table(path)
     names = path.read_text().partition("\n")[0].split(",")
     return Columns(read_columns(path, names), path=path)
 
@@ -76,6 +80,8 @@ def truth(record):
     """Return the instants of a sample record's steps, and what its voltage changes by each."""
     if record.startswith("first_order"):
         return [(0.0, -2.0 if record.endswith("down") else 2.0)]  # k/a, and it begins with the step
+    if record == FIELD:  # the AC1A's step, of 15.75 kV
+        return [(2.137, 15.75 * moved("reference_ac1a.csv", 0.5, 10.0))]
     if record == "ac8b_on_line":  # of 0.02 pu of the reference, vt keeps 0.018
         return [(1.0, moved("andes_ac8b_ieee_smib.csv", 0.5, 10.0))]
     unit = record.rpartition("_")[0]
@@ -122,7 +128,9 @@ def test_a_trigger_is_no_step_of_the_reference():
     assert next(one for one in found.channels if one.name == "trigger").steps == ()
 
 
-@pytest.mark.parametrize("record", [name for name in RECORDS if not name.startswith("first")])
+@pytest.mark.parametrize(
+    "record", [name for name in RECORDS if not name.startswith(("first", FIELD))]
+)
 def test_the_channels_of_a_sample_record_are_recognised(record):
     found = inspect(sample(SAMPLES / f"{record}.csv"))
     assert {one.name: one.signal for one in found.channels} == {
@@ -131,6 +139,24 @@ def test_the_channels_of_a_sample_record_are_recognised(record):
     assert found.sampling.even
     assert found.sampling.step == pytest.approx(0.01)
     assert found.findings == ()
+
+
+def test_the_field_record_is_told_as_it_was_made():
+    """sample_data/README.md says what was put into it, and where."""
+    found = inspect(sample(SAMPLES / f"{FIELD}.csv"))
+    assert found.clock == ("Date", "Time")
+    assert not found.sampling.even
+    (gap,) = found.sampling.gaps
+    assert (gap.start, gap.end) == pytest.approx(
+        (9.0, 9.04), abs=0.005
+    )  # a sample before and after
+    vt, ifd = found.channel_of("vt"), found.channel_of("ifd")
+    assert (vt.name, vt.unit, ifd.name, ifd.unit) == ("Ugen", "kV", "If", "A")
+    assert vt.spikes_at == pytest.approx((1.3, 5.61, 7.94), abs=0.005)
+    assert ifd.spikes_at == pytest.approx((6.72,), abs=0.005)
+    assert (vt.quantum, ifd.quantum) == pytest.approx((5.5e-5 * 15.75, 0.1), rel=0.01)
+    # rounding adds a twelfth of its step squared; of 2500 samples the noise is known to 4 %
+    assert (vt.noise, ifd.noise) == pytest.approx((1.6e-3, 0.4), rel=0.1)
 
 
 # ---- a record with all that may be wrong with one

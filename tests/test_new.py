@@ -1,5 +1,6 @@
 """new: a case for any model of the catalogue that runs as it stands, or says what to fill in."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from exfit.inspection import inspect
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
+from exfit.readers import open_table
 from exfit.starting_case import bounds_of, free_of, starting_case
 from exfit.study import fit, simulate
 
@@ -21,6 +23,7 @@ STEP = 0.05  # pu
 AT = 1.0  # s
 WIDTH = 80
 PLANTS = {"FIRST_ORDER": {"type": "none"}}
+FIELD_RECORD = Path(__file__).parent.parent / "sample_data" / "field_record.csv"
 OPEN = {"type": "open-circuit", "machine": "GENROU"}
 
 
@@ -128,6 +131,15 @@ def test_what_the_record_does_not_tell_is_refused_by_place(tmp_path):
     for place in ("plant.network.f0", "plant.network.X", "plant.network.P", "test.vref[0].at"):
         assert f"{place}: '?'" in faults
     assert "record.channels.vt" in faults
+
+
+def test_a_plants_record_leaves_only_the_base_of_its_voltage_open(tmp_path):
+    path = started("AC1A", open_table(FIELD_RECORD), tmp_path)
+    with pytest.raises(CaseError) as caught:
+        load_case(path)
+    assert re.fullmatch(r"\S+: record\.channels\.vt\.base: '\?' is not a number", str(caught.value))
+    path.write_text(path.read_text(encoding="utf-8").replace('base: "?"', "base: 15.75"))
+    assert load_case(path).test.vref[0].at.start == pytest.approx(2.137, abs=0.02)
 
 
 def test_on_load_the_record_tells_power_and_the_network_is_asked_for(tmp_path):

@@ -38,6 +38,7 @@ def iterations(result: FitResult) -> Figure:
         if count > 1:
             upper.set_title(f"{comparison.name}: {comparison.record.name}", fontsize=9, loc="left")
     axes[-1].set_xlabel("time (s)")
+    figure.align_ylabels()
     numbers = sorted({number for _, courses in shown for number in courses.numbers})
     _colour_bar(figure, list(axes), numbers)
     return figure
@@ -87,4 +88,4 @@ def _colour_bar(figure: Figure, axes: list[Axes], numbers: Sequence[int]) -> Non
         ScalarMappable(norm, steps), ax=axes, ticks=ticks, label="iteration", aspect=40
     )
     bar.ax.set_yticklabels([str(numbers[k]) for k in ticks])
-    bar.ax.tick_params(length=0)
+    bar.ax.tick_params(which="both", length=0)

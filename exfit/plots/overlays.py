@@ -19,6 +19,7 @@ def overlay(comparison: Comparison, title: str) -> Figure:
         _signal(axes[2 * k, 0], comparison, signal, one)
         _error(axes[2 * k + 1, 0], comparison, one)
     axes[-1, 0].set_xlabel("time (s)")
+    figure.align_ylabels()
     figure.suptitle(title, fontsize=11)
     return figure
 

@@ -38,6 +38,7 @@ def convergence(result: FitResult) -> Figure:
     axes[0].legend(loc="upper right", frameon=False)
     axes[-1].set_xlabel("iteration")
     axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.align_ylabels()
     figure.suptitle(f"{result.name}: {result.strategy}; {result.message}", fontsize=11)
     return figure
 

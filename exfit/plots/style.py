@@ -12,7 +12,7 @@ MEASURED, SIMULATED, START, LIMIT = "#8a8f98", "#c1272d", "#2b6cb0", "#b7791f"
 WIDTH = 9.0  # inches
 DPI = 120
 MILLI = 1e3
-COLORS = ("#1f4e9c", "#c1272d", "#2f855a", "#b7791f", "#6b46c1", "#0e7490", "#9d174d")
+COLORS = ("#1f4e9c", "#c1272d", "#2f855a", "#b7791f", "#6b46c1", "#0e7490", "#4a5568")
 STYLES = ("-", "--", ":")
 LABELS: Mapping[str, str] = {
     "vt": "terminal voltage vt (pu)",
