@@ -43,8 +43,8 @@ FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that
 # fonts of a server: a picture of its own has none
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
 
-# largest mean difference, of 255, over blocks of so many points: between processors there is none,
-# a line of 1.0 in place of 1.4 points makes 26 and a changed letter 54
+# largest mean difference, of 255, over blocks of so many points: between processors it is below 5,
+# a line of 1.0 in place of 1.4 points makes 47 and a changed letter 53
 POINTS, APART = 4, 12.0
 # the same between versions of Matplotlib or FreeType, which set letters and so axes a point or two
 # apart: other hinting of the letters makes 32

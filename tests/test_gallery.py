@@ -1,5 +1,7 @@
 """The gallery of the README is what the commands draw and print now."""
 
+import gallery
+import matplotlib
 import numpy as np
 import pytest
 from field_record import AT, FILE, QUANTUM, UNIT, VT0, field_record
@@ -106,6 +108,16 @@ def unchanged():
 
 def test_a_figure_is_the_same_when_it_is_drawn_again(unchanged):
     assert same(unchanged, picture(figure()))
+
+
+def test_letters_of_another_version_change_a_figure_only_of_the_same_version(
+    unchanged, monkeypatch
+):
+    with matplotlib.rc_context({"text.hinting": "none"}):
+        other = picture(figure())
+        monkeypatch.setattr(gallery, "DRAWN_BY", "Matplotlib 99.0")
+        assert not same(unchanged, other)
+        assert same(unchanged, picture(figure()))
 
 
 @pytest.mark.parametrize(
