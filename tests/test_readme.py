@@ -61,6 +61,15 @@ def test_the_case_of_the_readme_is_valid_and_its_records_can_be_read(folder):
         assert case.measure(one.test, one.record).time.size > 1
 
 
+def test_the_record_of_the_readme_is_read_in_the_recorders_units(folder):
+    head = block("yaml").partition("record:")[0]
+    (folder / "case.yaml").write_text(head + block("yaml", 1), encoding="utf-8")
+    case = load_case(folder / "case.yaml")
+    record = case.measure(case.test, case.record)
+    assert record.signals["vt"][0] == pytest.approx(1.0, abs=0.01)
+    assert record.signals["ifd"][0] == pytest.approx(1.12, abs=0.01)
+
+
 def test_the_records_of_the_readme_are_a_valid_part_of_a_case(folder):
     machine = "model: AC1A\nplant: {type: open-circuit, machine: GENROU}\n"
     (folder / "case.yaml").write_text(machine + block("yaml", 2), encoding="utf-8")
