@@ -25,11 +25,14 @@ def inspection(console: Console, found: Inspection, record: Sequence[str]) -> No
     _channels(console, found.channels)
     console.print()
     _steps(console, found)
-    notes(console, found.findings)
     console.print()
+    if found.findings:
+        notes(console, found.findings)
+        console.print()
     console.print("for a case; what is in # comments is a guess to check:")
     console.print()
     console.print("\n".join(record), markup=False, soft_wrap=True)
+    console.print()
 
 
 def in_words(sampling: Sampling) -> str:
