@@ -275,7 +275,8 @@ class Sampling:
         weights = self._polynomials(block, slice(0, NEIGHBOURS))
         on_grid = self._on_grid[block]
         if np.any(on_grid):
-            exact = self._rows_of(block) == self._nearest[block]
+            # by their own places: behind the end, one row stands for all
+            exact = self.first[block] + np.arange(NEIGHBOURS)[:, None] == self._nearest[block]
             weights[:, on_grid] = exact[:, on_grid]
         return weights
 

@@ -27,7 +27,9 @@ from exfit.simulate import (
     Course,
     Direction,
     Played,
+    Sampling,
     Simulator,
+    Stretch,
     each,
     parameters_used,
     stretches,
@@ -134,6 +136,16 @@ def test_a_sample_on_the_grid_is_the_computed_value(model):
     some = np.sort(rng.choice(2001, 50, replace=False))
     got = samples(model, values, times=np.append(some * 1e-3, 1.99951))
     np.testing.assert_allclose(got[:-1], fine[some], rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("steps", range(1, 9))
+def test_a_line_is_read_as_it_is_however_short_the_last_stretch(steps):
+    """Between grid points, on them, and behind the end, where the last value holds."""
+    grid = [Stretch(0.0, 0.01, 20), Stretch(0.2, 0.01, steps)]
+    end = grid[-1].end
+    times = np.sort(np.append(np.linspace(0.003, end + 0.02, 50), [0.0, 0.2, end]))
+    read = Sampling(grid, times)([part.times[:, None] for part in grid])[:, 0]
+    np.testing.assert_allclose(read, np.minimum(times, end), rtol=0.0, atol=1e-14)
 
 
 def test_a_response_has_every_signal_and_state_on_its_clock(model):
