@@ -5,9 +5,11 @@ lie there, the sum of their squared errors is a quadratic form of these six valu
 have the same sum: a search goes the same way, in a fraction of time and memory.
 """
 
+from collections.abc import MutableMapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import combinations_with_replacement
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,23 +68,33 @@ class CondensedChannel(Channel):
         return self.form.theirs.size + 1
 
 
-@lru_cache(maxsize=1)
+KNOWN: MutableMapping[Residuals, Residuals | None] = WeakKeyDictionary()  # for as long as it lives
+
+
 def condensed(residuals: Residuals) -> Residuals:
     """Return residuals with the same cost and gradient at every point, but fewer of them.
 
     The Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the
     same residuals where condensing would not save much, or where it does not hold: with filters,
     with a robust loss, and where the instants at which a record is read, or its scale, are found.
+    Asked again, it returns the same: what that counts is of the whole search.
 
     Source: Golub & Van Loan 2013, section 5.3 (the least-squares problem of a factor R is that of
     all rows).
     """
+    if residuals not in KNOWN:
+        KNOWN[residuals] = _fewer(residuals)
+    return KNOWN[residuals] or residuals
+
+
+def _fewer(residuals: Residuals) -> Residuals | None:
+    """Return condensed residuals, None where they would be the same."""
     if residuals.robust is not None:
-        return residuals
+        return None
     known = bool(residuals.priors)
     experiments = [_condensed(one, known) for one in residuals.experiments]
     if all(new is old for new, old in zip(experiments, residuals.experiments, strict=True)):
-        return residuals
+        return None
     return Residuals(experiments, residuals.free, residuals.fixed, residuals.ties)
 
 

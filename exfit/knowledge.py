@@ -104,14 +104,15 @@ def known_of(residuals: Residuals, theta: Array, linear: Linearisation) -> Knowl
 
 
 def _courses(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Moved]:
-    """Yield what each channel shows: on the record's clock or, where condensed, on the grid."""
+    """Yield what each channel shows: at the record's samples or, where condensed, of the grid."""
     values, moves = residuals.values(theta), residuals.moves(theta)
     size = linear.size / slopes_of(residuals, theta)
     labels = iter(linear.channels)
-    for one in condensed(residuals).experiments:
+    for one, whole in zip(condensed(residuals).experiments, residuals.experiments, strict=True):
         _, slopes = one.course(values, moves)
+        late = 0.0 if one is whole else one.simulator.delay  # the grid is the simulation's
         for k in range(len(one.channels)):
-            yield Moved(next(labels).label, one.simulator.times, slopes[:, k] * size)
+            yield Moved(next(labels).label, one.simulator.times + late, slopes[:, k] * size)
 
 
 def slopes_of(residuals: Residuals, theta: Array) -> Array:

@@ -172,7 +172,9 @@ def search(
     """Return the best point found from the start of a case, or from all its starts."""
     asked = case.estimate
     fewer = condensed(residuals)
-    good_enough = asked.good_enough.rmse * np.sqrt(fewer.samples / fewer.count)
+    known = len(fewer.priors)
+    share = (fewer.samples + known) / (fewer.count + known)
+    good_enough = asked.good_enough.rmse * np.sqrt(share)
     jacobian = JACOBIANS[asked.jacobian](fewer)
     if asked.starts == 1:
         found = estimate.least_squares(

@@ -1,13 +1,17 @@
 """Condensed records: the same cost, gradient and J'J as those of all samples, and when not."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from records import UNIT, case_of, found_in, one, synthetic
 
 from exfit import condensed as module
+from exfit import study
 from exfit.condensed import condensed
 from exfit.inference import confidence
-from exfit.knowledge import linearisation
+from exfit.knowledge import knowledge, linearisation
 from exfit.residuals import Residuals
 from exfit.study import fit
 from exfit.trial import fitted_trials, residuals_of
@@ -78,6 +82,56 @@ def test_errors_and_intervals_are_those_of_all_samples(tmp_path, monkeypatch):
     for ours_, theirs in zip(ours.noise, every.noise, strict=True):
         assert ours_.std == pytest.approx(theirs.std, rel=1e-9)
         assert ours_.p_value == theirs.p_value
+
+
+def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
+    """What is known beforehand is one more residual of both."""
+    asked = {}
+
+    def stopped(residuals, start, *, good_enough, **_):
+        asked[len(residuals(start))] = good_enough
+        raise KeyboardInterrupt
+
+    case = dense_case(tmp_path)
+    every = residuals(case)
+    few = condensed(every)
+    monkeypatch.setattr("exfit.study.estimate.least_squares", stopped)
+    for search in (lambda whole: whole, condensed):
+        monkeypatch.setattr("exfit.study.condensed", search)
+        with pytest.raises(KeyboardInterrupt):
+            study.search(case, every, "auto", print, print)
+    squares = [count * limit**2 for count, limit in asked.items()]
+    assert set(asked) == {every.count + 1, few.count + 1}
+    assert squares[0] == pytest.approx(squares[1], rel=1e-12)
+
+
+def test_what_moves_is_told_at_the_instants_of_the_record(tmp_path, monkeypatch):
+    """A recorder's delay is in them, too."""
+    case = dense_case(tmp_path, {"delay": 0.2})
+    found = residuals(case)
+    theta = found.start
+    (ours, _) = knowledge(found, theta, ()).sensitivity
+    monkeypatch.setattr("exfit.knowledge.condensed", lambda whole: whole)
+    (every, _) = knowledge(found, theta, ()).sensitivity
+    assert len(ours.time) < len(every.time)
+    later = ours.time <= every.time[-1]
+    for k in range(len(theta)):
+        line = np.interp(ours.time[later], every.time, every.moved[:, k])
+        # which lies between samples up to a millisecond apart
+        most = 1e-3 * np.max(np.abs(line))
+        np.testing.assert_allclose(ours.moved[later, k], line, rtol=0.0, atol=most)
+
+
+def test_a_record_is_condensed_once_whatever_comes_between_and_then_forgotten(tmp_path):
+    first = residuals(dense_case(tmp_path))
+    second = Residuals(first.experiments, first.free, first.fixed, first.ties)
+    few = condensed(first)
+    assert condensed(second) is not few
+    assert condensed(first) is few
+    gone = weakref.ref(few)
+    del first, few
+    gc.collect()
+    assert gone() is None
 
 
 def filtered(filter_):
