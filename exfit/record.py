@@ -107,7 +107,8 @@ def read_record(
         channels: signal name -> column, its unit and base, scale and offset, or three phases. The
             base of a field current is that of the air-gap line: what gives 1 pu voltage without
             saturation.
-        window: first and last instant kept, s, both included; what lies outside may hold gaps.
+        window: first and last instant kept, s, both included; what lies outside may hold gaps, and
+            no waveform is looked at there.
         missing: whether a sample may be missing from a signal: an empty cell or nan becomes nan.
         sheet: of a workbook.
         rate: Hz, of a slower, even clock; None: the record's own.
@@ -127,16 +128,15 @@ def read_record(
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
     columns = table.numbers(dict.fromkeys(names), gappy)
     refuse_uneven(path, {clock.columns[0]: time} | columns)
+    kept = _kept(path, time, window)
     courses = {
-        name: _of_phases(path, time, columns, channel)
+        name: _of_phases(path, time, columns, channel, kept)
         for name, channel in channels.items()
         if isinstance(channel, ThreePhases)
     }
-    known = np.ones(len(time), dtype=bool)
     for voltage, course in courses.values():
         if course is not None:
-            known &= np.isfinite(voltage)
-    kept = _kept(path, time, known, window)
+            kept = kept[np.isfinite(voltage[kept])]
     signals = {
         name: _frozen(courses[name][0][kept])
         if isinstance(channel, ThreePhases)
@@ -160,22 +160,28 @@ def _columns(channel: ChannelLike | ThreePhases) -> tuple[str, ...]:
 
 
 def _of_phases(
-    path: Path, time: Array, columns: Mapping[str, Array], channel: ThreePhases
+    path: Path,
+    time: Array,
+    columns: Mapping[str, Array],
+    channel: ThreePhases,
+    inside: NDArray[np.intp],
 ) -> tuple[Array, PhasorCourse | None]:
     """Return the voltage (M,) of three phases per unit, and what was found of their waveforms.
 
-    Raises RecordError where the columns are not the three phases of one voltage.
+    It is told from the samples ``inside`` the window, and nan at the others. Raises RecordError
+    where the columns are not the three phases of one voltage.
     """
-    phases = np.stack([columns[name] for name in channel.columns], axis=1)
+    phases = np.stack([columns[name][inside] for name in channel.columns], axis=1)
+    voltage, of = np.full(len(time), np.nan), (channel.base, channel.connection)
     try:
         if channel.kind == "rms":
-            return vt_of_rms(phases, channel.base, channel.connection), None
-        course = vt_of_waveforms(time, phases, channel.base, channel.connection, channel.cycles)
+            voltage[inside] = vt_of_rms(phases, *of)
+            return voltage, None
+        course = vt_of_waveforms(time[inside], phases, *of, channel.cycles)
     except ValueError as fault:
         named = ", ".join(map(repr, channel.columns))
         raise RecordError(f"{path}: columns {named}: {fault}") from None
-    voltage = np.full(len(time), np.nan)
-    voltage[course.kept] = course.voltage
+    voltage[inside[course.kept]] = course.voltage
     return voltage, course
 
 
@@ -231,12 +237,10 @@ def check_finite(table: Table, clock: Clock, time: Array) -> None:
         _refuse(table, lost[0], f"{clock.label}: {time[lost[0]]} is not a finite number")
 
 
-def _kept(
-    path: Path, time: Array, known: NDArray[np.bool_], window: tuple[float, float] | None
-) -> NDArray[np.intp]:
-    """Return the positions of the samples in the window, of those that are known."""
+def _kept(path: Path, time: Array, window: tuple[float, float] | None) -> NDArray[np.intp]:
+    """Return the positions of the samples in the window."""
     start, end = window or (time[0], time[-1])
-    kept = np.flatnonzero((time >= start) & (time <= end) & known)
+    kept = np.flatnonzero((time >= start) & (time <= end))
     if kept.size < FEWEST_SAMPLES:
         place = f" in the window {start:g} ... {end:g} s" if window else ""
         raise RecordError(

@@ -44,6 +44,21 @@ def trial(case):
     return fitted_trials(case)[0].secured(case.values())
 
 
+@pytest.mark.parametrize("kind", ["waveform", "rms"])
+def test_a_voltage_that_is_not_there_outside_the_window_does_not_matter(tmp_path, kind):
+    vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
+    whole = waves(vt) if kind == "waveform" else np.outer(vt, np.full(3, RATED / np.sqrt(3.0)))
+    dead = np.where((TIME > 0.5)[:, None], whole, [0.0, 0.001, 0.01])
+    seen = []
+    for phases in (whole, dead):
+        columns = {"t": TIME, **dict(zip(PHASES["phases"], phases.T, strict=True))}
+        case = case_with(tmp_path, {"vt": {**PHASES, "kind": kind}}, columns, window=[0.6, 3.9])
+        seen.append(trial(case).record)
+    np.testing.assert_array_equal(seen[0].time, seen[1].time)
+    np.testing.assert_array_equal(seen[0].signals["vt"], seen[1].signals["vt"])
+    assert seen[0].time[0] == pytest.approx(0.6, abs=1.0 / FREQUENCY)
+
+
 def test_waveforms_become_the_voltage_that_the_simulation_shows_averaged(tmp_path):
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     columns = {"t": TIME, **dict(zip(PHASES["phases"], waves(vt).T, strict=True))}
