@@ -83,9 +83,11 @@ class Difference:
 
     @property
     def finals(self) -> tuple[float, float]:
-        """The final values of both: means over the last twentieth of the time."""
-        tail = self.time >= self.time[-1] - TAIL * (self.time[-1] - self.time[0])
-        found = np.nanmean(self.values[:, tail & np.isfinite(self.error)], axis=1)
+        """The final values of both: means over the last twentieth of the time that both show."""
+        kept = np.isfinite(self.error)
+        time = self.time[kept]
+        tail = time >= time[-1] - TAIL * (time[-1] - time[0])
+        found = np.mean(self.values[:, kept][:, tail], axis=1)
         return float(found[0]), float(found[1])
 
     def as_json(self) -> dict[str, Any]:

@@ -128,6 +128,17 @@ def test_final_values_are_the_means_of_the_last_twentieth():
     assert of(compare(a, b, None, BY_NAME)).finals == pytest.approx((1.0, 1.05), abs=1e-4)
 
 
+def test_final_values_are_of_the_time_that_both_show():
+    """Where one ends in a gap, of what lies before it."""
+    time = clock(0.01)
+    falls = np.where(time < 8.0, 1.0, 0.5)
+    for name, vt in (("a", falls), ("b", np.where(time < 8.0, 1.01, np.nan))):
+        rows = (f"{t:.9g},{'' if np.isnan(y) else y}" for t, y in zip(time, vt, strict=True))
+        Path(f"{name}.csv").write_text("\n".join(["t,vt", *rows]) + "\n")
+    found = of(compare(Path("a.csv"), Path("b.csv"), None, BY_NAME))
+    assert found.finals == pytest.approx((1.0, 1.01))
+
+
 def test_features_stand_beside_each_other_with_the_step_found():
     """From 10 to 90 % two equal lags take 3.3579 times one of them."""
     time = clock(0.002)
