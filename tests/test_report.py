@@ -75,6 +75,7 @@ def fits(tmp_path_factory):
 
     def on_load():
         content = config("ac8b_on_line")
+        content["test"]["network"] = [{"at": 3.0, "R": 0.0}]  # as it was
         return made(room / "on-load", content)
 
     makers = {
@@ -276,6 +277,27 @@ def test_the_verdict_is_that_of_the_validation(tmp_path, accept, down, word):
     assert "every parameter determined" in report.verdict.sentence
     if not down:
         assert "no record for a validation" in Page(html(report)).text
+
+
+def test_the_iterations_begin_with_the_start_and_end_with_the_fit_as_they_are_compared(tmp_path):
+    """The recorder's average is in them, and what is left out of the comparison is missing."""
+    channel = {"column": "v", "averaged": 0.3, "filter": {"median": 3}}
+    record = {"file": "up.csv", "time": "t", "channels": {"vt": channel}, "mask": [[1.0, 1.2]]}
+    report = report_of(first_order(tmp_path / "case", record=record))
+    (found,), fitted = report.simulated.courses, report.fits[0].samples.overlays["vt"]
+    assert np.isnan(fitted.measured).any()
+    last = max(found.simulated)
+    for ours, theirs in (
+        (found.measured, fitted.measured),
+        (found.simulated[0], fitted.start),
+        (found.simulated[last], fitted.simulated),
+    ):
+        # the table of the fit has nine digits
+        np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
+
+
+def test_a_switch_is_told_though_it_sets_nothing_but_a_zero(pages):
+    assert "network switched at 3 s: R 0 pu" in pages("on load").text
 
 
 def test_an_interrupted_fit_is_no_converged_one(tmp_path):

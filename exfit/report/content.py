@@ -340,7 +340,8 @@ def _done(test: BumpTest) -> Iterator[str]:
             yield f"{signal} {_known(step.step, '+g')} pu at {_known(step.at, 'g')} s"
     for switch in test.network:
         values = {name: getattr(switch, name) for name in ("R", "X", "E")}
-        told = ", ".join(f"{name} {value:g} pu" for name, value in values.items() if value)
+        changed = {name: value for name, value in values.items() if value is not None}
+        told = ", ".join(f"{name} {value:g} pu" for name, value in changed.items())
         yield f"network switched at {switch.at:g} s: {told}"
 
 

@@ -13,8 +13,9 @@ from exfit.experiment import Experiment
 from exfit.knowledge import knowledge
 from exfit.report.sources import Sources
 from exfit.residuals import UNREACHABLE, Residuals
+from exfit.result import judged_of
 from exfit.study import names_of_records
-from exfit.trial import Trial, residuals_of
+from exfit.trial import Trial, compared, residuals_of
 
 if TYPE_CHECKING:
     from exfit.limits import LimitHit
@@ -105,7 +106,7 @@ def simulated(found: Sources) -> Simulated:
         flat=tuple(_flat(experiments, values)),
         small=tuple(_small(experiments, values)),
         limited=tuple(_limited((*trials, *unseen), values)),
-        courses=tuple(_courses(found, residuals, values)),
+        courses=tuple(_courses(found, trials, residuals, values)),
     )
 
 
@@ -156,21 +157,25 @@ def _limited(trials: Sequence[Trial], values: Values) -> Iterator[Limited]:
         yield Limited(one.name, limits_hit(simulator, parameters))
 
 
-def _courses(found: Sources, residuals: Residuals, values: Values) -> Iterator[Courses]:
+def _courses(
+    found: Sources, trials: Sequence[Trial], residuals: Residuals, values: Values
+) -> Iterator[Courses]:
     """Yield how the response to each fitted test went from the start to the fit."""
     history = found.saved.entries("history")
     rows = np.unique(np.geomspace(1, max(len(history), 1), MOST_COURSES).round().astype(int) - 1)
-    for trial in found.trials:
+    for trial in trials:
         signals = trial.experiment.signals
-        column = signals.index("vt") if "vt" in signals else 0
+        column = signals.index(judged_of(signals))
+        channel = trial.channels[column]
         samples: dict[int, Array] = {}
         for row in rows[: len(history)]:
             number = int(found.saved.number("history", int(row), "number"))
             moved = found.saved.at("history", int(row), "values")
             try:
                 at = residuals.ties.apply({**residuals.fixed, **moved})
-                samples[number] = trial.experiment.samples(at)[0][:, column]
+                shown = channel.shown(trial.experiment.samples(at)[0][:, column])
+                samples[number] = compared(channel, shown)
             except UNREACHABLE:  # a search may pass through values that have no response
                 continue
-        measured = trial.experiment.measured(trial.channels[column], values)
+        measured = compared(channel, trial.experiment.measured(channel, values))
         yield Courses(trial.name, signals[column], trial.record.time, measured, samples)
