@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.experiment import Channel, Experiment
-from exfit.residuals import Residuals, noise_of
+from exfit.residuals import Residuals
 from exfit.simulate import NEIGHBOURS, Sampling
 
 Array = NDArray[np.float64]
@@ -91,15 +91,14 @@ def _fewer(residuals: Residuals) -> Residuals | None:
     """Return condensed residuals, None where they would be the same."""
     if residuals.robust is not None:
         return None
-    known = bool(residuals.priors)
-    experiments = [_condensed(one, known) for one in residuals.experiments]
+    experiments = [_condensed(one) for one in residuals.experiments]
     if all(new is old for new, old in zip(experiments, residuals.experiments, strict=True)):
         return None
     return Residuals(experiments, residuals.free, residuals.fixed, residuals.ties)
 
 
-def _condensed(one: Experiment, noise: bool) -> Experiment:
-    """Return an experiment with fewer errors; with the ``noise`` of its samples if asked for."""
+def _condensed(one: Experiment) -> Experiment:
+    """Return an experiment with fewer errors, the same where that does not pay or hold."""
     simulator = one.simulator.on_grid()
     possible = all(channel.plain for channel in one.channels) and not any(
         nuisance.kind in READS for nuisance in one.nuisances
@@ -111,17 +110,17 @@ def _condensed(one: Experiment, noise: bool) -> Experiment:
     return replace(
         one,
         simulator=simulator,
-        channels=tuple(_condensed_channel(channel, sampling, noise) for channel in one.channels),
+        channels=tuple(_condensed_channel(channel, sampling) for channel in one.channels),
     )
 
 
-def _condensed_channel(channel: Channel, sampling: Sampling, noise: bool) -> CondensedChannel:
+def _condensed_channel(channel: Channel, sampling: Sampling) -> CondensedChannel:
     return CondensedChannel(
         signal=channel.signal,
         measured=channel.measured,
         weight=channel.weight,
         conditioning=channel.conditioning,
-        noise=noise_of(channel) if noise else channel.noise,
+        noise=channel.noise,
         form=form_of(sampling, channel.measured, channel.kept),
     )
 

@@ -18,20 +18,19 @@ from exfit.trial import fitted_trials, residuals_of
 
 TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}, {"at": 2.0, "step": -0.03}]}
 SEED = 3
-DENSE = 60_000  # samples in 3 s, at random instants
+DENSE = 20_000  # samples in 3 s, at random instants
 GRID = {"simulation": {"step": 0.01}}
 CHANNELS = {"vt": "vt", "efd": {"column": "efd", "weight": 0.02}}
 AGREE = 1e-10  # relative: what the rounding of sums of squares leaves
 
 
-def dense_case(folder, record=None, channels=None, sections=None, known=True):
-    """Return a case whose record has two hundred samples to each step of the simulation."""
+def dense_case(folder, record=None, channels=None, sections=None, test=None):
+    """Return a case whose record has dozens of samples to each step of the simulation."""
     rng = np.random.default_rng(SEED)
     time = np.sort(rng.uniform(0.0, 3.0, DENSE))
     synthetic(folder, TEST, time, signals=("vt", "efd"))
-    content = {**one(TEST, channels or CHANNELS, tuple(UNIT), **(record or {})), **GRID}
-    if known:
-        content["parameters"]["free"]["TE"]["prior"] = {"mean": 1.4, "std": "10 %"}
+    content = {**one(test or TEST, channels or CHANNELS, tuple(UNIT), **(record or {})), **GRID}
+    content["parameters"]["free"]["TE"]["prior"] = {"mean": 1.4, "std": "10 %"}
     return case_of({**content, **(sections or {})}, folder)
 
 
@@ -45,10 +44,29 @@ def forms(found, theta):
     return 0.5 * float(r @ r), slopes.T @ r, slopes.T @ slopes
 
 
-@pytest.mark.parametrize("mask", [[], [[0.4, 0.7], [1.001, 1.004]]])
-def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, mask):
+OF_RECORD = {
+    "vt0": found_in(1.0, 0.9, 1.1),
+    "vref": [
+        {"at": found_in(1.0, 0.8, 1.2), "step": 0.05},
+        {"at": 2.0, "step": found_in(-0.03, -0.05, -0.01)},
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("record", "test"),
+    [
+        ({}, TEST),
+        ({"mask": [[0.4, 0.7], [1.001, 1.004]]}, TEST),
+        ({"window": [0.2, 2.03], "delay": 0.0123}, TEST),
+        ({}, {**TEST, "begin": -0.5}),
+        ({}, OF_RECORD),
+    ],
+    ids=["whole", "mask", "ends with a step, late", "begins early", "of the record"],
+)
+def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, record, test):
     """Where samples are left out, too, some steps of the grid whole; and the last parts of both."""
-    every = residuals(dense_case(tmp_path, {"mask": mask}))
+    every = residuals(dense_case(tmp_path, record, test=test))
     few = condensed(every)
     assert module.WORTH * few.count < every.count
     rng = np.random.default_rng(SEED)
@@ -138,19 +156,25 @@ def filtered(filter_):
     return {"channels": {"vt": {"column": "vt", "filter": filter_}}}
 
 
+ONE_STEP = {"vt0": 1.0, "vref": [{"at": found_in(1.0, 0.8, 1.2), "step": 0.05}]}
+
+
 @pytest.mark.parametrize(
-    ("record", "sections"),
+    ("record", "sections", "test"),
     [
-        (filtered({"median": 3}), {}),
-        ({"delay": found_in(0.0, -0.1, 0.1)}, {}),
-        ({"channels": {"vt": {"column": "vt", "offset": found_in(0.0, -0.1, 0.1)}}}, {}),
-        ({}, {"estimate": {"loss": "huber"}}),
+        (filtered({"median": 3}), {}, TEST),
+        ({"channels": {"vt": {"column": "vt", "averaged": 0.1}, "efd": "efd"}}, {}, TEST),
+        ({"delay": found_in(0.0, -0.1, 0.1)}, {}, TEST),
+        ({"channels": {"vt": {"column": "vt", "offset": found_in(0.0, -0.1, 0.1)}}}, {}, TEST),
+        ({"channels": {"vt": {"column": "vt", "scale": found_in(1.0, 0.9, 1.1)}}}, {}, TEST),
+        ({}, {"estimate": {"loss": "huber"}}, TEST),
+        ({"channels": {"vt": "vt"}}, {}, ONE_STEP),
     ],
-    ids=["filter", "delay", "offset", "loss"],
+    ids=["filter", "one averaged", "delay", "offset", "scale", "loss", "only instant"],
 )
-def test_what_is_not_a_quadratic_form_of_the_grid_stays_as_it_is(tmp_path, record, sections):
+def test_what_is_not_a_quadratic_form_of_the_grid_stays_as_it_is(tmp_path, record, sections, test):
     given = {key: value for key, value in record.items() if key != "channels"}
-    case = dense_case(tmp_path, given, record.get("channels"), sections)
+    case = dense_case(tmp_path, given, record.get("channels"), sections, test)
     every = residuals(case)
     assert condensed(every) is every
 
