@@ -5,6 +5,7 @@ import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from math import floor, log10
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 
 MOST_ROWS = 100_000  # of a table of samples: of more, every second, third ...
 DIGITS = 9  # significant digits of a number in a table of samples
+MOST_DIGITS = 17  # of a double
 
 
 @dataclass(frozen=True)
@@ -402,17 +404,28 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def table(header: Sequence[str], columns: Sequence[Array]) -> str:
-    """Return samples as CSV, one column after the other: all, or every second, third ..."""
+    """Return samples as CSV, one column after the other: all, or every second, third ...
+
+    The first column is their clock, whose instants have as many digits more as it began long ago.
+    """
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerow(header)
     shown = slice(None, None, -(-len(columns[0]) // MOST_ROWS))
     np.savetxt(
         out,
         np.column_stack([column[shown] for column in columns]),
-        fmt=f"%.{DIGITS}g",
+        fmt=[f"%.{clock_digits(columns[0], DIGITS)}g", *[f"%.{DIGITS}g"] * (len(columns) - 1)],
         delimiter=",",
     )
     return out.getvalue()
+
+
+def clock_digits(time: Array, digits: int) -> int:
+    """Return how many digits instants (M,) need to be told as finely as so many from zero on."""
+    span = float(np.ptp(time))
+    if span == 0.0:
+        return digits
+    return min(digits + max(floor(log10(np.max(np.abs(time)) / span)), 0), MOST_DIGITS)
 
 
 def comparison_table(comparison: Comparison) -> str:

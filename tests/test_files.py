@@ -97,6 +97,15 @@ def test_parameters_read_back_are_exactly_those_found(fitted, folder):
     assert read_parameters(load_case(CASE), folder / "parameters.yaml") == fitted.values
 
 
+@pytest.mark.parametrize("begin", [0.0, -0.5, 45_000.0, 1.6e9])
+def test_instants_are_told_apart_whenever_the_clock_began(begin):
+    time = begin + np.linspace(0.0, 3.0, 3001)
+    rows = table(["t", "y"], [time, np.zeros(3001)]).splitlines()[1:]
+    shown = np.array([float(row.split(",")[0]) for row in rows])
+    # nine digits of three seconds, or as many as a double has
+    np.testing.assert_allclose(shown, time, rtol=1e-16, atol=1e-7)
+
+
 @pytest.mark.parametrize("value", [1e-05, 1.0, 1e16, 123456.789, 2.5e-07, 1e300])
 def test_every_yaml_reader_takes_a_parameter_for_the_same_number(fitted, value):
     one = replace(fitted.parameters["k"], value=value)

@@ -24,6 +24,7 @@ from exfit.report.charts import (
     drawing,
     ticks,
 )
+from exfit.report.figures import data, figures
 
 ROOT = Path(__file__).parent.parent
 MOST = 3_000_000  # bytes of a page
@@ -432,9 +433,26 @@ def test_ticks_are_round_equally_spaced_and_inside(low, span, most):
         step = (places[1] - places[0]) / 100.0 * span
         mantissa = step / 10.0 ** np.floor(np.log10(step) + 1e-9)
         assert min(abs(mantissa - np.array([1.0, 2.0, 5.0, 10.0]))) < 1e-6
-        if span >= 1e-4 * abs(low):  # else the labels need more digits than an axis has
-            values = [float(tick.label) for tick in found]
-            assert values == pytest.approx(list(low + places / 100.0 * span), abs=1e-3 * step)
+        values = [float(tick.label) for tick in found]
+        assert values == pytest.approx(list(low + places / 100.0 * span), abs=1e-3 * step)
+
+
+def test_a_clock_that_began_long_ago_is_drawn_as_finely(tmp_path):
+    """Seconds since 1970 in the file of the recorder."""
+    ago = 1.6e9
+    rows = [f"{t + ago:.3f},{v:.9g}" for t, v in zip(TIME, noisy(TRUTH, 1), strict=True)]
+    (tmp_path / "ago.csv").write_text("\n".join(["t,v", *rows]) + "\n")
+    record = {"file": "../ago.csv", "time": "t", "channels": {"vt": "v"}}
+    test = {"vt0": 0.0, "vref": [{"at": ago + 0.5, "step": 1.0}]}
+    run = first_order(tmp_path / "case", record=record, test=test, validate=None)
+    report = report_of(run)
+    shown = report.fits[0].samples.time
+    np.testing.assert_allclose(np.diff(shown), np.diff(TIME), atol=1e-6)  # a double is that fine
+    page = figures(report)
+    (sent,) = data(page.overlays)
+    np.testing.assert_allclose(np.diff(sent["time"]), np.diff(TIME), atol=1e-6)
+    labels = [tick.label for tick in drawing(page.overlays[0].chart).x_ticks]
+    assert len(set(labels)) == len(labels) > 2
 
 
 def test_a_drawing_has_no_number_that_is_none():

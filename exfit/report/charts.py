@@ -265,9 +265,10 @@ def _round_step(least: float) -> float:
 
 
 def _number(value: float, step: float) -> str:
-    """Return the label of a tick: as many decimals as its step has."""
+    """Return the label of a tick: as many decimals, or digits, as tell it from its neighbours."""
     decimals = max(0, -floor(log10(step) + 1e-9))
     if decimals > 5 or abs(value) >= 1e6:
-        return f"{value:.3g}"
+        digits = floor(log10(abs(value))) - floor(log10(step) + 1e-9) + 1 if value else 1
+        return f"{value:.{max(digits, 3)}g}"
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.case_form import show
 from exfit.envelope import envelope, kept_rows
 from exfit.report.charts import SMALL, Chart, Panel, Rule, Series
 from exfit.report.content import Fitted, Iteration, Match, Report, Signal
 from exfit.report.simulated import Courses, Moved, Small
+from exfit.result import clock_digits
 
 if TYPE_CHECKING:
     from exfit.small_signal import Bode, Margins
@@ -122,8 +124,8 @@ def overlay(key: str, match: Match, signal: Signal, bins: int = BINS) -> Chart:
     return Chart(
         key=key,
         title=f"{match.name}: {LABELS.get(signal.name, signal.name)}, {match.record}",
-        text=f"Measured and {fit} {signal.name} from {time[0]:g} to {time[-1]:g} s, the difference "
-        f"below: rmse {signal.rmse:.3g} pu, at most {signal.max_error:.3g} pu.",
+        text=f"Measured and {fit} {signal.name} from {show(time[0])} to {show(time[-1])} s, the "
+        f"difference below: rmse {signal.rmse:.3g} pu, at most {signal.max_error:.3g} pu.",
         x_title=TIME,
         panels=(
             Panel(LABELS.get(signal.name, signal.name), tuple(lines), TALL),
@@ -308,10 +310,10 @@ def _sent(one: Overlaid, most: int) -> dict[str, Any]:
         "group": one.match.name,
         "title": one.chart.title,
         "label": one.chart.panels[0].title,
-        "time": _numbers(time[rows]),
-        **{name: _numbers(samples[rows]) for name, samples in signals.items()},
+        "time": _numbers(time[rows], clock_digits(time, DIGITS)),
+        **{name: _numbers(samples[rows], DIGITS) for name, samples in signals.items()},
     }
 
 
-def _numbers(samples: Array) -> list[float | None]:
-    return [float(f"{x:.{DIGITS}g}") if np.isfinite(x) else None for x in samples.tolist()]
+def _numbers(samples: Array, digits: int) -> list[float | None]:
+    return [float(f"{x:.{digits}g}") if np.isfinite(x) else None for x in samples.tolist()]
