@@ -115,6 +115,8 @@ def test_a_shift_puts_two_clocks_together_and_is_proposed():
     (note,) = compare(a, b, None, BY_NAME).notes
     proposed = float(note.partition("--shift ")[2].split()[0])
     assert proposed == pytest.approx(AT - 3.0, abs=2e-3)  # the time of a fifth of a sample
+    (note,) = compare(a, b, None, BY_NAME, shift=-1.2).notes
+    assert float(note.partition("--shift ")[2].split()[0]) == pytest.approx(proposed, abs=2e-3)
     found = compare(a, b, None, BY_NAME, shift=-2.0)
     assert found.notes == ()
     assert of(found).rms == pytest.approx(0.0, abs=1e-9)
@@ -150,6 +152,15 @@ def test_features_stand_beside_each_other_with_the_step_found():
     assert found.features["B"].rise_time == pytest.approx(2.0 * 3.3579 * LAG, rel=1e-3)
     given = compare(a, b, None, BY_NAME, step_at=AT)
     assert given.step_at == AT
+
+
+def test_features_are_of_the_time_before_the_first_ends():
+    """What the longer one shows behind it is not in them."""
+    short, long = clock(0.01, 5.0), clock(0.01, 9.0)
+    a = write("a.csv", t=short, vt=rise(short))
+    b = write("b.csv", t=long, vt=rise(long) + np.where(long > 5.5, 0.02, 0.0))
+    found = compare(a, b, None, BY_NAME).features
+    assert found["B"].final_value == pytest.approx(found["A"].final_value, abs=1e-9)
 
 
 def test_without_a_step_there_are_no_features():

@@ -563,6 +563,18 @@ def test_sub_steps_follow_the_shortest_time_constant(exciter):
         assert simulator.samples(values, ("vt",))[1] == parts
 
 
+@pytest.mark.parametrize("name", ["AC1A", "AC8B"])
+def test_the_error_of_a_step_is_that_of_a_finer_run(name):
+    """Halving a step takes fifteen sixteenths of its error; sub-steps are halved with it."""
+    values, step = lively_values(name), 0.05
+    simulator = Simulator(system_of(name), UP, CLOCK, step)
+    assert simulator.substeps(values) > 1
+    times = np.linspace(0.0, 2.0, 41)
+    coarse, fine = (samples(name, values, UP, times, h) for h in (step, 1e-3))
+    error = np.abs(coarse - fine).max()
+    assert simulator.step_error(values, ("vt",)) == pytest.approx(error, rel=0.15)
+
+
 def test_sub_steps_along_a_response_are_at_least_those_of_its_start(exciter):
     simulator = Simulator(system_of(exciter), UP, CLOCK, 1e-2)
     values = lively_values(exciter)
