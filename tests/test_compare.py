@@ -100,6 +100,15 @@ def test_the_rms_is_over_time_whatever_the_samples():
     assert one.largest == pytest.approx((1.0, 1.0))
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_largest_difference_has_its_sign_and_its_instant(side):
+    time = clock(0.01)
+    bump = side * (0.03 * np.exp(-((time - 4.0) ** 2)) - 0.01 * np.exp(-((time - 8.0) ** 2)))
+    a = write("a.csv", t=time, vt=np.ones(len(time)))
+    b = write("b.csv", t=time, vt=1.0 + bump)
+    assert of(compare(a, b, None, BY_NAME)).largest == pytest.approx((0.03 * side, 4.0), rel=1e-6)
+
+
 def test_nothing_is_compared_beyond_what_both_cover():
     a = write("a.csv", t=clock(0.01, 4.0, -1.0), vt=rise(clock(0.01, 4.0, -1.0)))
     b = write("b.csv", t=clock(0.02, 9.0, 0.5), vt=rise(clock(0.02, 9.0, 0.5)))

@@ -221,7 +221,11 @@ def test_long_runs_are_followed_to_their_end():
 def test_the_nearest_limit_is_that_whose_distance_is_smallest():
     values = typical_values("SEXS")
     efd = simulator("SEXS", BUMP).response(values).signals["efd"]
-    found = by_name(nearest(simulator("SEXS", BUMP), values))
+    listed = nearest(simulator("SEXS", BUMP), values)
+    percents = [one.percent for one in listed]
+    assert len(percents) > 1
+    assert percents == sorted(percents)
+    found = by_name(listed)
     width = values["EMAX"] - values["EMIN"]
     assert found["EMAX", "EFD"].percent == pytest.approx(
         100.0 * (values["EMAX"] - efd.max()) / width, rel=1e-3

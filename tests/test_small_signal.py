@@ -397,6 +397,7 @@ def test_the_peak_and_the_bandwidth_are_those_of_a_denser_grid(name):
             small_signal(system, values, np.array([1e-7, found.bandwidth])).closed.response
         )
         assert there / slow == pytest.approx(np.sqrt(0.5), rel=1e-6)
+        assert np.all(gains[dense < 0.99 * found.bandwidth] / slow > np.sqrt(0.5))  # the first
 
 
 def test_a_start_beyond_a_limit_is_no_rest():
