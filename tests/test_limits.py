@@ -236,6 +236,16 @@ def test_the_nearest_limit_is_that_whose_distance_is_smallest():
     assert CLOCK[np.argmax(efd)] == pytest.approx(found["EMAX", "EFD"].at, abs=0.01)
 
 
+def test_a_delayed_recorder_is_near_a_limit_later():
+    values = typical_values("SEXS")
+    ours, late = (
+        by_name(nearest(simulator("SEXS", BUMP, delay=delay), values))["EMAX", "EFD"]
+        for delay in (0.0, 0.25)
+    )
+    assert late.at == pytest.approx(ours.at + 0.25)
+    assert late.percent == ours.percent
+
+
 def test_a_limit_that_is_met_is_not_near():
     values = typical_values("SEXS")
     assert ("EMAX", "EFD") not in by_name(nearest(simulator("SEXS", 0.4), values))
