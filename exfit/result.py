@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.atomic import write_whole
+from exfit.envelope import kept_rows
 from exfit.errors import ExfitError
 from exfit.features import Features
 from exfit.knowledge import Knowledge
 
 Array = NDArray[np.float64]
 
-MOST_ROWS = 100_000  # of a table of samples: of more, every second, third ...
+MOST_ROWS = 100_000  # of a table of samples: of more, those of all extremes
 DIGITS = 9  # significant digits of a number in a table of samples
 MOST_DIGITS = 17  # of a double
 
@@ -404,13 +405,15 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def table(header: Sequence[str], columns: Sequence[Array]) -> str:
-    """Return samples as CSV, one column after the other: all, or every second, third ...
+    """Return samples as CSV, one column after the other, the time first.
 
-    The first column is their clock, whose instants have as many digits more as it began long ago.
+    Of more than MOST_ROWS those stay that hold the least and greatest of each column in each of
+    many stretches. The time has as many digits as its instants need to stay apart.
     """
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerow(header)
-    shown = slice(None, None, -(-len(columns[0]) // MOST_ROWS))
+    signals = columns[1:]
+    shown = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
     np.savetxt(
         out,
         np.column_stack([column[shown] for column in columns]),

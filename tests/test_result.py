@@ -1,5 +1,6 @@
 """What a result says of itself: the figures of an overlay, and the JSON of a fit."""
 
+import io
 from dataclasses import fields
 from pathlib import Path
 
@@ -8,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from exfit import study
+from exfit import result, study
 from exfit.case import load_case
-from exfit.result import FitResult, Overlay
+from exfit.result import FitResult, Overlay, table
 
 ROOT = Path(__file__).parent.parent
 INSIDE = {"comparisons": "records", "parts": "machine_model"}  # under another name
@@ -47,3 +48,16 @@ def test_the_json_of_a_fit_has_every_field_with_its_value(fitted):
             assert told[name] == value, name
     assert tuple(told["typical"]) == fitted.typical
     assert told["fit"] == fitted.comparison.as_json() == told["records"][0]
+
+
+def test_a_long_table_keeps_the_extremes_of_every_column(monkeypatch):
+    monkeypatch.setattr(result, "MOST_ROWS", 1000)
+    time = np.linspace(0.0, 1.0, 50_001)
+    signals = np.random.default_rng(1).standard_normal((2, len(time)))
+    rows = np.loadtxt(
+        io.StringIO(table(["t", "a", "b"], [time, *signals])), delimiter=",", skiprows=1
+    )
+    assert len(rows) <= 1002
+    assert np.all(np.diff(rows[:, 0]) > 0.0)
+    assert rows[:, 1:].max(axis=0) == pytest.approx(signals.max(axis=1))
+    assert rows[:, 1:].min(axis=0) == pytest.approx(signals.min(axis=1))
