@@ -144,7 +144,7 @@ def test_the_channels_of_a_sample_record_are_recognised(record):
 def test_the_field_record_is_told_as_it_was_made():
     """sample_data/README.md says what was put into it, and where."""
     found = inspect(sample(SAMPLES / f"{FIELD}.csv"))
-    assert found.clock == ("Date", "Time")
+    assert found.clock.columns == ("Date", "Time")
     assert not found.sampling.even
     (gap,) = found.sampling.gaps
     assert (gap.start, gap.end) == pytest.approx(
