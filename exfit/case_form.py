@@ -7,6 +7,7 @@ from exfit.yaml_lines import Fault, Place
 
 Data = Mapping[str, Any]
 
+FILL_IN = "'?'"  # what a new case has in place of a value that nobody gave, as it is shown
 SHOWN = 60  # characters of a wrong value
 FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
@@ -18,8 +19,9 @@ PATTERNS: Mapping[str, str] = {
 }
 # kind of fault -> what to say of the value, given the limits
 WORDS: Mapping[str, Callable[[str, Data], str]] = {
-    "missing": lambda _, __: "is missing",
-    "float_type": lambda value, _: f"{value} is not a number",
+    "float_type": lambda value, _: (
+        f"{value} is to be filled in" if value == FILL_IN else f"{value} is not a number"
+    ),
     "int_type": lambda value, _: f"{value} is not a whole number",
     "int_from_float": lambda value, _: f"{value} is not a whole number",
     "finite_number": lambda value, _: f"{value} is not a finite number",
@@ -68,6 +70,8 @@ def _fault(detail: Data, schema: Data) -> Fault:
     value = show_value(detail["input"])
     if kind == "extra_forbidden":
         return Fault(place, _unknown(str(place[-1]), _known_keys(schema, place[:-1])))
+    if kind == "missing":
+        return Fault(place, "is missing" + _offered(schema, place))
     if kind == "union_tag_not_found":
         return Fault((*place, "type"), "is missing")
     if kind == "union_tag_invalid":
@@ -76,6 +80,12 @@ def _fault(detail: Data, schema: Data) -> Fault:
         return _wrong_choice(place, detail["input"], limits["expected"])
     words = WORDS.get(kind)
     return Fault(place, words(value, limits) if words else f"{value}: {detail['msg']}")
+
+
+def _offered(schema: Data, place: Place) -> str:
+    """Return the words that may stand at a place, as the end of a sentence."""
+    words = [word for part in _at(schema, schema, place) for word in part.get("enum", ())]
+    return f": {' or '.join(words)}?" if words else ""
 
 
 def near(word: str, known: Iterable[str]) -> str:

@@ -13,6 +13,7 @@ from exfit.features import TAIL, Features, features
 from exfit.onset import Onset, find_step
 from exfit.readers import Table, open_table
 from exfit.readers.table import listed, refuse_uneven
+from exfit.readers.units import needs_base
 from exfit.record import Clock, check_finite
 from exfit.result import judged_of
 
@@ -213,6 +214,7 @@ def _curve(name: str, source: Path, asked: Asked, ending: str, shift: float = 0.
         convention = [column for column in (signal, signal + ending) if column in header]
         if convention:
             places.setdefault(signal, convention[0])
+    _refuse_other_units(table, places)
     columns = table.numbers(places.values(), frozenset(places.values()))
     time = table.instants(clock) + shift
     refuse_uneven(path, {clock[0]: time} | columns)
@@ -220,6 +222,16 @@ def _curve(name: str, source: Path, asked: Asked, ending: str, shift: float = 0.
     last = np.append(np.diff(time) > 0.0, True)  # of instants that repeat, what holds from then on
     signals = {signal: columns[column][last] for signal, column in places.items()}
     return Curve(name, path, table.sha256, time[last], signals, header, int(np.sum(~last)))
+
+
+def _refuse_other_units(table: Table, places: Mapping[str, str]) -> None:
+    """Raise a RecordError for a column that its file says is not per unit."""
+    for signal, column in places.items():
+        unit = table.units.get(column)
+        if unit is not None and needs_base(unit):
+            raise RecordError(
+                f"{table.path}: column {column!r} is in {unit}, {signal} is compared in pu"
+            )
 
 
 def _table_of(source: Path) -> Path:
@@ -271,7 +283,8 @@ def _refuse_unknown(asked: Asked, curves: Sequence[Curve]) -> None:
     wanted = [*asked.columns.values(), *(() if asked.time is None else (asked.time,))]
     for column in wanted:
         if column not in headers:
-            raise RecordError(f"no file has a column {column!r}")
+            held = "; ".join(f"{one.path} has {listed(one.columns)}" for one in curves)
+            raise RecordError(f"no file has a column {column!r}; {held}")
 
 
 def _listed(curve: Curve) -> str:

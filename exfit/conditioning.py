@@ -130,6 +130,13 @@ class Conditioning:
         return np.asarray(whole[self.kept])
 
     @cached_property
+    def smooth_over(self) -> int:
+        """How many samples a window of the record's averages holds, 1 where it has none."""
+        if self.averaged is None:
+            return 1
+        return max(1, round(self.averaged.window / float(np.median(np.diff(self.time)))))
+
+    @cached_property
     def _nothing_to_do(self) -> bool:
         return self.filter is None and bool(self.kept.all())
 

@@ -21,6 +21,7 @@ COARSE = 0.2  # of the error of the fit: what halving the step may move
 INVISIBLE = 1e-7  # pu: no recorder shows it
 FAR = 0.01  # of vt0: beyond the noise of a record
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
+FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 MUCH_WORSE = 3.0  # than the fit
 MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
@@ -32,16 +33,16 @@ def notes(
     """Yield the notes on what a fit found; ``compared`` has sub-steps enough for its response."""
     values = residuals.values(found.x)
     yield from typical_notes(case)
-    rmse = float(np.sqrt(2.0 * found.cost / residuals.samples))
     for one, match in zip(residuals.experiments, compared, strict=True):
         simulator, at = one.moved(values), one.parameters(values)
-        moved = simulator.step_error(at, one.signals)
-        if moved > max(COARSE * rmse, INVISIBLE):
-            yield (
-                f"halving the step of {case.simulation.step:g} s moves the response by "
-                f"{moved:.1e} pu, the error of the fit is {rmse:.1e} pu: give a smaller "
-                "simulation.step"
-            )
+        for signal, moved in simulator.step_errors(at, one.signals).items():
+            error = match.overlays[signal].error
+            rmse = float(np.sqrt(np.nanmean(error**2)))
+            if moved > max(COARSE * rmse, INVISIBLE):
+                yield (
+                    f"halving the step of {case.simulation.step:g} s moves {signal} by "
+                    f"{moved:.1e} pu, its error is {rmse:.1e} pu: give a smaller simulation.step"
+                )
         taken = simulator.substeps(at)
         if match.substeps > 2 * taken:
             step = case.simulation.step * taken / match.substeps
@@ -105,6 +106,16 @@ def validation_notes(fitted: Sequence[Comparison], tried: Sequence[Comparison]) 
             )
 
 
+def voltage_notes(fitted: Comparison) -> Iterator[str]:
+    """Yield a voltage that no machine is tested at, yet some might rest with."""
+    measured = fitted.measured
+    if measured is not None and abs(measured.initial_value - 1.0) > FAR_FROM_RATED:
+        yield (
+            f"vt starts from {measured.initial_value:.4g} pu: check its unit, its base and, of "
+            "phases, their connection"
+        )
+
+
 def level_notes(fitted: Comparison, steady: float) -> Iterator[str]:
     """Yield the signals that start elsewhere than their record."""
     for signal, overlay in fitted.overlays.items():
@@ -120,11 +131,16 @@ def level_notes(fitted: Comparison, steady: float) -> Iterator[str]:
             )
 
 
-def unsteady_notes(record: Record, steady: float) -> Iterator[str]:
+def unsteady_notes(
+    record: Record, steady: float, channels: Sequence[Channel] = ()
+) -> Iterator[str]:
     """Yield the signals that drift while the case calls the unit steady."""
+    smooth = {one.signal: one.conditioning.smooth_over for one in channels if one.conditioning}
     before = record.time < steady
     for signal, samples in record.signals.items():
         still = samples[before & np.isfinite(samples)]
+        # averages over a window scatter little from each to the next: one of each window counts
+        still = still[:: smooth.get(signal, 1)]
         half = len(still) // 2
         if half < 4:
             continue

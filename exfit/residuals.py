@@ -15,7 +15,7 @@ from exfit.engine.kernel import SIDE_BY_SIDE, in_threads
 from exfit.errors import SimulationError
 from exfit.experiment import Channel, Experiment
 from exfit.loss import Loss
-from exfit.noise import noise
+from exfit.noise import NEIGHBOURS, noise
 from exfit.ties import TieError, Ties
 
 Array = NDArray[np.float64]
@@ -298,7 +298,10 @@ def noise_of(channel: Channel) -> float:
     """Return the standard deviation of a channel's noise, per unit: given, or estimated."""
     if channel.noise is not None:
         return channel.noise
-    return max(noise(channel.measured[channel.kept]), FINEST)
+    measured = channel.measured[channel.kept]
+    apart = 1 if channel.conditioning is None else channel.conditioning.smooth_over
+    # neighbours in one window of an average scatter little: they share most of it
+    return max(noise(measured[::apart] if len(measured) > NEIGHBOURS * apart else measured), FINEST)
 
 
 JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {

@@ -466,7 +466,11 @@ class Simulator:
         return simulator
 
     def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
-        """Return by how much, at most and per unit, halving every step moves the outputs.
+        """Return by how much, at most and per unit, halving every step moves any of the outputs."""
+        return max(self.step_errors(values, outputs).values())
+
+    def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
+        """Return by how much, at most and per unit, halving every step moves each output.
 
         At the points of the grid: a record with many more samples shows no more.
         """
@@ -474,7 +478,8 @@ class Simulator:
         coarse = Simulator(self.system, self.course, times, self.step, self.least)
         samples, parts = coarse.samples(values, outputs)
         finer = Simulator(self.system, self.course, times, self.step / 2.0, parts)
-        return float(np.max(np.abs(samples - finer.samples(values, outputs)[0])))
+        moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)
+        return dict(zip(outputs, map(float, moved), strict=True))
 
     def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
         """Return the outputs (all of the system's by default) at the sample times."""

@@ -24,6 +24,7 @@ from exfit.notes import (
     typical_notes,
     unsteady_notes,
     validation_notes,
+    voltage_notes,
 )
 from exfit.record import file_hash
 from exfit.residuals import JACOBIANS, Residuals
@@ -243,6 +244,8 @@ def _notes(
         before = trial.test.vt0 if trial.test.begin is None else None
         # one that is found lies where the record begins, or on a bound, which is told
         yield from match_notes(one, None if isinstance(before, Unknown) else before)
+        if case.plant.type != "none":
+            yield from voltage_notes(one)
         yield from record_notes(trial, one)
         yield from outlier_notes(trial.record.source.name, trial.channels)
     yield from validation_notes(compared, tried)
@@ -275,7 +278,7 @@ def record_notes(trial: Trial, compared: Comparison) -> Iterator[str]:
     """Yield what the steady part of a record says against the case."""
     test = trial.test
     if test.steady is not None and test.begin is None:
-        yield from unsteady_notes(trial.record, test.steady)
+        yield from unsteady_notes(trial.record, test.steady, trial.channels)
         yield from level_notes(compared, test.steady)
 
 

@@ -73,6 +73,7 @@ Securable = TypeVar("Securable", Simulator, Experiment)
 
 WIDEST = 10  # windows of a running median that a record holds: a wider one hides the response
 FEWEST = 3  # samples of a channel: fewer do not show its noise
+POSSIBLE = (0.1, 2.0)  # pu: voltages beyond are those of another unit or base
 
 
 def system_of(case: Case) -> System:
@@ -419,7 +420,10 @@ def _moved(test: BumpTest, record: Record, signal: str) -> Array:
 def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     """Return the parameters that a record gives: the levels of its signals at the start."""
     if not isinstance(case.plant, Playback):
-        return {VT0: initial_voltage(test, record)}
+        vt0 = initial_voltage(test, record)
+        if case.plant.type != "none":
+            _refuse_impossible(vt0, record)
+        return {VT0: vt0}
     levels = {
         initial(signal): initial_level(test, record, signal)
         for signal in (*DRIVING, "efd")
@@ -427,6 +431,16 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     }
     given = {} if case.plant.vref is None else {VREF0: case.plant.vref}
     return {**levels, VT0: initial_voltage(test, record), **given}
+
+
+def _refuse_impossible(vt0: float, record: Record) -> None:
+    """Raise a RecordError where a voltage is none that a machine is at rest with."""
+    low, high = POSSIBLE
+    if not low <= vt0 <= high:
+        raise RecordError(
+            f"{record.source}: vt rests at {vt0:.4g} pu, outside {low:g} ... {high:g}: its unit, "
+            "base or scale is another"
+        )
 
 
 def fitted_trials(case: Case) -> tuple[Trial, ...]:

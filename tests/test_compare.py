@@ -284,7 +284,7 @@ def test_wrong_files_are_refused(run):
         (("empty", b), ["empty: no response.csv"]),
         (("two", b), ["two: no response.csv", "name one of its files: up.csv\n"]),
         (("words.csv", b), ["words.csv:2", "'high'"]),
-        ((a, b, "--columns", "vt=VOLT"), ["no file has a column 'VOLT'"]),
+        ((a, b, "--columns", "vt=VOLT"), ["no file has a column 'VOLT'", f"{b} has 't', 'vt'"]),
         ((a, b, "--time", "sec"), ["no file has a column 'sec'"]),
         ((a, b, "--columns", "vt"), ["--columns vt: not of the form vt=VOLT"]),
         ((a, b, write("r.csv", t=[0, 1], x=[0, 1])), ["r.csv: none of the signals vt"]),
@@ -331,3 +331,16 @@ def test_the_figure_has_a_panel_and_a_panel_of_differences_for_each_signal(recor
     assert "vt" in curves.get_ylabel()
     assert len(differences.lines) == (4 if record else 2)  # with zero
     assert figure.axes[-1].get_xlabel() == "time (s)"
+
+
+def test_a_column_that_its_file_says_is_not_per_unit_is_refused(run):
+    a, _ = good()
+    rows = ((0.0, 15.75), (1.0, 15.75), (10.0, 16.5))
+    for name in ("U [kV]", "U (V)", "U [%]"):
+        other = write("other.csv", **{"t": [t for t, _ in rows], name: [u for _, u in rows]})
+        code, out, err = run(a, other, "--columns", f"vt={name}")
+        assert (code, out) == (1, "")
+        assert f"other.csv: column '{name}' is in" in err
+        assert "pu" in err
+    other = write("other.csv", **{"t": [t for t, _ in rows], "U [pu]": [1.0, 1.0, 1.05]})
+    assert run(a, other, "--columns", "vt=U [pu]")[0] == 0

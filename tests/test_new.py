@@ -137,7 +137,9 @@ def test_a_plants_record_leaves_only_the_base_of_its_voltage_open(tmp_path):
     path = started("AC1A", open_table(FIELD_RECORD), tmp_path)
     with pytest.raises(CaseError) as caught:
         load_case(path)
-    assert re.fullmatch(r"\S+: record\.channels\.vt\.base: '\?' is not a number", str(caught.value))
+    assert re.fullmatch(
+        r"\S+: record\.channels\.vt\.base: '\?' is to be filled in", str(caught.value)
+    )
     path.write_text(path.read_text(encoding="utf-8").replace('base: "?"', "base: 15.75"))
     assert load_case(path).test.vref[0].at.start == pytest.approx(2.137, abs=0.02)
 

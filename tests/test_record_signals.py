@@ -174,3 +174,63 @@ def test_a_clock_that_is_not_slower_or_has_no_samples_is_refused(tmp_path, rate)
     synthetic(tmp_path, TEST, TIME)
     with pytest.raises(RecordError, match=r"record\.csv: resample: "):
         trial(case_with(tmp_path, {"vt": "vt"}, resample=rate))
+
+
+@pytest.mark.parametrize(("base", "rests"), [(15750.0, "0.001"), (1.575, "10")])
+def test_a_voltage_that_no_machine_has_is_refused_with_its_value_and_limits(tmp_path, base, rests):
+    vt = synthetic(tmp_path, TEST, TIME)["vt"]
+    channels = {"vt": {"column": "u", "unit": "kV", "base": base}}
+    content = one({"vref": TEST["vref"]}, channels, ["KA"])
+    write(tmp_path / "record.csv", t=TIME, u=15.75 * vt)
+    with pytest.raises(
+        RecordError, match=rf"vt rests at {rests} pu, outside 0\.1 \.\.\. 2: .*base"
+    ):
+        fitted_trials(case_of(content, tmp_path))
+
+
+@pytest.mark.parametrize("connection", ["phase-to-ground", "phase-to-phase"])
+def test_a_voltage_off_by_the_connection_is_noted(tmp_path, connection):
+    vt = synthetic(tmp_path, TEST, TIME)["vt"]
+    columns = {"t": TIME, **dict.fromkeys(PHASES["phases"], RATED / np.sqrt(3.0) * vt)}
+    entry = {**PHASES, "kind": "rms", "connection": connection}
+    write(tmp_path / "record.csv", **columns)
+    found = fit(case_of(one({"vref": TEST["vref"]}, {"vt": entry}, ["KA"]), tmp_path))
+    told = any("vt starts from 0.577" in note and "connection" in note for note in found.notes)
+    assert told == (connection == "phase-to-phase")
+
+
+def test_noise_that_waveforms_smooth_is_neither_a_drift_nor_a_misfit(tmp_path):
+    vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
+    noise = 5e-3 * np.random.default_rng(3).standard_normal((len(TIME), 3))
+    columns = {"t": TIME, **dict(zip(PHASES["phases"], (waves(vt) + noise).T, strict=True))}
+    found = fit(case_with(tmp_path, {"vt": PHASES}, columns, ["KA", "TE", "TF"]))
+    assert found.success
+    assert not [one for one in found.notes if "scatters from" in one or "at rest" in one]
+
+
+def test_a_start_that_is_not_filled_in_and_a_missing_connection_say_what_is_wanted(tmp_path):
+    entry = {key: value for key, value in PHASES.items() if key != "connection"}
+    for channel, wanted in (
+        ({"column": "u", "unit": "kV", "base": "?"}, "vt.base: '?' is to be filled in"),
+        (entry, "vt.connection: is missing: phase-to-ground or phase-to-phase?"),
+    ):
+        with pytest.raises(CaseError) as told:
+            case_of(one(TEST, {"vt": channel}), tmp_path)
+        assert wanted in str(told.value)
+
+
+def test_a_coarse_step_is_held_against_the_error_of_the_signal_that_it_moves(tmp_path):
+    """At 20 ms it moves efd by 3e-5 pu: a third of the noise of vt, nothing beside that of efd."""
+    clock = np.arange(0.0, 6.0, 0.01)
+    known = synthetic(tmp_path, TEST, clock, signals=("vt", "efd"))
+    for noise, told in ((5e-3, False), (1e-4, True)):
+        efd = known["efd"] + noise * np.random.default_rng(1).standard_normal(len(clock))
+        write(tmp_path / "record.csv", t=clock, vt=known["vt"], efd=efd)
+        channels = {
+            "vt": {"column": "vt", "noise": 1e-4},
+            "efd": {"column": "efd", "noise": noise},
+        }
+        content = {**one(TEST, channels, ["KA"]), "simulation": {"step": 0.02}}
+        notes = [one for one in fit(case_of(content, tmp_path)).notes if "halving" in one]
+        assert any("moves efd by" in one for one in notes) == told
+        assert not any("moves vt by" in one for one in notes)

@@ -9,7 +9,9 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 from pages import Page
-from records import config, recording, several
+from records import TEST, config, found_in, recording, several, synthetic, write
+from records import TIME as OF_UNIT
+from records import one as ac1a
 
 from exfit import cli, files, study
 from exfit.case import load_case
@@ -217,6 +219,26 @@ def test_what_identifies_unit_and_test_is_told(pages):
     for name, value in ABOUT.items():
         assert f"{name} {value}" in pages("first order").text
     assert "does not say which unit" in pages("ac1a").text
+
+
+def test_the_base_of_each_signal_is_told_and_a_step_that_the_fit_found(tmp_path):
+    vt = synthetic(tmp_path, TEST, OF_UNIT)["vt"]
+    write(tmp_path / "record.csv", t=OF_UNIT, u=15.75 * vt)
+    test = {**TEST, "vref": [{"at": found_in(1.02, 0.9, 1.1), "step": 0.05}]}
+    content = ac1a(test, {"vt": {"column": "u", "unit": "kV", "base": 15.75}}, ["KA"])
+    words = Page(html(report_of(made(tmp_path, content)))).text
+    assert "vt, 1 pu = 15.75 kV" in words
+    assert "vref +0.05 pu at about 1.02 s (found by the fit)" in words
+
+
+def test_a_signal_with_a_wrong_base_stands_in_the_verdict(tmp_path):
+    shown = synthetic(tmp_path, TEST, OF_UNIT, signals=("vt", "ifd"))
+    write(tmp_path / "record.csv", t=OF_UNIT, vt=shown["vt"], i=550.0 * shown["ifd"])
+    for base, told in ((550.0, False), (0.55, True)):
+        ifd = {"column": "i", "unit": "A", "base": base, "weight": 1e-9}
+        content = ac1a(TEST, {"vt": "vt", "ifd": ifd}, ["KA"])
+        verdict = report_of(made(tmp_path, content)).verdict.sentence
+        assert ("no better than by a constant matched: ifd" in verdict) == told
 
 
 def test_hashes_versions_case_and_commands_are_told(fits, pages):

@@ -10,6 +10,7 @@ from exfit import __version__
 from exfit.case import BumpTest, Case, Recording, Unknown, known
 from exfit.case_form import show
 from exfit.case_parts import Part
+from exfit.case_schema import Channel, Phases
 from exfit.errors import ExfitError
 from exfit.export import export
 from exfit.features import Features
@@ -265,8 +266,16 @@ def _verdict(
         if vague
         else "every parameter determined"
     )
+    # none is judged by them, but a wrong base of one shows nowhere else at a glance
+    others = [
+        f"{signal.name} of {one.name}"
+        for one in fits
+        for signal in one.signals
+        if signal not in _judging(one) and not _describes(signal)
+    ]
+    missed = f"; no better than by a constant matched: {listed(others)}" if others else ""
     word, text, good = _judged(saved, fits, validations)
-    return Verdict(word, f"{text[:1].upper()}{text[1:]}; rmse {rmse}; {determined}.", good)
+    return Verdict(word, f"{text[:1].upper()}{text[1:]}{missed}; rmse {rmse}; {determined}.", good)
 
 
 def _judged(
@@ -323,7 +332,7 @@ def _tested(case: Case, recording: Recording, trial: Trial, role: str) -> Tested
         file=recording.record.file,
         plant=PLANTS[case.seen_from(recording).plant.type],
         done="; ".join(_done(recording.test)) or "no step of its own",
-        channels=", ".join(recording.record.channels),
+        channels="; ".join(_channel(*one) for one in recording.record.channels.items()),
         samples=len(time),
         first=float(time[0]),
         last=float(time[-1]),
@@ -334,10 +343,10 @@ def _tested(case: Case, recording: Recording, trial: Trial, role: str) -> Tested
 def _done(test: BumpTest) -> Iterator[str]:
     """Yield what was done to the unit, in words."""
     if test.vt0 is not None:
-        yield f"vt0 {_known(test.vt0, 'g')} pu"
+        yield f"vt0 {_known(test.vt0, 'g', 'pu')}"
     for signal in ("vref", "vs", "E"):
         for step in getattr(test, signal):
-            yield f"{signal} {_known(step.step, '+g')} pu at {_known(step.at, 'g')} s"
+            yield f"{signal} {_known(step.step, '+g', 'pu')} at {_known(step.at, 'g', 's')}"
     for switch in test.network:
         values = {name: getattr(switch, name) for name in ("R", "X", "E")}
         changed = {name: value for name, value in values.items() if value is not None}
@@ -345,12 +354,18 @@ def _done(test: BumpTest) -> Iterator[str]:
         yield f"network switched at {switch.at:g} s: {told}"
 
 
-def _known(value: float | Unknown, form: str) -> str:
+def _channel(signal: str, entry: Channel | Phases) -> str:
+    """Return a signal with what 1 pu of it is."""
+    return signal if entry.base is None else f"{signal}, 1 pu = {entry.base:g} {entry.unit}"
+
+
+def _known(value: float | Unknown, form: str, unit: str) -> str:
     """Return a value of a test; one that the fit found stands among the parameters."""
     if not isinstance(value, Unknown):
-        return format(value, form)
+        return f"{value:{form}} {unit}"
     start = known(value)
-    return "found by the fit" if start is None else f"found by the fit near {start:{form}}"
+    near = "" if start is None else f"about {start:{form}} {unit} "
+    return f"{near}(found by the fit)"
 
 
 def _models(case: Case) -> Iterator[Described]:
