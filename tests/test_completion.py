@@ -116,6 +116,8 @@ def test_names_of_models_are_completed(place, shell):
     assert set(completed(shell, "models", "ac")) == {name for name in MODELS if name[:2] == "AC"}
     assert completed(shell, "models", "PSS2") == ["PSS2B"]
     assert set(completed(shell, "models", "genro")) == {"GENROU", "GENROE"}
+    assert completed(shell, "new", "--model", "ac1") == ["AC1A"]
+    assert set(completed(shell, "new", "--machine", "GENRO")) == {"GENROU", "GENROE"}
 
 
 def test_free_parameters_of_the_case_are_completed_once(place, shell):

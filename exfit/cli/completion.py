@@ -18,6 +18,20 @@ def models(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
     return _beginning((*MODELS, *MACHINE_NAMES, *STABILISERS), incomplete.upper())
 
 
+def exciters(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    """Return the names of exciters, in upper or lower case."""
+    from exfit.models import MODELS
+
+    return _beginning(MODELS, incomplete.upper())
+
+
+def machines(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    """Return the names of machines, in upper or lower case."""
+    from exfit.models import MACHINE_NAMES
+
+    return _beginning(MACHINE_NAMES, incomplete.upper())
+
+
 def free_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
     """Return the free parameters of the case, but for those that are given already."""
     from exfit.glance import free_of

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from exfit.cli import completion
 from exfit.cli.options import (
     file_option,
     folder_of,
@@ -81,9 +82,19 @@ def inspect_(
 
 
 @click.command(short_help="Make a case of a model and a record to start from.")
-@click.option("--model", required=True, metavar="NAME", help="Exciter, or the file of a model.")
 @click.option(
-    "--machine", default="GENROU", metavar="NAME", help="Machine model (default: GENROU)."
+    "--model",
+    required=True,
+    metavar="NAME",
+    help="Exciter, or the file of a model.",
+    shell_complete=completion.exciters,
+)
+@click.option(
+    "--machine",
+    default="GENROU",
+    metavar="NAME",
+    help="Machine model (default: GENROU).",
+    shell_complete=completion.machines,
 )
 @click.option(
     "--record",
