@@ -30,7 +30,7 @@ WORDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
         "voltage",
         ("vt", "ut", "ug", "vg", "ugen", "vgen", "uterm", "vterm", "ugenerator", "terminal voltage",
          "generator voltage", "stator voltage", "generatorspannung", "klemmenspannung",
-         "ustator", "vstator", "voltage", "spannung", "u", "v"),
+         "ustator", "vstator", "voltage", "volt", "spannung", "u", "v"),
     ),
 }  # fmt: skip
 OF_EXCITER = {"exciter", "erregermaschine", "pilot", "ve", "ife", "ief", "efe", "vfe"}

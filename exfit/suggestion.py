@@ -16,9 +16,9 @@ from exfit.steps import Step
 
 FILL_IN = '"?"'  # no number: a case that holds it is refused by place
 AROUND = 0.25  # s: how far the instant of a step may be from where the record shows it
-SHARE = 0.5  # of the size that a record shows: how far the size may be from it
 LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower
 DIGITS = 4
+OUTLIERS = "6"  # times the noise, as `exfit inspect` counts spikes
 HINTS = {
     "vt": "rated, line to line",
     "vref": "rated, line to line",
@@ -55,26 +55,24 @@ def record_section(found: Inspection, file: str, only: tuple[str, ...] = COMPARE
         lines.append(f"    vt: {{column: {FILL_IN}}}")
     if any(one.missing for one in channels):
         lines.append("  gaps: skip            # samples without a number are left out")
-    if any(one.spikes for one in channels):
-        lines.append("  # spikes: {outliers: 6} in a channel leaves them out")
     return lines
 
 
 def bump_section(found: Inspection, vt0: bool = False) -> list[str]:
-    """Return the lines of a ``test:`` section: the steps of the reference, found by the fit.
+    """Return the lines of a ``test:`` section: steps whose instants the fit finds.
 
-    A reference that was recorded needs no finding. ``vt0`` says whether to give the level before.
+    Their sizes are to be filled in, unless the reference was recorded: vt changes by less, and the
+    gain of a regulator is what makes the difference. ``vt0`` says whether to give the level before.
     """
-    steps = [one for one in found.steps if _size(found, one)]
     lines = ["test:"]
     if vt0:
         level = found.channel_of("vt")
         lines.append(commented(f"  vt0: {_number(level.level if level else 1.0)}", "at rest"))
-    if not steps:
+    if not found.steps:
         at = "the record shows no step: when, s, and by how much, pu?"
         return [*lines, f"  # {at}", f"  vref: [{{at: {FILL_IN}, step: {FILL_IN}}}]"]
     lines.append("  vref:")
-    for step in steps:
+    for step in found.steps:
         lines += _step(found, step)
     return lines
 
@@ -89,38 +87,37 @@ def in_per_unit(one: Channel) -> bool:
 
 
 def _step(found: Inspection, step: Step) -> Iterator[str]:
-    size = _size(found, step)
     reference = found.channel_of("vref")
     if reference is not None and reference.name in step.seen_in:
         own = min((one.at for one in reference.steps), key=lambda at: abs(at - step.at))
+        size = step.sizes.get(reference.name, 0.0)
         yield f"    - at: {_number(own)}"
-        yield f"      step: {_number(size)}"
+        if in_per_unit(reference):
+            yield f"      step: {_number(size)}"
+        else:
+            yield commented(f"      step: {FILL_IN}", f"pu; {reference.name} {size:+.4g}")
         return
     if step.from_start:
         text = "the record moves from its first sample: made then, or before?"
         yield commented(f"    - at: {_number(step.at)}", text)
-        yield commented(
-            f"      step: {_number(size)}", "what vt changed by; what was keyed in is better"
-        )
-        return
-    low = max(step.at - AROUND, float(found.time[0]))
-    high = min(step.at + AROUND, float(found.time[-1]))
-    yield commented(f"    - at: {_found(step.at, low, high)}", f"+- {step.error:.1g} s")
-    bounds = sorted(((1.0 - SHARE) * size, (1.0 + SHARE) * size))
-    yield "      # what vt changed by; better the number that was keyed in"
-    yield f"      step: {_found(size, *bounds)}"
+    else:
+        low = max(step.at - AROUND, float(found.time[0]))
+        high = min(step.at + AROUND, float(found.time[-1]))
+        yield commented(f"    - at: {_found(step.at, low, high)}", f"+- {step.error:.1g} s")
+    shown = _shown(found, step)
+    yield commented(f"      step: {FILL_IN}", f"pu, as it was keyed in{shown}")
 
 
-def _size(found: Inspection, step: Step) -> float:
-    """Return a step in per unit: that of a recorded reference, else by what vt changed; or 0."""
-    for signal in ("vref", "vt"):
-        one = found.channel_of(signal)
-        if one is not None and one.name in step.sizes:
-            size = step.sizes[one.name]
-            return size if in_per_unit(one) else size / one.level
-    sizes = [step.sizes[group.name] / group.level for group in found.phases
-             if group.name in step.sizes]  # fmt: skip
-    return sizes[0] if sizes else 0.0
+def _shown(found: Inspection, step: Step) -> str:
+    """Return by how much vt changed for good, where that is known."""
+    voltage = found.channel_of("vt")
+    if voltage is not None and voltage.name in step.sizes:
+        size = step.sizes[voltage.name]
+        return f"; vt changed by {_number(size if in_per_unit(voltage) else size / voltage.level)}"
+    for group in found.phases:
+        if group.name in step.sizes:
+            return f"; vt changed by {_number(step.sizes[group.name] / group.level)}"
+    return ""
 
 
 def _voltage(found: Inspection, channels: list[Channel]) -> tuple[Phases, ...]:
@@ -163,9 +160,11 @@ def _channel(one: Channel, noisy: bool) -> str:
     elif not in_per_unit(one) and quantity_of(one.unit):
         entries |= {"unit": str(one.unit), "base": FILL_IN}
     elif not in_per_unit(one):
-        entries["scale"] = FILL_IN
+        entries |= {"unit": FILL_IN, "base": FILL_IN}
     if noisy:
         entries["noise"] = yaml_number(float(f"{one.noise:.2g}"))
+    if one.spikes:
+        entries["outliers"] = OUTLIERS
     if len(entries) == 1:
         return entries["column"]
     return "{" + ", ".join(f"{key}: {value}" for key, value in entries.items()) + "}"

@@ -83,9 +83,11 @@ class Run:
     @property
     def folder(self) -> Path:
         """Where the command leaves its files."""
-        words = self.command.split()
-        stem = f"{Path(words[2]).stem}-" if words[1] != "compare" else ""
-        return Path("runs") / f"{stem}{words[1]}"
+        _, command, first, *_ = self.command.split()
+        if command == "compare":
+            return Path("runs") / command
+        name = Path(first).name if command == "inspect" else Path(first).stem
+        return Path("runs") / f"{name}-{command}"
 
 
 FIT, BOTH, FIELD = (

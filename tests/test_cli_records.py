@@ -41,9 +41,9 @@ def test_inspect_shows_the_record_and_leaves_its_files(run):  # noqa: F811
     code, out, err = run("inspect", "up.csv")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= WIDTH
-    for words in ("1001 samples", "100 Hz", "vt?", "1.0003", "+0.04949", "runs/up-inspect"):
+    for words in ("1001 samples", "100 Hz", "vt?", "1.0003", "+0.04949", "runs/up.csv-inspect"):
         assert words in out
-    folder = Path("runs/up-inspect")
+    folder = Path("runs/up.csv-inspect")
     assert sorted(path.name for path in folder.iterdir()) == ["inspect.json", "inspect.png"]
     assert (folder / "inspect.png").read_bytes().startswith(PNG)
     content = json.loads((folder / "inspect.json").read_text())
@@ -55,7 +55,19 @@ def test_what_inspect_suggests_makes_a_case(run):  # noqa: F811
     sections = suggested(run("inspect", "up.csv", "--no-plots")[1])
     case = {"model": "AC1A", "plant": {"type": "open-circuit", "machine": "GENROU"}, **sections}
     Path("case.yaml").write_text(yaml.safe_dump(case))
+    code, _, err = run("check", "case.yaml")
+    assert (code, err.count("\n")) == (1, 1)
+    assert "test.vref[0].step: '?' is to be filled in" in err
+    fill_in("case.yaml")
     assert run("check", "case.yaml")[0] == 0
+
+
+def fill_in(case):
+    """Write the size of the step into a case."""
+    text = Path(case).read_text()
+    Path(case).write_text(
+        text.replace('step: "?"', "step: 0.05").replace("step: '?'", "step: 0.05")
+    )
 
 
 def test_inspect_as_json_prints_what_it_writes(run):  # noqa: F811
@@ -114,6 +126,7 @@ def test_new_makes_a_case_that_checks_and_fits(run):  # noqa: F811
     assert out == "written to cases/case.yaml; next: exfit check cases/case.yaml\n"
     content = yaml.safe_load(Path("cases/case.yaml").read_text())
     assert content["record"]["file"] == "../up.csv"
+    fill_in("cases/case.yaml")
     assert run("check", "cases/case.yaml")[0] == 0
 
 
@@ -129,6 +142,7 @@ def test_new_takes_a_model_of_ones_own(run):  # noqa: F811
     code, _, err = run("new", "--model", "mine.py", "--record", "up.csv", "-o", "cases/case.yaml")
     assert (code, err) == (0, "")
     assert yaml.safe_load(Path("cases/case.yaml").read_text())["model"] == "../mine.py"
+    fill_in("cases/case.yaml")
     assert run("check", "cases/case.yaml")[0] == 0
 
 

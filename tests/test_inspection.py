@@ -1,6 +1,7 @@
 """Inspection: what a record holds is told as it was put there, and its steps are found."""
 
 import json
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -234,14 +235,15 @@ def test_a_suggested_case_holds_no_base_that_nobody_gave():
     assert section["time"] == "t"
     assert section["gaps"] == "skip"
     assert section["channels"] == {
-        "vt": {"column": "Ugen", "unit": "kV", "base": "?"},
+        "vt": {"column": "Ugen", "unit": "kV", "base": "?", "outliers": 6},
         "ifd": {"column": "Ifd [A]", "unit": "A", "base": "?"},
         "efd": {"column": "Field voltage (V)", "unit": "V", "base": "?"},
     }
     (up, down) = yaml.safe_load("\n".join(bump_section(FOUND)))["test"]["vref"]
-    for step, size in ((up, 0.0495), (down, -0.0471)):
-        assert step["step"]["min"] < step["step"]["start"] < step["step"]["max"]
-        assert step["step"]["start"] == pytest.approx(size, rel=0.06)
+    assert up["at"]["min"] < 1.0 < up["at"]["max"]
+    assert (up["step"], down["step"]) == ("?", "?")
+    shown = re.findall(r"vt changed by (\S+)", "\n".join(bump_section(FOUND)))
+    assert list(map(float, shown)) == pytest.approx([0.0495, -0.0471], rel=0.06)
 
 
 def test_every_suggestion_fits_a_terminal_of_80_columns_but_for_names():

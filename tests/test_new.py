@@ -1,6 +1,5 @@
 """new: a case for any model of the catalogue that runs as it stands, or says what to fill in."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -51,12 +50,12 @@ def record(tmp_path):
     return made
 
 
-def started(name, table, folder, machine="GENROU"):
-    """Write the case that a model and a record begin with; return its path."""
+def started(name, table, folder, machine="GENROU", step=STEP):
+    """Write the case that a model and a record begin with, the step filled in; return its path."""
     found = inspect(table)
     text = starting_case(MODELS[name], name, MACHINES[machine], found, folder)
     path = folder / "case.yaml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text.replace('step: "?"', f"step: {step}"), encoding="utf-8")
     return path
 
 
@@ -133,15 +132,19 @@ def test_what_the_record_does_not_tell_is_refused_by_place(tmp_path):
     assert "record.channels.vt" in faults
 
 
-def test_a_plants_record_leaves_only_the_base_of_its_voltage_open(tmp_path):
-    path = started("AC1A", open_table(FIELD_RECORD), tmp_path)
+def test_a_plants_record_leaves_the_base_of_its_voltage_and_the_step_open(tmp_path):
+    path = started("AC1A", open_table(FIELD_RECORD), tmp_path, step='"?"')
     with pytest.raises(CaseError) as caught:
         load_case(path)
-    assert re.fullmatch(
-        r"\S+: record\.channels\.vt\.base: '\?' is to be filled in", str(caught.value)
-    )
-    path.write_text(path.read_text(encoding="utf-8").replace('base: "?"', "base: 15.75"))
+    open_ = [line.partition(": ")[2] for line in str(caught.value).splitlines()]
+    assert sorted(open_) == [
+        "record.channels.vt.base: '?' is to be filled in",
+        "test.vref[0].step: '?' is to be filled in",
+    ]
+    text = path.read_text(encoding="utf-8").replace('base: "?"', "base: 15.75")
+    path.write_text(text.replace('step: "?"', "step: 0.05"))
     assert load_case(path).test.vref[0].at.start == pytest.approx(2.137, abs=0.02)
+    assert load_case(path).record.channels["vt"].outliers == 6
 
 
 def test_on_load_the_record_tells_power_and_the_network_is_asked_for(tmp_path):

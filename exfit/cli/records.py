@@ -8,7 +8,6 @@ import click
 from exfit.cli import completion
 from exfit.cli.options import (
     file_option,
-    folder_of,
     force_option,
     json_option,
     output_option,
@@ -65,7 +64,8 @@ def inspect_(
     from exfit.result import to_json
     from exfit.suggestion import bump_section, record_section
 
-    folder = output or folder_of(file, "inspect")
+    # files of one record in several formats have one stem
+    folder = output or Path("runs") / f"{file.name}-inspect"
     files.refuse_unwritable(folder)
     found = _inspected(file, clock, unit, sheet)
     files.write_inspection(found, folder, plots)
