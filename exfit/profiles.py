@@ -16,7 +16,6 @@ from exfit.inference import LEVEL
 from exfit.knowledge import Knowledge, knowledge
 from exfit.residuals import Residuals
 from exfit.study import UNIT, fitted, names_of_records, search, unit_of
-from exfit.trial import residuals_of
 
 Array = NDArray[np.float64]
 
@@ -99,8 +98,7 @@ def profile(
 
     Source: Venzon & Moolgavkar 1988.
     """
-    trials = fitted(case)
-    residuals = residuals_of(case, trials)
+    trials, residuals = fitted(case)
     free = [one.name for one in residuals.free]
     wanted = tuple(names) or tuple(free)
     unknown = [name for name in wanted if name not in free]

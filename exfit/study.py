@@ -73,9 +73,10 @@ def fit(
     """
     began = clock.perf_counter()
     given = case.values()
-    trials = fitted(case)
+    trials, residuals = fitted(case)
     validations = tuple(trial_of(case, one, given) for one in case.validations)
-    residuals = residuals_of(case, trials)
+    fewer = condensed(residuals)
+    before = fewer.simulations
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
@@ -87,8 +88,7 @@ def fit(
         watch(history[-1])
 
     found, minima = search(case, residuals, method, announce, progress)
-    fewer = condensed(residuals)
-    simulations, substeps = fewer.simulations, fewer.substeps  # of the search alone
+    simulations, substeps = fewer.simulations - before, fewer.substeps  # of the search alone
     values, begin = residuals.values(found.x), residuals.values(residuals.start)
     interrupted = found.stop is estimate.Stop.INTERRUPTED
     known = None if interrupted else told(residuals, found.x, trials)
@@ -135,15 +135,16 @@ def fit(
     )
 
 
-def fitted(case: Case) -> tuple[Trial, ...]:
-    """Return the tests of a case with the records that it is fitted to, ready to be fitted.
+def fitted(case: Case) -> tuple[tuple[Trial, ...], Residuals]:
+    """Return the tests of a case with the records that it is fitted to, and what is made small.
 
     Raises ExfitError where there is none, or one that cannot be fitted.
     """
     given = case.values()
     trials = tuple(trial.secured(given) for trial in fitted_trials(case))
-    refuse_unfit(case, residuals_of(case, trials))
-    return trials
+    residuals = residuals_of(case, trials)
+    refuse_unfit(case, residuals)
+    return trials, residuals
 
 
 def told(residuals: Residuals, theta: Array, trials: Iterable[Trial]) -> Knowledge | None:

@@ -59,7 +59,7 @@ def sources(saved: Saved, case: Path | None = None) -> Sources:
     path = _found(saved) if case is None else case
     _refuse_changed(saved, path, file_hash(path), "inputs", "case")
     loaded = load_case(path)
-    trials = fitted(loaded)
+    trials, _ = fitted(loaded)
     given = loaded.values()
     validations = tuple(trial_of(loaded, one, given) for one in loaded.validations)
     files = {"case": path, "model": loaded.folder / str(loaded.model)}
