@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case import Case
+from exfit.course import Course
 from exfit.models.blocks import SHORTEST
 from exfit.notes import typical_notes
 from exfit.residuals import Residuals
-from exfit.simulate import Course, Simulator
+from exfit.simulate import Simulator
 from exfit.trial import fitted_trials, free_of, planned
 
 Array = NDArray[np.float64]

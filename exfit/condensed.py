@@ -14,9 +14,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.course import NEIGHBOURS, Sampling
 from exfit.experiment import Channel, Experiment
 from exfit.residuals import Residuals
-from exfit.simulate import NEIGHBOURS, Sampling
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]

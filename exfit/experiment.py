@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.conditioning import Conditioning
+from exfit.course import Change, Direction
 from exfit.plant import VT0
-from exfit.simulate import Change, Direction, Simulator
+from exfit.simulate import Simulator
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

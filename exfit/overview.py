@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from exfit.course import Change, Course
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Model, typical
 from exfit.plant import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.result import write
-from exfit.simulate import Change, Course, Response, Simulator
+from exfit.simulate import Response, Simulator
 
 MACHINE_DATA: Mapping[str, float] = {
     "Tpd0": 6.0, "Tppd0": 0.035, "Xd": 1.8, "Xpd": 0.3, "Xppd": 0.25, "Xl": 0.2,

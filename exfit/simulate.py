@@ -1,16 +1,25 @@
-"""From parameter values to a response: the start at rest, the grid, the sub-steps, the samples."""
+"""From parameter values to a response: the start at rest, the sub-steps, the samples."""
 
 import math
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.course import (
+    ON_GRID,
+    Change,
+    Course,
+    Direction,
+    Sampling,
+    Stretch,
+    WholeRun,
+    joined,
+    stretches,
+)
 from exfit.engine.kernel import (
     SIDE_BY_SIDE,
     Kernel,
@@ -29,121 +38,11 @@ from exfit.models.blocks import SHORTEST
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-MOST_STEPS = 1e7  # three hours at 1 ms
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
 REST_TOLERANCE = 1e-6  # pu/s: below any real motion
 ROUNDING = 1e-13  # of a state
-ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
 REMEMBERED = 64  # sets of values: several threads ask for a few of theirs again
-BLOCK = 1 << 16  # samples whose interpolation is kept
-NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
-
-
-class Stretch(NamedTuple):
-    """Equal steps of the grid between two changes of the inputs."""
-
-    start: float
-    step: float
-    steps: int
-
-    @property
-    def end(self) -> float:
-        """Where it ends, s."""
-        return self.start + self.step * self.steps
-
-    @property
-    def times(self) -> Array:
-        """Its grid points (n + 1,), s."""
-        return np.linspace(self.start, self.end, self.steps + 1)
-
-
-class Change(NamedTuple):
-    """A step of an input, by default of the reference: when (s) and by how much (pu).
-
-    It falls on the grid exactly, and divides it; or, ``smooth``, it leaves the grid as it is, and
-    is averaged over it with a linear B-spline. A fit may move the instant of a smooth one: the area
-    under the input, which an exact step between grid points would lose or gain, stays that of the
-    step wherever its instant lies, and follows it with a continuous derivative; so does the cost.
-    """
-
-    at: float
-    step: float
-    signal: str = "vref"
-    smooth: bool = False
-
-    def share(self, part: Stretch) -> Array:
-        """Return how much of the step the grid points (n + 1,) of a stretch have seen."""
-        if not self.smooth:
-            return np.full(part.steps + 1, 1.0 if self.at <= part.start else 0.0)
-        seen, (near, x) = np.zeros(part.steps + 1), self._near(part)
-        seen[near], seen[near.stop :] = 0.5 + x - 0.5 * x * np.abs(x), 1.0
-        return seen
-
-    def share_slope(self, part: Stretch) -> Array:
-        """Return the derivative of ``share`` to the instant, 1/s; only a smooth step has it."""
-        if not self.smooth:
-            raise ValueError(f"the step of {self.signal} at {self.at:g} s is not smooth: it stays")
-        slope, (near, x) = np.zeros(part.steps + 1), self._near(part)
-        slope[near] = (np.abs(x) - 1.0) / part.step
-        return slope
-
-    def _near(self, part: Stretch) -> tuple[slice, Array]:
-        """Return the grid points less than a step from the instant, and how far beyond it."""
-        position = (self.at - part.start) / part.step
-        first, stop = np.clip(math.floor(position) + np.array([0, 2]), 0, part.steps + 1)
-        return slice(first, stop), np.arange(first, stop) - position
-
-
-@dataclass(frozen=True, eq=False)
-class Played:
-    """Recorded inputs: ``time`` (M,) in s, and what each signal (M,) deviates from the start."""
-
-    time: Array
-    signals: Mapping[str, Array]
-
-
-@dataclass(frozen=True)
-class Course:
-    """A test from ``start`` to ``end`` (s): steps of the inputs, and recorded ones played back."""
-
-    start: float
-    end: float
-    steps: tuple[Change, ...]
-    played: Played | None = None
-
-    def level(self, signal: str, at: float) -> float:
-        """Return the sum of an input's exact steps at an instant; each counts from its own on."""
-        made = (c.step for c in self.steps if c.signal == signal and not c.smooth and c.at <= at)
-        return sum(made, start=0.0)
-
-    def input(self, signal: str, part: Stretch) -> Array:
-        """Return an input at the grid points (n + 1,) of a stretch."""
-        u = np.full(part.steps + 1, self.level(signal, part.start))
-        if self.played is not None and signal in self.played.signals:
-            u += np.interp(part.times, self.played.time, self.played.signals[signal])
-        for change in self.steps:
-            if change.smooth and change.signal == signal:
-                u += change.step * change.share(part)
-        return u
-
-
-@dataclass(frozen=True)
-class Direction:
-    """What moves together in one derivative, and how fast each.
-
-    System parameters by name; steps of the course by their index, as (d at, d step) in s and pu,
-    where only a smooth one has an instant that moves; the recorder's delay in s.
-    """
-
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    steps: Mapping[int, tuple[float, float]] = field(default_factory=dict)
-    delay: float = 0.0
-
-
-def each(names: Iterable[str]) -> tuple[Direction, ...]:
-    """Return a direction for each parameter, which moves alone."""
-    return tuple(Direction({name: 1.0}) for name in names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,161 +64,6 @@ class Response:
     time: Array
     signals: Mapping[str, Array]
     substeps: int
-
-
-def stretches(course: Course, step: float) -> list[Stretch]:
-    """Divide a course at its exact changes, which so fall on the grid, into steps of ``step``."""
-    if (course.end - course.start) / step > MOST_STEPS:
-        raise SimulationError(
-            f"simulation.step: {step:g} s divides {course.end - course.start:g} s into more than "
-            f"{MOST_STEPS:.0e} steps"
-        )
-    exact = (change.at for change in course.steps if not change.smooth)
-    instants = {at for at in exact if course.start < at < course.end}
-    result = []
-    for start, end in pairwise([course.start, *sorted(instants), course.end]):
-        count = max(1, math.ceil((end - start) / step - ON_GRID))
-        result.append(Stretch(start, (end - start) / count, count))
-    return result
-
-
-@cache
-def lagrange(points: int) -> Array:
-    """Return the polynomials that are one at one of some points a step apart, zero at the others.
-
-    A row of coefficients each, from the lowest power of the distance from their middle up, and
-    below them those of their slopes: zero where there are fewer points than NEIGHBOURS,
-    (2 NEIGHBOURS, NEIGHBOURS).
-    """
-    places = np.arange(points) - 0.5 * (points - 1)  # about the middle powers stay small
-    values = np.zeros((NEIGHBOURS, NEIGHBOURS))
-    values[:points, :points] = np.linalg.inv(np.vander(places, increasing=True)).T
-    slopes = np.roll(values * np.arange(NEIGHBOURS), -1, axis=1)
-    return np.vstack([values, slopes])
-
-
-class Sampling:
-    """Reads a run, whose stretches lie one behind the other, at given times less a delay (s).
-
-    Between grid points it interpolates with a polynomial that never reaches across an exact step of
-    the inputs; at the instant of such a step it gives the values before the step. Before the start
-    and after the end it gives the values there. What it needs for that is kept for BLOCK times, and
-    found anew for each block of more.
-    """
-
-    def __init__(self, grid: Sequence[Stretch], times: Array, delay: float = 0.0) -> None:
-        # with a delay no sample is moved to the grid: what is read must follow it without a jump
-        near = ON_GRID if delay == 0.0 else 0.0
-        wanted = times - delay
-        read = np.clip(wanted, grid[0].start, grid[-1].end)
-        self._still = np.abs(wanted - read) > near * grid[0].step
-        start, step, count, end = np.array([(*part, part.end) for part in grid]).T
-        owner = np.minimum(np.searchsorted(end, read - near * step[0]), len(grid) - 1)
-        position, last = (read - start[owner]) / step[owner], count[owner]
-        self._kinds = {min(NEIGHBOURS, part.steps + 1) for part in grid}
-        self._step, self._points = step[owner], np.minimum(NEIGHBOURS, last + 1.0)
-        first = np.clip(np.floor(position) - 1.0, 0.0, last + 1.0 - self._points)
-        self._from_middle = position - first - 0.5 * (self._points - 1.0)
-        before = np.cumsum(count + 1.0) - count - 1.0
-        self.first = (before[owner] + first).astype(np.int64)
-        self.last = int(before[-1] + count[-1])
-        nearest = np.clip(np.rint(position), 0.0, last)
-        self._on_grid = self._still | (np.abs(position - nearest) < near)
-        self._nearest = (before[owner] + nearest).astype(np.int64)
-        self._exact: list[NDArray[np.int64]] | None = None
-        if np.all(self._on_grid):
-            within = nearest.astype(np.int64)
-            self._exact = [within[owner == k] for k in range(len(grid))]
-
-    @property
-    def blocks(self) -> list[slice]:
-        """The samples, so many at a time that what belongs to them takes little memory."""
-        count = len(self.first)
-        return [slice(first, min(first + BLOCK, count)) for first in range(0, count, BLOCK)]
-
-    def __call__(self, run: Sequence[Array]) -> Array:
-        """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
-        if self._exact is None:
-            return self._read(run, self.weights)
-        # each stretch by itself: a copy of the whole run costs more than a simulation's tenth
-        return np.concatenate([part[k] for part, k in zip(run, self._exact, strict=True)])
-
-    def slope(self, run: Sequence[Array]) -> Array:
-        """Return the time derivatives (M, ...), per s, of what a run gives as samples."""
-        return self._read(run, self._slopes)
-
-    def rows(self, block: slice) -> NDArray[np.int64]:
-        """Return which points of a run each sample of a block is read from, (NEIGHBOURS, block)."""
-        if block == slice(0, len(self.first)):
-            return self._all_rows
-        return self._rows_of(block)
-
-    def weights(self, block: slice) -> Array:
-        """Return how much each of these points counts, (NEIGHBOURS, block)."""
-        if block == slice(0, len(self.first)):
-            return self._all_weights
-        return self._weights_of(block)
-
-    @cached_property
-    def _all_rows(self) -> NDArray[np.int64]:
-        return self._rows_of(slice(0, len(self.first)))
-
-    @cached_property
-    def _all_weights(self) -> Array:
-        return self._weights_of(slice(0, len(self.first)))
-
-    def _rows_of(self, block: slice) -> NDArray[np.int64]:
-        return np.asarray(np.minimum(self.first[block] + np.arange(NEIGHBOURS)[:, None], self.last))
-
-    def _weights_of(self, block: slice) -> Array:
-        weights = self._polynomials(block, slice(0, NEIGHBOURS))
-        on_grid = self._on_grid[block]
-        if np.any(on_grid):
-            # by their own places: behind the end, one row stands for all
-            exact = self.first[block] + np.arange(NEIGHBOURS)[:, None] == self._nearest[block]
-            weights[:, on_grid] = exact[:, on_grid]
-        return weights
-
-    def _slopes(self, block: slice) -> Array:
-        slopes = self._polynomials(block, slice(NEIGHBOURS, 2 * NEIGHBOURS)) / self._step[block]
-        slopes[:, self._still[block]] = 0.0
-        return np.asarray(slopes)
-
-    def _polynomials(self, block: slice, rows: slice) -> Array:
-        """Return rows of ``lagrange`` at the samples of a block, (NEIGHBOURS, block)."""
-        away, points = self._from_middle[block], self._points[block]
-        powers = np.ones((NEIGHBOURS, len(away)))
-        for k in range(1, NEIGHBOURS):
-            powers[k] = powers[k - 1] * away
-        if len(self._kinds) == 1:
-            return np.asarray(lagrange(*self._kinds)[rows] @ powers)
-        found = np.zeros((NEIGHBOURS, len(away)))
-        for n in self._kinds:
-            found += lagrange(n)[rows] @ (powers * (points == n))
-        return found
-
-    def _read(self, run: Sequence[Array], weights: Callable[[slice], Array]) -> Array:
-        whole = _rows(run)
-        found = np.empty((len(self.first), *whole.shape[1:]))
-        for block in self.blocks:
-            np.einsum("km,km...->m...", weights(block), whole[self.rows(block)], out=found[block])
-        return found
-
-
-class WholeRun:
-    """Reads a run at all points of its grid, one stretch behind the other."""
-
-    def __call__(self, run: Sequence[Array]) -> Array:
-        """Return all points (G, ...) of a run."""
-        return _rows(run)
-
-    def slope(self, run: Sequence[Array]) -> Array:
-        """Raise: a delay is one of samples."""
-        raise NotImplementedError("a delay between points of the grid")
-
-
-def _rows(run: Sequence[Array]) -> Array:
-    return np.concatenate(run) if len(run) > 1 else run[0]
 
 
 @cache
@@ -502,8 +246,8 @@ class Simulator:
         run = code.run(p, code.start(p), self._spans(self.substeps(values)))
         return Run(
             np.concatenate([part.times for part in self._grid]),
-            dict(zip(self.system.outputs, _rows(run)[:, :, 0].T, strict=True)),
-            dict(zip(self.system.inputs, _rows(self._inputs).T, strict=True)),
+            dict(zip(self.system.outputs, joined(run)[:, :, 0].T, strict=True)),
+            dict(zip(self.system.inputs, joined(self._inputs).T, strict=True)),
         )
 
     def samples_of_many(self, sets: Sequence[Values], outputs: tuple[str, ...]) -> Array:

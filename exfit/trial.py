@@ -31,6 +31,7 @@ from exfit.case import (
 )
 from exfit.case_schema import Filter, Signal
 from exfit.conditioning import Conditioning, LowPass, Median, MovingAverage, outliers
+from exfit.course import MOST_STEPS, Change, Course, Played
 from exfit.engine.system import System, trace
 from exfit.errors import CaseError, ModelError, RecordError, SimulationError
 from exfit.experiment import Channel, Experiment
@@ -55,15 +56,7 @@ from exfit.plant import (
 from exfit.record import Record
 from exfit.residuals import Free, Known, Residuals, Robust
 from exfit.result import Comparison, Overlay
-from exfit.simulate import (
-    MOST_STEPS,
-    Change,
-    Course,
-    Played,
-    Response,
-    Simulator,
-    parameters_used,
-)
+from exfit.simulate import Response, Simulator, parameters_used
 from exfit.ties import Ties
 from exfit.unknowns import prefix_of, started, unknowns
 

@@ -18,12 +18,12 @@ from exfit.case import (
     known,
 )
 from exfit.conditioning import outliers
+from exfit.course import Change
 from exfit.errors import CaseError, RecordError
 from exfit.experiment import Nuisance
 from exfit.onset import find_step
 from exfit.record import Record
 from exfit.residuals import Free
-from exfit.simulate import Change
 
 JUMPS = ("efd",)  # signals that follow a step at once
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from exfit.course import Change, Course
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plant import MACHINE, VT0
-from exfit.simulate import Change, Course
 
 REFERENCE = Path(__file__).parent / "reference"
 MACHINE_NAMES = {

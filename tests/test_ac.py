@@ -10,10 +10,11 @@ from diagrams import Transfer, alone, field_current, lag, lead_lag, rectified, s
 from oracle import system_of, typical_values
 from references import reference
 
+from exfit.course import Change, Course
 from exfit.models import MODELS, find
 from exfit.models.blocks import limited_lead_lag
 from exfit.models.sheet import typical
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Simulator
 
 ALTERNATORS = ("AC2A", "AC3A", "AC4A", "AC5A", "AC6A", "EXAC4")
 

@@ -10,11 +10,12 @@ from diagrams import alone, field_current, rectified, saturation, standing
 from oracle import rates_at_rest, system_of, typical_values
 from scipy.optimize import brentq
 
+from exfit.course import Change, Course
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 from exfit.plant import SATURATION, Names, exciter_inputs, exciter_parameters
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Simulator
 
 FREQUENCIES = np.geomspace(0.01, 50.0, 41)  # Hz
 EFD, IFD, VT = 1.9, 1.8, 1.02  # a start of a machine on load, and off every limit

@@ -10,11 +10,12 @@ from diagrams import Transfer, lag, lead_lag, pid, rectified, standing, washout
 from oracle import lively_values, system_of, typical_values
 from references import reference
 
+from exfit.course import Change, Course
 from exfit.engine.trace import Graph, evaluate, in_order
 from exfit.models import MODELS
 from exfit.models.blocks import compound_source
 from exfit.plant import MACHINE, Names
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Simulator
 
 J = 1j
 

@@ -7,11 +7,12 @@ from oracle import rates_at_rest, system_of, typical_values, vector
 from references import reference
 from scipy.optimize import brentq
 
+from exfit.course import Change, Course
 from exfit.engine.kernel import LinearKernel
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.plant import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Simulator
 
 CONTINUOUS = ("DC1A", "DC2A", "IEEET1", "IEEEX1", "EXDC2")
 COMPUTING = (*CONTINUOUS, "DC4B")  # where KE = 0 and VRMAX = 0 are computed

@@ -11,6 +11,7 @@ from oracle import MACHINE_SATURATION, vector
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
+from exfit.course import Change, Course, each
 from exfit.engine.kernel import LinearKernel
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
@@ -26,7 +27,7 @@ from exfit.plant import (
     infinite_bus,
     open_circuit,
 )
-from exfit.simulate import Change, Course, Simulator, each, parameters_used
+from exfit.simulate import Simulator, parameters_used
 
 REFERENCE = Path(__file__).parent / "reference"
 QUADRATIC = SATURATION["quadratic"]

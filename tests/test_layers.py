@@ -89,6 +89,7 @@ ORDER = (
     "exfit.case_schema",
     "exfit.case",
     "exfit.limiters",
+    "exfit.course",
     "exfit.simulate",
     "exfit.small_signal",
     "exfit.limits",

@@ -9,10 +9,11 @@ from oracle import lively_values, system_of, typical_values
 from scipy.integrate import solve_ivp
 
 from exfit.case import load_case
+from exfit.course import Change, Course
 from exfit.limiters import limiters
 from exfit.limits import limits_hit, nearest
 from exfit.models import MODELS
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Simulator
 from exfit.trial import fitted_trials, free_of
 
 CONFIGS = Path(__file__).parent.parent / "configs"

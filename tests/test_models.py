@@ -24,6 +24,7 @@ from oracle import (
 )
 
 from exfit import models
+from exfit.course import Change, Course
 from exfit.engine.kernel import Kernel, LinearKernel, Span
 from exfit.engine.system import trace
 from exfit.engine.trace import in_order
@@ -42,7 +43,7 @@ from exfit.plant import (
     exciter_parameters,
     open_circuit,
 )
-from exfit.simulate import Change, Course, Simulator, parameters_used
+from exfit.simulate import Simulator, parameters_used
 
 SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}
 FILES = Path(models.__file__).parent

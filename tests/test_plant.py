@@ -8,10 +8,11 @@ from oracle import drawn_values, system_of, typical_values
 from references import reference
 from scipy.integrate import solve_ivp
 
+from exfit.course import Change, Course, each
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plant import MACHINE, VT0
-from exfit.simulate import Change, Course, Simulator, each
+from exfit.simulate import Simulator
 
 
 @pytest.mark.parametrize("name", ["ac1a", "ac8b_unit1", "ac8b_unit2"])

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import lively_values, system_of
 
+from exfit.course import Change, Course, each
 from exfit.errors import SimulationError
 from exfit.experiment import Channel, Experiment
 from exfit.loss import LOSSES
@@ -26,7 +27,7 @@ from exfit.residuals import (
     Residuals,
     Robust,
 )
-from exfit.simulate import Change, Course, Simulator, each
+from exfit.simulate import Simulator
 from exfit.ties import Ties, parse
 
 TIMES = np.linspace(0.0, 2.0, 101)

@@ -15,25 +15,14 @@ from oracle import (
 )
 from scipy.integrate import solve_ivp
 
+from exfit.course import Change, Course, Direction, Played, Sampling, Stretch, each, stretches
 from exfit.engine.system import Motion, Rest, System, trace
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.plant import SATURATION, VT0, open_circuit
-from exfit.simulate import (
-    MOST_SUBSTEPS,
-    Change,
-    Course,
-    Direction,
-    Played,
-    Sampling,
-    Simulator,
-    Stretch,
-    each,
-    parameters_used,
-    stretches,
-)
+from exfit.simulate import MOST_SUBSTEPS, Simulator, parameters_used
 
 UP = Course(0.0, 2.0, (Change(0.5, 3e-4),))  # off the limits
 AT_REST = Course(0.0, 2.0, ())

@@ -10,12 +10,13 @@ from scipy import signal
 from test_infinite_bus import system as on_load
 from test_infinite_bus import values_on_load
 
+from exfit.course import Change, Course, Played
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plant import MACHINE, MEASURED, SATURATION, playback
-from exfit.simulate import Change, Course, Played, Simulator
+from exfit.simulate import Simulator
 from exfit.small_signal import StateSpace, linearised, margins, small_signal
 
 ALONE = "FIRST_ORDER"

@@ -7,10 +7,11 @@ import pytest
 from diagrams import Transfer, alone, lag, lead_lag, pid, washout
 from oracle import drawn_values, lively_values, system_of, typical_values
 
+from exfit.course import Change, Course
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.plant import VT0
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Simulator
 
 STATIC = ("ST1A", "ST5B", "ST6B", "ST7B", "EXST1")
 

@@ -7,7 +7,8 @@ import pytest
 from oracle import lively_values, system_of
 
 from exfit.conditioning import Conditioning, MovingAverage
-from exfit.simulate import Change, Course, Simulator
+from exfit.course import Change, Course
+from exfit.simulate import Simulator
 from exfit.three_phase import mean_rms, positive_sequence, vt_of_rms, vt_of_waveforms
 
 RATES = [1000.0, 1234.5, 4800.0, 20_000.0]  # Hz

@@ -24,10 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from oracle import system_of, typical_values
 
+from exfit.course import Change, Course
 from exfit.estimate import least_squares
 from exfit.experiment import Channel, Experiment
 from exfit.residuals import Free, Residuals
-from exfit.simulate import Change, Course, Simulator
+from exfit.simulate import Simulator
 from exfit.study import UNIT
 
 RECORD = Path(__file__).parents[2] / "sample_data" / "ac1a_up.csv"

@@ -25,8 +25,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from fit import ByHand
 from oracle import system_of, typical_values, vector
 
+from exfit.course import Change, Course, Direction, each
 from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
-from exfit.simulate import Change, Course, Direction, Simulator, each
+from exfit.simulate import Simulator
 
 HERE = Path(__file__).parent
 STEP, STEPS, AT, RISE = 1e-3, 10_000, 1_000, 0.05
