@@ -15,7 +15,6 @@ from exfit.experiment import Experiment
 from exfit.result import Iteration
 from exfit.show import progress
 from exfit.show import sketch as drawing
-from exfit.trial import residuals_of
 
 TIME = np.linspace(0.0, 10.0, 1001)
 RISE = np.where(TIME < 1.0, 1.0, 1.05 - 0.05 * np.exp(1.0 - TIME))
@@ -205,7 +204,7 @@ def test_a_look_at_a_record_with_gaps_leaves_them_out(tmp_path):
 
 def test_a_look_elsewhere_than_the_last_evaluation_is_simulated_there(tmp_path):
     case = case_of(several(recording("up"), recording("down")), tmp_path)
-    residuals = residuals_of(case, study.fitted(case))
+    _, residuals = study.fitted(case)
     start = residuals.start
     whole = residuals(start)
     first = sum(residuals.experiments[0].sizes)
