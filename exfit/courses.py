@@ -70,7 +70,7 @@ def with_courses(
         return comparison
     signal = comparison.judged_by
     lines = [history[k] for k in chosen(len(history))]
-    found = list(in_threads(lambda line: _course(trial, residuals, signal, line), lines))
+    found = list(in_threads(lambda line: course_of(trial, residuals, signal, line.values), lines))
     kept = [(line.number, one) for line, one in zip(lines, found, strict=True) if one is not None]
     if not kept:
         return comparison
@@ -79,12 +79,12 @@ def with_courses(
     return replace(comparison, courses=Courses(signal, numbers, samples))
 
 
-def _course(trial: Trial, residuals: Residuals, signal: str, line: Iteration) -> Array | None:
+def course_of(trial: Trial, residuals: Residuals, signal: str, values: Values) -> Array | None:
     """Return the response (M,) to the values of an iteration, None where there is none."""
     place = trial.experiment.signals.index(signal)
     channel = trial.channels[place]
     try:
-        samples, _ = trial.experiment.samples(residuals.completed(line.values))
+        samples, _ = trial.experiment.samples(residuals.completed(values))
     except UNREACHABLE:
         return None
     found = compared(channel, channel.shown(samples[:, place]))

@@ -99,11 +99,11 @@ def knowledge(residuals: Residuals, theta: Array, of_record: tuple[str, ...]) ->
 
 def known_of(residuals: Residuals, theta: Array, linear: Linearisation) -> Knowledge:
     """Return what a linearisation of the residuals at theta (N,) tells."""
-    known, courses = confidence(linear), tuple(_courses(residuals, theta, linear))
+    known, courses = confidence(linear), tuple(sensitivity(residuals, theta, linear))
     return Knowledge(linear, known, identifiability(linear, known), courses)
 
 
-def _courses(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Moved]:
+def sensitivity(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Moved]:
     """Yield what each channel shows: at the record's samples or, where condensed, of the grid."""
     values, moves = residuals.values(theta), residuals.moves(theta)
     size = linear.size / slopes_of(residuals, theta)

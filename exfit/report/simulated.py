@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.check import FLAT_DRIFT, flat_drift
+from exfit.courses import course_of
 from exfit.errors import SimulationError
 from exfit.experiment import Experiment
-from exfit.knowledge import knowledge
+from exfit.knowledge import linearisation, sensitivity
 from exfit.report.sources import Sources
-from exfit.residuals import UNREACHABLE, Residuals
+from exfit.residuals import Residuals
 from exfit.result import judged_of
 from exfit.study import names_of_records
 from exfit.trial import Trial, compared, residuals_of
@@ -119,12 +120,12 @@ def _flat(experiments: Sequence[Experiment], values: Values) -> Iterator[Flat]:
 def _moved(residuals: Residuals, theta: Array, trials: Sequence[Trial]) -> Iterator[Moved]:
     """Yield what 1 % more of each parameter does; what belongs to a record is left out."""
     try:
-        known = knowledge(residuals, theta, names_of_records(trials))
+        linear = linearisation(residuals, theta, names_of_records(trials))
     except SimulationError:
         return
-    shown = [k for k, of_record in enumerate(known.linear.nuisances) if not of_record]
-    names = tuple(known.linear.names[k] for k in shown)
-    for one in known.sensitivity:
+    shown = [k for k, of_record in enumerate(linear.nuisances) if not of_record]
+    names = tuple(linear.names[k] for k in shown)
+    for one in sensitivity(residuals, theta, linear):
         yield Moved(one.label, one.time, names, PERCENT * one.moved[:, shown])
 
 
@@ -171,11 +172,8 @@ def _courses(
         for row in rows[: len(history)]:
             number = int(found.saved.number("history", int(row), "number"))
             moved = found.saved.at("history", int(row), "values")
-            try:
-                at = residuals.ties.apply({**residuals.fixed, **moved})
-                shown = channel.shown(trial.experiment.samples(at)[0][:, column])
-                samples[number] = compared(channel, shown)
-            except UNREACHABLE:  # a search may pass through values that have no response
-                continue
+            course = course_of(trial, residuals, signals[column], moved)
+            if course is not None:
+                samples[number] = course
         measured = compared(channel, trial.experiment.measured(channel, values))
         yield Courses(trial.name, signals[column], trial.record.time, measured, samples)
