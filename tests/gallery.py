@@ -27,8 +27,8 @@ from PIL import Image, PngImagePlugin
 from rich.console import CONSOLE_SVG_FORMAT, Console
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 
-from exfit import plots, show
 from exfit.cli import main
+from exfit.output import plots, terminal
 
 ROOT = Path(__file__).parent.parent
 README = ROOT / "README.md"
@@ -153,7 +153,7 @@ DRAWN = (
 )  # fmt: skip
 
 
-class Still(show.Watch):
+class Still(terminal.Watch):
     """Shows the iterations of a fit once, when it is done."""
 
     @contextmanager
@@ -197,9 +197,9 @@ def ran(run: Run) -> bytes:
     words = run.command.split()[1:]
     with ExitStack() as changes:
         changes.enter_context(patch.object(plots.style, "DPI", DPI))
-        changes.enter_context(patch.object(show, "console", lambda: console))
-        changes.enter_context(patch.object(show, "Watch", Still))
-        changes.enter_context(patch.object(show, "fit", in_no_time(show.fit)))
+        changes.enter_context(patch.object(terminal, "console", lambda: console))
+        changes.enter_context(patch.object(terminal, "Watch", Still))
+        changes.enter_context(patch.object(terminal, "fit", in_no_time(terminal.fit)))
         for name in DRAWN:
             if f"{name}.png" not in run.figures:
                 changes.enter_context(patch.object(plots, name, lambda *_: Figure()))

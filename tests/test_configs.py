@@ -1,16 +1,13 @@
 """The cases that come with exfit: each runs as it stands, and each model has one."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from places import CONFIGS
 
-from exfit.case import load_case
+from exfit.case.case import load_case
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.study import simulate
-
-CONFIGS = Path(__file__).parent.parent / "configs"
+from exfit.workflows import simulate
 
 
 def test_a_model_has_a_case_of_its_typical_data(model):

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 
-from exfit import files, study
-from exfit.case import load_case
+from exfit import workflows
+from exfit.case.case import load_case
 from exfit.cli import main
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
+from exfit.output import run_folder
 
-ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 OWN_CASE = """\
 model: my_exciter.py
@@ -80,7 +81,7 @@ def test_the_records_of_the_readme_are_a_valid_part_of_a_case(folder):
 
 def test_the_unit_on_load_of_the_readme_can_be_simulated(folder):
     (folder / "case.yaml").write_text("model: AC1A\n" + block("yaml", 3), encoding="utf-8")
-    response = study.simulate(load_case(folder / "case.yaml"), {}).response
+    response = workflows.simulate(load_case(folder / "case.yaml"), {}).response
     assert response.signals["p"][0] == pytest.approx(0.8, rel=1e-9)
     assert response.signals["vt"][0] == pytest.approx(1.0, rel=1e-9)
     assert np.ptp(response.signals["delta"]) > 0.05
@@ -94,7 +95,7 @@ def test_the_readme_names_every_model():
 def test_the_model_of_the_readme_starts_at_rest_and_follows_a_step(folder):
     (folder / "my_exciter.py").write_text(block("python"), encoding="utf-8")
     (folder / "case.yaml").write_text(OWN_CASE, encoding="utf-8")
-    response = study.simulate(load_case(folder / "case.yaml"), {}).response
+    response = workflows.simulate(load_case(folder / "case.yaml"), {}).response
     vt = response.signals["vt"]
     assert vt[response.time <= 1.0] == pytest.approx(1.0, abs=1e-9)
     assert np.all(np.isfinite(vt))
@@ -109,8 +110,8 @@ def test_the_table_of_commands_names_every_command_and_no_other():
 
 def test_a_fit_leaves_the_files_of_the_table_and_no_others(tmp_path, monkeypatch):
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
-    result = study.fit(load_case(ROOT / "configs" / "first_order.yaml"))
-    files.write_fit(result, tmp_path / "run", figures=True)
+    result = workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))
+    run_folder.write_fit(result, tmp_path / "run", figures=True)
     told = re.findall(r"`([^`]+)`", " ".join(first_column("A fit leaves")))
     (validation,) = result.validation
     named = {name.replace("NAME", validation.name) for name in told}

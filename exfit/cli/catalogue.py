@@ -18,31 +18,33 @@ from exfit.cli import completion
 )
 def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
-    from exfit import show
     from exfit.models import MODELS, STABILISERS, find
     from exfit.models.machines import MACHINES
+    from exfit.output import terminal
 
     if folder is not None:
-        from exfit import files
-        from exfit.overview import write_overview
+        from exfit.output import run_folder
+        from exfit.output.catalogue_page import write_overview
 
-        files.refuse_unwritable(folder)
+        run_folder.refuse_unwritable(folder)
         write_overview(folder)
-        show.written(show.console(), folder)
+        terminal.written(terminal.console(), folder)
     elif name is None:
-        show.catalogue(show.console(), MODELS.values(), MACHINES.values(), STABILISERS.values())
+        terminal.catalogue(
+            terminal.console(), MODELS.values(), MACHINES.values(), STABILISERS.values()
+        )
     elif name.upper() in STABILISERS:
-        show.model(show.console(), STABILISERS[name.upper()])
+        terminal.model(terminal.console(), STABILISERS[name.upper()])
     elif name.upper() in MACHINES:
-        show.machine(show.console(), MACHINES[name.upper()])
+        terminal.machine(terminal.console(), MACHINES[name.upper()])
     else:
-        show.model(show.console(), find(name, Path()))
+        terminal.model(terminal.console(), find(name, Path()))
 
 
 @click.command(short_help="Print the JSON Schema of a case file.")
 def schema() -> None:
     """Print the JSON Schema of a case file, for editors that complete and check."""
-    from exfit.case import json_schema
-    from exfit.result import to_json
+    from exfit.case.case import json_schema
+    from exfit.results.model import to_json
 
     click.echo(to_json(json_schema()), nl=False)

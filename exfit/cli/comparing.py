@@ -47,23 +47,23 @@ def compare(
     the finer of their clocks. Writes compare.json, compare.csv and compare.png to runs/compare, or
     to DIR.
     """
-    from exfit import files
-    from exfit.compare import Asked
-    from exfit.compare import compare as compared
-    from exfit.result import to_json
+    from exfit.analysis.comparison import Asked
+    from exfit.analysis.comparison import compare as compared
+    from exfit.output import run_folder
+    from exfit.results.model import to_json
 
     folder = output or Path("runs") / "compare"
-    files.refuse_unwritable(folder)
+    run_folder.refuse_unwritable(folder)
     found = compared(a, b, record, Asked(_columns(columns), time), shift, step_at)
-    files.write_agreement(found, folder, plots)
+    run_folder.write_agreement(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:
-        from exfit import show
+        from exfit.output import terminal
 
-        console = show.console()
-        show.agreement(console, found)
-        show.written(console, folder)
+        console = terminal.console()
+        terminal.agreement(console, found)
+        terminal.written(console, folder)
 
 
 def _columns(texts: tuple[str, ...]) -> dict[str, str]:

@@ -34,7 +34,7 @@ def machines(_: click.Context, __: click.Parameter, incomplete: str) -> list[str
 
 def free_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
     """Return the free parameters of the case, but for those that are given already."""
-    from exfit.glance import free_of
+    from exfit.case.peek import free_of
 
     given = ctx.params.get("parameters") or ()
     found = () if (case := _case(ctx)) is None else free_of(case)
@@ -43,7 +43,7 @@ def free_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> 
 
 def assigned_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
     """Return the parameters that the case names, each ready for its value."""
-    from exfit.glance import parameters_of
+    from exfit.case.peek import parameters_of
 
     found = () if (case := _case(ctx)) is None else parameters_of(case)
     return _beginning((f"{name}=" for name in found), incomplete)

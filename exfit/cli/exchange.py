@@ -23,8 +23,8 @@ def import_(
     The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
     holds several units, --bus and --id choose one.
     """
-    from exfit.case_writer import case_text, import_unit
-    from exfit.psse import located
+    from exfit.case.templates import case_text, import_unit
+    from exfit.exchange.psse import located
 
     if output is not None:
         refuse_existing(output, force)
@@ -71,7 +71,7 @@ def export(
     RESULT is the result.json of a fit, or the folder that holds it. What a record cannot hold, or
     what is not sure about it, is told.
     """
-    from exfit.export import export as exported
+    from exfit.exchange.psse.export import export as exported
 
     if output is not None:
         refuse_existing(output, force)

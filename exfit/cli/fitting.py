@@ -59,15 +59,16 @@ def fit(
             raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
         fit_again_and_again(case, output or folder_of(case, "fit"), strategy, plots)
         return
-    from exfit import files, study
-    from exfit.result import to_json
+    from exfit import workflows
+    from exfit.output import run_folder
+    from exfit.results.model import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "fit")
-    files.refuse_unwritable(folder)
+    run_folder.refuse_unwritable(folder)
     if quiet or as_json:
-        result = study.fit(loaded, strategy)
-        files.write_fit(result, folder, plots)
+        result = workflows.fit(loaded, strategy)
+        run_folder.write_fit(result, folder, plots)
         if as_json:
             click.echo(to_json(result.as_json()), nl=False)
     else:
@@ -105,25 +106,26 @@ def simulate(
     to DIR. --set goes over --parameters, and both over the case; a parameter of the machine is
     named as in --set machine.Tpd0=6.
     """
-    from exfit import files, study
-    from exfit.changes import changed_values, read_parameters
+    from exfit import workflows
+    from exfit.fitting.overrides import changed_values, read_parameters
+    from exfit.output import run_folder
 
     loaded = load(case)
     folder = output or folder_of(case, "simulate")
-    files.refuse_unwritable(folder)
+    run_folder.refuse_unwritable(folder)
     values = read_parameters(loaded, parameters) if parameters else {}
     values |= changed_values(loaded, assignments(changes, "--set"), "--set")
-    simulation = study.simulate(loaded, values)
-    files.write_simulation(simulation, case.stem, folder, plots)
+    simulation = workflows.simulate(loaded, values)
+    run_folder.write_simulation(simulation, case.stem, folder, plots)
     if not quiet:
-        from exfit import show
+        from exfit.output import terminal
 
-        console = show.console()
+        console = terminal.console()
         if simulation.comparison is not None:
-            show.comparisons(console, [simulation.comparison])
+            terminal.comparisons(console, [simulation.comparison])
         console.print(f"sub-steps {simulation.response.substeps}")
-        show.notes(console, simulation.notes)
-        show.written(console, folder)
+        terminal.notes(console, simulation.notes)
+        terminal.written(console, folder)
 
 
 @click.command(short_help="Compare fitted values with records that no fit saw.")
@@ -153,26 +155,27 @@ def validate(
     The values are those of the last fit of the case, or of --parameters. Writes validation.json,
     samples and overlays to runs/CASE-validate, or to DIR.
     """
-    from exfit import files, study
-    from exfit.changes import read_parameters
-    from exfit.result import to_json
+    from exfit import workflows
+    from exfit.fitting.overrides import read_parameters
+    from exfit.output import run_folder
+    from exfit.results.model import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "validate")
-    files.refuse_unwritable(folder)
-    source = parameters or files.last_fit(case)
-    found = study.validate(loaded, read_parameters(loaded, source), record)
-    files.write_validation(found, folder, plots)
+    run_folder.refuse_unwritable(folder)
+    source = parameters or run_folder.last_fit(case)
+    found = workflows.validate(loaded, read_parameters(loaded, source), record)
+    run_folder.write_validation(found, folder, plots)
     if as_json:
         click.echo(to_json({"validation": [one.as_json() for one in found]}), nl=False)
     elif not quiet:
-        from exfit import show
+        from exfit.output import terminal
 
-        console = show.console()
+        console = terminal.console()
         console.print(f"values of {parameters or 'the last fit'}", soft_wrap=True, markup=False)
-        show.comparisons(console, found)
+        terminal.comparisons(console, found)
         console.print()
-        show.written(console, folder)
+        terminal.written(console, folder)
     if not all(one.accepted for one in found):
         raise SystemExit(NOT_CONVERGED)
 
@@ -181,10 +184,10 @@ def validate(
 @case_argument
 def check(case: Path) -> None:
     """Check CASE before a fit: derivatives, bypasses, sub-steps, a flat run."""
-    from exfit import show
-    from exfit.check import check as checked
+    from exfit.analysis.model_check import check as checked
+    from exfit.output import terminal
 
     found = checked(load(case))
-    show.check(show.console(), found)
+    terminal.check(terminal.console(), found)
     if not (found.agrees and found.flat):
         raise SystemExit(NOT_CONVERGED)

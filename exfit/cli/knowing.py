@@ -45,27 +45,27 @@ def profile(
     Without PARAM all free parameters are profiled. Writes profile.json, profile.csv and profile.png
     to runs/CASE-profile, or to DIR. Ctrl-C keeps what is done.
     """
-    from exfit import files
-    from exfit.profiles import profile as profiled
-    from exfit.result import to_json
+    from exfit.analysis.profiles import profile as profiled
+    from exfit.output import run_folder
+    from exfit.results.model import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "profile")
-    files.refuse_unwritable(folder)
+    run_folder.refuse_unwritable(folder)
     if quiet or as_json:
         found = profiled(loaded, parameters)
     else:
-        from exfit import show
+        from exfit.output import terminal
 
-        console = show.console()
-        with show.Bar(console).running() as watch:
+        console = terminal.console()
+        with terminal.Bar(console).running() as watch:
             found = profiled(loaded, parameters, watch)
-    files.write_profiles(found, folder, plots)
+    run_folder.write_profiles(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:
-        show.profiles(console, found)
-        show.written(console, folder)
+        terminal.profiles(console, found)
+        terminal.written(console, folder)
     if found.interrupted:
         raise SystemExit(NOT_CONVERGED)
 
@@ -96,20 +96,20 @@ def identify(
     At the start values: the test of CASE, steps of 2, 5 and 10 %, a test twice as long, further
     channels. Writes identify.json and figures to runs/CASE-identify, or to DIR.
     """
-    from exfit import files
-    from exfit.design import identify as identified
-    from exfit.result import to_json
+    from exfit.analysis.experiment_design import identify as identified
+    from exfit.output import run_folder
+    from exfit.results.model import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "identify")
-    files.refuse_unwritable(folder)
+    run_folder.refuse_unwritable(folder)
     found = identified(loaded, assignments(noise, "--noise"))
-    files.write_design(found, folder, plots)
+    run_folder.write_design(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:
-        from exfit import show
+        from exfit.output import terminal
 
-        console = show.console()
-        show.design(console, found)
-        show.written(console, folder)
+        console = terminal.console()
+        terminal.design(console, found)
+        terminal.written(console, folder)

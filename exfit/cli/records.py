@@ -18,7 +18,7 @@ from exfit.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from exfit.inspection import Inspection
+    from exfit.records.inspection import Inspection
 
 time_option = click.option(
     "--time",
@@ -60,25 +60,25 @@ def inspect_(
     Suggests the record and test sections of a case; what is guessed is marked. Writes inspect.json
     and inspect.png to runs/FILE-inspect, or to DIR.
     """
-    from exfit import files
-    from exfit.result import to_json
-    from exfit.suggestion import bump_section, record_section
+    from exfit.case.suggestion import bump_section, record_section
+    from exfit.output import run_folder
+    from exfit.results.model import to_json
 
     # files of one record in several formats have one stem
     folder = output or Path("runs") / f"{file.name}-inspect"
-    files.refuse_unwritable(folder)
+    run_folder.refuse_unwritable(folder)
     found = _inspected(file, clock, unit, sheet)
-    files.write_inspection(found, folder, plots)
+    run_folder.write_inspection(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:
-        from exfit import show
+        from exfit.output import terminal
 
-        console = show.console()
-        show.inspection(
+        console = terminal.console()
+        terminal.inspection(
             console, found, [*record_section(found, file.as_posix()), *bump_section(found)]
         )
-        show.written(console, folder)
+        terminal.written(console, folder)
 
 
 @click.command(short_help="Make a case of a model and a record to start from.")
@@ -124,10 +124,10 @@ def new(
     Gains and time constants are free; see `exfit models NAME` for what is typical. What the record
     does not tell is left to be filled in, and the case is refused until it is.
     """
+    from exfit.case.starting_case import starting_case
+    from exfit.case.suggestion import relative
     from exfit.models import find
     from exfit.models.machines import find_machine
-    from exfit.starting_case import starting_case
-    from exfit.suggestion import relative
 
     if output is not None:
         refuse_existing(output, force)
@@ -143,7 +143,7 @@ def new(
 def _inspected(
     file: Path, clock: tuple[str, ...], unit: str | None, sheet: str | None
 ) -> "Inspection":
-    from exfit.inspection import inspect
-    from exfit.readers import open_table
+    from exfit.records.formats import open_table
+    from exfit.records.inspection import inspect
 
     return inspect(open_table(file, sheet), clock or None, unit)

@@ -30,6 +30,6 @@ def report(result: Path, output: Path | None, case: Path | None, force: bool) ->
     be those of the fit; what the folder does not hold is simulated again. A former report is
     replaced, another file only with --force.
     """
-    from exfit.report import write_report
+    from exfit.output.report import write_report
 
     click.echo(f"written to {write_report(result, output, case, force)}")

@@ -8,9 +8,9 @@ from exfit.cli.options import Refusal, load
 from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
-    from exfit.case import Case
+    from exfit.case.case import Case
     from exfit.estimate import Method
-    from exfit.result import FitResult
+    from exfit.results.model import FitResult
 
 
 def fit_in_sight(
@@ -21,18 +21,19 @@ def fit_in_sight(
     before: "FitResult | None" = None,
 ) -> "FitResult":
     """Fit a case, show its iterations and its result beside a former one, write its files."""
-    from exfit import files, show, study
+    from exfit import workflows
+    from exfit.output import run_folder, terminal
 
-    console = show.console()
+    console = terminal.console()
     if case.estimate.starts > 1:
-        with show.Bar(console).running() as progress:
-            result = study.fit(case, strategy, progress=progress)
+        with terminal.Bar(console).running() as progress:
+            result = workflows.fit(case, strategy, progress=progress)
     else:
-        title, most = show.task(case, strategy), case.estimate.iterations
-        with show.Watch(console, title, most).running() as watch:
-            result = study.fit(case, strategy, watch, look=watch.look)
-    files.write_fit(result, folder, plots)
-    show.fit(console, result, folder, before)
+        title, most = terminal.task(case, strategy), case.estimate.iterations
+        with terminal.Watch(console, title, most).running() as watch:
+            result = workflows.fit(case, strategy, watch, look=watch.look)
+    run_folder.write_fit(result, folder, plots)
+    terminal.fit(console, result, folder, before)
     return result
 
 
@@ -42,13 +43,13 @@ def fit_again_and_again(case: Path, folder: Path, strategy: "Method | None", plo
     Raises ExfitError where there is no such file, or no place for the results: a change of the
     case would not help.
     """
-    from exfit import files, show
-    from exfit.watching import changed, stamps_of
-    from exfit.yaml_lines import read_text
+    from exfit.case.watch import changed, stamps_of
+    from exfit.case.yaml import read_text
+    from exfit.output import run_folder, terminal
 
     read_text(case)
-    files.refuse_unwritable(folder)
-    console, before = show.console(), None
+    run_folder.refuse_unwritable(folder)
+    console, before = terminal.console(), None
     with suppress(KeyboardInterrupt):
         while True:
             stamps = stamps_of(case)
@@ -58,5 +59,5 @@ def fit_again_and_again(case: Path, folder: Path, strategy: "Method | None", plo
                 Refusal(str(fault)).show()
             if before is not None and before.interrupted:
                 return
-            show.waiting(console, stamps)
-            show.again(console, changed(stamps))
+            terminal.waiting(console, stamps)
+            terminal.again(console, changed(stamps))

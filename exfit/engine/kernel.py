@@ -14,9 +14,9 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.atomic import write_whole
 from exfit.engine.emit import linearisation, simulation, simulation_with_tangents
 from exfit.engine.system import System, differentiate, trace
+from exfit.util.files import write_whole
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor

@@ -4,22 +4,28 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from types import ModuleType
 
 from exfit.errors import ModelError
+from exfit.models import exciters, stabilisers
 from exfit.models.sheet import Model, model
 
 
 class Catalogue(Mapping[str, Model]):
-    """Models by name; the file of each, named after it, is loaded when it is first asked for."""
+    """Models by name: a file each in a package, named after the model, loaded when first asked for.
 
-    def __init__(self, *names: str) -> None:
-        self.names = names
+    Their order is that of the alphabet.
+    """
+
+    def __init__(self, package: ModuleType) -> None:
+        self.package = package.__name__
+        self.names = tuple(sorted(one.name.upper() for one in iter_modules(package.__path__)))
 
     def __getitem__(self, name: str) -> Model:
         if name not in self.names:
             raise KeyError(name)
-        return _loaded(name)
+        return _loaded(self.package, name)
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
@@ -32,48 +38,12 @@ class Catalogue(Mapping[str, Model]):
 
 
 @cache
-def _loaded(name: str) -> Model:
-    return model(name, vars(import_module(f"exfit.models.{name.lower()}")))
+def _loaded(package: str, name: str) -> Model:
+    return model(name, vars(import_module(f"{package}.{name.lower()}")))
 
 
-MODELS = Catalogue(
-    "DC1A",
-    "DC2A",
-    "DC3A",
-    "DC4B",
-    "AC1A",
-    "AC2A",
-    "AC3A",
-    "AC4A",
-    "AC5A",
-    "AC6A",
-    "AC7B",
-    "AC8B",
-    "ST1A",
-    "ST2A",
-    "ST3A",
-    "ST4B",
-    "ST5B",
-    "ST6B",
-    "ST7B",
-    "IEEET1",
-    "IEEEX1",
-    "EXDC2",
-    "EXAC1",
-    "EXAC2",
-    "EXAC4",
-    "ESAC8B",
-    "EXST1",
-    "SEXS",
-    "SCRX",
-    "FIRST_ORDER",
-)
-
-STABILISERS = Catalogue(
-    "PSS1A",
-    "PSS2B",
-    "STAB1",
-)
+MODELS = Catalogue(exciters)
+STABILISERS = Catalogue(stabilisers)
 
 MACHINE_NAMES = ("GENROU", "GENROE", "GENSAL", "GENSAE", "ONE_AXIS")  # known without their files
 

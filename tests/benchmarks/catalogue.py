@@ -14,15 +14,15 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from oracle import WITHOUT_PLANT, system_of, typical_values, vector
 from simulate import bump, timed
 
-from exfit.course import Change, Course
 from exfit.engine.kernel import Kernel
 from exfit.models import MODELS
-from exfit.simulate import Simulator
+from exfit.simulation.inputs import Change, Course
+from exfit.simulation.simulator import Simulator
 
 ROUNDS = 100
 NAMES = ["AC1A", *(name for name in MODELS if name not in ("AC1A", *WITHOUT_PLANT))]

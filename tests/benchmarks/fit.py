@@ -20,16 +20,16 @@ from rich.table import Table
 from scipy import optimize
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from oracle import system_of, typical_values
 
-from exfit.course import Change, Course
 from exfit.estimate import least_squares
-from exfit.experiment import Channel, Experiment
-from exfit.residuals import Free, Residuals
-from exfit.simulate import Simulator
-from exfit.study import UNIT
+from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.residuals import Free, Residuals
+from exfit.simulation.inputs import Change, Course
+from exfit.simulation.simulator import Simulator
+from exfit.workflows import UNIT
 
 RECORD = Path(__file__).parents[2] / "sample_data" / "ac1a_up.csv"
 TYPICAL = {"KA": 766, "KF": 0.024, "TE": 1.3, "TF": 1.0, "TA": 0.02, "KC": 0.486, "KD": 0.3556}

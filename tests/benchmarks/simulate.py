@@ -20,14 +20,14 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from fit import ByHand
 from oracle import system_of, typical_values, vector
 
-from exfit.course import Change, Course, Direction, each
 from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
-from exfit.simulate import Simulator
+from exfit.simulation.inputs import Change, Course, Direction, each
+from exfit.simulation.simulator import Simulator
 
 HERE = Path(__file__).parent
 STEP, STEPS, AT, RISE = 1e-3, 10_000, 1_000, 0.05

@@ -25,17 +25,17 @@ from rich.progress import track
 from rich.table import Table
 from scipy.stats import binomtest, chi2, f
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from linearised import autoregressive
 
-from exfit.case import load_case
+from exfit.case.case import load_case
 from exfit.estimate import least_squares
+from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.uncertainty import knowledge
 from exfit.inference import LEVEL
-from exfit.knowledge import knowledge
-from exfit.residuals import Residuals
-from exfit.study import UNIT
-from exfit.trial import fitted_trials, residuals_of
+from exfit.workflows import UNIT
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
 # what the record of that case was made with: sample_data/README.md

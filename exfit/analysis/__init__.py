@@ -1,0 +1,1 @@
+"""What can be worked out beside and after a fit."""

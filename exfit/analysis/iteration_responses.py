@@ -1,0 +1,101 @@
+"""How a fit came about: the response after each of its iterations."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.kernel import in_threads
+from exfit.fitting.build import Trial, compared
+from exfit.fitting.residuals import UNREACHABLE, Residuals
+from exfit.results.model import Comparison, Courses, Iteration, judged_of
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+MOST_COURSES = 40  # colours that an eye still tells apart, and columns of a table
+MOST_SAMPLES = 20_000  # of a record, 20 s at 1 kHz: a table of 9 MB, written within a second
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """A signal of a record and the response to the values of now, (M,) each, per unit.
+
+    ``time`` (M,) is in s. What is left out of the comparison is not among them.
+    """
+
+    signal: str
+    time: Array
+    measured: Array
+    simulated: Array
+
+
+def sketch(trial: Trial, residuals: Residuals, theta: Array) -> Sketch | None:
+    """Return the judged signal of the first trial at scaled parameters theta (N,).
+
+    It mostly costs no simulation. None where there is no response, and of a record of more than
+    MOST_SAMPLES.
+    """
+    if len(trial.record.time) > MOST_SAMPLES:
+        return None
+    signals = trial.experiment.signals
+    place = signals.index(judged_of(signals))
+    channel, begin = trial.channels[place], sum(trial.experiment.sizes[:place])
+    try:
+        errors = residuals.first_errors(theta)[begin : begin + trial.experiment.sizes[place]]
+        values = residuals.values(theta)
+    except UNREACHABLE:
+        return None
+    measured = channel.conditioned(trial.experiment.measured(channel, values))
+    simulated = measured + errors / channel.weight
+    return Sketch(channel.signal, trial.record.time[channel.kept], measured, simulated)
+
+
+def chosen(count: int) -> list[int]:
+    """Return which of so many iterations are kept: evenly some, the first and last among them."""
+    kept = np.linspace(0, count - 1, min(count, MOST_COURSES))
+    return [int(k) for k in np.rint(kept)]
+
+
+def with_courses(
+    comparison: Comparison, trial: Trial, residuals: Residuals, history: Sequence[Iteration]
+) -> Comparison:
+    """Return the comparison of a secured trial with the courses of the fit that led to it.
+
+    Iterations without a finite response are left out. A record of more than MOST_SAMPLES has no
+    courses.
+    """
+    if not history or len(comparison.time) > MOST_SAMPLES:
+        return comparison
+    signal = comparison.judged_by
+    lines = [history[k] for k in chosen(len(history))]
+    found = list(in_threads(lambda line: course_of(trial, residuals, signal, line.values), lines))
+    kept = [(line.number, one) for line, one in zip(lines, found, strict=True) if one is not None]
+    if not kept:
+        return comparison
+    numbers = tuple(number for number, _ in kept)
+    samples = np.stack([one for _, one in kept])
+    return replace(comparison, courses=Courses(signal, numbers, samples))
+
+
+def course_of(trial: Trial, residuals: Residuals, signal: str, values: Values) -> Array | None:
+    """Return the response (M,) to the values of an iteration, None where there is none."""
+    place = trial.experiment.signals.index(signal)
+    channel = trial.channels[place]
+    try:
+        samples, _ = trial.experiment.samples(residuals.completed(values))
+    except UNREACHABLE:
+        return None
+    found = compared(channel, channel.shown(samples[:, place]))
+    return found if np.isfinite(found[channel.kept]).all() else None
+
+
+def course_notes(comparisons: Sequence[Comparison]) -> list[str]:
+    """Say of which records the iterations are not kept for their size."""
+    return [
+        f"{one.record.name}: {len(one.time)} samples: the response after each iteration is kept of "
+        f"records up to {MOST_SAMPLES}"
+        for one in comparisons
+        if len(one.time) > MOST_SAMPLES
+    ]

@@ -1,0 +1,109 @@
+"""Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.analysis.diagnostics import typical_notes
+from exfit.case.case import Case
+from exfit.fitting.build import fitted_trials, free_of, planned
+from exfit.fitting.residuals import Residuals
+from exfit.models.blocks import SHORTEST
+from exfit.simulation.inputs import Course
+from exfit.simulation.simulator import Simulator
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
+AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
+ROUNDING = 1e-12  # of the largest column
+TINY = float(np.finfo(float).tiny)
+FLAT_SECONDS = 60.0
+FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
+FLAT_DRIFT = 1e-9  # pu
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a check found.
+
+    ``deviations`` holds, for each free parameter, the largest difference between the exact column
+    of the Jacobian and the central difference at each of STEPS, relative to the column's largest
+    element; ``step_error`` is by how much halving every step moves the response (pu).
+    """
+
+    deviations: Mapping[str, tuple[float, ...]]
+    bypassed: tuple[str, ...]
+    substeps: int
+    step: float
+    step_error: float
+    drift: float
+    notes: tuple[str, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every column agrees with its best central difference."""
+        return all(min(found) <= AGREEMENT for found in self.deviations.values())
+
+    @property
+    def flat(self) -> bool:
+        """Whether a run without a step stays where it starts."""
+        return self.drift <= FLAT_DRIFT
+
+
+def check(case: Case) -> Check:
+    """Check a case at its start values; raises ExfitError for input that cannot be used."""
+    if case.recordings:
+        trials = fitted_trials(case)
+        experiments = [trial.secured(trial.known(case.values())).experiment for trial in trials]
+    else:
+        trials, experiments = (), [planned(case)]
+    free = free_of(case, trials)
+    names = {one.name for one in free}
+    values = {**{one.name: one.start for one in free}, **case.values()}
+    fixed = {name: value for name, value in values.items() if name not in names}
+    drift, error = 0.0, 0.0
+    for one in experiments:
+        simulator, at = one.moved(values), one.parameters(values)
+        drift = max(drift, flat_drift(simulator, at, one.signals))
+        error = max(error, simulator.step_error(at, one.signals))
+    first = experiments[0].simulator
+    at = experiments[0].parameters(values)
+    return Check(
+        deviations=deviations(Residuals(experiments, free, fixed, case.ties)),
+        bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
+        substeps=max(one.simulator.substeps(one.parameters(values)) for one in experiments),
+        step=first.step,
+        step_error=error,
+        drift=drift,
+        notes=tuple(typical_notes(case)),
+    )
+
+
+def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:
+    """Return how far signals stray from their start (pu) in FLAT_SECONDS without any change.
+
+    ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
+    is no rest.
+    """
+    still = Simulator(simulator.system, Course(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
+    flat, _ = still.samples(values, tuple(signals))
+    return float(np.max(np.abs(flat - flat[0])))
+
+
+def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:
+    """Compare the exact Jacobian with central differences at the start, column by column."""
+    if not residuals.free:
+        return {}
+    start = residuals.start
+    exact = residuals.exact(start)
+    sizes = np.max(np.abs(exact), axis=0)
+    # a column of rounding errors belongs to a parameter without effect
+    sizes = np.maximum(sizes, ROUNDING * max(float(np.max(sizes)), TINY))
+    rows = [
+        np.max(np.abs(residuals.differences(start, -h, h) - exact), axis=0) / sizes for h in STEPS
+    ]
+    return {one.name: tuple(float(row[k]) for row in rows) for k, one in enumerate(residuals.free)}

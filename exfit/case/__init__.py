@@ -1,0 +1,1 @@
+"""The case file: its schema, its checks, its text."""

@@ -1,0 +1,1 @@
+"""Checks of a case that no single key can make."""

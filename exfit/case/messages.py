@@ -1,0 +1,160 @@
+"""What is wrong with the form of a case file, in plain words: place, value and limit."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from exfit.case.yaml import Fault, Place
+
+Data = Mapping[str, Any]
+
+FILL_IN = "'?'"  # what a new case has in place of a value that nobody gave, as it is shown
+SHOWN = 60  # characters of a wrong value
+FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
+
+
+PATTERNS: Mapping[str, str] = {
+    FILE_NAME: "must begin with a letter or digit and hold letters, digits, - _ . only",
+    PERCENT: "is neither a number nor a share such as 20 %",
+}
+# kind of fault -> what to say of the value, given the limits
+WORDS: Mapping[str, Callable[[str, Data], str]] = {
+    "float_type": lambda value, _: (
+        f"{value} is to be filled in" if value == FILL_IN else f"{value} is not a number"
+    ),
+    "int_type": lambda value, _: f"{value} is not a whole number",
+    "int_from_float": lambda value, _: f"{value} is not a whole number",
+    "finite_number": lambda value, _: f"{value} is not a finite number",
+    "string_type": lambda value, _: f"{value} is not text; in quotes it would be",
+    "string_too_short": lambda _, __: "is empty",
+    "string_too_long": lambda value, limits: (
+        f"{value} is longer than {limits['max_length']} characters"
+    ),
+    "string_pattern_mismatch": lambda value, limits: (
+        f"{value} {PATTERNS.get(limits['pattern'], 'has another form')}"
+    ),
+    "model_attributes_type": lambda value, _: f"{value} is not a mapping (key: value)",
+    "model_type": lambda value, limits: (
+        f"{value} is not a mapping (key: value)"
+        + (" or, as text, a column" if limits["class_name"] == "Channel" else "")
+    ),
+    "dict_type": lambda value, _: f"{value} is not a mapping (key: value)",
+    "tuple_type": lambda value, _: f"{value} is not a list",
+    "too_short": lambda _, limits: (
+        f"{_entries(limits['actual_length'])}; at least {limits['min_length']} needed"
+    ),
+    "too_long": lambda _, limits: (
+        f"{_entries(limits['actual_length'])}; at most {limits['max_length']} allowed"
+    ),
+    "greater_than": lambda value, limits: f"{value} is not above {limits['gt']:g}",
+    "greater_than_equal": lambda value, limits: f"{value} is below {limits['ge']:g}",
+    "less_than_equal": lambda value, limits: f"{value} is above {limits['le']}",
+}
+
+
+def form_faults(details: Iterable[Data], schema: Data) -> list[Fault]:
+    """Return the faults that pydantic's error details describe, given the file's JSON Schema."""
+    return [_fault(detail, schema) for detail in details if not _only_counts_good_ones(detail)]
+
+
+def _only_counts_good_ones(detail: Data) -> bool:
+    """Tell whether a list is called too short for its faulty entries, which are told anyway."""
+    return detail["type"] == "too_short" and bool(
+        len(detail["input"]) >= detail["ctx"]["min_length"]
+    )
+
+
+def _fault(detail: Data, schema: Data) -> Fault:
+    kind, limits = detail["type"], detail.get("ctx", {})
+    place = _place_in_file(detail["loc"])
+    value = show_value(detail["input"])
+    if kind == "extra_forbidden":
+        return Fault(place, _unknown(str(place[-1]), _known_keys(schema, place[:-1])))
+    if kind == "missing":
+        return Fault(place, "is missing" + _offered(schema, place))
+    if kind == "union_tag_not_found":
+        return Fault((*place, "type"), "is missing")
+    if kind == "union_tag_invalid":
+        return _wrong_choice((*place, "type"), str(limits["tag"]), limits["expected_tags"])
+    if kind == "literal_error":
+        return _wrong_choice(place, detail["input"], limits["expected"])
+    words = WORDS.get(kind)
+    return Fault(place, words(value, limits) if words else f"{value}: {detail['msg']}")
+
+
+def _offered(schema: Data, place: Place) -> str:
+    """Return the words that may stand at a place, as the end of a sentence."""
+    words = [word for part in _at(schema, schema, place) for word in part.get("enum", ())]
+    return f": {' or '.join(words)}?" if words else ""
+
+
+def near(word: str, known: Iterable[str]) -> str:
+    """Return a hint at the known word that is meant, or at all of them."""
+    import difflib
+
+    folded = {name.casefold(): name for name in known}
+    close = difflib.get_close_matches(word.casefold(), folded, n=1)
+    return f"did you mean {folded[close[0]]}?" if close else f"known: {', '.join(folded.values())}"
+
+
+def show(value: float) -> str:
+    """Return a number in as few digits as tell it."""
+    return f"{value:.12g}"
+
+
+def show_value(value: Any) -> str:
+    """Return a value as a message shows it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return show(value)
+    if isinstance(value, list | dict):
+        return "a list" if isinstance(value, list) else "a mapping"
+    text = repr(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+
+
+def _unknown(key: str, known: list[str]) -> str:
+    return "does not go with this type" if key in known else f"unknown key; {near(key, known)}"
+
+
+def _wrong_choice(place: Place, value: Any, expected: str) -> Fault:
+    """Return the fault of a value outside a list of words, given as ``'a', 'b' or 'c'``."""
+    words = expected.replace("'", "").replace(" or ", ", ").split(", ")
+    return Fault(place, f"{show_value(value)} is not possible; {near(str(value), words)}")
+
+
+def _entries(count: int) -> str:
+    return f"{count} {'entry' if count == 1 else 'entries'}"
+
+
+def _place_in_file(location: Place) -> Place:
+    """Return a place without what pydantic adds: the kind of plant, and marks in brackets."""
+    place = [part for part in location if not str(part).startswith("[")]
+    if "plant" in place[:-1]:
+        del place[place.index("plant") + 1]
+    return tuple(place)
+
+
+def _known_keys(schema: Data, place: Place) -> list[str]:
+    """Return the keys that a JSON Schema knows at a place."""
+    keys: list[str] = []
+    for part in _at(schema, schema, place):
+        keys += [key for key in part.get("properties", ()) if key not in keys]
+    return keys
+
+
+def _at(schema: Data, part: Data, place: Place) -> list[Data]:
+    """Return the parts of a JSON Schema that describe a place."""
+    if "$ref" in part:
+        return _at(schema, schema["$defs"][part["$ref"].rpartition("/")[2]], place)
+    choices = [*part.get("oneOf", ()), *part.get("anyOf", ())]
+    if choices:
+        return [found for choice in choices for found in _at(schema, choice, place)]
+    if not place:
+        return [part]
+    key, rest = place[0], place[1:]
+    inner = part.get("properties", {}).get(key)
+    if inner is None:
+        inner = part.get("items" if isinstance(key, int) else "additionalProperties")
+    return _at(schema, inner, rest) if isinstance(inner, dict) else []

@@ -1,0 +1,272 @@
+"""The parts of a case that have a data sheet: exciter, machine, network, stabiliser."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from exfit.case.messages import near
+from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
+from exfit.case.yaml import Fault, Place
+from exfit.errors import ModelError
+from exfit.models import STABILISERS, find
+from exfit.models.blocks import SHORTEST
+from exfit.models.machines import MACHINES, Machine
+from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
+from exfit.plants import MACHINE, NETWORK, STABILISER, flow_sheet
+
+Data = Mapping[str, Any]
+Contradictions = Iterator[tuple[str, str]]
+
+WITH_MACHINE = ("open-circuit", "infinite-bus", "machine-playback")
+WITHOUT_EXCITER = ("machine-playback",)
+OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a case: its kind, the model it names, where the file gives its parameters.
+
+    Its parameters are those of its sheet, in the system under ``prefix``. ``check(values)`` yields
+    (symbol, text) for values that contradict each other.
+    """
+
+    kind: str
+    name: str
+    prefix: str
+    sheet: Sheet
+    fixed: Place
+    free: Place | None
+    check: Callable[[Mapping[str, float]], Contradictions] = field(compare=False)
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Its parameters by symbol."""
+        return tuple(row.symbol for row in self.sheet)
+
+    def resolved(self, *given: Mapping[str, float]) -> dict[str, float]:
+        """Return a value for each parameter: typical unless given, the last one wins."""
+        values = typical(self.sheet)
+        for some in given:
+            values |= {symbol: value for symbol, value in some.items() if symbol in values}
+        return values
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The models that a case names, and all its parts."""
+
+    exciter: Model | None
+    machine: Machine | None
+    stabiliser: Model | None
+    all: tuple[Part, ...]
+
+
+def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
+    """Return the parts of a case file's data; add a fault for a name that stands for none."""
+    plant = _mapping(data.get("plant"))
+    exciter = None if plant.get("type") in WITHOUT_EXCITER else _exciter(data, folder, faults)
+    machine = _machine(plant, faults) if plant.get("type") in WITH_MACHINE else None
+    stabiliser = _stabiliser(data, faults)
+    found = []
+    if exciter is not None:
+        exponential = str(data.get("saturation")).startswith("exponential")
+        found.append(exciter_part(exciter, exponential))
+    if machine is not None:
+        kinds = {str(one.get("type")) for one in (plant, *plants_of_records(data).values())}
+        found.append(machine_part(machine, on_load="infinite-bus" in kinds))
+    if plant.get("type") == "infinite-bus":
+        found.append(network_part(_mapping(plant.get("network"))))
+    if stabiliser is not None:
+        found.append(stabiliser_part(stabiliser))
+    return Parts(exciter, machine, stabiliser, tuple(found))
+
+
+def with_network(parts: Parts, given: Data | None) -> Parts:
+    """Return the parts with another network, or with none where the breaker is open."""
+    others = tuple(part for part in parts.all if part.kind != "network")
+    network = () if given is None else (network_part(given),)
+    return replace(parts, all=(*others, *network))
+
+
+def plants_of_records(data: Data) -> dict[Place, Data]:
+    """Return the plants that records have in place of the case's, by their place in the file."""
+    return {
+        (key, at, "plant"): _mapping(entry["plant"])
+        for key in ("records", "validate")
+        for at, entry in enumerate(_entries(data.get(key)))
+        if isinstance(entry, dict) and "plant" in entry
+    }
+
+
+def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
+    """Return the ties of a case file's data; add a fault for each that cannot be used."""
+    found: dict[str, Tie] = {}
+    places: dict[str, Place] = {}
+    for name, place, text in _tied(data, parts):
+        places[name] = place
+        try:
+            found[name] = parse(text)
+        except TieError as error:
+            faults.append(Fault(place, str(error)))
+    known = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
+    known += helpers_of(data, parts)
+    for name, tie in list(found.items()):
+        for used in tie.names:
+            if used not in known:
+                faults.append(Fault(places[name], f"{used} is no parameter; {near(used, known)}"))
+                found.pop(name, None)
+    try:
+        return Ties(found)
+    except TieError as error:
+        first = str(error).partition(" -> ")[0]
+        faults.append(Fault(places[first], str(error)))
+        return Ties({})
+
+
+def used_by_ties(data: Data, parts: Parts) -> set[str]:
+    """Return the names that stand in the arithmetic of a case file's data."""
+    used: set[str] = set()
+    for _, _, text in _tied(data, parts):
+        with suppress(TieError):
+            used |= {*parse(text).names}
+    return used
+
+
+def places_of_ties(data: Data, parts: Parts) -> dict[str, Place]:
+    """Return where the arithmetic stands that gives each tied parameter."""
+    return {name: place for name, place, _ in _tied(data, parts)}
+
+
+def helpers_of(data: Data, parts: Parts) -> dict[str, Place]:
+    """Return the names among the exciter's parameters that are none of them, with their places.
+
+    A name of another part (machine.H), or of what may be found about a record, is no helper.
+    """
+    own = next((part.symbols for part in parts.all if part.kind == "exciter"), ())
+    section = _mapping(data.get("parameters"))
+    return {
+        name: ("parameters", key, name)
+        for key in ("fixed", "free")
+        for name in _mapping(section.get(key))
+        if name not in own and name.isidentifier() and name not in OF_RECORD
+    }
+
+
+def _tied(data: Data, parts: Parts) -> Iterator[tuple[str, Place, str]]:
+    """Yield name, place and text of every value that is the arithmetic of others."""
+    sections: list[tuple[str, Place]] = [
+        (part.prefix, part.fixed) for part in parts.all if part.kind != "network"
+    ]
+    for prefix, place in sections:
+        section = data
+        for key in place:
+            section = _mapping(section.get(str(key)))
+        for symbol, value in section.items():
+            if is_tie(value):
+                yield prefix + symbol, (*place, symbol), value
+
+
+def exciter_part(model: Model, exponential: bool) -> Part:
+    """Return the part of an exciter, with an exponential saturation or a quadratic one."""
+
+    def check(values: Mapping[str, float]) -> Contradictions:
+        yield from contradictions(values)
+        if exponential:
+            yield from exponential_faults(values)
+
+    places: tuple[Place, Place] = ("parameters", "fixed"), ("parameters", "free")
+    return Part("exciter", model.name, "", model.sheet, *places, check)
+
+
+def machine_part(machine: Machine, on_load: bool) -> Part:
+    """Return the part of a machine."""
+
+    def check(values: Mapping[str, float]) -> Contradictions:
+        if len(values) == len(machine.sheet):
+            yield from machine.faults(values)
+        if on_load and values.get("Tppd0", inf) < SHORTEST:
+            yield "Tppd0", f"{values['Tppd0']:g} is for open circuit; on load it must be positive"
+
+    places: tuple[Place, Place] = ("plant", "parameters"), ("plant", "free")
+    return Part("machine", machine.name, MACHINE, machine.sheet, *places, check)
+
+
+def stabiliser_part(model: Model) -> Part:
+    """Return the part of a stabiliser."""
+    places: tuple[Place, Place] = ("stabiliser", "parameters"), ("stabiliser", "free")
+    return Part(
+        "stabiliser",
+        model.name,
+        STABILISER,
+        model.sheet,
+        *places,
+        lambda values: iter(contradictions(values)),
+    )
+
+
+def network_part(given: Data, place: Place = ("plant", "network")) -> Part:
+    """Return the part of a network, whose start is given by E where the file has E."""
+
+    def check(values: Mapping[str, float]) -> Contradictions:
+        for symbol in ("f0", "X", "P"):
+            if symbol not in given:
+                yield symbol, "is missing"
+        if "Q" not in given and "E" not in given:
+            yield "Q", "is missing: with P it says where to start; or E, the voltage of the source"
+        if "Q" in given and "E" in given:
+            yield "Q", "follows from E: give one of them"
+        if values.get("R") == values.get("X") == 0.0:
+            yield "X", "0 with R = 0 leaves nothing between the machine and the source"
+
+    sheet = flow_sheet("E" if "E" in given else "Q")
+    if "Q" in given and "E" in given:
+        sheet = (*sheet, *(row for row in flow_sheet("Q") if row.symbol == "Q"))
+    return Part("network", "the network", NETWORK, sheet, place, None, check)
+
+
+def _exciter(data: Data, folder: Path, faults: list[Fault]) -> Model | None:
+    name = data.get("model")
+    if not isinstance(name, str) or not name:
+        return None
+    try:
+        return find(name, folder)
+    except ModelError as error:
+        faults.append(Fault(("model",), str(error)))
+        return None
+
+
+def _machine(plant: Data, faults: list[Fault]) -> Machine | None:
+    name = _known(plant, ("plant", "machine"), MACHINES, "machine", faults)
+    return None if name is None else MACHINES[name]
+
+
+def _stabiliser(data: Data, faults: list[Fault]) -> Model | None:
+    section = _mapping(data.get("stabiliser"))
+    name = _known(section, ("stabiliser", "model"), STABILISERS, "stabiliser", faults)
+    return None if name is None else STABILISERS[name]
+
+
+def _known(
+    section: Data, place: Place, catalogue: Mapping[str, Any], kind: str, faults: list[Fault]
+) -> str | None:
+    """Return the entry that a section names; add a fault where there is none of that name."""
+    name = section.get(str(place[-1]))
+    if not isinstance(name, str) or not name:
+        return None
+    if name.upper() in catalogue:
+        return name.upper()
+    faults.append(Fault(place, f"{name!r} is not a {kind} model; {near(name, catalogue)}"))
+    return None
+
+
+def _entries(value: Any) -> list[Any]:
+    """Return a list of the file, an empty one where there is none."""
+    return value if isinstance(value, list) else []
+
+
+def _mapping(value: Any) -> dict[str, Any]:
+    """Return a mapping of the file, an empty one where there is none."""
+    return value if isinstance(value, dict) else {}

@@ -1,0 +1,88 @@
+"""What a case file names, at a glance: read at once and without a check, faulty or not."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from exfit.case.yaml import read_text, read_yaml
+from exfit.errors import CaseError
+from exfit.siblings import siblings
+
+RECORDS = ("record", "records", "validate")
+# where parameters stand, and how their names begin
+SECTIONS: Mapping[str, tuple[tuple[str, ...], ...]] = {
+    "": (("parameters", "free"), ("parameters", "fixed")),
+    "machine.": (("plant", "free"), ("plant", "parameters")),
+    "network.": (("plant", "network"),),
+    "stabiliser.": (("stabiliser", "free"), ("stabiliser", "parameters")),
+}
+
+
+def files_of(case: Path) -> tuple[Path, ...]:
+    """Return the case file, its model's file and its records, whether they exist or not.
+
+    Of a file that cannot be read as YAML it is the case alone.
+    """
+    content = _content(case)
+    model = content.get("model")
+    named = [model] if isinstance(model, str) and model.endswith(".py") else []
+    named += [file for key in RECORDS for file in _files(content.get(key))]
+    files = [part for name in named for part in _parts(case.parent / name)]
+    return tuple(dict.fromkeys([case, *files]))
+
+
+def free_of(case: Path) -> tuple[str, ...]:
+    """Return the names of the free parameters, in the order of the file."""
+    return _names(_content(case), free=True)
+
+
+def parameters_of(case: Path) -> tuple[str, ...]:
+    """Return the names of all parameters that the file gives, in its order."""
+    return _names(_content(case), free=False)
+
+
+def _content(case: Path) -> Mapping[str, Any]:
+    try:
+        root, _ = read_yaml(read_text(case), case)
+    except CaseError:
+        return {}
+    return root.value if isinstance(root.value, Mapping) else {}
+
+
+def _files(content: Any) -> Iterator[str]:
+    """Yield what stands under a key ``file``, however deep."""
+    if isinstance(content, Mapping):
+        file = content.get("file")
+        if isinstance(file, str) and "\0" not in file:
+            yield file
+        content = list(content.values())
+    if isinstance(content, list):
+        for one in content:
+            yield from _files(one)
+
+
+def _parts(file: Path) -> Iterator[Path]:
+    """Yield a file, and the other part of a COMTRADE record beside it."""
+    yield file
+    if file.suffix.lower() == ".cfg":
+        yield from siblings(file, ".dat") or [file.with_suffix(".dat")]
+    elif file.suffix.lower() == ".dat":  # without a configuration it is text
+        yield from siblings(file, ".cfg")
+
+
+def _names(content: Mapping[str, Any], free: bool) -> tuple[str, ...]:
+    found = [
+        prefix + str(name)
+        for prefix, places in SECTIONS.items()
+        for place in places
+        if not free or place[-1] == "free"
+        for name in _section(content, place)
+    ]
+    return tuple(dict.fromkeys(found))
+
+
+def _section(content: Mapping[str, Any], place: tuple[str, ...]) -> Mapping[str, Any]:
+    inner: Any = content
+    for key in place:
+        inner = inner.get(key) if isinstance(inner, Mapping) else None
+    return inner if isinstance(inner, Mapping) else {}

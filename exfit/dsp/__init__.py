@@ -1,0 +1,1 @@
+"""Signal processing on arrays; nothing here knows a case or a file."""

@@ -1,0 +1,267 @@
+"""What is done alike to a recorded signal and to its simulation before they are compared."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from exfit.dsp.noise import noise, spread
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Places = NDArray[np.intp]
+
+ORDER = 2  # of the Butterworth filter, which runs twice
+FEWEST_FILTERED = 10  # samples: the filter starts on a mirror of three times its length
+FEWEST_AVERAGED = 2  # samples of a line
+UNEVEN = 0.01  # of a sampling step
+WINDOW = 7  # samples around one that is held against its neighbours; 3 may be spikes
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A Butterworth filter of second order, run forwards and backwards: no delay, and half the
+    amplitude at ``cutoff`` (Hz)."""
+
+    cutoff: float
+
+
+@dataclass(frozen=True)
+class Median:
+    """A running median over an odd number of ``samples``; the first and last are held beyond the
+    ends."""
+
+    samples: int
+
+    def __post_init__(self) -> None:
+        if self.samples < 1 or self.samples % 2 == 0:
+            raise ValueError(f"a median over {self.samples} samples: the number must be odd")
+
+
+@dataclass(frozen=True)
+class MovingAverage:
+    """The mean over a ``window`` (s) about each instant, of the line through the samples.
+
+    A kink between two of them, ``step`` s apart, where the slope jumps by ``jump`` per second, is
+    cut by the line: the mean there errs by up to ``jump * step**2 / (8 * window)``.
+    """
+
+    window: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.window < np.inf:
+            raise ValueError(f"an average over {self.window:g} s: it must be longer than 0")
+
+
+@dataclass(frozen=True, eq=False)
+class Conditioning:
+    """How a signal (M,) on the clock ``time`` (s) is filtered, and which samples are ``kept``.
+
+    Samples that are not kept, which may be nan, are bridged in a line between their kept
+    neighbours before the filter, so that they do not smear, and dropped behind it. Where the record
+    holds averages already, the simulation is ``averaged`` alike before all that.
+
+    Raises:
+        ValueError: no sample is kept, the low-pass filter finds uneven sampling, a cutoff that is
+            not between zero and half the sampling rate, or fewer than ten samples, or an average
+            finds fewer than two samples or a window longer than the record.
+    """
+
+    time: Array
+    kept: Mask
+    filter: LowPass | Median | None = None
+    averaged: MovingAverage | None = None
+
+    def __post_init__(self) -> None:
+        if not self.kept.any():
+            raise ValueError("no sample is kept")
+        if isinstance(self.filter, LowPass):
+            _check_filter(self.time, self.filter.cutoff)
+        if self.averaged is not None:
+            _check_average(self.time, self.averaged.window)
+
+    def shown(self, simulated: Array) -> Array:
+        """Return simulated values (M, ...) as the record shows them: averaged, where it is so.
+
+        Beyond the ends they go on in a line. It is linear: derivatives are averaged as values.
+        """
+        if self.averaged is None:
+            return simulated
+        column = (-1, *[1] * (simulated.ndim - 1))
+        steps = np.diff(self.time).reshape(column)
+        # from the first value on: a mean is a difference of areas, and these are rounded
+        values = simulated - simulated[0]
+        areas, slopes = np.zeros_like(values), np.diff(values, axis=0) / steps
+        np.cumsum(0.5 * steps * (values[1:] + values[:-1]), axis=0, out=areas[1:])
+
+        def area(place: Places, beyond: Array) -> Array:
+            way = beyond.reshape(column)
+            return np.asarray(areas[place] + way * (values[place] + 0.5 * way * slopes[place]))
+
+        before, behind = self._windows
+        rise = area(*behind) - area(*before)
+        return np.asarray(simulated[0] + rise / self.averaged.window)
+
+    def apply(self, samples: Array) -> Array:
+        """Return what is compared of a signal (M,), one number for each kept sample."""
+        if self._nothing_to_do:
+            return samples
+        whole = self._bridged(samples)
+        if isinstance(self.filter, LowPass):
+            whole = self._low_passed(whole)
+        elif isinstance(self.filter, Median):
+            whole = whole[_picked(whole, self.filter.samples)]
+        return np.asarray(whole[self.kept])
+
+    def tangents(self, samples: Array, slopes: Array) -> Array:
+        """Return the derivatives (kept, N) of ``apply`` at a signal of derivatives (M, N).
+
+        Where the median may pick one of several equal samples, it is that of one of them.
+        """
+        if self._nothing_to_do:
+            return slopes
+        whole = self._bridged(slopes)
+        if isinstance(self.filter, LowPass):
+            whole = self._low_passed(whole)
+        elif isinstance(self.filter, Median):
+            whole = whole[_picked(self._bridged(samples), self.filter.samples)]
+        return np.asarray(whole[self.kept])
+
+    @cached_property
+    def smooth_over(self) -> int:
+        """How many samples a window of the record's averages holds, 1 where it has none."""
+        if self.averaged is None:
+            return 1
+        return max(1, round(self.averaged.window / float(np.median(np.diff(self.time)))))
+
+    @cached_property
+    def _nothing_to_do(self) -> bool:
+        return self.filter is None and bool(self.kept.all())
+
+    @cached_property
+    def _windows(self) -> tuple[tuple[Places, Array], tuple[Places, Array]]:
+        """Return the lines on which each window begins and ends, and how far (s) along them."""
+        assert self.averaged is not None
+        half = 0.5 * self.averaged.window
+        begin, end = (
+            np.clip(np.searchsorted(self.time, at) - 1, 0, len(self.time) - 2)
+            for at in (self.time - half, self.time + half)
+        )
+        return (
+            (begin, self.time - half - self.time[begin]),
+            (end, self.time + half - self.time[end]),
+        )
+
+    @cached_property
+    def _bridges(self) -> tuple[Places, Places, Places, Array]:
+        """Places of the lost samples, of their kept neighbours, and their way between these."""
+        lost, kept = np.flatnonzero(~self.kept), np.flatnonzero(self.kept)
+        right = np.searchsorted(kept, lost)
+        before = kept[np.maximum(right - 1, 0)]
+        after = kept[np.minimum(right, len(kept) - 1)]
+        gap = np.where(before == after, 1.0, self.time[after] - self.time[before])
+        return lost, before, after, (self.time[lost] - self.time[before]) / gap
+
+    def _bridged(self, values: Array) -> Array:
+        """Return values (M, ...) with lines in the place of the lost samples."""
+        lost, before, after, way = self._bridges
+        if not len(lost):
+            return values
+        whole = values.copy()
+        rise = values[after] - values[before]
+        whole[lost] = values[before] + way.reshape(-1, *[1] * (values.ndim - 1)) * rise
+        return whole
+
+    @cached_property
+    def _sections(self) -> Array:
+        from scipy.signal import butter
+
+        assert isinstance(self.filter, LowPass)
+        rate = 1.0 / float(np.mean(np.diff(self.time)))
+        return np.asarray(butter(ORDER, self.filter.cutoff, fs=rate, output="sos"))
+
+    def _low_passed(self, values: Array) -> Array:
+        from scipy.signal import sosfiltfilt
+
+        return np.asarray(sosfiltfilt(self._sections, values, axis=0))
+
+
+def outliers(time: Array, samples: Array, limit: float, scatter: float | None = None) -> Mask:
+    """Return which samples (M,) lie off the line through the medians of their neighbours.
+
+    The line is the repeated median over seven samples, which three spikes do not move and along
+    which a steep rise is no spike. Off is farther than ``limit`` robust standard deviations: the
+    noise of the record, or of these seven where they scatter more.
+
+    Args:
+        time: (M,), s, increasing.
+        samples: (M,), finite.
+        limit: in standard deviations.
+        scatter: the noise of the record where it is known, else it is told from the samples.
+
+    Source: Hampel 1974 (the rule); Siegel 1982 (the line).
+
+    Raises:
+        ValueError: fewer than seven samples.
+    """
+    if len(samples) < WINDOW:
+        raise ValueError(f"{len(samples)} samples: spikes show among {WINDOW} or more")
+    from_line = _from_lines(sliding_window_view(time, WINDOW), sliding_window_view(samples, WINDOW))
+    place = np.arange(len(samples))
+    window = np.clip(place - WINDOW // 2, 0, len(samples) - WINDOW)
+    away = np.abs(from_line[window, place - window])
+    scale = np.maximum(spread(from_line), noise(samples) if scatter is None else scatter)
+    return np.asarray(away > limit * scale[window])
+
+
+def _from_lines(time: Array, samples: Array) -> Array:
+    """Return how far each sample of each row lies from the row's repeated-median line."""
+    others = [np.flatnonzero(np.arange(WINDOW) != one) for one in range(WINDOW)]
+    slopes = [
+        np.median((samples[:, rest] - samples[:, [one]]) / (time[:, rest] - time[:, [one]]), axis=1)
+        for one, rest in enumerate(others)
+    ]
+    slope = np.median(slopes, axis=0)
+    level = samples - slope[:, None] * (time - time[:, [WINDOW // 2]])
+    return np.asarray(level - np.median(level, axis=1, keepdims=True))
+
+
+def _check_filter(time: Array, cutoff: float) -> None:
+    """Raise a ValueError where a low-pass filter cannot work."""
+    if len(time) < FEWEST_FILTERED:
+        raise ValueError(
+            f"{len(time)} samples: the low-pass filter needs {FEWEST_FILTERED} or more"
+        )
+    steps = np.diff(time)
+    step = float(np.mean(steps))
+    uneven = float(np.max(np.abs(steps - step))) / step
+    if uneven > UNEVEN:
+        raise ValueError(
+            f"the low-pass filter needs even sampling: a step differs by {100 * uneven:.3g} % "
+            f"from the mean of {step:g} s, allowed is {100 * UNEVEN:g} %"
+        )
+    if not 0.0 < cutoff < 0.5 / step:
+        raise ValueError(
+            f"cutoff of {cutoff:g} Hz: it must lie between 0 and half the sampling rate, "
+            f"{0.5 / step:g} Hz"
+        )
+
+
+def _check_average(time: Array, window: float) -> None:
+    """Raise a ValueError where a moving average has nothing to average."""
+    if len(time) < FEWEST_AVERAGED:
+        raise ValueError(f"{len(time)} samples: an average needs {FEWEST_AVERAGED} or more")
+    if window > time[-1] - time[0]:
+        raise ValueError(
+            f"an average over {window:g} s: the record is {time[-1] - time[0]:g} s long"
+        )
+
+
+def _picked(samples: Array, width: int) -> Places:
+    """Return the place of the sample that each running median picks."""
+    around = np.arange(len(samples))[:, None] + np.arange(width) - width // 2
+    around = np.clip(around, 0, len(samples) - 1)
+    middle = np.argpartition(samples[around], width // 2, axis=1)[:, [width // 2]]
+    return np.asarray(np.take_along_axis(around, middle, axis=1)[:, 0])

@@ -1,0 +1,176 @@
+"""The PSS/E records of a fit: its result.json, read back and written as a dynamics file."""
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from exfit import __version__
+from exfit.case.messages import near, show
+from exfit.errors import ExfitError
+from exfit.exchange.psse import Definition, alternatives, definitions, record_text
+from exfit.models import MODELS
+from exfit.models.machines import MACHINES
+from exfit.results.io import Saved, read_saved
+
+WIDTH = 80  # columns
+NO_LIMIT = 99.0  # pu: data sheets write limits that never act as 99 or 999
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A dynamics file, and what its user must know."""
+
+    text: str
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Written:
+    """A record with its values; ``fitted`` and ``typical`` name those that are it."""
+
+    definition: Definition
+    values: Mapping[str, float]
+    fitted: tuple[str, ...]
+    typical: tuple[str, ...]
+
+
+def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Exported:
+    """Return the PSS/E records of a fit, given its result.json or the folder that holds it.
+
+    ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
+    file is no result of a fit, or its model has no record.
+    """
+    result = read_saved(path)
+    source = result.path
+    warnings = [*_of_fit(result)]
+    written = [
+        *_machine(result, warnings),
+        *_exciter(result, name),
+        *_stabiliser(result, warnings),
+    ]
+    if not written:
+        raise ExfitError(f"{source}: {result.text('model')} has no PSS/E record")
+    for one in written:
+        warnings += _warnings(one)
+    comments = [*_origin(result), *(f"{text}." for text in _of_fit(result))]
+    comments += [text for one in written for text in _comments(one)]
+    lines = [line for text in comments for line in _wrapped(text)]
+    lines += [record_text(one.definition, one.values, bus, machine_id) for one in written]
+    return Exported("\n".join(lines) + "\n", tuple(f"{source}: {text}" for text in warnings))
+
+
+def _of_fit(result: Saved) -> Iterator[str]:
+    """Yield what of the fit itself must be known."""
+    if result.content.get("success") is False:
+        yield f"the fit did not converge: {result.text('message')}"
+    form = result.text("saturation") or "quadratic"
+    if form != "quadratic":
+        yield f"fitted with saturation: {form}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
+
+
+def _exciter(result: Saved, name: str | None) -> Iterator[Written]:
+    model_name = result.text("model") or ""
+    if model_name == result.text("machine_model"):  # it stood alone
+        if name is not None:
+            raise ExfitError(f"--model {name}: the fit is of {model_name}, without an exciter")
+        return
+    model = MODELS.get(model_name)
+    if model is None or "model" in result.mapping("inputs"):
+        raise ExfitError(
+            f"{result.path}: {model_name} is not a model of the catalogue: it has no PSS/E record"
+        )
+    known = {one.record.name: one for one in alternatives(model)}
+    if not known:
+        raise ExfitError(f"{result.path}: {model_name} has no PSS/E record")
+    wanted = next(iter(known)) if name is None else name.upper()
+    if wanted not in known:
+        raise ExfitError(f"--model {name}: {model_name} is not written so; {near(wanted, known)}")
+    yield _written(result, known[wanted], "fixed", "")
+
+
+def _machine(result: Saved, warnings: list[str]) -> Iterator[Written]:
+    name = result.text("machine_model")
+    known = alternatives(MACHINES[name]) if name in MACHINES else []
+    if not known:
+        what = "no machine is named" if name is None else f"machine {name} has no PSS/E record"
+        warnings.append(f"{what}: only the exciter is written")
+        return
+    yield _written(result, known[0], "machine", "machine.")
+
+
+def _stabiliser(result: Saved, warnings: list[str]) -> Iterator[Written]:
+    name = result.text("stabiliser_model")
+    if name is None:
+        return
+    known = [one for one in definitions() if one.kind == "stabiliser" and one.model.name == name]
+    if not known:
+        warnings.append(f"stabiliser {name} has no PSS/E record: it is left out")
+        return
+    yield _written(result, known[0], "stabiliser", "stabiliser.")
+
+
+def _written(result: Saved, definition: Definition, key: str, prefix: str) -> Written:
+    """Return a record with the values of a result; raises ExfitError where one is missing."""
+    values, fitted = result.values(key, prefix), result.fitted_of(prefix)
+    missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
+    if missing:
+        raise ExfitError(f"{result.path}: {key}: missing: {', '.join(missing)}")
+    told = result.content.get("typical")
+    assumed = told if isinstance(told, list) else []
+    in_record = definition.names
+    return Written(
+        definition,
+        values,
+        tuple(name for name in in_record if name in fitted),
+        tuple(name for name in in_record if prefix + name in assumed),
+    )
+
+
+def _warnings(one: Written) -> Iterator[str]:
+    """Yield what a record cannot hold, leaves open, or takes from no one's data."""
+    record = one.definition.record
+    for row in one.definition.model.sheet:
+        value = one.values[row.symbol]
+        if row.symbol not in one.definition.names and _matters(row.symbol, value):
+            yield f"{record.name} cannot hold {row.symbol} = {show(value)}: it is lost"
+    if record.doubt:
+        yield f"{record.name}: {record.doubt}"
+    if one.typical:
+        names = ", ".join(one.typical)
+        yield f"{record.name}: as in exfit's typical data, check that it is the unit's: {names}"
+
+
+def _matters(symbol: str, value: float) -> bool:
+    """Tell whether a value does anything: a gain of 0 and a limit out of reach do not."""
+    if symbol.endswith("MAX"):
+        return value < NO_LIMIT
+    if symbol.endswith("MIN"):
+        return value > -NO_LIMIT
+    return value != 0.0
+
+
+def _origin(result: Saved) -> Iterator[str]:
+    record = result.mapping("fit").get("record")
+    rmse = result.content.get("rmse")
+    to = f" to {record}" if isinstance(record, str) else ""
+    error = f", rmse {rmse:.3g} pu" if isinstance(rmse, float) else ""
+    yield f"exfit {__version__}: {result.text('model')} fitted{to}{error}."
+    if (case := result.text("case")) is not None:
+        yield f"Case: {case}."
+
+
+def _comments(one: Written) -> Iterator[str]:
+    record = one.definition.record
+    if one.fitted:
+        yield f"{record.name}: fitted: {' '.join(one.fitted)}."
+    for warning in _warnings(one):
+        yield f"{warning}."
+
+
+def _wrapped(text: str) -> list[str]:
+    """Return a comment in lines; what is not ASCII is not sure to be read."""
+    plain = "".join(letter if " " <= letter <= "~" else "?" for letter in text)
+    return textwrap.wrap(
+        plain, WIDTH, initial_indent="// ", subsequent_indent="//   ", break_on_hyphens=False
+    )

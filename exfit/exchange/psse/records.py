@@ -1,0 +1,187 @@
+"""The records that exfit has models for: constants in PSS/E's order, read and written."""
+
+import textwrap
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from exfit.case.messages import show
+from exfit.exchange.psse.fields import Fault, Field, number, whole
+from exfit.models import MODELS, STABILISERS, sheet
+from exfit.models.machines import MACHINES, Machine
+from exfit.models.sheet import Model, Record, Sheet, typical
+
+WIDTH = 80  # columns of a file
+SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
+UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A record and the model that it gives the data of; ``kind``: machine, exciter, stabiliser."""
+
+    kind: str
+    model: Model | Machine
+    record: Record
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of what follows the id: integers, then constants."""
+        return (*(name for name, _ in self.record.icons), *self.record.cons)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the fields of a record say: values by symbol, what is wrong, what must be known."""
+
+    values: Mapping[str, float]
+    faults: list[Fault]
+    warnings: list[Fault]
+
+
+def definitions() -> list[Definition]:
+    """Return every record of every model."""
+    catalogues: Iterable[tuple[str, Mapping[str, Model | Machine]]] = (
+        ("machine", MACHINES),
+        ("exciter", MODELS),
+        ("stabiliser", STABILISERS),
+    )
+    return [
+        Definition(kind, model, record)
+        for kind, catalogue in catalogues
+        for model in catalogue.values()
+        for record in model.records
+    ]
+
+
+def definition_of(name: str) -> Definition | None:
+    """Return the record that a file means by a name, None where exfit has no model of it.
+
+    A further record of a model is meant only where the model is known by that very name: PSS/E's
+    ESAC8B is another model than the AC8B that can be written as one.
+    """
+    of_that_name = [one for one in definitions() if one.record.name == name.upper()]
+    for one in of_that_name:
+        if one.record == one.model.records[0]:
+            return one
+    for one in of_that_name:
+        if one.record.name in (one.model.name, *getattr(one.model, "aliases", ())):
+            return one
+    return None
+
+
+def alternatives(model: Model | Machine) -> list[Definition]:
+    """Return the records that a model can be written as, its own first."""
+    return [one for one in definitions() if one.model is model]
+
+
+def contradictions(
+    model: Model | Machine, values: Mapping[str, float]
+) -> Iterable[tuple[str, str]]:
+    """Return (symbol, fault) for values of a model that do not go together."""
+    return model.faults(values) if isinstance(model, Machine) else sheet.contradictions(values)
+
+
+def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) -> Reading:
+    """Return what the fields behind a record's id say; ``line`` is where the record begins."""
+    record, names = definition.record, definition.names
+    if len(fields) != len(names):
+        count = Fault(line, _wrong_count(definition, len(fields)))
+        return Reading({}, [count, *_no_numbers(record.name, fields)], [])
+    lines = dict(zip(names, (field.line for field in fields), strict=True))
+
+    def placed(found: Iterable[tuple[str, str]]) -> list[Fault]:
+        return [
+            Fault(lines.get(name, line), f"{record.name}: {name}: {text}") for name, text in found
+        ]
+
+    given, unreadable = _numbers(definition, fields)
+    known = {row.symbol: given[row.symbol] for row in definition.model.sheet if row.symbol in given}
+    if all(known.get(name) == 0.0 for name in UNSATURATED):
+        known |= UNSATURATED  # the voltages say nothing
+    values = {**typical(definition.model.sheet), **known}
+    wrong = [*unreadable, *_outside(definition.model.sheet, known)]
+    wrong = wrong or [*contradictions(definition.model, values)]
+    doubt = [Fault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
+    lacking = [
+        (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
+        for row in definition.model.sheet
+        if row.symbol not in definition.names
+    ]
+    symbols = [row.symbol for row in definition.model.sheet]
+    return Reading(
+        values, placed(wrong), doubt + placed([*_unmodelled(record, symbols, given), *lacking])
+    )
+
+
+def record_text(
+    definition: Definition, values: Mapping[str, float], bus: int, machine_id: str
+) -> str:
+    """Return a record as a dynamics file has it, each number in the digits that give it back."""
+    given = {**dict.fromkeys(definition.record.ignored, 0.0), **values}
+    given |= dict(definition.record.absent)
+    if {"E1", "SE1", "E2", "SE2"} <= given.keys() and given["E1"] > given["E2"]:
+        for first, second in zip(*SORTED, strict=True):
+            given[first], given[second] = given[second], given[first]
+    fields = [
+        str(bus),
+        f"'{definition.record.name}'",
+        machine_id if machine_id.isalnum() else f"'{machine_id}'",
+        *(str(int(given.get(name, value))) for name, value in definition.record.icons),
+        *(repr(float(given[name])).upper() for name in definition.record.cons),
+        "/",
+    ]
+    return textwrap.fill("  ".join(fields), WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+
+
+def _numbers(
+    definition: Definition, fields: tuple[Field, ...]
+) -> tuple[dict[str, float], list[tuple[str, str]]]:
+    """Return the numbers of a record by symbol, and (symbol, fault) for what is none."""
+    integers = dict(definition.record.icons)
+    values: dict[str, float] = {}
+    faults = []
+    for name, field in zip(definition.names, fields, strict=True):
+        try:
+            values[name] = whole(field) if name in integers else number(field)
+        except ValueError as error:
+            faults.append((name, str(error)))
+    return values, faults
+
+
+def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[Fault]:
+    """Yield what is no number, such as a repeat count: it may be why the count is wrong."""
+    for field in fields:
+        try:
+            number(field)
+        except ValueError as error:
+            yield Fault(field.line, f"{name}: {error}")
+
+
+def _unmodelled(
+    record: Record, symbols: Iterable[str], given: Mapping[str, float]
+) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for what the model, of these symbols, has in one way only."""
+    for name, modelled in (*record.icons, *record.absent):
+        found = given.get(name, modelled)
+        if found != modelled and name not in symbols:
+            yield name, f"{show(found)} is not modelled; {show(modelled)} is taken"
+
+
+def _outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, fault) for each value that its data sheet excludes."""
+    for row in rows:
+        value = values.get(row.symbol, row.low)
+        if not row.low <= value <= row.high:
+            limits = f"{show(row.low)} ... {show(row.high)} {row.unit}"
+            yield row.symbol, f"{show(value)} lies outside {limits}, its data sheet's range"
+
+
+def _wrong_count(definition: Definition, found: int) -> str:
+    icons, cons = len(definition.record.icons), len(definition.record.cons)
+    parts = f"{icons} integers and {cons} constants" if icons else f"{cons} constants"
+    order = " ".join(definition.names)
+    plural = "value" if found == 1 else "values"
+    return (
+        f"{definition.record.name}: {found} {plural} after the id, "
+        f"but the record has {icons + cons} ({parts}): {order}"
+    )

@@ -1,0 +1,193 @@
+"""One unit of a dynamics file: its machine, its exciter, its stabiliser, and what is left out."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from exfit.case.messages import near, show_value
+from exfit.errors import DynamicsError
+from exfit.exchange.psse.fields import Fault, Field, Fields, read_records, refuse
+from exfit.exchange.psse.records import Definition, definition_of, definitions, read_values
+
+NEEDED = ("machine", "exciter")
+LISTED = 20  # units in a message
+LONGEST_ID = 2
+OTHERS: Mapping[str, str] = {
+    name: kind
+    for kind, names in {
+        "governor": """BBGOV1 CRCMGV DEGOV DEGOV1 GAST GAST2A GASTWD GGOV1 GGOV1DU HYGOV HYGOV2
+            HYGOVDU HYGOVM HYGOVR1 HYGOVRU HYGOVT IEEEG1 IEEEG1SDU IEEEG2 IEEEG3 IEESGO IVOGO
+            PIDGOV SHAF25 TGOV1 TGOV1DU TGOV2 TGOV3 TGOV4 TGOV5 TURCZT TWDM1T TWDM2T URCSCT URGS3T
+            WEHGOV WESGOV WPIDHY WSHYDD WSHYGP WSIEG1""",
+        "stabiliser": """BEPSST IEE2ST IEEEST IVOST OSTB2T OSTB5T PSS1A PSS2A PSS2B PSS2C PSS3B
+            PSS4B PSS5C PSS6C PSS7C PTIST1 PTIST3 ST2CUT STAB1 STAB2A STAB3 STAB4 STABNI STBSVC""",
+        "excitation limiter": """MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL2C OEL3C OEL4C OEL5C
+            UEL1 UEL2 UEL2C""",
+        "compensator": "COMP COMPCC IEEEVC REMCMP",
+    }.items()
+    for name in names.split()
+}
+
+
+class Head(NamedTuple):
+    """A record by what it begins with, and the fields behind."""
+
+    bus: int
+    name: str
+    id: str
+    line: int
+    fields: tuple[Field, ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A model of the unit with the values of its record, which begins on ``line``."""
+
+    definition: Definition
+    line: int
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit; ``warnings`` say, by line, what of the file its models do not stand for."""
+
+    bus: int
+    id: str
+    machine: Part
+    exciter: Part
+    stabiliser: Part | None
+    warnings: tuple[Fault, ...]
+
+
+def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | None = None) -> Unit:
+    """Return a unit of a dynamics file: the only one, or that of a bus and a machine id.
+
+    Raises DynamicsError with all faults of its records, each as ``file:line: what is wrong``, and
+    where the unit is not in the file, is not the only one, or has no machine or exciter that exfit
+    knows.
+    """
+    faults: list[Fault] = []
+    heads = [head for record in read_records(text, file) for head in _heads(record, faults)]
+    refuse(faults, file)
+    chosen = _chosen(heads, file, bus, machine_id)
+    left_out = tuple(head for head in chosen if definition_of(head.name) is None)
+    warnings = [Fault(head.line, _left_out(head)) for head in left_out]
+    parts = _parts(chosen, faults, warnings)
+    faults += _missing(parts, chosen, left_out)
+    refuse(faults, file)
+    return Unit(
+        chosen[0].bus,
+        chosen[0].id,
+        parts["machine"],
+        parts["exciter"],
+        parts.get("stabiliser"),
+        tuple(sorted(warnings, key=lambda one: one.line)),
+    )
+
+
+def _parts(chosen: Iterable[Head], faults: list[Fault], warnings: list[Fault]) -> dict[str, Part]:
+    """Return the models of a unit by their kind; add what is wrong and what must be known."""
+    parts: dict[str, Part] = {}
+    for head in chosen:
+        definition = definition_of(head.name)
+        if definition is None:
+            continue
+        kind, name = definition.kind, head.name
+        if kind in parts:
+            first = parts[kind]
+            other = f"{first.definition.record.name} is on line {first.line}"
+            faults.append(Fault(head.line, f"{name}: a second {kind}; {other}"))
+            continue
+        reading = read_values(definition, head.line, head.fields)
+        faults += reading.faults
+        warnings += reading.warnings
+        parts[kind] = Part(definition, head.line, reading.values)
+    return parts
+
+
+def _heads(record: Fields, faults: list[Fault]) -> Iterator[Head]:
+    """Yield the head of a record that belongs to a unit; add a fault where it cannot be told."""
+    line, fields = record
+    if len(fields) < 3 or not fields[1].text[:1].isalpha():
+        if any(definition_of(field.text) for field in fields[:2]) or len(fields) < 3:
+            begin = " ".join(field.text for field in fields[:3])
+            faults.append(Fault(line, f"{show_value(begin)} is not bus, 'model' and id"))
+        return  # of a line or a device: their records begin otherwise
+    bus, name, machine_id = (field.text for field in fields[:3])
+    label = f"{name} {fields[3].text}" if name.upper() == "USRMDL" and fields[3:] else name
+    wrong = []
+    if fields[0].quoted or not (bus.isascii() and bus.isdigit() and 0 < int(bus[:10]) < 10**6):
+        wrong.append(f"{show_value(bus)} is not the number of a bus")
+    if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
+        wrong.append(f"{show_value(machine_id)} is not a machine id of one or two characters")
+    if not wrong:
+        label = "".join(letter if letter.isprintable() else "?" for letter in label)
+        yield Head(int(bus), label.upper(), machine_id, line, fields[3:])
+    elif definition_of(name) is not None:
+        faults += [Fault(line, f"{name.upper()}: {text}") for text in wrong]
+
+
+def _chosen(heads: list[Head], file: str, bus: int | None, machine_id: str | None) -> list[Head]:
+    """Return the records of one unit; raises DynamicsError where it is not exactly one."""
+    units: dict[tuple[int, str], list[Head]] = {}
+    for head in heads:
+        units.setdefault((head.bus, head.id.upper()), []).append(head)
+    meant = {
+        key: found
+        for key, found in units.items()
+        if bus in (None, key[0]) and (machine_id is None or machine_id.strip().upper() == key[1])
+    }
+    if len(meant) == 1:
+        return next(iter(meant.values()))
+    if not units:
+        raise DynamicsError(
+            [f"{file}: holds no record of a unit: bus, 'model', id, values and '/'"]
+        )
+    if meant:
+        raise DynamicsError(
+            [f"{file}: {len(meant)} units; choose by --bus and --id", *_list(meant)]
+        )
+    asked = ", ".join(
+        f"{label} {value!r}"
+        for label, value in (("bus", bus), ("id", machine_id))
+        if value is not None
+    )
+    raise DynamicsError([f"{file}: no record of {asked}; the file has", *_list(units)])
+
+
+def _list(units: Mapping[tuple[int, str], list[Head]]) -> Iterator[str]:
+    for (bus, machine_id), heads in list(units.items())[:LISTED]:
+        yield f"  bus {bus}, id {machine_id}: {', '.join(head.name for head in heads)}"
+    if len(units) > LISTED:
+        yield f"  and {len(units) - LISTED} more"
+
+
+def _missing(
+    parts: Mapping[str, Part], chosen: Sequence[Head], left_out: Iterable[Head]
+) -> Iterator[Fault]:
+    """Yield a fault for each record that may be the machine or exciter that is missing."""
+    known = [one for one in definitions() if definition_of(one.record.name) == one]
+    missing = [kind for kind in NEEDED if kind not in parts]
+    unknown = [head for head in left_out if head.name not in OTHERS]
+    for kind in missing:
+        names = sorted({one.record.name for one in known if one.kind == kind})
+        meant = [head for head in unknown if len(missing) == 1 or _looks_like(head) == kind]
+        for head in meant:
+            text = f"exfit has no {kind} of that name; {near(head.name, names)}"
+            yield Fault(head.line, f"{head.name}: {text}")
+        if not meant:
+            unit = f"bus {chosen[0].bus}, id {chosen[0].id}"
+            yield Fault(chosen[0].line, f"{unit}: has no {kind}; known: {', '.join(names)}")
+
+
+def _looks_like(head: Head) -> str:
+    """Return what a record is by its name: PSS/E's machines are GENROU, GENSAL, GENCLS ..."""
+    return "machine" if head.name.startswith("GEN") else "exciter"
+
+
+def _left_out(head: Head) -> str:
+    kind = OTHERS.get(head.name)
+    return (
+        f"{kind} {head.name} is left out" if kind else f"{head.name} is left out: not a known model"
+    )

@@ -1,0 +1,1 @@
+"""From a case to residuals, and what they say about the parameters."""

@@ -1,0 +1,163 @@
+"""A record with many more samples than the grid of its simulation, condensed without any loss.
+
+Between two points of the grid a response is a polynomial through six of them. However many samples
+lie there, the sum of their squared errors is a quadratic form of these six values, and six errors
+have the same sum: a search goes the same way, in a fraction of time and memory.
+"""
+
+from collections.abc import MutableMapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import combinations_with_replacement
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.residuals import Residuals
+from exfit.simulation.inputs import NEIGHBOURS, Sampling
+
+Array = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+WORTH = 3  # times fewer errors: else it does not pay
+ROUNDING = 1e-14  # of the largest eigenvalue of such a form: smaller ones are rounding
+READS = ("shift", "delay", "scale", "offset")  # what is found of these kinds changes the samples
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """Squared errors of samples as those of six errors for each of K groups, and of one more.
+
+    A group's samples are read from the same points of the grid: ``rows`` (K, 6). Its errors are
+    ``maps`` (K, 6, 6) times the values there less ``theirs`` (K, 6); ``rest`` is the root of what
+    no response can lower.
+    """
+
+    rows: Places
+    maps: Array
+    theirs: Array
+    rest: float
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedChannel(Channel):
+    """A channel whose simulated samples are all points of the grid (G,)."""
+
+    form: Form = field(kw_only=True)
+
+    def conditioned(self, samples: Array) -> Array:
+        """Return what is compared of samples (G,): (6 K + 1,)."""
+        found = np.einsum("kij,kj->ki", self.form.maps, samples[self.form.rows])
+        return np.append(found, 0.0)
+
+    def slopes(self, samples: Array, slopes: Array) -> Array:
+        """Return the derivatives (6 K + 1, N) of these, given those (G, N) of samples."""
+        found = self.form.maps @ slopes[self.form.rows]
+        return np.vstack([found.reshape(-1, slopes.shape[1]), np.zeros(slopes.shape[1])])
+
+    @cached_property
+    def record(self) -> Array:
+        """The record as it is compared, (6 K + 1,)."""
+        return np.append(self.form.theirs, self.form.rest)
+
+    @property
+    def size(self) -> int:
+        """How many errors there are."""
+        return self.form.theirs.size + 1
+
+
+KNOWN: MutableMapping[Residuals, Residuals | None] = WeakKeyDictionary()  # for as long as it lives
+
+
+def condensed(residuals: Residuals) -> Residuals:
+    """Return residuals with the same cost and gradient at every point, but fewer of them.
+
+    The Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the
+    same residuals where condensing would not save much, or where it does not hold: with filters,
+    with a robust loss, and where the instants at which a record is read, or its scale, are found.
+    Asked again, it returns the same: what that counts is of the whole search.
+
+    Source: Golub & Van Loan 2013, section 5.3 (the least-squares problem of a factor R is that of
+    all rows).
+    """
+    if residuals not in KNOWN:
+        KNOWN[residuals] = _fewer(residuals)
+    return KNOWN[residuals] or residuals
+
+
+def _fewer(residuals: Residuals) -> Residuals | None:
+    """Return condensed residuals, None where they would be the same."""
+    if residuals.robust is not None:
+        return None
+    experiments = [_condensed(one) for one in residuals.experiments]
+    if all(new is old for new, old in zip(experiments, residuals.experiments, strict=True)):
+        return None
+    return Residuals(experiments, residuals.free, residuals.fixed, residuals.ties)
+
+
+def _condensed(one: Experiment) -> Experiment:
+    """Return an experiment with fewer errors, the same where that does not pay or hold."""
+    simulator = one.simulator.on_grid()
+    possible = all(channel.plain for channel in one.channels) and not any(
+        nuisance.kind in READS for nuisance in one.nuisances
+    )
+    fewer = NEIGHBOURS * WORTH * len(simulator.times) * len(one.channels) < sum(one.sizes)
+    if not (possible and fewer):
+        return one
+    sampling = one.simulator.sampling()
+    return replace(
+        one,
+        simulator=simulator,
+        channels=tuple(_condensed_channel(channel, sampling) for channel in one.channels),
+    )
+
+
+def _condensed_channel(channel: Channel, sampling: Sampling) -> CondensedChannel:
+    return CondensedChannel(
+        signal=channel.signal,
+        measured=channel.measured,
+        weight=channel.weight,
+        conditioning=channel.conditioning,
+        noise=channel.noise,
+        form=form_of(sampling, channel.measured, channel.kept),
+    )
+
+
+def form_of(sampling: Sampling, measured: Array, kept: NDArray[np.bool_]) -> Form:
+    """Return the form of a record's kept samples (M,)."""
+    first = sampling.first[kept]
+    starts = np.flatnonzero(np.diff(first, prepend=-1))
+    group = np.cumsum(np.bincount(starts, minlength=len(first))) - 1
+    levels = measured[kept][starts]  # about a sample of each group squares do not cancel
+    moved = measured[kept] - levels[group]
+    count = len(starts)
+    squares = np.zeros((count, NEIGHBOURS, NEIGHBOURS))
+    products = np.zeros((count, NEIGHBOURS))
+    place = np.cumsum(kept) - 1
+    for block in sampling.blocks:
+        here = kept[block]
+        if not here.any():
+            continue
+        weights = sampling.weights(block)[:, here]
+        own, y = group[place[block][here]], moved[place[block][here]]
+        low = own[0]
+        size = own[-1] - low + 1
+        within = own - low
+        for i, j in combinations_with_replacement(range(NEIGHBOURS), 2):
+            sums = np.bincount(within, weights[i] * weights[j], size)
+            squares[low : low + size, i, j] += sums
+            if i != j:
+                squares[low : low + size, j, i] += sums
+        for i in range(NEIGHBOURS):
+            products[low : low + size, i] += np.bincount(within, weights[i] * y, size)
+    sizes, vectors = np.linalg.eigh(squares)
+    some = sizes > ROUNDING * sizes[:, -1:]
+    roots = np.sqrt(np.where(some, sizes, 1.0))
+    maps = np.where(some, roots, 0.0)[:, :, None] * vectors.transpose(0, 2, 1)
+    along = np.einsum("kji,kj->ki", vectors, products)
+    theirs = np.where(some, along / roots, 0.0)
+    rest = max(float(moved @ moved - np.sum(theirs**2)), 0.0)
+    rows = np.minimum(first[starts][:, None] + np.arange(NEIGHBOURS), sampling.last)
+    return Form(rows, maps, theirs + maps.sum(axis=2) * levels[:, None], np.sqrt(rest))

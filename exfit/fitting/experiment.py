@@ -1,0 +1,259 @@
+"""A test beside its record: what is simulated, conditioned, and compared with what was measured."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.filtering import Conditioning
+from exfit.plants import VT0
+from exfit.simulation.inputs import Change, Direction
+from exfit.simulation.simulator import Simulator
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """What a fit finds about a record, under ``name``: it is no parameter of the unit.
+
+    ``step`` is the place in the course of a step whose instant or size it is, ``signal`` the
+    channel whose scale or offset it is. The instant of an only step is a ``shift`` of the whole
+    response: the simulation stays as it is.
+    """
+
+    name: str
+    kind: Literal["at", "shift", "step", "vt0", "delay", "scale", "offset"]
+    step: int = 0
+    signal: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A measured signal (M,) per unit, and the weight of its errors.
+
+    ``noise`` is the standard deviation of its noise, per unit, where that is given; ``scale`` and
+    ``offset`` are those that made it per unit.
+    """
+
+    signal: str
+    measured: Array
+    weight: float = 1.0
+    conditioning: Conditioning | None = None
+    noise: float | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def conditioned(self, samples: Array) -> Array:
+        """Return samples (M,) as they are compared: filtered, without those left out."""
+        return samples if self.conditioning is None else self.conditioning.apply(samples)
+
+    def shown(self, simulated: Array) -> Array:
+        """Return simulated values (M, ...) as the recorder shows them, before they are conditioned.
+
+        Where it records averages, these are averaged alike; so are derivatives.
+        """
+        return simulated if self.conditioning is None else self.conditioning.shown(simulated)
+
+    def slopes(self, samples: Array, slopes: Array) -> Array:
+        """Return the derivatives of conditioned samples, given those (M, N) of the samples."""
+        if self.conditioning is None:
+            return slopes
+        return self.conditioning.tangents(samples, slopes)
+
+    @cached_property
+    def record(self) -> Array:
+        """The record as it is compared: filtering it for every evaluation would double the work."""
+        return self.conditioned(self.measured)
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Which samples are compared, (M,)."""
+        if self.conditioning is None:
+            return np.ones(len(self.measured), dtype=bool)
+        return self.conditioning.kept
+
+    @property
+    def samples(self) -> int:
+        """How many samples are compared."""
+        return int(np.count_nonzero(self.kept))
+
+    @property
+    def size(self) -> int:
+        """How many errors there are: one for each of these samples."""
+        return self.samples
+
+    @property
+    def plain(self) -> bool:
+        """Whether samples are compared as they stand."""
+        if self.conditioning is None:
+            return True
+        return self.conditioning.filter is None and self.conditioning.averaged is None
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A simulated test and the channels that it is compared with.
+
+    ``own`` holds the parameters of the system that this test alone has: where its signals start,
+    its network.
+    """
+
+    simulator: Simulator
+    channels: tuple[Channel, ...]
+    own: Values = field(default_factory=dict)
+    nuisances: tuple[Nuisance, ...] = ()
+    name: str = ""
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The signals that are compared."""
+        return tuple(channel.signal for channel in self.channels)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the fit moves what its simulations do not have side by side."""
+        return any(one.kind in ("at", "shift", "step", "delay") for one in self.nuisances)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """How many errors each channel has."""
+        return tuple(channel.size for channel in self.channels)
+
+    def parameters(self, values: Values) -> dict[str, float]:
+        """Return the parameters of the system."""
+        found = {**values, **self.own}
+        for one in self.nuisances:
+            if one.kind == "vt0":
+                found[VT0] = values[one.name]
+        return found
+
+    def moved(self, values: Values) -> Simulator:
+        """Return the simulator with the steps and the delay that the values give."""
+        if not self.moves:
+            return self.simulator
+        steps: list[Change] = list(self.simulator.course.steps)
+        delay = self.simulator.delay
+        for one in self.nuisances:
+            if one.kind == "at":
+                steps[one.step] = steps[one.step]._replace(at=values[one.name])
+            elif one.kind == "step":
+                steps[one.step] = steps[one.step]._replace(step=values[one.name])
+            elif one.kind == "delay":
+                delay = values[one.name]
+        shifts = [
+            values[one.name] - steps[one.step].at for one in self.nuisances if one.kind == "shift"
+        ]
+        return self.simulator.moved(tuple(steps), sum(shifts, start=delay))
+
+    def measured(self, channel: Channel, values: Values) -> Array:
+        """Return a record (M,) in per unit, by the scale and offset that the values give."""
+        found = {
+            one.kind: values[one.name] for one in self.nuisances if one.signal == channel.signal
+        }
+        if not found:
+            return channel.measured
+        raw = (channel.measured - channel.offset) / channel.scale
+        return raw * found.get("scale", channel.scale) + found.get("offset", channel.offset)
+
+    def samples(self, values: Values) -> tuple[Array, int]:
+        """Return the simulated signals (M, channels), and the number of sub-steps."""
+        return self.moved(values).samples(self.parameters(values), self.signals)
+
+    def errors(self, values: Values) -> tuple[Array, int]:
+        """Return the weighted errors, one channel behind the other, and the sub-steps."""
+        samples, parts = self.samples(values)
+        return self.compared(samples, values), parts
+
+    def errors_of_many(self, sets: Sequence[Values]) -> list[Array]:
+        """Return the weighted errors of several sets of values."""
+        if self.moves:
+            return [self.errors(values)[0] for values in sets]
+        systems = [self.parameters(values) for values in sets]
+        samples = self.simulator.samples_of_many(systems, self.signals)
+        return [self.compared(samples[:, :, k], values) for k, values in enumerate(sets)]
+
+    def compared(self, samples: Array, values: Values) -> Array:
+        """Return the weighted errors of simulated signals (M, channels)."""
+        blocks = []
+        for k, channel in enumerate(self.channels):
+            measured = self.measured(channel, values)
+            same = measured is channel.measured
+            theirs = channel.record if same else channel.conditioned(measured)
+            ours = channel.conditioned(channel.shown(samples[:, k]))
+            blocks.append(channel.weight * ours - channel.weight * theirs)
+        return np.concatenate(blocks)
+
+    def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
+        """Return the weighted errors and their derivatives (errors, N).
+
+        Each of ``moves`` (N) is a direction: by how much it changes which value.
+        """
+        samples, slopes = self.course(values, moves)
+        blocks = []
+        for k, channel in enumerate(self.channels):
+            ours = channel.slopes(channel.shown(samples[:, k]), channel.shown(slopes[:, k]))
+            theirs = self._measured_slopes(channel, values, moves)
+            blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
+        return self.compared(samples, values), np.concatenate(blocks)
+
+    def course(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
+        """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
+        directions = [self._direction(move) for move in moves]
+        moving = [k for k, direction in enumerate(directions) if direction != Direction()]
+        samples, found = self.moved(values).tangents(
+            self.parameters(values), self.signals, [directions[k] for k in moving]
+        )
+        if len(moving) == len(moves):
+            return samples, found
+        slopes = np.zeros((*samples.shape, len(moves)))
+        slopes[:, :, moving] = found
+        return samples, slopes
+
+    def _direction(self, move: Values) -> Direction:
+        """Return a direction as the simulator takes it."""
+        own = self.own.keys()
+        known = self.simulator.system.parameters
+        parameters = {name: d for name, d in move.items() if name in known and name not in own}
+        steps: dict[int, tuple[float, float]] = {}
+        delay = 0.0
+        for one in self.nuisances:
+            d = move.get(one.name, 0.0)
+            if d == 0.0:
+                continue
+            at, step = steps.get(one.step, (0.0, 0.0))
+            if one.kind == "at":
+                steps[one.step] = (at + d, step)
+            elif one.kind == "step":
+                steps[one.step] = (at, step + d)
+            elif one.kind in ("delay", "shift"):
+                delay += d
+            elif one.kind == "vt0":
+                parameters = {**parameters, VT0: d}
+        return Direction(parameters, steps, delay)
+
+    def _measured_slopes(
+        self, channel: Channel, values: Values, moves: Sequence[Values]
+    ) -> Array | None:
+        """Return the derivatives of what was measured, if its scale or offset is found."""
+        found = [one for one in self.nuisances if one.signal == channel.signal]
+        if not found:
+            return None
+        raw = (channel.measured - channel.offset) / channel.scale
+        columns = np.zeros((len(raw), len(moves)))
+        for one in found:
+            for k, move in enumerate(moves):
+                by = raw if one.kind == "scale" else np.ones_like(raw)
+                columns[:, k] += by * move.get(one.name, 0.0)
+        return channel.slopes(self.measured(channel, values), columns)
+
+    def secured(self, values: Values) -> "Experiment":
+        """Return the experiment with sub-steps enough all along the response to the values."""
+        steps, delay = self.simulator.course.steps, self.simulator.delay
+        simulator = self.moved(values).secured(self.parameters(values))
+        # moved back: what the values shift must not be shifted twice
+        return replace(self, simulator=simulator.moved(steps, delay))

@@ -1,0 +1,49 @@
+"""Whether the intervals of the linear theory hold: what the cost itself is at their ends."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.estimate.problem import half_square
+from exfit.fitting.compression import condensed
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.uncertainty import Knowledge
+
+Array = NDArray[np.float64]
+
+BENT = 2.0  # times the rise that the theory tells: there an end may be 30 % off
+
+
+def bent(residuals: Residuals, theta: Array, known: Knowledge) -> tuple[str, ...]:
+    """Return the parameters over whose intervals the response is not linear.
+
+    Each end of an interval is visited along the linear trace, on which the other parameters follow,
+    and the rise of the cost is compared with what the linear theory tells. ``theta`` (N,) is the
+    solution; what belongs to a record is left out.
+
+    Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
+    """
+    residuals = condensed(residuals)
+    least, rises, linear = half_square(residuals(theta)), known.rises, known.linear
+    found = [
+        name
+        for name, end in _ends(residuals, theta, known)
+        if not 1.0 / BENT <= (half_square(residuals(end)) - least) / rises[name] <= BENT
+    ]
+    of_record = dict(zip(linear.names, linear.nuisances, strict=True))
+    return tuple(name for name in dict.fromkeys(found) if not of_record[name])
+
+
+def _ends(residuals: Residuals, theta: Array, known: Knowledge) -> Iterator[tuple[str, Array]]:
+    """Yield both ends of each interval, with the others along, unless a bound comes before."""
+    low, high = residuals.bounds
+    own = np.array([one.slope(float(x)) for one, x in zip(residuals.free, theta, strict=True)])
+    covariance = np.nan_to_num(known.confidence.covariance / np.outer(own, own))
+    for k, one in enumerate(residuals.free):
+        for limit in known.confidence.parameters[one.name].interval or ():
+            if one.low < limit < one.high:
+                along = covariance[:, k] / covariance[k, k] * (one.scaled(limit) - theta[k])
+                end = theta + along
+                if np.all((end >= low) & (end <= high)):
+                    yield one.name, end

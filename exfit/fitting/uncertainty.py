@@ -1,0 +1,175 @@
+"""What the records of a fit tell of its parameters, and what they leave open."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import SimulationError
+from exfit.fitting.compression import condensed
+from exfit.fitting.residuals import Residuals
+from exfit.inference import (
+    Channel,
+    Confidence,
+    Identifiability,
+    Linearisation,
+    Prior,
+    confidence,
+    identifiability,
+    rises,
+)
+from exfit.inference.wording import listed
+
+Array = NDArray[np.float64]
+
+
+class Moved(NamedTuple):
+    """By how much a signal moves over ``time`` (S,) in s for 100 % of each parameter: (S, N), pu.
+
+    What counts as 100 % says `Linearisation.size`: the value, for most.
+    """
+
+    label: str
+    time: Array
+    moved: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """Confidence and identifiability at the solution, with the linearisation that they are of.
+
+    ``sensitivity`` is one course for each channel. ``bent`` names the parameters over whose
+    intervals the response is not linear.
+    """
+
+    linear: Linearisation
+    confidence: Confidence
+    identifiability: Identifiability
+    sensitivity: tuple[Moved, ...]
+    bent: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures, without the samples."""
+        return {
+            "confidence": self.confidence.as_json(),
+            "identifiability": self.identifiability.as_json(),
+            "not_linear": list(self.bent),
+            "sentences": list(self.sentences),
+        }
+
+    @property
+    def rises(self) -> dict[str, float]:
+        """By how much the cost rises from its minimum to the ends of each profile's interval."""
+        return rises(self.linear, self.confidence)
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """What is not determined, and what could be done about it, in words."""
+        without = {
+            name: one for name, one in self.confidence.parameters.items() if one.why is not None
+        }
+        vague = [name for name, one in without.items() if one.std_error is not None]
+        if len(vague) < 2:
+            vague = []  # its own reason says more
+        reasons = [f"{name} {one.why}" for name, one in without.items() if name not in vague]
+        if vague:
+            reasons.append(f"{listed(vague)} are not determined by the record: see `exfit profile`")
+        return (*reasons, *self.identifiability.sentences)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What a reader must know of it, in words."""
+        names = ", ".join(self.bent)
+        told = f"the response is not linear over the intervals of {names}: see `exfit profile`"
+        return (*self.confidence.sentences, *([told] if names else []), *self.open)
+
+
+def knowledge(residuals: Residuals, theta: Array, of_record: tuple[str, ...]) -> Knowledge:
+    """Return what the records tell at the scaled parameters theta (N,).
+
+    ``of_record`` names what belongs to a record and is no parameter of the unit. Raises
+    SimulationError where a derivative is not finite.
+    """
+    linear = linearisation(residuals, theta, of_record)
+    return known_of(residuals, theta, linear)
+
+
+def known_of(residuals: Residuals, theta: Array, linear: Linearisation) -> Knowledge:
+    """Return what a linearisation of the residuals at theta (N,) tells."""
+    known, courses = confidence(linear), tuple(sensitivity(residuals, theta, linear))
+    return Knowledge(linear, known, identifiability(linear, known), courses)
+
+
+def sensitivity(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Moved]:
+    """Yield what each channel shows: at the record's samples or, where condensed, of the grid."""
+    values, moves = residuals.values(theta), residuals.moves(theta)
+    size = linear.size / slopes_of(residuals, theta)
+    labels = iter(linear.channels)
+    for one, whole in zip(condensed(residuals).experiments, residuals.experiments, strict=True):
+        _, slopes = one.course(values, moves)
+        late = 0.0 if one is whole else one.simulator.delay  # the grid is the simulation's
+        for k in range(len(one.channels)):
+            yield Moved(next(labels).label, one.simulator.times + late, slopes[:, k] * size)
+
+
+def slopes_of(residuals: Residuals, theta: Array) -> Array:
+    """Return the derivative of each parameter to the number that the estimator moves, (N,)."""
+    pairs = zip(residuals.free, theta, strict=True)
+    return np.array([one.slope(float(x)) for one, x in pairs])
+
+
+def linearisation(
+    residuals: Residuals, theta: Array, of_record: tuple[str, ...], errors: Array | None = None
+) -> Linearisation:
+    """Return the errors and their exact derivatives at theta, in the parameters' own units.
+
+    ``errors`` takes the place of those at theta. Raises SimulationError where a derivative is not
+    finite.
+    """
+    values, fewer = residuals.values(theta), condensed(residuals)
+    found, slopes = fewer.errors(theta)
+    if not np.isfinite(slopes).all():
+        at = ", ".join(f"{one.name} = {values[one.name]:g}" for one in residuals.free)
+        raise SimulationError(f"the derivatives are not finite at {at}")
+    if errors is None:
+        errors = found if fewer is residuals else residuals(theta)[: residuals.count]
+    influence, curvature = residuals.influence(errors)
+    free = residuals.free
+    return Linearisation(
+        names=tuple(one.name for one in free),
+        units=tuple("" for _ in free),
+        values=np.array([values[one.name] for one in free]),
+        logarithmic=np.array([one.logarithmic for one in free]),
+        width=np.array([one.high - one.low for one in free]),
+        held=tuple(one.bound(values[one.name]) for one in free),
+        errors=errors,
+        jacobian=slopes / slopes_of(residuals, theta),
+        influence=influence,
+        curvature=curvature,
+        channels=tuple(_channels(residuals, fewer.sizes)),
+        priors=tuple(
+            Prior(k, known.mean, known.std, residuals.noise)
+            for k, known in residuals.priors.items()
+        ),
+        nuisances=tuple(one.name in of_record for one in free),
+    )
+
+
+def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[Channel]:
+    """Yield where the errors of each channel stand among those of all, and its rows."""
+    several = len(residuals.experiments) > 1
+    each = [(one, channel) for one in residuals.experiments for channel in one.channels]
+    places = zip(slices(rows), slices(residuals.sizes), strict=True)
+    for (one, channel), (own, errors) in zip(each, places, strict=True):
+        label = f"{one.name} {channel.signal}" if several else channel.signal
+        noise = None if channel.noise is None else channel.noise * channel.weight
+        yield Channel(label, own, noise, channel.weight, errors)
+
+
+def slices(sizes: Sequence[int]) -> list[slice]:
+    """Return where blocks of these sizes stand, one behind the other."""
+    ends = list(accumulate(sizes))
+    return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]

@@ -1,0 +1,1 @@
+"""The exciters, a file each."""

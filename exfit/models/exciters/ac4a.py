@@ -1,0 +1,54 @@
+"""AC4A: alternator with a controlled rectifier (IEEE Std 421.5-2005, 6.4).
+
+                 VIMAX             UEL  VRMAX - KC IFD
+vref + vs ─►(+)─►[clip]─►[1 + sTC]─►HV─►[  KA  ]─► efd
+           -▲    VIMIN   [1 + sTB]      [1+sTA]
+            │                           VRMIN
+vc1 ►[  1  ]┘
+     [1+sTR]
+
+The limits of the lag are non-windup, and only the upper one sinks with the
+field current; the UEL gate does not act by itself. The alternator's own
+regulator is left out, as in the standard, and so is an OEL, which is added to
+vs. PSS/E's older EXAC4 differs in its limits: it is a model of its own.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESAC4A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("VIMAX", 10.0, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
+    ("VIMIN", -10.0, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
+    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.015, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
+    ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
+    ("KC", 0.0, "pu", (0.0, 100.0), "rectifier loading factor"),
+)
+
+RECORDS = (record("ESAC4A", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),)
+
+STATES = "VC VL VR"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vi = clip(u.vref + u.vs - vc, p.VIMIN, p.VIMAX)
+    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
+    ceiling = p.VRMAX - p.KC * u.ifd
+    efd, d.VR = limited_lag(larger(vl, u.vuel), s.VR, p.KA, p.TA, p.VRMIN, ceiling)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    error = efd / p.KA
+    x.VC, x.VL, x.VR = u.vc1, error, efd
+    return u.vc1 + error - u.vs

@@ -1,0 +1,69 @@
+"""DC3A: commutator exciter, non-continuous regulator (421.5-2005, 5.3).
+
+                 ┌──────────────────────────────► VRMAX where VERR >= KV ─┐
+vref ─►(+)─ VERR ┤ VRMAX                                                  │
+       -▲        ├─►[VRMAX - VRMIN]─ VRH ───────► VRH elsewhere ──────────┼─ VR
+        │        │  [   sKV TRH   ]                                       │
+vc1 ►[  1  ]     │ VRMIN                                                  │
+     [1+sTR]     └──────────────────────────────► VRMIN where VERR <= -KV ┘
+
+VR ─►(+)─►[  1  ]─┬─► efd
+     -▲   [ sTE ] │
+      │    VEMIN  │
+      └── VFE ◄───┘
+
+VFE = KE EFD + VX(EFD). The limits of the rheostat VRH and of EFD are
+non-windup; the rheostat moves on while a contact bypasses it. The contacts make
+VR jump: a derivative of the response is exact between the jumps, and does not
+see them move. KE is taken as it is given, 0 too (the standard computes none).
+Not modelled: stabiliser, OEL and UEL, which the standard's drawing does not
+have. PSLF's ESDC3A has another record; IEEET4 has no lag TR, and a dead band.
+The typical data are not the standard's sample (KV .05, TRH 20, KE .05, VR 1/0):
+with those the rheostat hunts on open circuit.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import exciter, exciter_demand, lag, limited_integrator, where
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KV", 0.1, "pu", (0.001, 10.0), "setting of the fast raise and lower contacts"),
+    ("VRMAX", 4.0, "pu", (-9999.0, 9999.0), "voltage of the raise contact"),
+    ("VRMIN", -0.9, "pu", (-9999.0, 9999.0), "voltage of the lower contact"),
+    ("TRH", 60.0, "s", (0.01, 1000.0), "travel time of the rheostat"),
+    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant"),
+    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
+    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+    ("E1", 3.375, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.267, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 3.15, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.068, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "DC3A",
+        "TR KV VRMAX VRMIN TRH TE KE VEMIN E1 SE1 E2 SE2",
+        doubt="the order of DC3A is that of PowerWorld's list, not confirmed by a record",
+    ),
+)
+
+STATES = "VC VRH EFD"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = u.vref - vc
+    travel = (p.VRMAX - p.VRMIN) * error
+    vrh, d.VRH = limited_integrator(travel, s.VRH, p.KV * p.TRH, p.VRMIN, p.VRMAX)
+    vr = where(error >= p.KV, p.VRMAX, where(error <= -p.KV, p.VRMIN, vrh))
+    efd, d.EFD = exciter(vr, s.EFD, p.KE, p, p.VEMIN)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    x.VC, x.VRH, x.EFD = u.vc1, exciter_demand(efd, p.KE, p), efd
+    return u.vc1

@@ -1,0 +1,52 @@
+"""EXAC4: alternator with a controlled rectifier (IEEE type AC4 of 1981).
+
+                 VIMAX                       VRMAX - KC IFD
+vref + vs ─►(+)─►[clip]─►[1 + sTC]─►[  KA  ]─►[clip]─► efd
+           -▲    VIMIN   [1 + sTB]  [1+sTA]
+            │                                VRMIN - KC IFD
+vc1 ►[  1  ]┘
+     [1+sTR]
+
+AC4A with other limits: the clamp stands behind the lag, which runs on beyond it
+(windup), and the field current lowers both sides of it. Two models written
+after PSS/E's EXAC4 have it so; a third has the same limits, but non-windup. Not
+modelled: UEL and OEL, which are added to vs.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, lag, lead_lag
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("VIMAX", 10.0, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
+    ("VIMIN", -10.0, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
+    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.015, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
+    ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
+    ("KC", 0.0, "pu", (0.0, 100.0), "rectifier loading factor"),
+)
+
+RECORDS = (record("EXAC4", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),)
+
+STATES = "VC VL VR"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vi = clip(u.vref + u.vs - vc, p.VIMIN, p.VIMAX)
+    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
+    vr, d.VR = lag(vl, s.VR, p.KA, p.TA)
+    drop = p.KC * u.ifd
+    return clip(vr, p.VRMIN - drop, p.VRMAX - drop)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    error = efd / p.KA
+    x.VC, x.VL, x.VR = u.vc1, error, efd
+    return u.vc1 + error - u.vs

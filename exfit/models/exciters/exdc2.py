@@ -1,0 +1,74 @@
+"""EXDC2: commutator exciter, bus-fed regulator, DC2 of 1981 (PSS/E EXDC2).
+
+                            VT VRMAX
+vref + vs ─►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+           -▲ ▲- [1 + sTB]  [1+sTA]   -▲   [ sTE ] │
+            │ │             VT VRMIN    │           │
+vc1 ►[  1  ]┘ │                        └── VFE ◄───┤
+     [1+sTR]  └──────[  sKF  ]◄────────────────────┘
+                     [1 + sTF1]
+
+VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
+The limits are proportional to VT: so the DC2 of 1981, Opal-RT and InterPSS
+(ANDES and GridPACK hold them constant). InterPSS and ANDES multiply efd by the
+speed, Opal-RT does not: at rated speed, as here, it is the same.
+KE = 0 is self-excited: KE is computed at the start so that VR starts at
+VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+(SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the setpoints
+KE0, VRMAX0, VRMIN0.
+Not modelled: speed, UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import commutator_start, exciter, lag, lead_lag, limited_lag, washout
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 300.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant"),
+    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
+    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    ("VRMAX", 4.95, "pu", (-9999.0, 9999.0), "regulator ceiling at rated voltage, or 0"),
+    ("VRMIN", -4.9, "pu", (-9999.0, 9999.0), "regulator floor at rated voltage"),
+    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
+    ("TE", 1.33, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.02, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF1", 0.675, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("E1", 3.05, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.279, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 2.29, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.117, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "EXDC2",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
+        absent={"Switch": 0.0},
+    ),
+)
+
+STATES = "VC VL VR EFD VF"
+SETPOINTS = "KE0 VRMAX0 VRMIN0"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF1)
+    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    low, high = u.vt * s.VRMIN0, u.vt * s.VRMAX0
+    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, low, high)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    error = start.vr / p.KA
+    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
+    return u.vc1 + error - u.vs

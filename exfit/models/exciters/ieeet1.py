@@ -1,0 +1,68 @@
+"""IEEET1: commutator exciter, IEEE type 1 of 1968 (PSS/E IEEET1).
+
+                 VRMAX
+vref + vs ─►(+)─►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
+           -▲ ▲- [1+sTA]   -▲   [ sTE ] │
+            │ │  VRMIN      │           │
+vc1 ►[  1  ]┘ │             └── VFE ◄───┤
+     [1+sTR]  └──[  sKF ]◄──────────────┘
+                 [1+sTF]
+
+VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
+KE = 0 is self-excited: KE is computed at the start so that VR starts at
+VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
+VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
+(SE(E) E where KE < 0), VRMIN = -VRMAX (ANDES: 999). The values in use are the
+setpoints KE0, VRMAX0, VRMIN0.
+Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import commutator_start, exciter, lag, limited_lag, washout
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 50.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.06, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
+    ("VRMIN", -7.3, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
+    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant"),
+    ("KF", 0.08, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("E1", 3.1, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.33, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 2.3, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.1, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (
+    record(
+        "IEEET1",
+        "TR KA TA VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
+        absent={"Switch": 0.0},
+    ),
+)
+
+STATES = "VC VR EFD VF"
+SETPOINTS = "KE0 VRMAX0 VRMIN0"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
+    error = u.vref + u.vs - vc - vf
+    vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    error = start.vr / p.KA
+    x.VC, x.VR, x.EFD, x.VF = u.vc1, start.vr, efd, efd
+    return u.vc1 + error - u.vs

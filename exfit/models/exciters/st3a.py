@@ -1,0 +1,77 @@
+"""ST3A: controlled rectifier with a field voltage loop (IEEE Std 421.5-2005, 7.3).
+
+              VIMAX                        VRMAX            VMMAX
+vref + vs ►(+)►[clip]►[larger]►[1 + sTC]►[  KA  ]─►(+)─►[  KM  ]─►(x)─┬─► efd
+           -▲  VIMIN     ▲     [1 + sTB] [1+sTA]   -▲   [1+sTM]    ▲  │
+            │           vuel               VRMIN    │       VMMIN  VB │
+vc1 ►[  1  ]┘                                       │                 │
+     [1+sTR]                                        └[smaller]◄─[KG]◄─┘
+                                                         ▲
+                                                       VGMAX
+
+VB = VE FEX(KC IFD / VE), at most VBMAX, with the source
+VE = |KP∠THETAP VT + j (KI + KP∠THETAP XL) IT|, THETAP in degrees. The limits of
+both lags are non-windup. The current IT, and so KI, XL and THETAP, act on load
+only. The standard has no OEL gate here.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller, source_voltage
+from exfit.models.sheet import record, sheet
+
+ALIASES = ("ESST3A",)
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("VIMAX", 0.2, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
+    ("VIMIN", -0.2, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    ("KM", 7.93, "pu", (0.01, 100000.0), "gain of the field voltage loop"),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
+    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
+    ("VRMAX", 10.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", -10.0, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KG", 1.0, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
+    ("KP", 6.15, "pu", (0.01, 100.0), "potential source gain"),
+    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+    ("VBMAX", 6.9, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("XL", 0.081, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
+    ("VGMAX", 5.8, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
+    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+    ("TM", 0.4, "s", (0.001, 10.0), "time constant of the field voltage loop"),
+    ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
+    ("VMMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
+)
+
+RECORDS = (
+    record(
+        "ESST3A",
+        "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP "
+        "TM VMMAX VMMIN",
+    ),
+)
+
+STATES = "VC VL VR VM"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vb = source_voltage(u, p)
+    vg = smaller(p.KG * vb * s.VM, p.VGMAX)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vi = larger(clip(u.vref + u.vs - vc, p.VIMIN, p.VIMAX), u.vuel)
+    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
+    vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    vm, d.VM = limited_lag(vr - vg, s.VM, p.KM, p.TM, p.VMMIN, p.VMMAX)
+    return vm * vb
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vm = efd / source_voltage(u, p)
+    vr = vm / p.KM + smaller(p.KG * efd, p.VGMAX)
+    vi = vr / p.KA
+    x.VC, x.VL, x.VR, x.VM = u.vc1, vi, vr, vm
+    return u.vc1 + vi - u.vs

@@ -1,0 +1,1 @@
+"""The power system stabilisers, a file each."""

@@ -1,0 +1,1 @@
+"""What a person sees: figures, terminal, report, the folder of a run."""

@@ -1,0 +1,47 @@
+"""Measured against simulated."""
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from exfit.dsp.decimation import envelope
+from exfit.output.plots.style import LABELS, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.results.model import Comparison, Overlay
+
+
+def overlay(comparison: Comparison, title: str) -> Figure:
+    """Return measured and simulated signals on one axis each, with their difference below."""
+    count = len(comparison.overlays)
+    figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * count), layout="constrained")
+    axes = figure.subplots(
+        2 * count, 1, sharex=True, height_ratios=[3.0, 1.0] * count, squeeze=False
+    )
+    for k, (signal, one) in enumerate(comparison.overlays.items()):
+        _signal(axes[2 * k, 0], comparison, signal, one)
+        _error(axes[2 * k + 1, 0], comparison, one)
+    axes[-1, 0].set_xlabel("time (s)")
+    figure.align_ylabels()
+    figure.suptitle(title, fontsize=11)
+    return figure
+
+
+def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> None:
+    time = comparison.time
+    axes.plot(*envelope(time, one.measured), ".", color=MEASURED, markersize=3, label="measured")
+    if one.start is not None:
+        axes.plot(
+            *envelope(time, one.start), "--", color=START, linewidth=1.2, label="start values"
+        )
+    label = "fitted" if one.start is not None else "simulated"
+    axes.plot(*envelope(time, one.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
+    axes.set_ylabel(LABELS[signal])
+    axes.legend(loc="best", frameon=False)
+    text = f"rmse {one.rmse:.3g} pu, fit {one.fit_percent:.2f} %"
+    axes.set_title(text, fontsize=9, loc="right")
+    tidy(axes)
+
+
+def _error(axes: Axes, comparison: Comparison, one: Overlay) -> None:
+    axes.axhline(0.0, color="black", linewidth=0.6)
+    axes.plot(*envelope(comparison.time, MILLI * one.error), color=SIMULATED, linewidth=0.7)
+    axes.set_ylabel("simulated\n- measured\n(1e-3 pu)")
+    tidy(axes)

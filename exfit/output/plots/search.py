@@ -1,0 +1,115 @@
+"""The way of a search: its iterations, its starts."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from exfit.output.plots.style import LIMIT, MEASURED, SIMULATED, WIDTH, tidy
+from exfit.results.model import FitResult, Minima
+
+PHASES: Mapping[str, str] = {"lm": "#2b6cb0", "dgn": "#c1272d", "gn": "#2f855a"}
+PHASE_NAMES: Mapping[str, str] = {
+    "lm": "Levenberg-Marquardt",
+    "dgn": "damped Gauss-Newton",
+    "gn": "Gauss-Newton",
+}
+
+
+def convergence(result: FitResult) -> Figure:
+    """Return cost, gradient and damping over the iterations."""
+    figure = Figure(figsize=(WIDTH, 7.0), layout="constrained")
+    axes = figure.subplots(3, 1, sharex=True)
+    rows = (
+        ("cost", "cost f (pu²)", "o"),
+        ("gradient_norm", "norm of the gradient", "o"),
+        ("damping", "damping ν, or\nstep length λ", "s"),
+    )
+    for ax, (name, label, marker) in zip(axes, rows, strict=True):
+        values = [float(getattr(line, name)) for line in result.history]
+        # an undamped step and a vanished gradient have no place on a logarithmic axis
+        _by_phase(ax, result, [v if v > 0.0 else float("nan") for v in values], marker)
+        if any(value > 0.0 for value in values):
+            ax.set_yscale("log")
+        ax.set_ylabel(label)
+        tidy(ax)
+    axes[0].legend(loc="upper right", frameon=False)
+    axes[-1].set_xlabel("iteration")
+    axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.align_ylabels()
+    figure.suptitle(f"{result.name}: {result.strategy}; {result.message}", fontsize=11)
+    return figure
+
+
+def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: str) -> None:
+    numbers = [line.number for line in result.history]
+    axes.plot(numbers, values, "-", color=MEASURED, linewidth=0.8)
+    for phase in dict.fromkeys(line.phase for line in result.history):
+        chosen = [k for k, line in enumerate(result.history) if line.phase == phase]
+        axes.plot(
+            [numbers[k] for k in chosen],
+            [values[k] for k in chosen],
+            marker,
+            color=PHASES[phase],
+            markersize=4,
+            clip_on=False,
+            label=PHASE_NAMES[phase],
+        )
+
+
+def trajectories(result: FitResult) -> Figure:
+    """Return every free parameter over the iterations, between its bounds."""
+    names = list(result.parameters)
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    figure = Figure(figsize=(WIDTH, 1.0 + 2.0 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for ax, name in zip(grid.flat, names, strict=False):
+        one = result.parameters[name]
+        values = [line.values[name] for line in result.history]
+        _by_phase(ax, result, values, "o")
+        for limit in (one.min, one.max):
+            if min(values) <= limit <= max(values):
+                ax.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
+        bound = f" (on its {one.at_bound})" if one.at_bound else ""
+        ax.set_title(f"{name} = {one.value:.5g} {one.unit}{bound}", fontsize=9)
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        tidy(ax)
+    for k, ax in enumerate(grid.flat):
+        lowest = k + columns >= len(names)
+        ax.tick_params(labelbottom=lowest)
+        ax.set_xlabel("iteration" if lowest else "")
+        ax.set_visible(k < len(names))
+    phases = dict.fromkeys(line.phase for line in result.history)
+    if len(phases) > 1:
+        handles = grid[0, 0].get_legend_handles_labels()
+        figure.legend(*handles, loc="outside lower right", ncols=len(phases), frameon=False)
+    figure.suptitle(f"{result.name}: the parameters on their way", fontsize=11)
+    return figure
+
+
+def waterfall(found: Minima, title: str) -> Figure:
+    """Return the costs that all starts led to, in rising order, with those they began at."""
+    figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
+    axes = figure.subplots()
+    refined = np.flatnonzero(np.isfinite(found.end_costs))
+    order = refined[np.argsort(found.end_costs[refined], kind="stable")]
+    ranks = np.arange(1, len(order) + 1)
+    axes.plot(ranks, found.start_costs[order], ".", color=MEASURED, markersize=3, label="start")
+    axes.step(
+        ranks, found.end_costs[order], where="mid", color=SIMULATED, linewidth=1.4, label="refined"
+    )
+    axes.set_yscale("log")
+    axes.set_xlabel("start, by the cost that it led to")
+    axes.set_ylabel("cost f (pu²)")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.legend(loc="outside lower right", ncols=2, frameon=False)
+    best = found.minima[0].starts
+    axes.set_title(
+        f"{best} of {len(order)} refined starts led to the lowest minimum", fontsize=9, loc="right"
+    )
+    tidy(axes)
+    figure.suptitle(f"{title}: the minima that {len(found.start_costs)} starts found", fontsize=11)
+    return figure

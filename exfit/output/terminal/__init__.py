@@ -1,0 +1,32 @@
+"""What the terminal shows: tables and lines, with rich."""
+
+from exfit.output.terminal.agreement import agreement
+from exfit.output.terminal.checks import check
+from exfit.output.terminal.fits import fit
+from exfit.output.terminal.knowledge import design, profiles
+from exfit.output.terminal.matches import comparisons
+from exfit.output.terminal.progress import Bar, Watch, task
+from exfit.output.terminal.records import inspection
+from exfit.output.terminal.sheets import catalogue, machine, model
+from exfit.output.terminal.terminal import again, console, notes, waiting, written
+
+__all__ = [
+    "Bar",
+    "Watch",
+    "again",
+    "agreement",
+    "catalogue",
+    "check",
+    "comparisons",
+    "console",
+    "design",
+    "fit",
+    "inspection",
+    "machine",
+    "model",
+    "notes",
+    "profiles",
+    "task",
+    "waiting",
+    "written",
+]

@@ -1,0 +1,188 @@
+"""A search while it runs."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import zip_longest
+
+from rich.console import Console
+from rich.live import Live
+from rich.progress import TaskID
+from rich.text import Text
+
+from exfit.analysis.iteration_responses import Sketch
+from exfit.case.case import Case
+from exfit.estimate import Progress
+from exfit.output.terminal.sketch import LEAST_HEIGHT, LEAST_WIDTH, sketched
+from exfit.results.model import Iteration
+
+LINES = 12  # of the history that stay in sight
+FEWEST = 4  # of them beside a plot
+TABLE = 63  # characters of the history
+GAP = 2  # columns between the history and a plot beside it
+AROUND = 5  # lines beside the history: title, what is hidden, names of columns, progress, cursor
+HIGHEST = (20, 14)  # lines of a plot beside the history and below it
+WIDEST = 100  # columns of a plot
+SHARE = 0.03  # of the time of a fit: so much may be spent on showing it
+FORMS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>5}", "{:>5}")
+HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "inner", "nfev")
+
+
+class Watch:
+    """Shows the iterations of a fit as they come: a live table, or lines in a file or pipe.
+
+    A terminal with room for it has a plot of the response beside the table or below it. ``most`` is
+    the largest number of iterations of a phase.
+    """
+
+    def __init__(self, console: Console, title: str, most: int | None = None) -> None:
+        self.console, self.title, self.most = console, title, most
+        self.lines: list[Iteration] = []
+        self._sketch: Sketch | None = None
+        self._live: Live | None = None
+        self._next = 0.0  # when it may be drawn again
+
+    @contextmanager
+    def running(self) -> Iterator["Watch"]:
+        """Show the table for as long as the fit runs."""
+        if not self.console.is_terminal:
+            yield self
+            return
+        with Live(console=self.console, auto_refresh=False) as self._live:
+            try:
+                yield self
+            finally:
+                if self.lines:
+                    self._live.update(self.picture(), refresh=True)
+
+    @property
+    def look(self) -> Callable[[Sketch], None] | None:
+        """What is to be told the responses; None where they would not be shown."""
+        shows = self.console.is_terminal and not self.console.options.ascii_only
+        return self._keep if shows else None
+
+    def _keep(self, sketch: Sketch) -> None:
+        self._sketch = sketch
+
+    def __call__(self, line: Iteration) -> None:
+        """Show one more iteration."""
+        self.lines.append(line)
+        if len(self.lines) == 1:
+            self.console.print(self.title, markup=False)
+        if self._live is None:
+            if len(self.lines) == 1:
+                self.console.print(_row(HISTORY), soft_wrap=True)
+            self.console.print(_row(_cells(line)), soft_wrap=True)
+        else:
+            self._draw(self._live)
+
+    def _draw(self, live: Live) -> None:
+        """Draw, unless that was done so lately that it would slow down the fit."""
+        began = time.perf_counter()
+        if began < self._next:
+            return
+        live.update(self.picture(), refresh=True)
+        ended = time.perf_counter()
+        self._next = ended + (ended - began) / SHARE
+
+    def picture(self) -> Text:
+        """Return the table, and the plot where there is room for it: beside or below."""
+        width, height = self.console.size
+        free, beside, below = height - AROUND, width - TABLE - GAP, height - AROUND - FEWEST
+        if self._sketch is not None and beside >= LEAST_WIDTH and free >= LEAST_HEIGHT:
+            plot = sketched(self._sketch, min(beside, WIDEST), min(free, HIGHEST[0]))
+            table = [Text(line.plain.ljust(TABLE + GAP), line.style) for line in self._table(free)]
+            blank = Text(" " * (TABLE + GAP))
+            both = zip_longest(table, plot)
+            lines = [(left or blank) + (right or Text()) for left, right in both]
+            return _joined([*lines, self._progress()])
+        if self._sketch is not None and below >= LEAST_HEIGHT and width > LEAST_WIDTH:
+            plot = sketched(self._sketch, min(width - 1, WIDEST), min(below, HIGHEST[1]))
+            return _joined([*self._table(free - len(plot)), self._progress(), *plot])
+        return _joined([*self._table(max(free, 1)), self._progress()])
+
+    def _table(self, room: int) -> list[Text]:
+        """Return the last lines of the history, in no more than so many beside its head."""
+        rows, columns = min(room, LINES), _fitting(self.console.width)
+        hidden = len(self.lines) - rows
+        above = f"({hidden} earlier iterations)" if hidden > 0 else ""
+        head = Text(_row(HISTORY[:columns]), style="bold")
+        return [
+            Text(above, style="dim"),
+            head,
+            *(Text(_row(_cells(line)[:columns])) for line in self.lines[-rows:]),
+        ]
+
+    def _progress(self) -> Text:
+        first, last = self.lines[0], self.lines[-1]
+        limit = "" if self.most is None else f" (at most {self.most} a phase)"
+        share = last.cost / first.cost if first.cost > 0.0 else 1.0
+        cost = f"cost {last.cost:.4e}, {100.0 * share:.3g} % of the start's"
+        text = f"iteration {last.number}{limit}: {cost}"
+        return Text(text, style="dim")
+
+
+def _joined(lines: Iterable[Text]) -> Text:
+    """Return lines below each other; what is wider than the terminal is cut off."""
+    found = Text("\n").join(lines)
+    found.no_wrap, found.overflow = True, "crop"
+    return found
+
+
+def _row(cells: Sequence[str]) -> str:
+    """Return the first cells of a line of the history, each in its column."""
+    return " ".join(form.format(cell) for form, cell in zip(FORMS, cells, strict=False))
+
+
+def _fitting(width: int) -> int:
+    """Return how many columns of the history a terminal has room for: none is cut in two."""
+    return max(k for k in range(1, len(HISTORY) + 1) if k == 1 or len(_row(HISTORY[:k])) <= width)
+
+
+def _cells(line: Iteration) -> tuple[str, ...]:
+    return (
+        str(line.number),
+        line.phase,
+        f"{line.cost:.4e}",
+        f"{line.gradient_norm:.2e}",
+        f"{line.step_norm:.2e}",
+        f"{line.damping:.2e}" if line.damping == line.damping else "-",
+        str(line.inner),
+        str(line.nfev),
+    )
+
+
+def task(case: Case, strategy: str | None) -> str:
+    """Return what a fit is about to do."""
+    free = ", ".join(case.free())
+    return f"{case.path.stem}: {case.subject}, {strategy or case.estimate.strategy}; free {free}"
+
+
+class Bar:
+    """Shows how far many searches are, with the time left; in a file or pipe a line at the end."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+
+    @contextmanager
+    def running(self) -> Iterator[Callable[[Progress], None]]:
+        """Return what is to be told the progress."""
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bars
+
+        columns = (
+            TextColumn("{task.description:<10}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            TextColumn("best cost {task.fields[best]:.4e}"),
+        )
+        with Bars(*columns, console=self.console) as bars:
+            tasks: dict[str, TaskID] = {}
+
+            def tell(now: Progress) -> None:
+                if now.stage not in tasks:
+                    tasks[now.stage] = bars.add_task(now.stage, total=now.total, best=now.best)
+                bars.update(tasks[now.stage], completed=now.done, best=now.best)
+
+            yield tell

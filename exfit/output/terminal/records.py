@@ -1,0 +1,82 @@
+"""What a recorder's file holds."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.text import Text
+
+from exfit.dsp.sampling import Sampling
+from exfit.output.terminal.terminal import notes, number, plain_table
+from exfit.records.inspection import Channel, Inspection
+
+NAME = 22  # letters of a channel's name that leave room for its numbers
+
+
+def inspection(console: Console, found: Inspection, record: Sequence[str]) -> None:
+    """Show what a file holds, and the sections of a case that it suggests."""
+    clock = " and ".join(found.clock.columns)
+    console.print(
+        f"{found.path.name}: {len(found.time)} samples by {clock}, "
+        f"{found.sampling.start:.6g} ... {found.sampling.end:.6g} s",
+        markup=False,
+    )
+    console.print(in_words(found.sampling), markup=False)
+    console.print()
+    _channels(console, found.channels)
+    console.print()
+    _steps(console, found)
+    console.print()
+    if found.findings:
+        notes(console, found.findings)
+        console.print()
+    console.print("for a case; what is in # comments is a guess to check:")
+    console.print()
+    console.print("\n".join(record), markup=False, soft_wrap=True)
+    console.print()
+
+
+def in_words(sampling: Sampling) -> str:
+    """Return how a record is sampled as a sentence."""
+    rate = f"{sampling.rate:.4g} Hz" if sampling.rate >= 1.0 else f"every {sampling.step:.4g} s"
+    if sampling.even:
+        text = f"sampled evenly, {rate}, {1e3 * sampling.step:.6g} ms apart"
+    else:
+        low, high = 1e3 * sampling.smallest, 1e3 * sampling.largest
+        text = (
+            f"sampled unevenly, {rate}: {low:.4g} to {high:.4g} ms apart, "
+            f"mostly {1e3 * sampling.step:.4g}"
+        )
+    count = len(sampling.gaps)
+    return text + (f"; {count} gap{'s' if count > 1 else ''}" if count else "; no gaps")
+
+
+def _channels(console: Console, channels: Sequence[Channel]) -> None:
+    heads = ("at rest", "smallest", "largest", "noise", "rounded to")
+    table = plain_table("channel", "unit", "is", *heads, numbers=heads)
+    for one in channels:
+        name = one.name if len(one.name) <= NAME else one.name[: NAME - 1] + "…"
+        unit = (one.unit or "") + ("?" if one.unit_from == "name" else "")
+        cells = (
+            name,
+            unit,
+            f"{one.signal}?" if one.signal else "",
+            number(one.level),
+            number(one.low),
+            number(one.high),
+            f"{one.frequency:.4g} Hz" if one.frequency else number(one.noise, 2),
+            number(one.quantum, 2),
+        )
+        table.add_row(*(Text(cell) for cell in cells))
+    console.print(table)
+
+
+def _steps(console: Console, found: Inspection) -> None:
+    if not found.steps:
+        console.print("no step is seen in any channel")
+        return
+    table = plain_table("step at (s)", "+- (s)", "changes for good", numbers=("step at (s)",))
+    for step in found.steps:
+        sizes = ", ".join(f"{name} {size:+.4g}" for name, size in step.sizes.items())
+        at = f"{step.at:.4f}" if not step.from_start else f"<= {step.at:.4g}"
+        table.add_row(at, "-" if step.from_start else f"{step.error:.1g}", Text(sizes))
+    console.print(table)

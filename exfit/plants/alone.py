@@ -1,0 +1,47 @@
+"""No plant: a model alone, whose output is the voltage."""
+
+from functools import cache
+
+from exfit.engine.system import Motion, Rest, Signals, System
+from exfit.models.blocks import quadratic
+from exfit.models.sheet import Model
+from exfit.plants.parts import (
+    VT0,
+    Names,
+    exciter_inputs,
+    exciter_parameters,
+    motion,
+    refuse_taken,
+    rest_of,
+    seconds,
+    state_of,
+    symbols,
+)
+
+
+@cache
+def alone(model: Model) -> System:
+    """Return a model without a plant: its output is ``vt``."""
+    refuse_taken(model, ("vref", "vt"))
+
+    def rest(p: Signals) -> Rest:
+        u = exciter_inputs(vt=p[VT0], ifd=0.0)
+        found = rest_of(model, p[VT0], u, exciter_parameters(p, model, quadratic))
+        return Rest(found.states, found.setpoints)
+
+    def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+        vref, d = r["vref"] + u["vref"], Names()
+        values = exciter_parameters(p, model, quadratic)
+        output = model.equations(state_of(model, x, r), exciter_inputs(vref=vref), values, d)
+        return motion(d, model.states, {"vref": vref, "vt": output, **x})
+
+    return System(
+        parameters=(*symbols("", model.sheet), VT0),
+        setpoints=("vref", *model.setpoints),
+        states=model.states,
+        inputs=("vref",),
+        outputs=("vref", "vt", *model.states),
+        time_constants=tuple(seconds("", model.sheet)),
+        rest=rest,
+        motion=course,
+    )

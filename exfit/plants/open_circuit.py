@@ -1,0 +1,104 @@
+"""A machine whose breaker is open, at rated speed."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+from exfit.engine.system import Motion, Rest, Signals, System
+from exfit.engine.trace import Signal
+from exfit.models.machines import Axes, Machine
+from exfit.models.sheet import Model
+from exfit.plants.parts import (
+    MACHINE,
+    MEASURED,
+    VT0,
+    Names,
+    SaturationForm,
+    exciter_inputs,
+    exciter_parameters,
+    motion,
+    named_parameters,
+    refuse_taken,
+    rest_of,
+    seconds,
+    state_of,
+    symbols,
+    values_named,
+    values_of,
+)
+
+SIGNALS = ("vref", "vt", "efd", "ifd")
+NO_CURRENT = Axes(0.0, 0.0)
+
+
+class OpenMachine(NamedTuple):
+    """A machine on open circuit at one instant; ``moved(efd, d)`` writes its slopes."""
+
+    vt: Signal
+    ifd: Signal
+    moved: Callable[[Signal, Names], None]
+
+
+def machine_on_open_circuit(machine: Machine, x: Signals, p: Names) -> OpenMachine:
+    """Return what a machine without stator current shows; the fluxes of its q axis are zero."""
+    s = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
+    ifd = machine.field(s, NO_CURRENT, p)
+
+    def moved(efd: Signal, d: Names) -> None:
+        machine.slopes(s, efd, ifd, NO_CURRENT, p, d)
+
+    return OpenMachine(machine.source(s, p).voltage.q, ifd, moved)
+
+
+def at_rest(machine: Machine, vt: Signal, p: Names) -> tuple[dict[str, Signal], Signal]:
+    """Return the states that hold vt without stator current, and the field current."""
+    fluxes = Names()
+    machine.rest(Axes(0.0, vt), NO_CURRENT, p, fluxes)
+    return values_of(fluxes, machine.d_axis), machine.field(fluxes, NO_CURRENT, p)
+
+
+@cache
+def open_circuit(
+    model: Model,
+    machine: Machine,
+    saturation: SaturationForm,
+    inputs: tuple[str, ...] = ("vref",),
+) -> System:
+    """Return an exciter on a machine whose breaker is open, at rated speed.
+
+    Parameters are the exciter's, the machine's (``machine.Tpd0``) and the initial voltage ``vt0``;
+    of the inputs, ``vref`` is the change of the reference from the one that holds ``vt0``, and
+    ``vs`` a signal in place of a stabiliser; ``vc1`` is added to the voltage that the exciter
+    measures. All per unit.
+    """
+    refuse_taken(model, (*SIGNALS, MEASURED, *machine.d_axis))
+    states = (*machine.d_axis, *model.states)
+
+    def rest(p: Signals) -> Rest:
+        fluxes, ifd = at_rest(machine, p[VT0], named_parameters(p, MACHINE, machine.sheet))
+        u = exciter_inputs(vt=p[VT0], ifd=ifd)
+        found = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
+        return Rest({**fluxes, **found.states}, found.setpoints)
+
+    def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+        d = Names()
+        at = machine_on_open_circuit(machine, x, named_parameters(p, MACHINE, machine.sheet))
+        vref = r["vref"] + u["vref"]
+        measured = at.vt + u.get(MEASURED, 0.0)
+        seen = exciter_inputs(vref=vref, vt=at.vt, vc1=measured, ifd=at.ifd, vs=u.get("vs", 0.0))
+        values = exciter_parameters(p, model, saturation)
+        efd = model.equations(state_of(model, x, r), seen, values, d)
+        at.moved(efd, d)
+        outputs = {"vref": vref, "vt": at.vt, MEASURED: at.vt, "efd": efd, "ifd": at.ifd, **x}
+        return motion(d, states, outputs)
+
+    return System(
+        parameters=(*symbols("", model.sheet), *symbols(MACHINE, machine.sheet), VT0),
+        setpoints=("vref", *model.setpoints),
+        states=states,
+        inputs=inputs,
+        outputs=(*SIGNALS, *states),
+        time_constants=(*seconds("", model.sheet), *seconds(MACHINE, machine.sheet)),
+        rest=rest,
+        motion=course,
+    )

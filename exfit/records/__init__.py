@@ -1,0 +1,1 @@
+"""Records of measurements: reading, inspecting, recognising."""

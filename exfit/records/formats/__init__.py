@@ -1,0 +1,41 @@
+"""Recorders' files, each kind read by a module of its own, all to the same table."""
+
+from pathlib import Path
+
+from exfit.errors import RecordError
+from exfit.records.formats.table import Table
+from exfit.records.formats.text import read_text_table
+from exfit.siblings import siblings
+
+__all__ = ["Table", "open_table"]
+
+COMTRADE = (".cfg", ".cff")
+BESIDE_CFG = (".dat", ".hdr")  # text files too may be called so
+WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
+
+
+def open_table(path: Path, sheet: str | None = None) -> Table:
+    """Return the table of a file of any kind that is known, by its suffix; ``sheet`` of a workbook.
+
+    Raises RecordError for a file that cannot be read, and for a sheet of a file without sheets.
+    """
+    suffix = path.suffix.lower()
+    if suffix in WORKBOOKS:
+        from exfit.records.formats.excel import read_excel
+
+        return read_excel(path, sheet)
+    if sheet is not None:
+        raise RecordError(f"{path}: has no sheets such as {sheet!r}: a workbook has them")
+    if suffix in COMTRADE or (suffix in BESIDE_CFG and siblings(path, ".cfg")):
+        from exfit.records.formats.comtrade import read_comtrade
+
+        return read_comtrade(path)
+    if suffix == ".mat":
+        from exfit.records.formats.matlab import read_mat
+
+        return read_mat(path)
+    if suffix == ".parquet":
+        from exfit.records.formats.parquet import read_parquet
+
+        return read_parquet(path)
+    return read_text_table(path)

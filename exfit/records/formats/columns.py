@@ -1,0 +1,119 @@
+"""A table whose columns are fetched one by one: what the readers of binary files share."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import RecordError
+from exfit.records.formats.clock import clock_of, in_seconds
+from exfit.records.formats.table import (
+    NONE,
+    Array,
+    column_error,
+    increases,
+    position,
+    refuse_uneven,
+)
+
+T = TypeVar("T")
+
+SECOND = np.timedelta64(1, "s")
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """A Table over columns that are fetched when they are asked for, by position.
+
+    ``fetch`` returns float64, or datetime64[ns] for timestamps and timedelta64[ns] for times of
+    day, nan or NaT where a sample is missing; it raises RecordError for a column of anything else.
+    ``where`` names the place of a sample, counted from 0. ``said`` are the columns of the time
+    where the kind of file itself says so, ``stamps`` those known to hold timestamps.
+    """
+
+    path: Path
+    sha256: str
+    names: tuple[str, ...]
+    units: Mapping[str, str]
+    fetch: Callable[[int], NDArray[Any]]
+    where: Callable[[int], str]
+    said: tuple[str, ...] = ()
+    stamps: tuple[str, ...] = ()
+
+    @cached_property
+    def clock(self) -> tuple[str, ...]:
+        """The column that holds the time, or those of date and time; empty where none seems to."""
+        return self.said or clock_of(self.names, self.stamps, partial(increases, self))
+
+    def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
+        """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
+
+        Raises RecordError for a column that is not there or there twice, that holds no numbers or
+        lacks one, and for columns that are not equally long.
+        """
+        columns = {name: self._numbers(name, name in gappy) for name in names}
+        refuse_uneven(self.path, columns)
+        return columns
+
+    def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
+        """Return the time (M,) in s: numbers as they stand, timestamps since the first of them.
+
+        ``columns`` are one, or a date and a time of day; ``unit`` is that of numbers: s, ms, us or
+        min. Raises RecordError where it contradicts the file, and where a sample is missing.
+        """
+        found = {name: self._whole(name) for name in columns}
+        refuse_uneven(self.path, found)
+        first = columns[0]
+        if len(found) == 1 and found[first].dtype.kind == "f":
+            return in_seconds(self.path, first, found[first], self.units.get(first), unit)
+        if unit is not None:
+            raise column_error(self.path, first, f"timestamps, no numbers of {unit}")
+        ticks = self._ticks(found)
+        return np.asarray((ticks - ticks[0]) / SECOND, np.float64)
+
+    def place(self, row: int) -> str:
+        """Return where a sample stands, counted from 0, as messages name it."""
+        return self.where(row)
+
+    def _numbers(self, name: str, gappy: bool) -> Array:
+        column = self.fetch(position(self.path, self.names, name)) if gappy else self._whole(name)
+        if column.dtype.kind != "f":
+            raise column_error(self.path, name, "timestamps, not numbers")
+        return np.asarray(column, np.float64)
+
+    def _whole(self, name: str) -> NDArray[Any]:
+        """Return a column that lacks no sample."""
+        column = self.fetch(position(self.path, self.names, name))
+        lost = np.flatnonzero(np.isnan(column))  # NaT too
+        if lost.size:
+            raise column_error(self.where(int(lost[0])), name, "the sample is missing")
+        return column
+
+    def _ticks(self, found: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+        """Return instants of one column, or of a date and a time of day."""
+        kinds = "".join(sorted(column.dtype.kind for column in found.values()))
+        if kinds not in ("M", "m", "Mm"):
+            names = " and ".join(map(repr, found))
+            raise RecordError(f"{self.path}: columns {names} are not a date and a time of day")
+        first, *rest = found.values()
+        return first + rest[0] if rest else first
+
+
+def needed(path: Path, package: str, extra: str) -> RecordError:
+    """Return the error of an optional package that is not installed."""
+    return RecordError(
+        f'{path}: reading it needs the package {package}: pip install "exfit[{extra}]"'
+    )
+
+
+def sound(path: Path, kind: str, read: Callable[[], T]) -> T:
+    """Return what a package reads of a file, or raise RecordError that it is none of its kind."""
+    try:
+        return read()
+    except Exception as error:  # a damaged file fails in a package in many ways
+        what = str(error).partition("\n")[0] or type(error).__name__
+        raise RecordError(f"{path}: not {kind}, or damaged: {what}") from None

@@ -1,0 +1,107 @@
+"""The configuration of a COMTRADE record, its .cfg: checked, then read by the package comtrade."""
+
+import io
+import math
+import re
+from typing import TYPE_CHECKING
+
+from exfit.errors import RecordError
+from exfit.records.formats.columns import needed
+from exfit.records.formats.comtrade.files import Parts
+
+if TYPE_CHECKING:
+    from comtrade import Cfg
+
+REVISIONS = ("", "1991", "1999", "2001", "2013")  # none stands for 1991 (-1999, 5.3.1)
+KINDS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")
+ANALOG_CELLS = (10, 13)  # 1991, and since
+STATUS_CELLS = (3, 5)
+SLOWEST = 1e-6  # Hz: less is no sampling rate
+TEXT_SHOWN = 60
+
+_COUNTS = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*[Aa]\s*,\s*(\d{1,6})\s*[Dd]\s*")
+_NO_FRACTION = re.compile(r"(\d:\d\d:\d\d)(?=[ \t]*$)", re.MULTILINE)
+
+
+def config_of(parts: Parts) -> "Cfg":
+    """Return the configuration as the package reads it, where its lines are as they should be.
+
+    Raises RecordError for a line that cannot be, or the package comtrade missing.
+    """
+    try:
+        from comtrade import Cfg
+    except ImportError:
+        raise needed(parts.path, "comtrade", "comtrade") from None
+    _check_lines(parts)
+    text = _NO_FRACTION.sub(r"\1.0", parts.text)  # the package fails where seconds have none
+    stream = io.StringIO(text)
+    config = Cfg(ignore_warnings=True)
+    try:
+        config.read(stream)
+    except Exception as error:  # a damaged line fails in the package in many ways
+        at = text.count("\n", 0, max(stream.tell() - 1, 0))
+        line = [*text.split("\n"), ""][at][:TEXT_SHOWN]
+        raise RecordError(f"{parts.line(at)}: {line!r} cannot be read: {error}") from None
+    _check_config(parts, config)
+    return config
+
+
+def _check_lines(parts: Parts) -> None:
+    """Raise RecordError where a line has too many or too few cells, which the package fills."""
+    lines = parts.text.rstrip().split("\n")
+    if not lines[0].strip():
+        raise RecordError(f"{parts.line(0)}: station, device and revision are missing")
+    cells = [cell.strip() for cell in lines[0].split(",")]
+    if len(cells) not in (2, 3):
+        raise RecordError(f"{parts.line(0)}: {len(cells)} cells: station, device, revision")
+    if len(cells) == 3 and cells[2] not in REVISIONS:
+        known = ", ".join(REVISIONS[1:])
+        raise RecordError(f"{parts.line(0)}: revision {cells[2]!r} is none of {known}")
+    counts = _COUNTS.fullmatch(lines[1]) if len(lines) > 1 else None
+    if counts is None:
+        raise RecordError(f"{parts.line(1)}: the numbers of channels are missing, as in 6,4A,2D")
+    total, analog, status = map(int, counts.groups())
+    if total != analog + status or total == 0:
+        raise RecordError(
+            f"{parts.line(1)}: {total} channels, but {analog} analog and {status} status channels"
+        )
+    if len(lines) < total + 2:
+        raise RecordError(
+            f"{parts.line(len(lines) - 1)}: it ends here: {total} channels, {len(lines) - 2} lines"
+        )
+    for at in range(2, total + 2):
+        kind, allowed = ("analog", ANALOG_CELLS) if at < analog + 2 else ("status", STATUS_CELLS)
+        count = lines[at].count(",") + 1
+        if count not in allowed:
+            raise RecordError(
+                f"{parts.line(at)}: {count} cells of an {kind} channel, not "
+                f"{' or '.join(map(str, allowed))}"
+            )
+
+
+def _check_config(parts: Parts, config: "Cfg") -> None:
+    """Raise RecordError where a number of the configuration cannot be."""
+    for at, channel in enumerate(config.analog_channels):
+        if not (math.isfinite(channel.a) and math.isfinite(channel.b)):
+            raise RecordError(
+                f"{parts.line(at + 2)}: channel {channel.name!r}: a = {channel.a}, b = {channel.b}"
+            )
+    first = config.analog_count + config.status_count + 4
+    if not config.sample_rates:
+        raise RecordError(f"{parts.line(first - 1)}: {config.nrates} sampling rates")
+    before = 0
+    for at, (rate, last) in enumerate(config.sample_rates):
+        if rate != 0.0 and not SLOWEST < rate < math.inf:
+            raise RecordError(f"{parts.line(first + at)}: a sampling rate of {rate} Hz")
+        if last <= before:
+            raise RecordError(
+                f"{parts.line(first + at)}: the rate ends at sample {last}, not behind {before}"
+            )
+        before = last
+    multiplier = config.timemult
+    if not (math.isfinite(multiplier) and multiplier > 0.0):
+        raise RecordError(f"{parts.cfg}: a time multiplier of {multiplier}")
+    if config.ft.upper() not in KINDS:
+        raise RecordError(
+            f"{parts.cfg}: data of the kind {config.ft!r}, which is none of {', '.join(KINDS)}"
+        )

@@ -1,0 +1,111 @@
+"""The files of a COMTRADE record: a configuration and its data, in two files or in one."""
+
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from exfit.errors import RecordError
+from exfit.records.formats.table import read_bytes
+from exfit.siblings import siblings
+
+_SECTION = re.compile(
+    rb"^--- *file type: *([a-z]+)(?: +([a-z0-9]+))?(?: *: *([0-9]{1,15}))? *---[ \t]*\r?\n",
+    re.IGNORECASE | re.MULTILINE,
+)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The two halves of a record, whether they are two files or one."""
+
+    path: Path
+    cfg: Path
+    text: str
+    first_line: int
+    dat: Path
+    data: bytes
+    sha256: str
+
+    def line(self, at: int) -> str:
+        """Return the place of a line of the configuration, counted from 0."""
+        return f"{self.cfg}:{self.first_line + at}"
+
+    def sample(self, row: int) -> str:
+        """Return the place of a sample, counted from 0."""
+        return f"{self.dat}: sample {row + 1}"
+
+
+def of_file(path: Path) -> Parts:
+    """Return the parts of a record, by its .cfg, its .dat or its .cff file.
+
+    Raises RecordError for a file of another kind, and where one is missing or cut off.
+    """
+    kind = path.suffix.lower()
+    if kind not in (".cfg", ".dat", ".cff"):
+        raise RecordError(f"{path}: a COMTRADE record is a .cfg with its .dat, or a .cff")
+    return _of_one_file(path) if kind == ".cff" else _of_two_files(path)
+
+
+def _of_two_files(path: Path) -> Parts:
+    found = read_bytes(path)
+    if path.suffix.lower() == ".cfg":
+        cfg, dat, text = path, _beside(path, ".dat"), found
+        data = read_bytes(dat)
+    else:
+        cfg, dat, data = _beside(path, ".cfg"), path, found
+        text = read_bytes(cfg)
+    sha256 = hashlib.sha256(text + data).hexdigest()
+    return Parts(path, cfg, _decoded(cfg, text), 1, dat, data, sha256)
+
+
+def _beside(path: Path, suffix: str) -> Path:
+    """Return the file of the same name with another suffix, in capitals or not."""
+    found = siblings(path, suffix)
+    if not found:
+        raise RecordError(f"{path}: {path.stem}{suffix} is not beside it")
+    if len(found) > 1:
+        names = " and ".join(one.name for one in found)
+        raise RecordError(f"{path}: more than one file may belong to it: {names}")
+    return found[0]
+
+
+def _of_one_file(path: Path) -> Parts:
+    """Return the parts of a .cff file (IEEE Std C37.111-2013, clause 9)."""
+    whole = read_bytes(path)
+    sections = {}
+    for found in _SECTION.finditer(whole):
+        sections[found[1].upper().decode()] = found
+        if found[1].upper() == b"DAT":  # what follows may be binary
+            break
+    for name in ("CFG", "DAT"):
+        if name not in sections:
+            raise RecordError(f"{path}: no line --- file type: {name} ---")
+    cfg, dat = sections["CFG"], sections["DAT"]
+    ends = [found.start() for found in sections.values() if found.start() > cfg.start()]
+    if not ends:
+        raise RecordError(f"{path}: the data stand before the configuration")
+    data = whole[dat.end() :]
+    if dat[3] is not None:
+        data = _cut(path, data, int(dat[3]))
+    text = _decoded(path, whole[cfg.end() : min(ends)])
+    first_line = whole.count(b"\n", 0, cfg.end()) + 1
+    return Parts(path, path, text, first_line, path, data, hashlib.sha256(whole).hexdigest())
+
+
+def _cut(path: Path, data: bytes, size: int) -> bytes:
+    if len(data) < size:
+        raise RecordError(f"{path}: {len(data)} of {size} bytes of data: it is cut off")
+    return data[:size]
+
+
+def _decoded(path: Path, text: bytes) -> str:
+    """Return a configuration as text with line ends of one kind; latin-1 where it is not UTF-8."""
+    if b"\0" in text:
+        line = text.count(b"\n", 0, text.index(b"\0")) + 1
+        raise RecordError(f"{path}:{line}: not text: byte 0x00")
+    try:
+        decoded = text.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        decoded = text.decode("latin-1")
+    return decoded.replace("\r\n", "\n").replace("\r", "\n").replace("\x1a", "")

@@ -1,0 +1,33 @@
+"""The head of a table: a row of names, and perhaps a row of units below it.
+
+Names stay as the file has them, without blanks around them: ``Ut [kV]``, not ``Ut``. A column
+without a name is called by its number in the row, counted from 1; names that stand there twice are
+refused only where they are asked for.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from exfit.records.units import unit_in, unit_of
+
+NO_UNIT = ("", "-", "1", "[-]", "[1]")
+
+
+def names_of(cells: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of columns by the cells of their row."""
+    return tuple(cell.strip() or str(at + 1) for at, cell in enumerate(cells))
+
+
+def is_units(cells: Sequence[str]) -> bool:
+    """Tell whether a row is one of units: each cell is one, or says that there is none."""
+    return all(cell.strip() in NO_UNIT or unit_of(cell) for cell in cells)
+
+
+def units_of(names: Sequence[str], row: Sequence[str] = ()) -> dict[str, str]:
+    """Return the units by column: from a row or fields of their own, else out of the names."""
+    said = dict(zip(names, map(unit_of, row), strict=False))
+    return stated({name: said.get(name) or unit_in(name) for name in names})
+
+
+def stated(units: Mapping[str, str | None]) -> dict[str, str]:
+    """Return those units that say something."""
+    return {name: unit for name, unit in units.items() if unit and unit not in NO_UNIT}

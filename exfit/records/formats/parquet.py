@@ -1,0 +1,128 @@
+"""Parquet files, by pyarrow; a column is read when it is asked for."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.errors import RecordError
+from exfit.records.formats.columns import Columns, needed, sound
+from exfit.records.formats.heads import stated
+from exfit.records.formats.table import Table, column_error, readable
+from exfit.records.units import unit_in
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    from pyarrow.parquet import ParquetFile
+
+PARQUET = "a Parquet file"
+UNIT_KEYS = (b"unit", b"units")  # of a column's metadata
+
+
+def read_parquet(path: Path) -> Table:
+    """Return the table of a Parquet file: its columns of numbers, timestamps and times of day.
+
+    Nulls are missing samples; the unit is that of the column's metadata (unit or units), else of
+    its name. Raises RecordError for a file that is damaged or empty, or the package pyarrow
+    missing.
+    """
+    try:
+        from pyarrow.parquet import ParquetFile
+    except ImportError:
+        raise needed(path, "pyarrow", "parquet") from None
+    sha256 = _hash(path)
+
+    def opened() -> "ParquetFile":
+        return ParquetFile(path, page_checksum_verification=True)
+
+    schema, rows = sound(path, PARQUET, lambda: _outline(opened))
+    if rows == 0:
+        raise RecordError(f"{path}: no samples in it")
+    names = tuple(schema.names)
+    return Columns(
+        path=path,
+        sha256=sha256,
+        names=names,
+        units=_units(schema),
+        fetch=lambda at: _fetch(path, opened, schema.field(at)),
+        where=lambda row: f"{path}: row {row + 1}",
+        stamps=tuple(field.name for field in schema if _is_stamp(field.type)),
+    )
+
+
+def _hash(path: Path) -> str:
+    with readable(path), path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":
+    with opened() as file:
+        return file.schema_arrow, file.metadata.num_rows
+
+
+def _units(schema: "pa.Schema") -> dict[str, str]:
+    return stated(
+        {field.name: _said(field.metadata or {}) or unit_in(field.name) for field in schema}
+    )
+
+
+def _said(metadata: Mapping[bytes, bytes]) -> str | None:
+    """Return the unit in the metadata of a column."""
+    return next(
+        (metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if key in metadata), None
+    )
+
+
+def _is_stamp(kind: "pa.DataType") -> bool:
+    from pyarrow import types
+
+    return types.is_temporal(kind) and not types.is_interval(kind)
+
+
+def _fetch(path: Path, opened: "Callable[[], ParquetFile]", field: "pa.Field") -> NDArray[Any]:
+    """Return a column as float64, datetime64[ns] or timedelta64[ns]."""
+    steps = _steps(field.type)
+    if not steps:
+        raise column_error(path, field.name, f"{field.type}, not numbers")
+
+    def read() -> "pa.ChunkedArray":
+        with opened() as file:
+            return file.read(columns=[field.name]).column(0)
+
+    return _cast(path, field.name, sound(path, PARQUET, read), steps)
+
+
+def _cast(
+    path: Path, name: str, column: "pa.ChunkedArray", steps: "tuple[pa.DataType, ...]"
+) -> NDArray[Any]:
+    from pyarrow import ArrowInvalid
+    from pyarrow.types import is_floating
+
+    try:
+        for kind in steps:
+            # an integer beyond 2**53 becomes the float64 next to it; a date beyond ns does not
+            column = column.cast(kind, safe=not is_floating(kind))
+    except ArrowInvalid as error:
+        raise column_error(path, name, str(error)) from None
+    return np.asarray(column.to_numpy())
+
+
+def _steps(kind: "pa.DataType") -> "tuple[pa.DataType, ...]":
+    """Return the types by which a column is cast to one that NumPy knows; none for text."""
+    from pyarrow import duration, float64, int64, time64, timestamp, types
+
+    if types.is_dictionary(kind):
+        kind = kind.value_type
+    if types.is_timestamp(kind) or types.is_date(kind):
+        return (timestamp("ns"),)
+    if types.is_duration(kind):
+        return (duration("ns"),)
+    if types.is_time(kind):
+        return (time64("ns"), int64(), duration("ns"))
+    number = types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)
+    if number or types.is_boolean(kind) or types.is_null(kind):
+        return (float64(),)
+    return ()

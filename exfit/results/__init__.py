@@ -1,0 +1,1 @@
+"""What a fit leaves behind: as data, in files, in tables."""

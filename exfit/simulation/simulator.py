@@ -1,0 +1,405 @@
+"""From parameter values to a response: the start at rest, the sub-steps, the samples."""
+
+import math
+from collections.abc import Container, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.kernel import (
+    SIDE_BY_SIDE,
+    Kernel,
+    LinearKernel,
+    Span,
+    Start,
+    TangentKernel,
+    in_threads,
+)
+from exfit.engine.system import System, trace
+from exfit.engine.trace import in_order
+from exfit.errors import SimulationError
+from exfit.models.blocks import SHORTEST
+from exfit.simulation.inputs import (
+    ON_GRID,
+    Change,
+    Course,
+    Direction,
+    Sampling,
+    Stretch,
+    WholeRun,
+    joined,
+    stretches,
+)
+from exfit.simulation.limiters import limits_passed
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
+MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
+REST_TOLERANCE = 1e-6  # pu/s: below any real motion
+ROUNDING = 1e-13  # of a state
+REMEMBERED = 64  # sets of values: several threads ask for a few of theirs again
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A simulation at every point of its grid: ``time`` (n,) in s, the outputs and inputs (n,).
+
+    The instant of an exact step is there twice, before it and after it.
+    """
+
+    time: Array
+    outputs: Mapping[str, Array]
+    inputs: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Response:
+    """Simulated signals on one clock: ``time`` (M,) in s, each signal (M,) per unit."""
+
+    time: Array
+    signals: Mapping[str, Array]
+    substeps: int
+
+
+@cache
+def kernel(system: System, outputs: tuple[str, ...], lanes: int) -> Kernel:
+    """Return the machine code that simulates a system."""
+    return Kernel(system, outputs, lanes)
+
+
+@cache
+def tangent_kernel(
+    system: System, outputs: tuple[str, ...], free: tuple[str, ...], moving: tuple[str, ...]
+) -> TangentKernel:
+    """Return the machine code that simulates a system with its derivatives."""
+    return TangentKernel(system, outputs, free, moving)
+
+
+@cache
+def linear_kernel(system: System) -> LinearKernel:
+    """Return the machine code that linearises a system."""
+    return LinearKernel(system)
+
+
+@cache
+def parameters_used(system: System) -> frozenset[str]:
+    """Return the parameters that a response of the system can depend on."""
+    traced = trace(system, system.outputs)
+    targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
+    reached = {node.index for node in in_order(targets)}
+    pairs = zip(system.parameters, traced.p, strict=True)
+    return frozenset(name for name, node in pairs if node.index in reached)
+
+
+class Simulator:
+    """Simulates one system through one course, sampled at ``times`` (M,) in s.
+
+    ``step`` (s) is the largest step; where the system is faster, every step is divided, into no
+    fewer than ``least`` parts. A recorder's ``delay`` (s) makes it show at ``times`` the response
+    at ``times - delay``: before the start, where all is at rest, and after the end that there.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        course: Course,
+        times: Array,
+        step: float,
+        least: int = 1,
+        delay: float = 0.0,
+    ) -> None:
+        self.system, self.course, self.times = system, course, times
+        self.step, self.least, self.delay = step, least, delay
+        self._grid = stretches(course, step)
+        self._inputs = [self._inputs_of(part) for part in self._grid]
+        self._sampling: Sampling | WholeRun = Sampling(self._grid, times, delay)
+        self._known: dict[bytes, int] = {}  # the sub-steps of values asked for lately
+
+    def moved(self, steps: tuple[Change, ...], delay: float) -> "Simulator":
+        """Return the simulator of the same course, whose steps and delay (s) are others.
+
+        The instant of a smooth step may be another, and the size of any. It costs little: the grid
+        and what is known of the sub-steps are shared. Raises ValueError where a step is another.
+        """
+        if [_fixed(change) for change in steps] != [_fixed(change) for change in self.course.steps]:
+            raise ValueError("only sizes, and the instants of smooth steps, can be moved")
+        pairs = zip(steps, self.course.steps, strict=True)
+        others = {new.signal for new, old in pairs if new != old}
+        result = copy(self)
+        result.course, result.delay = replace(self.course, steps=steps), delay
+        if others:
+            known = zip(self._inputs, self._grid, strict=True)
+            result._inputs = [result._inputs_with(others, u, part) for u, part in known]
+        if delay != self.delay:
+            result._sampling = Sampling(self._grid, self.times, delay)
+        return result
+
+    def on_grid(self) -> "Simulator":
+        """Return the simulator that gives all points of its grid, whatever the delay.
+
+        An instant of an exact step is there twice: before and after it.
+        """
+        result = copy(self)
+        result.times, result._sampling = np.concatenate([p.times for p in self._grid]), WholeRun()
+        return result
+
+    def sampling(self) -> Sampling:
+        """Return what reads the response at the sample times from the points of its grid."""
+        known = self._sampling
+        return (
+            known if isinstance(known, Sampling) else Sampling(self._grid, self.times, self.delay)
+        )
+
+    @cached_property
+    def time_constants(self) -> tuple[str, ...]:
+        """The parameters in seconds that matter to the response."""
+        used = parameters_used(self.system)
+        return tuple(name for name in self.system.time_constants if name in used)
+
+    def substeps(self, values: Values) -> int:
+        """Return into how many parts each step is divided for these values.
+
+        The rule is ceil(step * fastest rate), where the rate is the largest of the spectral radius
+        of the slopes' Jacobian at rest and 1/T of every time constant that is not bypassed:
+        Runge-Kutta of order four is unstable beyond 2.785, and a limit would hide it. It depends
+        on the values alone, and a change of one sub-step moves a response by less than the
+        method's own error. What is faster away from rest is for ``secured``.
+
+        Raises SimulationError where the start is no rest, or beyond ``MOST_SUBSTEPS``.
+        """
+        p = self._vector(values)
+        key = p.tobytes()
+        parts = self._known.get(key)
+        if parts is None:
+            parts = max(self.least, self._parts(values, self._rate_at_rest(values, p)))
+            if len(self._known) >= REMEMBERED:
+                self._known.clear()
+            self._known[key] = parts
+        return parts
+
+    def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
+        """Return the sub-steps that the rule asks for along a response with all its states."""
+        p = self._vector(values)
+        rest = linear_kernel(self.system).rest(p)
+        inputs = self._sampling(self._inputs)
+        rows = np.linspace(0, len(response.time) - 1, points).astype(int)
+        states = np.stack([response.signals[name][rows] for name in self.system.states], axis=1)
+        code, r = linear_kernel(self.system), rest.r
+        pairs = zip(np.ascontiguousarray(states), np.ascontiguousarray(inputs[rows]), strict=True)
+        jacobians = np.stack([code.motion(p, r, x, u)[1] for x, u in pairs])
+        return self._parts(values, fastest(jacobians))
+
+    def secured(self, values: Values) -> "Simulator":
+        """Return a simulator whose sub-steps are enough all along the response to these values.
+
+        Raises SimulationError where that response does not stay finite.
+        """
+        simulator = self
+        for _ in range(MOST_REPEATS):
+            whole = simulator.on_grid()
+            response = whole.response(values)
+            wanted = whole.substeps_along(values, response)
+            if wanted <= response.substeps:
+                break
+            simulator = self._with(self.step, wanted)
+        return simulator
+
+    def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
+        """Return by how much, at most and per unit, halving every step moves any of the outputs."""
+        return max(self.step_errors(values, outputs).values())
+
+    def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
+        """Return by how much, at most and per unit, halving every step moves each output.
+
+        At the points of the grid: a record with many more samples shows no more.
+        """
+        times = np.unique(np.concatenate([part.times for part in self._grid]))
+        coarse = Simulator(self.system, self.course, times, self.step, self.least)
+        samples, parts = coarse.samples(values, outputs)
+        finer = Simulator(self.system, self.course, times, self.step / 2.0, parts)
+        moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)
+        return dict(zip(outputs, map(float, moved), strict=True))
+
+    def response(self, values: Values, outputs: Sequence[str] | None = None) -> Response:
+        """Return the outputs (all of the system's by default) at the sample times."""
+        wanted = self.system.outputs if outputs is None else tuple(outputs)
+        samples, parts = self.samples(values, wanted)
+        return Response(self.times, dict(zip(wanted, samples.T, strict=True)), parts)
+
+    def samples(self, values: Values, outputs: tuple[str, ...]) -> tuple[Array, int]:
+        """Return outputs (M, ny) and the number of sub-steps."""
+        parts = self.substeps(values)
+        code = kernel(self.system, outputs, 1)
+        p = self._vector(values)[:, None]
+        run = code.run(p, code.start(p), self._spans(parts))
+        return self._sampling(run)[:, :, 0], parts
+
+    def run(self, values: Values) -> Run:
+        """Return all outputs and inputs of the system on the grid, without the recorder's delay."""
+        code = kernel(self.system, self.system.outputs, 1)
+        p = self._vector(values)[:, None]
+        run = code.run(p, code.start(p), self._spans(self.substeps(values)))
+        return Run(
+            np.concatenate([part.times for part in self._grid]),
+            dict(zip(self.system.outputs, joined(run)[:, :, 0].T, strict=True)),
+            dict(zip(self.system.inputs, joined(self._inputs).T, strict=True)),
+        )
+
+    def samples_of_many(self, sets: Sequence[Values], outputs: tuple[str, ...]) -> Array:
+        """Return outputs (M, ny, sets): side by side, in threads, and with equal sub-steps."""
+        spans = self._spans(max(self.substeps(values) for values in sets))
+        code = kernel(self.system, outputs, SIDE_BY_SIDE)
+        vectors = np.stack([self._vector(values) for values in sets], axis=1)
+        missing = -len(sets) % SIDE_BY_SIDE
+        padded = np.pad(vectors, ((0, 0), (0, missing)), mode="edge")
+
+        def block(first: int) -> Array:
+            p = np.ascontiguousarray(padded[:, first : first + SIDE_BY_SIDE])
+            return self._sampling(code.run(p, code.start(p), spans))
+
+        firsts = range(0, padded.shape[1], SIDE_BY_SIDE)
+        return np.concatenate(list(in_threads(block, firsts)), axis=2)[:, :, : len(sets)]
+
+    def tangents(
+        self, values: Values, outputs: tuple[str, ...], directions: Sequence[Direction]
+    ) -> tuple[Array, Array]:
+        """Return outputs (M, ny) and their exact derivatives (M, ny, directions).
+
+        A direction costs the same whatever moves in it; one of the delay alone costs nothing.
+        Raises ValueError where one moves the instant of a step that is not smooth.
+        """
+        columns = [k for k, one in enumerate(directions) if one.parameters or one.steps]
+        driving = [directions[k] for k in columns]
+        free = {name for one in driving for name in one.parameters}
+        inputs = {self.course.steps[k].signal for one in driving for k in one.steps}
+        code = tangent_kernel(
+            self.system,
+            outputs,
+            tuple(name for name in self.system.parameters if name in free),
+            tuple(name for name in self.system.inputs if name in inputs),
+        )
+        spans = self._spans(self.substeps(values))
+        if code.moving:
+            spans = [
+                span._replace(du=self._moving(part, code.moving, driving))
+                for span, part in zip(spans, self._grid, strict=True)
+            ]
+        run, derived = code.run(self._vector(values), self._seeds(driving), spans)
+        slopes = np.zeros((len(self.times), len(outputs), len(directions)))
+        slopes[:, :, columns] = self._sampling(derived)
+        delays = np.array([one.delay for one in directions])
+        if np.any(delays):
+            slopes -= self._sampling.slope(run)[:, :, None] * delays
+        return self._sampling(run), slopes
+
+    def _seeds(self, directions: Sequence[Direction]) -> Array:
+        """Return how each parameter moves in each direction, (np, N)."""
+        seeds = np.zeros((len(self.system.parameters), len(directions)))
+        for column, direction in enumerate(directions):
+            for name, rate in direction.parameters.items():
+                seeds[self.system.parameters.index(name), column] = rate
+        return seeds
+
+    def _moving(
+        self, part: Stretch, inputs: Sequence[str], directions: Sequence[Direction]
+    ) -> Array:
+        """Return how inputs move in each direction at a stretch's grid points, (n + 1, nu, N)."""
+        du = np.zeros((part.steps + 1, len(inputs), len(directions)))
+        for column, direction in enumerate(directions):
+            for index, (at, step) in direction.steps.items():
+                change = self.course.steps[index]
+                if change.signal in inputs:
+                    row = du[:, inputs.index(change.signal), column]
+                    if at:
+                        row += at * change.step * change.share_slope(part)
+                    if step:
+                        row += step * change.share(part)
+        return du
+
+    def _with(self, step: float, least: int) -> "Simulator":
+        return Simulator(self.system, self.course, self.times, step, least, self.delay)
+
+    def _inputs_of(self, part: Stretch) -> Array:
+        """Return the inputs at the grid points of a stretch, (n + 1, nu)."""
+        inputs = [self.course.input(name, part) for name in self.system.inputs]
+        return np.ascontiguousarray(np.stack(inputs, axis=1))
+
+    def _inputs_with(self, others: Container[str], known: Array, part: Stretch) -> Array:
+        """Return known inputs with the others of them computed anew."""
+        u = known.copy()
+        for column, name in enumerate(self.system.inputs):
+            if name in others:
+                u[:, column] = self.course.input(name, part)
+        return u
+
+    def _vector(self, values: Values) -> Array:
+        return np.array([values[name] for name in self.system.parameters], dtype=np.float64)
+
+    def _spans(self, parts: int) -> list[Span]:
+        return [Span(u, part.step, parts) for u, part in zip(self._inputs, self._grid, strict=True)]
+
+    def _rate_at_rest(self, values: Values, p: Array) -> float:
+        """Return the fastest rate (1/s) at the start; raises SimulationError if that is no rest."""
+        rest = linear_kernel(self.system).rest(p)
+        slopes, rate = self._motion(p, rest, rest.x, np.zeros(len(self.system.inputs)))
+        # what the rounding of a state leaves of its slope, at the fastest rate
+        rounding = ROUNDING * float(np.max(np.abs(rest.x))) * rate
+        moving = ~(np.abs(slopes) <= REST_TOLERANCE + rounding)
+        if np.any(moving) or not math.isfinite(rounding):
+            why = self._why_moving(values, slopes, moving)
+            at = f" at vt0 = {values['vt0']:g} pu" if "vt0" in values else ""
+            raise SimulationError(f"no state of rest{at}: {why}")
+        return rate
+
+    def _motion(self, p: Array, rest: Start, x: Array, u: Array) -> tuple[Array, float]:
+        """Return the slopes at states x and the spectral radius (1/s) of their Jacobian."""
+        slopes, jacobian = linear_kernel(self.system).motion(p, rest.r, x, u)
+        rate = fastest(jacobian)
+        return slopes if math.isfinite(rate) else np.full(len(x), np.nan), rate
+
+    def _parts(self, values: Values, radius: float) -> int:
+        lags = {name: values[name] for name in self.time_constants if values[name] >= SHORTEST}
+        shortest = min(lags, key=lambda name: lags[name], default=None)
+        rate = max(radius, 1.0 / lags[shortest] if shortest else 0.0)
+        if not math.isfinite(rate):
+            raise SimulationError("the response does not stay finite")
+        parts = max(1, math.ceil(self.step * rate - ON_GRID))
+        if parts > MOST_SUBSTEPS:
+            smallest = (
+                f"; the smallest time constant is {shortest} = {lags[shortest]:g} s"
+                if shortest
+                else ""
+            )
+            raise SimulationError(
+                f"simulation.step: {self.step:g} s would need {parts} sub-steps "
+                f"(limit {MOST_SUBSTEPS}) for a rate of {rate:.4g} 1/s{smallest}"
+            )
+        return parts
+
+    def _why_moving(self, values: Values, slopes: Array, moving: NDArray[np.bool_]) -> str:
+        states = zip(self.system.states, slopes, moving, strict=True)
+        moved = [
+            f"{name} moves by {slope:.3g} pu/s"
+            for name, slope, moves in states
+            if moves and math.isfinite(slope)
+        ]
+        return (
+            limits_passed(self.system, values) or ", ".join(moved) or "the values do not define one"
+        )
+
+
+def _fixed(change: Change) -> Change:
+    """Return what of a step cannot be moved."""
+    return change._replace(at=0.0 if change.smooth else change.at, step=0.0)
+
+
+def fastest(jacobians: Array) -> float:
+    """Return the largest spectral radius of Jacobians (..., nx, nx), inf where one is infinite."""
+    if not np.isfinite(jacobians).all():
+        return math.inf
+    return float(np.abs(np.linalg.eigvals(jacobians)).max())

@@ -1,0 +1,346 @@
+"""What a system does near its state of rest: its poles, and its frequency responses with margins.
+
+Everything follows from the exact linearisation, the derivatives of the equations at rest. A limit
+that is reached there has no gain.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from math import inf, log10, pi, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.system import System, Tangents, Trace, differentiate, trace
+from exfit.engine.trace import Node, evaluate
+from exfit.errors import SimulationError
+from exfit.plants import MEASURED
+from exfit.simulation.limiters import at_rest, limits_passed
+from exfit.simulation.simulator import REST_TOLERANCE, ROUNDING, fastest
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Values = Mapping[str, float]
+
+MOST_STATES = 3  # named with a pole
+TAKES_PART = 0.2  # of the participation of the state that takes part most
+NO_POLE = 1e-12  # of the fastest rate: an eigenvalue of zero, but for rounding
+SPLIT = 1e-6  # of a pole: rounding moves the two of a double one apart by its square root
+POINTS = 350  # of a frequency response, beside those around its peaks
+AROUND = np.linspace(-3.0, 3.0, 25)  # half widths of a peak: where its points lie
+LIGHTLY = 0.5  # damping ratio: a mode below it has a peak that the other points would cut off
+DECADE = 10.0  # beyond the slowest and the fastest pole
+FINER = 2  # times as many points to find crossovers between
+BETWEEN = 33  # points in a gap that is searched for its crossover
+ROUNDS = 6  # of that search, each 32 times finer: to rounding
+HALF_POWER = 1.0 / sqrt(2.0)  # -3 dB
+
+
+class Pole(NamedTuple):
+    """A mode: of a pair of conjugate poles the upper one, so ``value`` (1/s) has Im >= 0.
+
+    ``damping`` is the ratio -Re/|value|: 1 for a real stable pole, negative for an unstable one,
+    0 at the origin; ``frequency`` that of its oscillation in Hz, 0 for a real one; ``states`` the
+    one to three that take part most, the first the most.
+    """
+
+    value: complex
+    damping: float
+    frequency: float
+    states: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Bode:
+    """A frequency response: ``frequency`` (M,) in Hz, ``response`` (M,) complex, pu per pu."""
+
+    frequency: Array
+    response: ComplexArray
+
+
+class Margins(NamedTuple):
+    """How far the voltage loop is from instability; None where the loop gain has no crossover.
+
+    ``gain`` (dB) is by how much the loop gain may rise, or, negative, must not fall; ``phase``
+    (deg) how much the loop may lag more, or, negative, less. Of several crossovers it is that with
+    the smallest margin. ``gain_at`` and ``phase_at`` are its frequencies (Hz): where the phase is
+    -180 degrees, and where the gain is 1.
+    """
+
+    gain: float | None
+    phase: float | None
+    gain_at: float | None
+    phase_at: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class SmallSignal:
+    """A system near its state of rest.
+
+    ``closed`` is the response of ``path[1]`` to ``path[0]``: of vt to vref, of efd where the
+    voltage is played back; ``open`` the gain of the voltage loop, broken where the exciter
+    measures the voltage, positive at low frequency; with ``margins`` it is None where there is no
+    such loop. ``bandwidth`` (Hz) is where ``closed`` first falls 3 dB below its value at rest, None
+    where it does not; ``peak`` its largest gain (dB).
+    """
+
+    poles: tuple[Pole, ...]
+    closed: Bode
+    open: Bode | None
+    margins: Margins | None
+    bandwidth: float | None
+    peak: float
+    path: tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """A linear system dx/dt = A x + b u, y = c x + d u with one input and one output."""
+
+    A: Array
+    b: Array
+    c: Array
+    d: float
+
+    def response(self, s: ComplexArray) -> ComplexArray:
+        """Return the transfer function at complex frequencies s (M,) in 1/s."""
+        states = len(self.A)
+        shifted = s[:, None, None] * np.eye(states) - self.A
+        given = np.broadcast_to(self.b.astype(np.complex128)[:, None], (len(s), states, 1))
+        found = np.linalg.solve(shifted, given)[:, :, 0] @ self.c + self.d
+        return np.asarray(found, dtype=np.complex128)
+
+    def at(self, frequency: Array) -> ComplexArray:
+        """Return the frequency response at frequencies (M,) in Hz."""
+        return self.response(np.asarray(2j * pi * frequency, dtype=np.complex128))
+
+    def broken(self) -> "StateSpace":
+        """Return the gain of the loop that feeds y back into u, as a negative feedback has it.
+
+        No time passes from u to y but through a state: d = 0.
+        """
+        return StateSpace(self.A - np.outer(self.b, self.c), self.b, -self.c, 0.0)
+
+
+class Linear(NamedTuple):
+    """A linearisation: the Jacobian A of the moving states, and columns and rows by name."""
+
+    states: tuple[str, ...]
+    A: Array
+    B: Mapping[str, Array]
+    C: Mapping[str, Array]
+    D: Mapping[tuple[str, str], float]
+
+    def path(self, source: str, output: str) -> StateSpace:
+        """Return the system from one input to one output."""
+        return StateSpace(self.A, self.B[source], self.C[output], self.D[output, source])
+
+
+def small_signal(system: System, values: Values, frequency: Array | None = None) -> SmallSignal:
+    """Return poles, frequency responses and margins of a system at the state of rest of ``values``.
+
+    ``frequency`` (M,) in Hz is where the responses are told; by default about 400 points that span
+    the poles, dense around the peaks. The margins are those of Astrom and Murray, Feedback Systems
+    (2008), 9.3, at crossovers found to rounding; which states take part in a pole is told by the
+    participation factors of Perez-Arriaga, Verghese and Schweppe (1982).
+
+    Raises SimulationError where the values have no state of rest.
+    """
+    linear = linearised(system, values)
+    source = "vref" if "vref" in system.inputs else system.inputs[0]
+    output = "efd" if "vt" in system.inputs else "vt"
+    forward = linear.path(source, output)
+    loop = linear.path(MEASURED, MEASURED).broken() if MEASURED in linear.C else None
+    poles = poles_of(linear)
+    rates = [pole.value for pole in poles]
+    if loop is not None:
+        rates += list(np.linalg.eigvals(loop.A))
+    dense = spanning(rates)
+    told = dense if frequency is None else np.asarray(frequency, dtype=np.float64)
+    closed = _bode(forward, told)
+    own = closed if told is dense else _bode(forward, dense)
+    return SmallSignal(
+        poles=poles,
+        closed=closed,
+        open=None if loop is None else _bode(loop, told),
+        margins=None if loop is None else margins(loop, dense),
+        bandwidth=bandwidth(forward, own),
+        peak=_decibels(float(np.max(np.abs(own.response)))),
+        path=(source, output),
+    )
+
+
+@cache
+def _traced(system: System) -> tuple[System, Trace, Tangents]:
+    """Return a system with the input that breaks its voltage loop, its graph and derivatives."""
+    from_outside = replace(system, inputs=tuple(dict.fromkeys((*system.inputs, MEASURED))))
+    try:
+        traced = trace(from_outside, (*system.outputs, MEASURED))
+    except KeyError:  # there is no loop
+        from_outside, traced = system, trace(system, system.outputs)
+    return from_outside, traced, differentiate(traced, from_outside, (), from_outside.inputs)
+
+
+def linearised(system: System, values: Values) -> Linear:
+    """Return the exact linearisation of a system at rest, without the states of bypassed blocks.
+
+    Raises SimulationError where the values have no state of rest.
+    """
+    system, traced, derived = _traced(system)
+    start = at_rest(traced, values)
+    seeds = np.eye(len(traced.x) + len(traced.u))
+    moving: list[Node] = [node for node in (*derived.x, *derived.u) if node is not None]
+    known = {
+        **start,
+        **dict.fromkeys(derived.r, np.zeros(len(seeds))),
+        **dict(zip(moving, seeds, strict=True)),
+    }
+    found = evaluate([*traced.slopes, *derived.slopes, *derived.outputs], known)
+
+    def rows(nodes: Sequence[Node]) -> Array:
+        return np.stack([np.broadcast_to(found[node], (len(seeds),)) for node in nodes])
+
+    slopes, count = rows(derived.slopes), len(traced.x)
+    _refuse_motion(
+        system,
+        values,
+        x=np.array([float(start[node]) for node in traced.x]),
+        moving=np.array([float(found[node]) for node in traced.slopes]),
+        jacobian=slopes[:, :count],
+    )
+    # the state of a bypassed block, and one held at its limit, stays put
+    moves = np.any(slopes != 0.0, axis=1)
+    outputs = (*system.outputs, MEASURED)[: len(traced.outputs)]
+    out = dict(zip(outputs, rows(derived.outputs), strict=True))
+    columns = {name: count + k for k, name in enumerate(system.inputs)}
+    kept = np.flatnonzero(moves)
+    return Linear(
+        states=tuple(system.states[k] for k in kept),
+        A=slopes[np.ix_(kept, kept)],
+        B={name: slopes[kept, column] for name, column in columns.items()},
+        C={name: row[kept] for name, row in out.items()},
+        D={(y, u): float(out[y][column]) for y in out for u, column in columns.items()},
+    )
+
+
+def _refuse_motion(
+    system: System, values: Values, x: Array, moving: Array, jacobian: Array
+) -> None:
+    """Raise SimulationError where slopes at rest are not zero, but for rounding."""
+    rounding = ROUNDING * float(np.max(np.abs(x), initial=0.0)) * fastest(jacobian)
+    if not (np.isfinite(rounding) and np.all(np.abs(moving) <= REST_TOLERANCE + rounding)):
+        why = limits_passed(system, values) or "the values do not define one"
+        raise SimulationError(f"no state of rest: {why}")
+
+
+def poles_of(linear: Linear) -> tuple[Pole, ...]:
+    """Return the modes of a linear system, the slowest first."""
+    from scipy.linalg import eig
+
+    modes: Any = eig(linear.A, left=True, right=True)
+    found, left, right = modes
+    size = np.max(np.abs(found), initial=0.0)
+    found = np.where(np.abs(found.imag) > SPLIT * np.abs(found), found, found.real + 0j)
+    taking_part = np.abs(left.conj() * right)
+    poles = [
+        _pole(complex(value), taking_part[:, k], linear.states, size)
+        for k, value in enumerate(found)
+        if value.imag >= 0.0
+    ]
+    return tuple(sorted(poles, key=lambda pole: abs(pole.value)))
+
+
+def _pole(value: complex, taking_part: Array, states: Sequence[str], size: float) -> Pole:
+    value = value if abs(value) > NO_POLE * size else 0j
+    ranked = np.argsort(-taking_part, kind="stable")[:MOST_STATES]
+    least = TAKES_PART * taking_part[ranked[0]]
+    return Pole(
+        value=value,
+        damping=-value.real / abs(value) if value else 0.0,
+        frequency=value.imag / (2.0 * pi),
+        states=tuple(states[k] for k in ranked if taking_part[k] >= least),
+    )
+
+
+def spanning(rates: Sequence[complex], points: int = POINTS) -> Array:
+    """Return frequencies (M,) in Hz that span poles (1/s), dense around those lightly damped."""
+    sizes = np.abs(np.array(rates, dtype=np.complex128))
+    sizes = sizes[sizes > NO_POLE * np.max(sizes, initial=0.0)]
+    low, high = (np.min(sizes), np.max(sizes)) if len(sizes) else (1.0, 1.0)
+    peaks = [
+        rate.imag + abs(rate.real) * AROUND
+        for rate in rates
+        if rate.imag > 0.0 and abs(rate.real) < LIGHTLY * abs(rate)
+    ]
+    every = np.concatenate([np.geomspace(low / DECADE, high * DECADE, points), *peaks])
+    return np.asarray(np.unique(every[every >= low / DECADE]) / (2.0 * pi))
+
+
+def _bode(of: StateSpace, frequency: Array) -> Bode:
+    return Bode(frequency, of.at(frequency))
+
+
+def margins(loop: StateSpace, frequency: Array) -> Margins:
+    """Return the smallest margins of a loop gain, all its crossovers between frequencies (Hz)."""
+    places = np.linspace(0.0, len(frequency) - 1.0, FINER * (len(frequency) - 1) + 1)
+    fine = np.exp(np.interp(places, np.arange(len(frequency)), np.log(frequency)))
+    L = loop.at(fine)
+    at_phase = [f for f in _crossings(lambda z: z.imag, loop, fine, L) if _at(loop, f).real < 0.0]
+    at_gain = _crossings(lambda z: np.abs(z) - 1.0, loop, fine, L)
+    gain, gain_at = _smallest([(-_decibels(abs(_at(loop, f))), f) for f in at_phase])
+    phase, phase_at = _smallest([(float(np.degrees(np.angle(-_at(loop, f)))), f) for f in at_gain])
+    return Margins(gain, phase, gain_at, phase_at)
+
+
+def _smallest(found: Sequence[tuple[float, float]]) -> tuple[float | None, float | None]:
+    return min(found, key=lambda one: abs(one[0]), default=(None, None))
+
+
+def _at(of: StateSpace, frequency: float) -> complex:
+    return complex(of.at(np.array([frequency]))[0])
+
+
+def _crossings(
+    measure: Callable[[ComplexArray], Array],
+    of: StateSpace,
+    frequency: Array,
+    response: ComplexArray,
+) -> list[float]:
+    """Return the frequencies (Hz) where a measure of the response changes its sign."""
+    positive = measure(response) > 0.0
+    found = []
+    for k in np.flatnonzero(positive[1:] != positive[:-1]):
+        low, high = frequency[k], frequency[k + 1]
+        for _ in range(ROUNDS):
+            inside = np.linspace(low, high, BETWEEN)
+            above = measure(of.at(inside)) > 0.0
+            first = int(np.argmax(above != above[0]))
+            if first == 0:  # within rounding of its end
+                break
+            low, high = inside[first - 1], inside[first]
+        found.append(float(0.5 * (low + high)))
+    return found
+
+
+def bandwidth(of: StateSpace, at: Bode) -> float | None:
+    """Return where a response first falls 3 dB below its value at rest (Hz); None if it does not.
+
+    ``at`` is the response at frequencies between which it is looked for.
+    """
+    still = _gain_at_rest(of)
+    level = HALF_POWER * still
+    found = _crossings(lambda z: level - np.abs(z), of, at.frequency, at.response)
+    return found[0] if found and 0.0 < still < inf else None
+
+
+def _gain_at_rest(of: StateSpace) -> float:
+    try:
+        return abs(float(of.d - of.c @ np.linalg.solve(of.A, of.b)))
+    except np.linalg.LinAlgError:  # an integrator that nothing holds
+        return inf
+
+
+def _decibels(gain: float) -> float:
+    return 20.0 * log10(gain) if gain > 0.0 else -inf

@@ -1,0 +1,347 @@
+"""compare: the differences of two responses are what they are, whatever clocks they have."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exfit import cli
+from exfit.analysis.comparison import Asked, compare
+from exfit.errors import RecordError
+from exfit.output import plots
+
+BY_NAME = Asked({})
+LAG = 0.25  # s
+AT, SIZE = 1.0, 0.05
+
+
+def rise(time, lag=LAG, at=AT):
+    """Return two lags behind a step, as a voltage rises."""
+    ago = np.maximum(time - at, 0.0) / lag
+    return 1.0 + SIZE * (1.0 - (1.0 + ago) * np.exp(-ago))
+
+
+def write(path, **columns):
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = np.column_stack(list(columns.values()))
+    lines = [",".join(f"{x:.12g}" for x in row) for row in rows]
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    return path
+
+
+def clock(step, end=10.0, begin=0.0):
+    return begin + step * np.arange(round((end - begin) / step) + 1)
+
+
+@pytest.fixture(autouse=True)
+def workplace(tmp_path, monkeypatch):
+    """Work in an empty folder, and draw with few dots."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plots.style, "DPI", 40)
+
+
+@pytest.fixture
+def run(capsys):
+    def command(*arguments):
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            cli.main(args=["compare", *map(str, arguments)], prog_name="exfit")
+        shown = capsys.readouterr()
+        return int(ended.value.code or 0), shown.out, shown.err
+
+    return command
+
+
+def of(found, signal="vt", first="A", second="B"):
+    (one,) = [
+        one
+        for one in found.differences
+        if (one.signal, one.first, one.second) == (signal, first, second)
+    ]
+    return one
+
+
+def test_a_response_does_not_differ_from_itself():
+    a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
+    one = of(compare(a, a, None, BY_NAME))
+    assert (one.rms, one.largest[0], one.interpolation) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.007, 0.0213])
+def test_an_offset_is_the_difference_on_any_two_clocks(step):
+    a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
+    b = write("b.csv", t=clock(step), vt=rise(clock(step)) + 0.003)
+    one = of(compare(a, b, None, BY_NAME))
+    assert len(one.time) == pytest.approx(10.0 / min(step, 0.01), abs=2)
+    assert one.rms == pytest.approx(0.003, abs=one.interpolation + 1e-9)
+    assert one.largest[0] == pytest.approx(0.003, abs=one.interpolation + 1e-9)
+    # a straight line is off by an eighth of the curvature times the step squared
+    bound = max(step, 0.01) ** 2 / 8.0 * SIZE / LAG**2
+    assert one.interpolation <= (0.0 if step == 0.01 else 1.5 * bound)
+
+
+def test_the_stated_error_of_interpolation_is_more_than_the_true_one():
+    time, fine = clock(0.05), clock(0.001)
+    a = write("a.csv", t=time, vt=np.sin(time))
+    b = write("b.csv", t=fine, vt=np.sin(fine))
+    one = of(compare(a, b, None, BY_NAME))
+    assert 0.0 < np.max(np.abs(one.error)) < one.interpolation
+
+
+def test_the_rms_is_over_time_whatever_the_samples():
+    """The difference is t: over one second, the mean of its square is a third."""
+    uneven = np.concatenate([np.linspace(0.0, 0.1, 500), np.linspace(0.11, 1.0, 90)])
+    a = write("a.csv", t=uneven, vt=np.ones(len(uneven)))
+    b = write("b.csv", t=uneven, vt=1.0 + uneven)
+    one = of(compare(a, b, None, BY_NAME))
+    assert one.rms == pytest.approx(3.0**-0.5, rel=1e-4)  # of the trapezoids
+    assert one.largest == pytest.approx((1.0, 1.0))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_largest_difference_has_its_sign_and_its_instant(side):
+    time = clock(0.01)
+    bump = side * (0.03 * np.exp(-((time - 4.0) ** 2)) - 0.01 * np.exp(-((time - 8.0) ** 2)))
+    a = write("a.csv", t=time, vt=np.ones(len(time)))
+    b = write("b.csv", t=time, vt=1.0 + bump)
+    assert of(compare(a, b, None, BY_NAME)).largest == pytest.approx((0.03 * side, 4.0), rel=1e-6)
+
+
+def test_nothing_is_compared_beyond_what_both_cover():
+    a = write("a.csv", t=clock(0.01, 4.0, -1.0), vt=rise(clock(0.01, 4.0, -1.0)))
+    b = write("b.csv", t=clock(0.02, 9.0, 0.5), vt=rise(clock(0.02, 9.0, 0.5)))
+    one = of(compare(a, b, None, BY_NAME))
+    assert (one.time[0], one.time[-1]) == pytest.approx((0.5, 4.0))
+    assert np.isfinite(one.error).all()
+
+
+def test_a_shift_puts_two_clocks_together_and_is_proposed():
+    time = clock(0.01)
+    a = write("a.csv", t=time, vt=rise(time))
+    b = write("b.csv", t=time, vt=rise(time, at=3.0))
+    (note,) = compare(a, b, None, BY_NAME).notes
+    proposed = float(note.partition("--shift ")[2].split()[0])
+    assert proposed == pytest.approx(AT - 3.0, abs=2e-3)  # the time of a fifth of a sample
+    (note,) = compare(a, b, None, BY_NAME, shift=-1.2).notes
+    assert float(note.partition("--shift ")[2].split()[0]) == pytest.approx(proposed, abs=2e-3)
+    found = compare(a, b, None, BY_NAME, shift=-2.0)
+    assert found.notes == ()
+    assert of(found).rms == pytest.approx(0.0, abs=1e-9)
+
+
+def test_final_values_are_the_means_of_the_last_twentieth():
+    time = clock(0.01)
+    ripple = 0.01 * np.sin(2.0 * np.pi * time / 0.1)  # five periods of it
+    a = write("a.csv", t=time, vt=np.ones(len(time)) + ripple)
+    b = write("b.csv", t=time, vt=np.full(len(time), 1.05))
+    assert of(compare(a, b, None, BY_NAME)).finals == pytest.approx((1.0, 1.05), abs=1e-4)
+
+
+def test_final_values_are_of_the_time_that_both_show():
+    """Where one ends in a gap, of what lies before it."""
+    time = clock(0.01)
+    falls = np.where(time < 8.0, 1.0, 0.5)
+    for name, vt in (("a", falls), ("b", np.where(time < 8.0, 1.01, np.nan))):
+        rows = (f"{t:.9g},{'' if np.isnan(y) else y}" for t, y in zip(time, vt, strict=True))
+        Path(f"{name}.csv").write_text("\n".join(["t,vt", *rows]) + "\n")
+    found = of(compare(Path("a.csv"), Path("b.csv"), None, BY_NAME))
+    assert found.finals == pytest.approx((1.0, 1.01))
+
+
+def test_features_stand_beside_each_other_with_the_step_found():
+    """From 10 to 90 % two equal lags take 3.3579 times one of them."""
+    time = clock(0.002)
+    a = write("a.csv", t=time, vt=rise(time))
+    b = write("b.csv", t=time, vt=rise(time, lag=2.0 * LAG))
+    found = compare(a, b, None, BY_NAME)
+    assert found.step_at == pytest.approx(AT, abs=0.05)  # by the shape of the rise
+    assert found.features["A"].rise_time == pytest.approx(3.3579 * LAG, rel=1e-3)
+    assert found.features["B"].rise_time == pytest.approx(2.0 * 3.3579 * LAG, rel=1e-3)
+    given = compare(a, b, None, BY_NAME, step_at=AT)
+    assert given.step_at == AT
+
+
+def test_features_are_of_the_time_before_the_first_ends():
+    """What the longer one shows behind it is not in them."""
+    short, long = clock(0.01, 5.0), clock(0.01, 9.0)
+    a = write("a.csv", t=short, vt=rise(short))
+    b = write("b.csv", t=long, vt=rise(long) + np.where(long > 5.5, 0.02, 0.0))
+    found = compare(a, b, None, BY_NAME).features
+    assert found["B"].final_value == pytest.approx(found["A"].final_value, abs=1e-9)
+
+
+def test_without_a_step_there_are_no_features():
+    time = clock(0.01)
+    a = write("a.csv", t=time, vt=np.ones(len(time)))
+    found = compare(a, a, None, BY_NAME)
+    assert found.features == {}
+    assert found.step_at is None
+
+
+def test_a_record_is_never_interpolated():
+    rng = np.random.default_rng(0)
+    time, coarse = clock(0.001), clock(0.013)
+    a = write("a.csv", t=time, vt=rise(time))
+    b = write("b.csv", t=time, vt=rise(time) + 0.001)
+    measured = rise(coarse) + 1e-3 * rng.standard_normal(len(coarse))
+    record = write("record.csv", t=coarse, vt=measured)
+    found = compare(a, b, record, BY_NAME)
+    one = of(found, first="record", second="A")
+    np.testing.assert_allclose(one.time, coarse)
+    np.testing.assert_allclose(one.values[0], measured, rtol=0, atol=1e-11)
+    assert one.rms == pytest.approx(1e-3, rel=0.1)  # of 770 samples, 2.5 % is one sigma
+    assert {*found.features} == {"A", "B", "record"}
+
+
+def test_all_signals_in_common_are_compared_and_no_others():
+    time = clock(0.01)
+    a = write("a.csv", t=time, vt=rise(time), efd=2 * rise(time), ifd=time, VA=time)
+    b = write("b.csv", t=time, vt=rise(time), efd=2 * rise(time) + 0.1, q=time, VA=time)
+    found = compare(a, b, None, BY_NAME)
+    assert [one.signal for one in found.between] == ["vt", "efd"]
+    assert of(found, "efd").rms == pytest.approx(0.1)
+    asked = compare(a, b, None, Asked({"VA": "VA"}))
+    assert "VA" in [one.signal for one in asked.between]
+
+
+def test_a_fit_is_compared_with_an_export_of_another_program():
+    time = clock(0.01)
+    write("fit/response.csv", t=time, vt_measured=rise(time) + 1.0, vt_simulated=rise(time))
+    Path("fit/result.json").write_text("{}")
+    export = {"Time(s)": time, "VOLT 1 [GEN]": rise(time), "EFD": time}
+    b = write("psse.csv", **export)
+    asked = Asked({"vt": "VOLT 1 [GEN]"})
+    for fit in (Path("fit"), Path("fit/result.json"), Path("fit/response.csv")):
+        found = compare(fit, b, Path("fit/response.csv"), asked)
+        assert of(found).rms == 0.0
+        assert of(found, first="record").finals[0] == pytest.approx(2.05, abs=1e-6)
+
+
+def test_a_column_of_time_is_named_where_it_has_a_name_of_its_own():
+    time = clock(0.01)
+    a = write("a.csv", t=time, vt=rise(time))
+    b = write("b.csv", vt=rise(time), sec=time)
+    with pytest.raises(RecordError, match=r"b\.csv: no column seems .*--time .*'vt', 'sec'"):
+        compare(a, b, None, BY_NAME)
+    assert of(compare(a, b, None, Asked({}, "sec"))).rms == 0.0
+
+
+def test_of_instants_that_repeat_the_last_row_is_taken():
+    """A simulator writes the instant of a step twice: before and after it."""
+    a = write("a.csv", t=[0, 1, 1, 2], vt=[1, 1, 2, 2])
+    b = write("b.csv", t=[0, 1, 2], vt=[1, 2, 2])
+    found = compare(a, b, None, BY_NAME)
+    assert of(found).rms == 0.0
+    assert any("1 instants repeat" in note for note in found.notes)
+
+
+def test_nothing_is_read_across_a_gap():
+    time, fine = clock(0.1), clock(0.01)
+    gappy = np.where((time > 4.0) & (time < 5.0), np.nan, time)
+    a = write("a.csv", t=time, vt=gappy)
+    b = write("b.csv", t=fine, vt=fine)
+    one = of(compare(a, b, None, BY_NAME))
+    inside = (one.time > 4.0 + 1e-6) & (one.time < 5.0 - 1e-6)
+    assert np.isnan(one.error[inside]).all()
+    assert np.isfinite(one.error[~inside]).all()
+    assert one.rms == pytest.approx(0.0, abs=1e-9)
+
+
+def good():
+    time = clock(0.01)
+    return write("a.csv", t=time, vt=rise(time)), write("b.csv", t=time, vt=rise(time))
+
+
+NOWHERE = {"t": clock(0.01), "vt": np.full(1001, np.nan)}
+REFUSED = {
+    "no signal": ({"t": [0, 1], "x": [1, 1]}, ["no signal in common", "--columns"]),
+    "no time": ({"t": [20, 21], "vt": [1, 1]}, ["no time in common", "--shift"]),
+    "back": ({"t": [0, 2, 1], "vt": [1, 1, 1]}, ["b.csv", "'t'", "goes back"]),
+    "lost time": ({"t": [0, np.nan], "vt": [1, 1]}, ["b.csv", "'t'", "not a finite"]),
+    "no sample": (NOWHERE, ["vt", "samples of both"]),
+}
+
+
+@pytest.mark.parametrize(("b", "words"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_compared_is_refused(run, b, words):
+    a, _ = good()
+    code, out, err = run(a, write("b.csv", **b))
+    assert (code, out) == (1, "")
+    for word in words:
+        assert word in err
+
+
+def test_wrong_files_are_refused(run):
+    a, b = good()
+    Path("empty").mkdir()
+    write("two/up.csv", t=[0, 1], vt_simulated=[1, 1])
+    write("two/history.csv", iteration=[0, 1])
+    Path("words.csv").write_text("t,vt\n0,high\n")
+    for arguments, words in (
+        (("none.csv", b), ["none.csv", "No such file"]),
+        (("empty", b), ["empty: no response.csv"]),
+        (("two", b), ["two: no response.csv", "name one of its files: up.csv\n"]),
+        (("words.csv", b), ["words.csv:2", "'high'"]),
+        ((a, b, "--columns", "vt=VOLT"), ["no file has a column 'VOLT'", f"{b} has 't', 'vt'"]),
+        ((a, b, "--time", "sec"), ["no file has a column 'sec'"]),
+        ((a, b, "--columns", "vt"), ["--columns vt: not of the form vt=VOLT"]),
+        ((a, b, write("r.csv", t=[0, 1], x=[0, 1])), ["r.csv: none of the signals vt"]),
+    ):
+        code, out, err = run(*arguments)
+        assert (code, out) == (1, ""), arguments
+        for word in words:
+            assert word in err
+
+
+def test_the_command_writes_its_files_and_says_what_they_hold(run):
+    time = clock(0.01)
+    a, b = good()
+    b = write("b.csv", t=time, vt=rise(time) + 0.002)
+    code, out, _ = run(a, b, a)
+    assert code == 0
+    place = Path("runs/compare")
+    assert {path.name for path in place.iterdir()} == {"compare.csv", "compare.json", "compare.png"}
+    header, *rows = csv.reader((place / "compare.csv").read_text().splitlines())
+    assert header == ["t", "vt_A", "vt_B", "vt_difference"]
+    assert {row[3] for row in rows} == {"0.002"}
+    stored = json.loads((place / "compare.json").read_text())
+    assert stored["differences"][0]["rms"] == pytest.approx(0.002)
+    assert "B - A" in out
+    assert "2.000e-03" in out
+    assert max(map(len, out.splitlines())) <= 80
+    code, printed, _ = run(a, b, a, "--json", "--no-plots", "-o", "other")
+    assert json.loads(printed) == stored
+    assert not Path("other/compare.png").exists()
+    assert run(a, b, "--quiet", "--no-plots")[:2] == (0, "")
+
+
+@pytest.mark.parametrize("record", [False, True])
+def test_the_figure_has_a_panel_and_a_panel_of_differences_for_each_signal(record):
+    time = clock(0.01)
+    a = write("a.csv", t=time, vt=rise(time), efd=rise(time))
+    b = write("b.csv", t=time, vt=rise(time) + 1e-3, efd=rise(time))
+    figure = plots.agreement(compare(a, b, a if record else None, BY_NAME))
+    assert plots.png(figure)
+    assert len(figure.axes) == 4
+    curves, differences = figure.axes[:2]
+    labels = [text.get_text() for text in curves.get_legend().get_texts()]
+    assert labels == (["record", "A", "B"] if record else ["A", "B"])
+    assert "vt" in curves.get_ylabel()
+    assert len(differences.lines) == (4 if record else 2)  # with zero
+    assert figure.axes[-1].get_xlabel() == "time (s)"
+
+
+def test_a_column_that_its_file_says_is_not_per_unit_is_refused(run):
+    a, _ = good()
+    rows = ((0.0, 15.75), (1.0, 15.75), (10.0, 16.5))
+    for name in ("U [kV]", "U (V)", "U [%]"):
+        other = write("other.csv", **{"t": [t for t, _ in rows], name: [u for _, u in rows]})
+        code, out, err = run(a, other, "--columns", f"vt={name}")
+        assert (code, out) == (1, "")
+        assert f"other.csv: column '{name}' is in" in err
+        assert "pu" in err
+    other = write("other.csv", **{"t": [t for t, _ in rows], "U [pu]": [1.0, 1.0, 1.05]})
+    assert run(a, other, "--columns", "vt=U [pu]")[0] == 0

@@ -1,0 +1,161 @@
+"""The iterations of a fit: the response after each of them, kept, written and drawn."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import ROOT
+from records import case_of, config, recording, several
+
+from exfit import workflows
+from exfit.analysis import iteration_responses
+from exfit.case.case import load_case
+from exfit.errors import SimulationError
+from exfit.fitting.experiment import Experiment
+from exfit.output import plots, run_folder
+from exfit.results.model import DIGITS, Courses
+
+CASE = ROOT / "configs" / "first_order.yaml"
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return workflows.fit(load_case(CASE))
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch, tmp_path):
+    """Draw with few dots, and remember fits elsewhere."""
+    monkeypatch.setattr(plots.style, "DPI", 40)
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+
+
+def columns(path):
+    header, *rows = csv.reader(path.read_text().splitlines())
+    return dict(zip(header, np.array(rows, float).T, strict=True))
+
+
+def with_many(result, count):
+    """Return a fit that took so many iterations more than it did."""
+    kept = result.comparison.courses
+    numbers = tuple(range(count))
+    many = Courses(kept.signal, numbers, np.tile(kept.samples[:1], (count, 1)))
+    return replace(result, comparisons=(replace(result.comparison, courses=many),))
+
+
+def test_the_first_course_is_the_start_and_the_last_the_fit(fitted):
+    found, overlay = fitted.comparison.courses, fitted.comparison.judged
+    np.testing.assert_array_equal(found.samples[0], overlay.start)
+    # the last line of the history holds the fitted values themselves
+    np.testing.assert_array_equal(found.samples[-1], overlay.simulated)
+
+
+def test_every_course_costs_what_its_iteration_did(fitted):
+    found, measured = fitted.comparison.courses, fitted.comparison.judged.measured
+    costs = 0.5 * np.sum((found.samples - measured) ** 2, axis=1)
+    lines = {line.number: line.cost for line in fitted.history}
+    # the sub-steps are those of the fitted values: what they move is far below a thousandth
+    np.testing.assert_allclose(costs, [lines[k] for k in found.numbers], rtol=1e-3)
+
+
+def test_every_record_has_its_own_courses(tmp_path):
+    case = case_of(several(recording("up"), recording("down")), tmp_path)
+    result = workflows.fit(case)
+    run_folder.write_fit(result, tmp_path / "run", figures=False)
+    for one in result.comparisons:
+        table = columns(tmp_path / "run" / f"{one.name}-iterations.csv")
+        assert table["vt_0"] == pytest.approx(one.judged.start, rel=10.0 ** (1 - DIGITS))
+    assert not (tmp_path / "run" / "iterations.csv").exists()
+
+
+def test_what_is_found_about_a_record_moves_with_the_iterations(tmp_path):
+    """The instant of the step is free: the simulations then have no common course."""
+    content = config("ac1a_typical")
+    content["test"]["vref"][0]["at"] = {"start": 1.1, "min": 0.9, "max": 1.2}
+    result = workflows.fit(case_of(content, tmp_path))
+    found, overlay = result.comparison.courses, result.comparison.judged
+    np.testing.assert_array_equal(found.samples[0], overlay.start)
+    np.testing.assert_array_equal(found.samples[-1], overlay.simulated)
+
+
+@pytest.mark.parametrize("count", [1, 2, 40, 41, 1000])
+def test_of_many_iterations_some_are_kept_evenly_with_the_first_and_the_last(count):
+    kept = iteration_responses.chosen(count)
+    assert len(kept) == min(count, iteration_responses.MOST_COURSES)
+    assert (kept[0], kept[-1]) == (0, count - 1)
+    steps = np.diff(kept)
+    assert not len(steps) or 1 <= np.max(steps) <= np.min(steps) + 1
+
+
+def test_an_iteration_without_a_response_is_left_out(fitted, monkeypatch, tmp_path):
+    whole = Experiment.samples
+    lost = fitted.history[1].values["k"]
+
+    def samples(self, values):
+        if values["k"] == lost:
+            raise SimulationError("no state of rest")
+        return whole(self, values)
+
+    result_of = workflows.with_courses
+
+    def failing(*given):
+        monkeypatch.setattr(Experiment, "samples", samples)
+        return result_of(*given)
+
+    monkeypatch.setattr(workflows, "with_courses", failing)
+    result = workflows.fit(load_case(CASE))
+    assert 1 not in result.comparison.courses.numbers
+    assert len(result.comparison.courses.numbers) == len(result.history) - 1
+    run_folder.write_fit(result, tmp_path / "run", figures=True)
+    assert "vt_1" not in columns(tmp_path / "run" / "iterations.csv")
+
+
+def test_an_interruption_keeps_the_iterations_until_then():
+    def stop(line):
+        if line.number == 2:
+            raise KeyboardInterrupt
+
+    result = workflows.fit(load_case(CASE), watch=stop)
+    assert result.interrupted
+    assert result.comparison.courses.numbers == (0, 1, 2)
+
+
+def test_a_large_record_leaves_no_courses_and_says_so(fitted, monkeypatch, tmp_path):
+    run_folder.write_fit(fitted, tmp_path / "run", figures=True)
+    monkeypatch.setattr(iteration_responses, "MOST_SAMPLES", 100)
+    result = workflows.fit(load_case(CASE))
+    assert result.comparison.courses is None
+    assert any("up to 100" in note for note in result.notes)
+    run_folder.write_fit(result, tmp_path / "run", figures=True)  # over the former ones
+    assert not list((tmp_path / "run").glob("*iterations*"))
+
+
+def test_without_figures_the_table_is_written_on_the_record_s_clock(fitted, tmp_path):
+    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    table = columns(tmp_path / "run" / "iterations.csv")
+    np.testing.assert_array_equal(table["t"], fitted.comparison.time)
+    assert list(table)[1:] == [f"vt_{line.number}" for line in fitted.history]
+    assert not (tmp_path / "run" / "iterations.png").exists()
+
+
+@pytest.mark.parametrize("count", [1, 2, 13, 40])
+def test_a_line_is_drawn_for_every_course_and_the_bar_names_first_and_last(fitted, count):
+    figure = plots.iterations(with_many(fitted, count))
+    assert plots.png(figure)
+    responses, errors, *bar = figure.axes
+    assert len(responses.lines) == count + 1  # and the record
+    assert len(errors.lines) == count + 1  # and zero
+    colours = [line.get_color() for line in responses.lines[1:]]
+    assert len(set(colours)) == count
+    assert errors.get_xlabel() == "time (s)"
+    if count == 1:
+        assert not bar
+    else:
+        labels = [label.get_text() for label in bar[0].get_yticklabels()]
+        assert (labels[0], labels[-1]) == ("0", str(count - 1))
+
+
+def test_a_fit_without_courses_has_an_empty_figure(fitted):
+    bare = replace(fitted, comparisons=(replace(fitted.comparison, courses=None),))
+    assert plots.iterations(bare).axes == []

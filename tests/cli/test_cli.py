@@ -1,0 +1,847 @@
+"""The commands: what they print, what they leave, how they end."""
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from io import StringIO
+from pathlib import Path
+
+import click
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH
+from places import ROOT
+from rich.console import Console
+
+from exfit import cli, workflows
+from exfit.models import MODELS
+from exfit.models.machines import MACHINES
+from exfit.output import terminal
+from exfit.results.model import Iteration
+from exfit.simulation.simulator import kernel, linear_kernel, tangent_kernel
+
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+COMMANDS = ("fit", "simulate", "validate", "check")
+WIDTH = 80
+
+# k/(s + a) with k = 4 and a = 2, a unit step at 0.5 s from rest
+DOWN = {"vt0": 2.0, "vref": [{"at": 0.5, "step": -1.0}]}
+CASE = {
+    **FIRST_ORDER,
+    "record": {"file": "up.csv", "time": "t", "channels": {"vt": "v"}},
+    "validate": [
+        {
+            "name": "down-step",
+            "test": DOWN,
+            "record": {"file": "down.csv", "time": "t", "channels": {"vt": "v"}},
+        }
+    ],
+}
+MACHINE_CASE = {
+    **yaml.safe_load((ROOT / "configs" / "ac1a_typical.yaml").read_text()),
+    "test": {"vt0": 1.0, "vref": [{"at": 0.5, "step": 0.05}]},
+    "record": {"file": "unit.csv", "time": "t", "channels": {"vt": "v"}},
+    "validate": [],
+}
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a command left on the terminal."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(capsys):
+    """Return a function that runs a command as the shell does."""
+
+    def command(*arguments):
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            cli.main(args=[str(one) for one in arguments], prog_name="exfit")
+        found = capsys.readouterr()
+        return Ran(int(ended.value.code or 0), found.out, found.err)
+
+    return command
+
+
+@pytest.fixture(autouse=True)
+def workplace(tmp_path, monkeypatch):
+    """Work in an empty folder with the records of CASE, in no terminal."""
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "COLUMNS"):
+        monkeypatch.delenv(name, raising=False)
+    place = tmp_path / "work"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    records = {
+        "up.csv": TRUTH,
+        "down.csv": 2.0 - TRUTH,
+        "flat.csv": np.ones(len(TIME)),
+        "unit.csv": 1.0 + 0.05 * (1.0 - np.exp(-3.0 * np.maximum(TIME - 0.5, 0.0))),
+    }
+    for name, samples in records.items():
+        (place / name).write_text(csv_text(TIME, samples))
+    (place / "values.yaml").write_text("parameters: {k: 4.0, a: 2.0}\n")
+    return place
+
+
+def csv_text(time, samples):
+    rows = (f"{t:.6g},{v:.9g}" for t, v in zip(time, samples, strict=True))
+    return "\n".join(["t,v", *rows]) + "\n"
+
+
+def case_file(content=CASE, path="case.yaml"):
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def changed(content, *changes):
+    """Return a copy of a case with values put at dotted places; None takes the key away."""
+    content = deepcopy(content)
+    for place, value in changes:
+        *way, last = [int(part) if part.isdigit() else part for part in place.split(".")]
+        inner = content
+        for part in way:
+            inner = inner[part]
+        if value is None:
+            del inner[last]
+        else:
+            inner[last] = value
+    return content
+
+
+def listing(folder):
+    return sorted(str(path) for path in folder.rglob("*"))
+
+
+def columns(path):
+    header, *rows = csv.reader(Path(path).read_text().splitlines())
+    return {name: [row[k] for row in rows] for k, name in enumerate(header)}
+
+
+# what is wrong, and the words that must name place, value and limit
+CASE_FAULTS = {
+    "unknown key": (CASE, [("estimat", {})], ["case.yaml:", "estimat", "estimate"]),
+    "unknown model": (CASE, [("model", "AC1B")], ["case.yaml:1: model", "AC1B", "AC1A"]),
+    "unknown parameter": (
+        CASE,
+        [("parameters.fixed", {"q": 1.0})],
+        ["parameters.fixed.q", "FIRST_ORDER"],
+    ),
+    "start outside bounds": (
+        CASE,
+        [("parameters.free.k.start", 0.01)],
+        ["parameters.free.k.start", "0.01", "0.1 ... 100"],
+    ),
+    "min above max": (
+        CASE,
+        [("parameters.free.k.min", 200.0)],
+        ["parameters.free.k.min", "200", "100"],
+    ),
+    "text in a number": (
+        CASE,
+        [("parameters.free.k.start", "one")],
+        ["parameters.free.k.start", "'one'", "not a number"],
+    ),
+    "step outside the window": (
+        CASE,
+        [("record.window", [1.0, 3.0])],
+        ["test.vref[0].at", "0.5", "1 ... 3"],
+    ),
+    "machine data out of order": (
+        MACHINE_CASE,
+        [("plant.parameters.Xd", 0.28)],
+        ["plant.parameters", "Xd", "0.28", "0.3"],
+    ),
+    "saturation points that contradict": (
+        MACHINE_CASE,
+        [("parameters.fixed.SE1", 0.01)],
+        ["parameters.fixed.SE1", "0.01", "0.03"],
+    ),
+    "crossed limits": (
+        MACHINE_CASE,
+        [("parameters.fixed.VAMAX", 0.0), ("parameters.fixed.VAMIN", 0.0)],
+        ["parameters.fixed.VAMIN", "VAMAX"],
+    ),
+    "start beyond a limit": (
+        MACHINE_CASE,
+        [("parameters.fixed.VRMAX", 0.5)],
+        ["VRMAX", "0.5", "1.83"],
+    ),
+}
+TWICE = np.where(TIME == 1.0, 0.95, TIME)
+BACK = np.where(TIME == 1.0, 0.5, TIME)
+RECORD_FAULTS = {
+    "missing file": (None, ["up.csv", "No such file"]),
+    "empty record": ("", ["up.csv", "empty"]),
+    "no samples": ("t,v\n", ["up.csv", "no samples"]),
+    "missing column": ("t,w\n0,0\n1,0\n", ["up.csv", "'v'", "'w'"]),
+    "duplicate time": (csv_text(TWICE, TRUTH), ["up.csv:22", "0.95", "repeats"]),
+    "decreasing time": (csv_text(BACK, TRUTH), ["up.csv:22", "0.5", "0.95"]),
+    "NaN in a channel": ("t,v\n0,0\n1,nan\n2,0\n", ["up.csv:3", "'v'", "nan"]),
+    "text in a channel": ("t,v\n0,0\n1,n/a\n2,0\n", ["up.csv:3", "'v'", "'n/a'"]),
+    "shorter than the step time": (
+        csv_text(TIME[:5], TRUTH[:5]),
+        ["up.csv", "0 ... 0.2 s", "0.5 s"],
+    ),
+}
+
+
+def arguments(command, case):
+    given = ["--parameters", "values.yaml"] if command == "validate" else []
+    plots = [] if command == "check" else ["--no-plots"]
+    return [command, case, *given, *plots]
+
+
+def is_refused(ran, words, before, folder):
+    assert ran.code == 1
+    assert ran.out == ""
+    assert ran.err.startswith("Error: ")
+    assert "Traceback" not in ran.err
+    for word in words:
+        assert word in ran.err, word
+    assert listing(folder) == before
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("fault", CASE_FAULTS)
+def test_a_fault_of_the_case_is_told_and_nothing_is_written(run, workplace, fault, command):
+    base, changes, words = CASE_FAULTS[fault]
+    if base is MACHINE_CASE:
+        Path("values.yaml").write_text("parameters: {KA: 400.0}\n")
+    case = case_file(changed(base, *changes))
+    before = listing(workplace)
+    is_refused(run(*arguments(command, case)), words, before, workplace)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("fault", RECORD_FAULTS)
+def test_a_fault_of_the_record_is_told_and_nothing_is_written(run, workplace, fault, command):
+    text, words = RECORD_FAULTS[fault]
+    if text is None:
+        Path("up.csv").unlink()
+    else:
+        Path("up.csv").write_text(text)
+    case, before = case_file(), listing(workplace)
+    is_refused(run(*arguments(command, case)), words, before, workplace)
+
+
+@pytest.mark.parametrize("command", ["fit", "validate"])
+def test_a_fault_of_a_validation_is_told_before_anything_is_written(run, workplace, command):
+    Path("down.csv").unlink()
+    case, before = case_file(), listing(workplace)
+    is_refused(run(*arguments(command, case)), ["down.csv", "No such file"], before, workplace)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_case_that_does_not_exist_is_told(run, workplace, command):
+    before = listing(workplace)
+    is_refused(run(*arguments(command, "none.yaml")), ["none.yaml", "No such"], before, workplace)
+
+
+def test_a_fit_needs_a_free_parameter_but_a_simulation_does_not(run, workplace):
+    case = case_file(changed(CASE, ("parameters", {"fixed": {"k": 4.0, "a": 2.0}})))
+    before = listing(workplace)
+    words = ["case.yaml", "parameters.free", "needs a free parameter"]
+    is_refused(run("fit", case), words, before, workplace)
+    assert run("simulate", case, "--no-plots").code == 0
+    assert run("check", case).code == 0
+
+
+def test_a_fit_needs_a_record_but_a_simulation_does_not(run, workplace):
+    case = case_file(
+        changed(
+            CASE, ("record", None), ("validate", None), ("test", {**CASE["test"], "duration": 2.0})
+        )
+    )
+    before = listing(workplace)
+    is_refused(run("fit", case), ["case.yaml", "record", "missing"], before, workplace)
+    words = ["case.yaml", "no record to compare with"]
+    is_refused(run("validate", case, "--parameters", "values.yaml"), words, before, workplace)
+    assert run("simulate", case, "--no-plots").code == 0
+    assert run("check", case).code == 0
+
+
+def test_all_faults_of_a_case_are_told_at_once(run):
+    case = case_file(changed(CASE, ("model", "AC1B"), ("test.vref.0.at", "x"), ("accept", {})))
+    ran = run("fit", case)
+    assert ran.code == 1
+    assert [line.split(": ")[1] for line in ran.err.removeprefix("Error: ").splitlines()] == [
+        "model",
+        "test.vref[0].at",
+        "accept.rmse",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["--set", "q=1"], ["--set", "q", "known: k, a"]),
+        (["--set", "k=four"], ["--set", "k=four"]),
+        (["--set", "k"], ["--set", "KA=400"]),
+        (["--set", "k="], ["--set", "KA=400"]),
+        (["--set", "k=nan"], ["--set", "nan", "1e+06"]),
+        (["--set", "k=-1"], ["--set", "-1", "1e-06 ... 1e+06"]),
+        (["--parameters", "none.yaml"], ["none.yaml", "No such file"]),
+        (["--parameters", "up.csv"], ["up.csv"]),
+        (["--parameters", "."], ["Is a directory"]),
+        (["--parameters", "other.yaml"], ["other.yaml", "AC8B", "FIRST_ORDER"]),
+        (["--parameters", "text.yaml"], ["text.yaml", "parameters.k", "'four'"]),
+        (["--parameters", "symbol.yaml"], ["symbol.yaml", "KQ"]),
+    ],
+)
+def test_a_wrong_value_is_told_and_nothing_is_written(run, workplace, given, words):
+    Path("other.yaml").write_text("model: AC8B\nparameters: {k: 1.0}\n")
+    Path("text.yaml").write_text("parameters: {k: four}\n")
+    Path("symbol.yaml").write_text("parameters: {KQ: 1.0}\n")
+    case, before = case_file(), listing(workplace)
+    is_refused(run("simulate", case, *given), words, before, workplace)
+
+
+@pytest.mark.parametrize("command", ["fit", "simulate", "validate"])
+@pytest.mark.parametrize("place", ["taken", "taken/below"])
+def test_an_output_that_cannot_be_a_folder_is_told_before_the_work(run, workplace, command, place):
+    Path("taken").write_text("mine")
+    case, before = case_file(), listing(workplace)
+    ran = run(*arguments(command, case), "-o", place)
+    is_refused(ran, ["taken", "cannot be written"], before, workplace)
+    assert Path("taken").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "damage", [b"", b"damaged", None], ids=["emptied", "overwritten", "one bit turned"]
+)
+def test_a_damaged_cache_is_rebuilt_in_silence(run, tmp_path, monkeypatch, damage):
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    case = case_file()
+    for of_this_process in (kernel, tangent_kernel, linear_kernel):
+        of_this_process.cache_clear()
+    assert run("simulate", case, "--no-plots", "-o", "first").code == 0
+    kept = {path: path.read_bytes() for path in (tmp_path / "cache").glob("*.code")}
+    assert kept
+    for of_this_process in (kernel, tangent_kernel, linear_kernel):
+        of_this_process.cache_clear()
+    for path, content in kept.items():
+        path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]) if damage is None else damage)
+    ran = run("simulate", case, "--no-plots", "-o", "second", "-q")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+    assert Path("first/response.csv").read_text() == Path("second/response.csv").read_text()
+    assert {path: path.read_bytes() for path in (tmp_path / "cache").glob("*.code")} == kept
+
+
+def test_a_cache_that_cannot_be_written_costs_only_time(run, tmp_path, monkeypatch):
+    (tmp_path / "cache").write_text("a file in its place")
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    ran = run("fit", case_file(), "--no-plots", "-q")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+
+
+def test_a_fit_that_converges_ends_with_0_and_writes_its_files(run):
+    ran = run("fit", case_file())
+    assert (ran.code, ran.err) == (0, "")
+    assert {path.name for path in Path("runs/case-fit").iterdir()} == FILES_OF_A_FIT
+
+
+def test_a_fit_without_a_terminal_prints_plain_lines_of_80_columns(run):
+    ran = run("fit", case_file(), "--no-plots")
+    assert "\x1b" not in ran.out
+    assert "…" not in ran.out
+    assert max(map(len, ran.out.splitlines())) <= WIDTH
+    history = columns("runs/case-fit/history.csv")
+    shown = re.findall(r"^ +(\d+) (?:lm|dgn) ", ran.out, re.MULTILINE)
+    assert shown == history["iteration"]
+    for word in ("converged", "cost", "rmse", "simulations", "runs/case-fit", "down-step"):
+        assert word in ran.out
+
+
+def test_a_value_on_its_bound_is_marked(run):
+    ran = run("fit", case_file(changed(CASE, ("parameters.free.k.max", 3.0))), "--no-plots")
+    (line,) = [line for line in ran.out.splitlines() if line.startswith("k ")]
+    assert line.rstrip().endswith("on its max")
+    stored = json.loads(Path("runs/case-fit/result.json").read_text())
+    assert stored["parameters"]["k"]["at_bound"] == "max"
+    assert stored["parameters"]["a"]["at_bound"] is None
+
+
+def test_quiet_prints_nothing_and_writes_the_same(run):
+    case = case_file()
+    ran = run("fit", case, "--no-plots", "-q")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+    for command in ("simulate", "validate"):
+        ran = run(command, case, "--no-plots", "-q")
+        assert (ran.code, ran.out, ran.err) == (0, "", "")
+
+
+def test_json_is_the_result_and_nothing_else(run):
+    ran = run("fit", case_file(), "--no-plots", "--json")
+    assert (ran.code, ran.err) == (0, "")
+    printed = json.loads(ran.out, parse_constant=pytest.fail)
+    assert printed.keys() >= {
+        *("case", "model", "strategy", "parameters", "fixed", "cost", "rmse", "status", "message"),
+        *("success", "nit", "nfev", "njev", "seconds", "validation", "versions", "inputs"),
+        *("typical", "machine", "substeps", "simulations", "interrupted", "start_cost", "notes"),
+    }
+    assert printed["parameters"].keys() == {"k", "a"}
+    for one in printed["parameters"].values():
+        assert one.keys() >= {"value", "start", "min", "max", "at_bound"}
+    (validation,) = printed["validation"]
+    assert validation.keys() >= {"name", "rmse", "max_error", "fit_percent", "features"}
+    assert validation["name"] == "down-step"
+    assert all(re.fullmatch("[0-9a-f]{64}", digest) for digest in printed["inputs"].values())
+    assert "record" in printed["inputs"]
+    assert "exfit" in printed["versions"]
+    assert printed["parameters"]["k"]["value"] == pytest.approx(4.0, rel=1e-4)
+    stored = json.loads(Path("runs/case-fit/result.json").read_text())
+    assert {key: stored[key] for key in printed} == printed
+
+
+def test_json_of_a_validation_is_the_result_and_nothing_else(run):
+    ran = run("validate", case_file(), "--no-plots", "--json", "--parameters", "values.yaml")
+    assert (ran.code, ran.err) == (0, "")
+    names = [one["name"] for one in json.loads(ran.out)["validation"]]
+    assert names == ["fit", "down-step"]
+    assert json.loads(Path("runs/case-validate/validation.json").read_text()) == json.loads(ran.out)
+
+
+def test_the_iteration_limit_ends_with_3_and_leaves_the_best_point(run):
+    case = case_file(changed(CASE, ("estimate", {"strategy": "lm", "iterations": 1})))
+    ran = run("fit", case, "--no-plots", "--json")
+    assert ran.code == 3
+    printed = json.loads(ran.out)
+    assert not printed["success"]
+    assert "iteration limit" in printed["message"]
+    assert printed["nit"] == 1
+    assert printed["cost"] < printed["start_cost"]
+    assert Path("runs/case-fit/parameters.yaml").is_file()
+    assert "NOT CONVERGED" in run("fit", case, "--no-plots").out
+
+
+def test_a_validation_beyond_its_limit_ends_with_3(run):
+    case = case_file(changed(CASE, ("accept", {"rmse": 1e-12})))
+    ran = run("fit", case, "--no-plots")
+    assert ran.code == 3
+    assert "not accepted down-step" in ran.out
+    assert "converged" in ran.out
+    ran = run("validate", case, "--no-plots")
+    assert ran.code == 3
+    assert "not accepted down-step" in ran.out
+    assert "not accepted fit" not in ran.out
+
+
+@pytest.mark.parametrize(
+    "given", [["fit"], ["fit", "a", "b"], ["fit", "a", "--strategy", "x"], ["none"], ["fit", "-z"]]
+)
+def test_wrong_usage_ends_with_2(run, given):
+    ran = run(*given)
+    assert ran.code == 2
+    assert ran.out == ""
+    assert "Usage" in ran.err
+
+
+def test_the_strategy_option_goes_over_the_case(run):
+    ran = run("fit", case_file(), "--no-plots", "--json", "--strategy", "gn")
+    assert json.loads(ran.out)["strategy"] == "gn"
+
+
+@pytest.mark.parametrize("source", ["--parameters", "last fit"])
+def test_the_parameters_of_a_fit_give_its_response_again(run, source):
+    case = case_file()
+    run("fit", case, "--no-plots", "-q", "-o", "else where")
+    response = columns("else where/response.csv")
+    values = "else where/parameters.yaml"
+    run("simulate", case, "--no-plots", "-q", "--parameters", values)
+    assert columns("runs/case-simulate/response.csv")["vt"] == response["vt_simulated"]
+    given = ["--parameters", values] if source == "--parameters" else []
+    assert run("validate", case, "--no-plots", "-q", *given).code == 0
+    again = columns("runs/case-validate/fit.csv")
+    assert again["vt_simulated"] == response["vt_simulated"]
+    assert columns("runs/case-validate/down-step.csv") == columns("else where/down-step.csv")
+
+
+def test_a_validation_without_a_fit_says_what_to_give(run, workplace):
+    case, before = case_file(), listing(workplace)
+    words = ["case.yaml", "no fit of this case is known", "--parameters"]
+    is_refused(run("validate", case), words, before, workplace)
+
+
+def test_another_record_takes_the_place_of_the_first_validation(run):
+    samples = columns("down.csv")
+    other = Path("elsewhere/other.csv")
+    other.parent.mkdir()
+    shifted = np.array(samples["v"], float) + 0.5
+    other.write_text(csv_text(TIME, shifted))
+    ran = run(
+        *("validate", case_file(), "--no-plots", "--json"),
+        *("--parameters", "values.yaml", "--record", other),
+    )
+    fit, validation = json.loads(ran.out)["validation"]
+    assert (fit["name"], validation["name"]) == ("fit", "other")
+    assert fit["rmse"] < 1e-6
+    assert validation["rmse"] == pytest.approx(0.5, rel=1e-6)
+
+
+def test_a_record_that_is_called_fit_is_not_taken_for_the_fitted_one(run):
+    shutil.copy("down.csv", "fit.csv")
+    case = case_file(changed(CASE, ("accept", {"rmse": 1e-12})))
+    given = ["--parameters", "values.yaml", "--record", "fit.csv"]
+    ran = run("validate", case, "--no-plots", "--json", *given)
+    assert ran.code == 3
+    fit, other = json.loads(ran.out)["validation"]
+    assert (fit["accepted"], other["accepted"]) == (True, False)
+    assert len(list(Path("runs/case-validate").glob("*.csv"))) == 2
+
+
+def test_a_record_that_does_not_exist_is_told(run, workplace):
+    case, before = case_file(), listing(workplace)
+    ran = run("validate", case, "--parameters", "values.yaml", "--record", "none.csv")
+    is_refused(ran, ["none.csv", "No such file"], before, workplace)
+
+
+def final_voltage():
+    return float(columns("runs/case-simulate/response.csv")["vt"][-1])
+
+
+def test_set_goes_over_parameters_and_both_over_the_case(run):
+    case = case_file()
+    run("simulate", case, "--no-plots", "-q")
+    assert final_voltage() == pytest.approx(1.0 - np.exp(-2.5), rel=1e-6)
+    run("simulate", case, "--no-plots", "-q", "--parameters", "values.yaml")
+    assert final_voltage() == pytest.approx(2.0 * (1.0 - np.exp(-5.0)), rel=1e-6)
+    given = ["--parameters", "values.yaml", "--set", "k=8", "--set", "k=6"]
+    run("simulate", case, "--no-plots", "-q", *given)
+    assert final_voltage() == pytest.approx(3.0 * (1.0 - np.exp(-5.0)), rel=1e-6)
+
+
+def test_a_simulation_writes_every_signal_and_its_figures(run):
+    ran = run("simulate", case_file())
+    assert (ran.code, ran.err) == (0, "")
+    names = {path.name for path in Path("runs/case-simulate").iterdir()}
+    assert names == {"response.csv", "response.png", "overlay.png"}
+    assert list(columns("runs/case-simulate/response.csv")) == ["t", "vref", "vt", "V"]
+
+
+def test_a_simulation_of_a_machine_writes_its_field_and_all_states(run):
+    case = case_file(MACHINE_CASE)
+    assert run("simulate", case, "--no-plots", "-q", "--set", "machine.Tpd0=7").code == 0
+    header = list(columns("runs/case-simulate/response.csv"))
+    assert header[:5] == ["t", "vref", "vt", "efd", "ifd"]
+    assert set(header[5:]) == {"EQP", "PSID", *MODELS["AC1A"].states}
+
+
+def test_paths_are_relative_to_the_case_not_to_the_shell(run, tmp_path, monkeypatch):
+    case = case_file(path="deep/er/case.yaml")
+    for name in ("up.csv", "down.csv"):
+        shutil.move(name, case.parent / name)
+    monkeypatch.chdir(tmp_path)
+    assert run("fit", Path("work") / case, "--no-plots", "-q").code == 0
+    assert (tmp_path / "runs" / "case-fit" / "result.json").is_file()
+
+
+def test_a_path_may_hold_spaces_brackets_and_letters_of_any_language(run):
+    case = case_file(path="Prüfung [1] 試験/fall ä.yaml")
+    for name in ("up.csv", "down.csv"):
+        shutil.copy(name, case.parent / name)
+    ran = run("fit", case)
+    assert (ran.code, ran.err) == (0, "")
+    assert "written to runs/fall ä-fit" in ran.out
+    ran = run("validate", case, "--no-plots", "-o", "aus [2]")
+    assert ran.code == 0
+    assert "written to aus [2]" in ran.out
+
+
+SLOW = """\
+import signal
+import time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
+from exfit.cli import main
+from exfit.residuals import Residuals
+quick = Residuals.__call__
+def slow(self, theta):
+    time.sleep(0.2)
+    return quick(self, theta)
+Residuals.__call__ = slow
+main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="sends a signal of POSIX")
+def test_ctrl_c_keeps_the_best_point_and_ends_with_3():
+    case = case_file()
+    with subprocess.Popen(
+        [sys.executable, "-c", SLOW, "fit", str(case), "--no-plots"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        for line in process.stdout:
+            if line.startswith("   1 lm"):
+                process.send_signal(signal.SIGINT)
+                break
+        rest, err = process.communicate(timeout=30)
+    assert process.returncode == 3
+    assert err == ""
+    assert "NOT CONVERGED: interrupted" in rest
+    stored = json.loads(Path("runs/case-fit/result.json").read_text())
+    assert stored["interrupted"]
+    assert not stored["success"]
+    assert stored["cost"] < stored["start_cost"]
+    assert Path("runs/case-fit/parameters.yaml").read_text().splitlines()[0].endswith("interrupted")
+    assert len(columns("runs/case-fit/history.csv")["f"]) == stored["nit"] + 1
+
+
+def test_an_interruption_at_the_start_leaves_the_start_and_all_figures(run, monkeypatch):
+    def stop(self, line):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(terminal.Watch, "__call__", stop)
+    ran = run("fit", case_file())
+    assert (ran.code, ran.err) == (3, "")
+    stored = json.loads(Path("runs/case-fit/result.json").read_text())
+    assert stored["interrupted"]
+    assert stored["parameters"]["k"]["value"] == 1.0
+    assert Path("runs/case-fit/trajectories.png").is_file()
+
+
+OWN = (ROOT / "exfit" / "models" / "exciters" / "ac1a.py").read_text(encoding="utf-8")
+
+
+def own_case(text):
+    Path("own.py").write_text(text, encoding="utf-8")
+    return case_file(
+        changed(MACHINE_CASE, ("model", "own.py"), ("estimate", {"iterations": 2})), "own.yaml"
+    )
+
+
+def test_a_model_of_the_user_s_own_gives_the_same_fit(run):
+    builtin = case_file(changed(MACHINE_CASE, ("estimate", {"iterations": 2})))
+    found = json.loads(run("fit", builtin, "--no-plots", "--json").out)
+    own = json.loads(run("fit", own_case(OWN), "--no-plots", "--json").out)
+    assert own["parameters"] == found["parameters"]
+    assert (own["cost"], own["nfev"]) == (found["cost"], found["nfev"])
+    assert own["model"] == "OWN"
+    assert own["inputs"].keys() == found["inputs"].keys() | {"model"}
+    assert run("models", "own.py").code == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        pytest.param("def rest(", "def rest((", ["SyntaxError"], id="syntax"),
+        pytest.param("SHEET = ", "PAPER = ", ["lacks SHEET"], id="no sheet"),
+        pytest.param("def rest(", "def still(", ["lacks rest"], id="no rest"),
+        pytest.param("import Signal", "import Sgnal", ["ImportError"], id="import"),
+        pytest.param(", p.TC,", ", p.TQ,", ["TQ", "declare"], id="unknown parameter"),
+        pytest.param("u.vref +", "u.vreff +", ["vreff", "declare"], id="unknown input"),
+        pytest.param("vc, d.VC", "vc, _", ["VC"], id="slope forgotten"),
+        pytest.param("x.VC, x.VL", "_, x.VL", ["VC"], id="state at rest forgotten"),
+        pytest.param(
+            "    vr = clip(va, p.VRMIN, p.VRMAX)\n",
+            "    vr = p.VRMAX if va > p.VRMAX else va\n",
+            ["own.py:", "branch", "where"],
+            id="branch",
+        ),
+        pytest.param(
+            "return rectifier(ve,", "return rectifier(vee,", ["own.py:", "vee"], id="name"
+        ),
+        pytest.param(
+            "(s: Signal, u: Signal, p", "(s: Signal, p", ["own.py", "arg"], id="arguments"
+        ),
+        pytest.param("return u.vc1 + error", "return None  #", ["own.py"], id="returns nothing"),
+        pytest.param("error = vfe / p.KA", "error = vfe", ["rest"], id="rest that moves"),
+    ],
+)
+def test_a_broken_model_of_the_user_s_own_is_told(run, workplace, monkeypatch, old, new, words):
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    assert OWN.count(old) >= 1
+    case = own_case(OWN.replace(old, new, 1))
+    before = listing(workplace)
+    ran = run("fit", case, "--no-plots")
+    is_refused(ran, words, before, workplace)
+
+
+@pytest.mark.parametrize("command", [None, *cli.main.commands])
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+def test_every_command_has_help_that_fits_80_columns(run, command, flag):
+    ran = run(*([] if command is None else [command]), flag)
+    assert (ran.code, ran.err) == (0, "")
+    assert max(map(len, ran.out.splitlines())) <= WIDTH
+    # nothing is cut off: KA=400 ... and the like do not occur in help
+    assert "..." not in ran.out.replace("]...", "")
+
+
+@pytest.mark.parametrize("command", cli.main.commands)
+def test_every_option_is_explained(command):
+    for one in cli.main.commands[command].params:
+        if isinstance(one, click.Option):
+            assert one.help, one.name
+
+
+def test_the_schema_is_one_and_accepts_the_cases(run):
+    ran = run("schema")
+    assert (ran.code, ran.err) == (0, "")
+    schema = json.loads(ran.out)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for path in CONFIGS:
+        jsonschema.validate(yaml.safe_load(path.read_text()), schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**CASE, "estimat": {}}, schema)
+
+
+def test_the_catalogue_names_every_model_and_machine(run):
+    ran = run("models")
+    assert ran.code == 0
+    assert {line.split()[0] for line in ran.out.splitlines() if line} >= {*MODELS, *MACHINES}
+
+
+@pytest.mark.parametrize("name", [None, *MODELS, *MACHINES, "esac1a"])
+def test_models_are_described_in_80_columns_with_nothing_cut_off(run, name):
+    ran = run("models", *([] if name is None else [name]))
+    assert (ran.code, ran.err) == (0, "")
+    assert max(map(len, ran.out.splitlines())) <= WIDTH
+    assert "…" not in ran.out
+
+
+@pytest.mark.parametrize("name", [*MODELS, *MACHINES])
+def test_a_data_sheet_holds_every_parameter_with_its_meaning(run, name):
+    words = set(run("models", name).out.split())
+    for row in {**MODELS, **MACHINES}[name].sheet:
+        assert row.symbol in words
+        assert set(row.meaning.split()) <= words
+
+
+def test_an_unknown_model_is_told_with_the_known_ones(run, workplace):
+    is_refused(
+        run("models", "AC1B"), ["AC1B", "AC1A", "did you mean"], listing(workplace), workplace
+    )
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_every_case_of_configs_simulates_and_passes_its_check(run, path):
+    assert run("simulate", path, "--no-plots", "-q").code == 0
+    ran = run("check", path)
+    assert ran.code == 0, ran.out
+    assert "derivatives agree" in ran.out
+    assert "stays flat" in ran.out
+    assert max(map(len, ran.out.splitlines())) <= WIDTH
+
+
+def test_a_check_that_fails_ends_with_3(run, monkeypatch):
+    monkeypatch.setattr("exfit.analysis.model_check.AGREEMENT", 0.0)
+    ran = run("check", case_file())
+    assert ran.code == 3
+    assert "DISAGREE" in ran.out
+
+
+def lines(count):
+    for number in range(count):
+        yield Iteration(number, "dgn", 1e-300, 1e-10, 1e-10, 1e-10, 30, 9999, 9999, 0.5, {})
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_a_terminal_shows_the_last_iterations_whole(width):
+    screen = StringIO()
+    console = Console(file=screen, force_terminal=True, width=width, height=24, color_system=None)
+    with terminal.Watch(console, "case: AC1A").running() as watch:
+        for line in lines(30):
+            watch(line)
+    last = screen.getvalue().rpartition("earlier iterations)")[2]
+    rows = [row.split() for row in last.splitlines() if "dgn" in row]
+    assert [row[0] for row in rows] == [str(number) for number in range(18, 30)]
+    assert rows[-1][1:] == ["dgn", "1.0000e-300", *["1.00e-10"] * 3, "30", "9999"]
+    assert "…" not in screen.getvalue()
+
+
+def test_more_validations_than_fit_beside_each_other_stand_below_each_other(run):
+    many = [
+        {**CASE["validate"][0], "name": f"repetition-{number}-of-the-down-step"}
+        for number in range(4)
+    ]
+    ran = run("fit", case_file(changed(CASE, ("validate", many))), "--no-plots")
+    assert "…" not in ran.out
+    assert max(map(len, ran.out.splitlines())) <= WIDTH
+    for one in many:
+        assert one["name"] in ran.out
+
+
+def test_the_program_starts_as_a_command_and_as_a_pipe(tmp_path):
+    program = shutil.which("exfit", path=str(Path(sys.executable).parent))
+    start = [program] if program else [sys.executable, "-m", "exfit.cli"]
+    if not program:
+        pytest.skip("exfit is not installed as a command")
+    case = case_file()
+    ran = subprocess.run(
+        [*start, "fit", str(case), "--no-plots", "--json"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert json.loads(ran.stdout)["success"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        pytest.param(("record.file", "flat.csv"), "vt is 1 pu throughout", id="flat"),
+        pytest.param(
+            ("record.channels.vt", {"column": "v", "scale": 0.0}),
+            "leaves nothing",
+            id="scaled away",
+        ),
+        pytest.param(
+            ("record.channels.vt", {"column": "v", "scale": 1e200}), "too large", id="overflow"
+        ),
+    ],
+)
+def test_a_record_that_shows_no_test_is_refused(run, change, words):
+    ran = run("fit", case_file(changed(CASE, change)), "--no-plots")
+    assert (ran.code, ran.out) == (1, "")
+    assert words in ran.err
+
+
+def test_a_record_with_fewer_samples_than_unknowns_is_refused(run):
+    ran = run("fit", case_file(changed(MACHINE_CASE, ("record.window", [0.45, 0.6]))), "--no-plots")
+    assert ran.code == 1
+    assert "4 samples for 7 free parameters" in ran.err
+
+
+def test_a_fit_no_better_than_a_constant_ends_with_3_and_says_why(run):
+    """The step is given with the wrong sign: every value runs to a bound, and none helps."""
+    wrong = changed(MACHINE_CASE, ("test.vref.0.step", -0.05), ("estimate", {"iterations": 5}))
+    ran = run("fit", case_file(wrong), "--no-plots")
+    assert ran.code == 3
+    told = " ".join(ran.out.split())
+    assert "no better than a constant" in told
+    assert "the response the other way" in told
+
+
+def test_an_acceptance_without_a_validation_is_refused(run):
+    case = changed(CASE, ("accept", {"rmse": 1.0}), ("validate", []))
+    ran = run("fit", case_file(case), "--no-plots")
+    assert ran.code == 1
+    assert "no validation" in ran.err
+
+
+def test_a_search_that_was_cut_short_ends_with_3_though_its_best_point_converged(run, monkeypatch):
+    found = workflows.fit
+    monkeypatch.setattr(
+        "exfit.workflows.fit",
+        lambda *given, **more: replace(found(*given, **more), interrupted=True),
+    )
+    ran = run("fit", case_file(), "--no-plots")
+    assert ran.code == 3

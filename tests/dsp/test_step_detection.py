@@ -1,0 +1,262 @@
+"""Onset: the step of a reference nobody recorded is found where the simulator made it."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from places import REFERENCE, SAMPLES
+
+from exfit.dsp.step_detection import find_step, find_steps
+from exfit.records.record import read_columns
+
+STEP_AT = 1.0  # s, in every record and reference
+STEP = 0.05  # pu, of the reference
+
+# what ANDES computed of ten-second responses to such a step, without noise
+REFERENCES = [
+    "reference_ac1a",
+    "reference_ac8b_unit1",
+    "reference_ac8b_unit2",
+    "reference_esdc2a",
+    "reference_ieeet1",
+    "andes_esac5a_up5",
+    "andes_exac4_up5",
+    "andes_sexs_up5",
+]
+# sign of the step, and share of it that vt settles off by in 10 s: the AC8B's reset is slow
+RECORDS = {
+    "ac1a_up": (1, 0.02),
+    "ac1a_down": (-1, 0.02),
+    "ac8b_unit1_up": (1, 0.05),
+    "ac8b_unit1_down": (-1, 0.05),
+    "ac8b_unit2_up": (1, 0.05),
+    "ac8b_unit2_down": (-1, 0.05),
+    "ac1a_channels": (1, 0.02),
+}
+
+every_reference = pytest.mark.parametrize("reference", REFERENCES)
+
+
+@cache
+def unit_response(reference):
+    """Return time and the response to a step at 1 s, from 0 to 1 where it settles."""
+    columns = read_columns(REFERENCE / f"{reference}.csv", ["t", "vt"])
+    first = columns["t"] < 10.9  # a second step follows at 11 s
+    time, vt = columns["t"][first], columns["vt"][first]
+    return time, (vt - vt[0]) / (vt[-1] - vt[0])
+
+
+def response(time, reference, step=STEP, at=STEP_AT):
+    return step * np.interp(time - at + STEP_AT, *unit_response(reference), left=0.0)
+
+
+def recorded(reference, step=STEP, rate=100.0, seed=0, size=0.0, **dirt):
+    """Return time and vt as a recorder would give them."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 10.5, 1.0 / rate)
+    if dirt.get("uneven"):
+        time = np.sort(time + rng.uniform(-0.4, 0.4, time.size) / rate)
+    vt = 1.0 + response(time, reference, step) + rng.normal(0.0, size, time.size)
+    if dirt.get("spikes"):
+        spiky = rng.random(time.size) < 0.01
+        vt = vt + np.where(spiky, 0.05 * rng.choice([-1.0, 1.0], time.size), 0.0)
+    if dirt.get("quantum"):
+        vt = dirt["quantum"] * np.round(vt / dirt["quantum"])
+    return time, vt
+
+
+@pytest.mark.parametrize("record", RECORDS)
+def test_the_step_of_a_sample_record_is_found_within_three_samples(record):
+    sign, share = RECORDS[record]
+    columns = read_columns(SAMPLES / f"{record}.csv", ["t", "vt"])
+    onset = find_step(columns["t"], columns["vt"])
+    assert onset.at == pytest.approx(STEP_AT, abs=0.03)
+    assert onset.size == pytest.approx(sign * STEP, rel=share)
+    before = columns["vt"][columns["t"] < STEP_AT]
+    assert onset.level == pytest.approx(np.mean(before), abs=1e-4)
+
+
+def test_on_load_the_instant_is_found_and_the_size_is_that_of_the_voltage():
+    columns = read_columns(SAMPLES / "ac8b_on_line.csv", ["t", "vt"])
+    onset = find_step(columns["t"], columns["vt"])
+    assert onset.at == pytest.approx(STEP_AT, abs=0.03)
+    assert onset.size == pytest.approx(0.018, rel=0.02)  # the reference stepped by 0.02 pu
+
+
+@every_reference
+@pytest.mark.parametrize("step", [0.02, -0.05, 0.1])
+def test_without_noise_the_step_is_found_within_two_samples(reference, step):
+    onset = find_step(*recorded(reference, step))
+    assert onset.at == pytest.approx(STEP_AT, abs=0.02)
+    assert onset.size == pytest.approx(step, rel=0.003)
+    assert onset.level == pytest.approx(1.0, abs=1e-6)
+
+
+DIRT = {
+    "noise": {"size": 1e-4},
+    "spikes": {"size": 1e-4, "spikes": True},
+    "rounded": {"quantum": 5.5e-5},
+    "uneven": {"size": 1e-4, "uneven": True},
+    "all": {"size": 1e-4, "spikes": True, "quantum": 5.5e-5, "uneven": True},
+}
+
+
+@every_reference
+@pytest.mark.parametrize("dirt", DIRT)
+def test_what_a_recorder_does_moves_the_step_little(reference, dirt):
+    for seed, step in enumerate([0.02, -0.05, 0.1]):
+        onset = find_step(*recorded(reference, step, seed=seed, **DIRT[dirt]))
+        # what the shape of the rise errs by, and three standard errors
+        assert abs(onset.at - STEP_AT) <= 0.025 + 3.0 * onset.spread
+        assert onset.spread < 0.02
+        assert onset.size == pytest.approx(step, rel=0.01)
+
+
+@every_reference
+def test_the_spread_is_what_noise_leaves_open(reference):
+    found = [find_step(*recorded(reference, seed=seed, size=3e-4)) for seed in range(12)]
+    told = np.mean([onset.spread for onset in found])
+    # 12 values tell their own spread to a factor of 1.6 in 99 of 100 cases
+    assert np.std([onset.at for onset in found], ddof=1) == pytest.approx(told, rel=0.65)
+
+
+@every_reference
+@pytest.mark.parametrize(("step", "worst"), [(0.02, 0.15), (-0.05, 0.08), (0.1, 0.05)])
+def test_large_noise_is_survived(reference, step, worst):
+    for seed in range(3):
+        onset = find_step(*recorded(reference, step, seed=seed, size=1e-3, spikes=True))
+        assert onset.at == pytest.approx(STEP_AT, abs=worst)
+        assert onset.size == pytest.approx(step, rel=0.03)
+
+
+@pytest.mark.parametrize("rate", [20.0, 50.0, 500.0, 5000.0])
+def test_the_rate_of_sampling_does_not_matter(rate):
+    for reference in REFERENCES[:3]:
+        onset = find_step(*recorded(reference, rate=rate, size=1e-4))
+        assert onset.at == pytest.approx(STEP_AT, abs=0.03)
+
+
+def test_the_unit_of_the_signal_and_the_origin_of_time_do_not_matter():
+    time, vt = recorded("reference_ac1a", size=1e-4, spikes=True)
+    plain, scaled = find_step(time, vt), find_step(time + 300.0, -13.8 * vt)
+    # a minimum is flat: its place rounds at the root of what the samples round at
+    assert scaled.at - 300.0 == pytest.approx(plain.at, abs=1e-5)
+    assert find_step(time + 1e6, vt).at - 1e6 == pytest.approx(plain.at, abs=1e-4)
+    assert scaled.spread == pytest.approx(plain.spread, rel=1e-3)
+    assert scaled.size == pytest.approx(-13.8 * plain.size, rel=1e-12)
+    assert scaled.level == pytest.approx(-13.8 * plain.level, rel=1e-12)
+
+
+@every_reference
+@pytest.mark.parametrize(
+    "steps", [(0.05, -0.05), (0.02, -0.1), (0.05, 0.05), (0.1, -0.03)], ids=str
+)
+def test_of_several_steps_the_first_is_found_with_its_own_size(reference, steps):
+    time = np.arange(0.0, 24.0, 0.01)
+    vt = 1.0 + np.random.default_rng(5).normal(0.0, 1e-4, time.size)
+    for step, at in zip(steps, (3.0, 13.0), strict=True):
+        vt = vt + response(time, reference, step, at)
+    onset = find_step(time, vt)
+    assert onset.at == pytest.approx(3.0, abs=0.04)
+    assert onset.size == pytest.approx(steps[0], rel=0.01)
+
+
+@every_reference
+@pytest.mark.parametrize(
+    "steps", [(0.05, -0.05), (0.02, -0.1), (0.05, 0.05, -0.1), (0.05,), (0.1, -0.03)], ids=str
+)
+def test_all_steps_are_found_in_their_order_and_no_others(reference, steps):
+    time = np.arange(0.0, 4.0 + 10.0 * len(steps), 0.01)
+    vt = 1.0 + np.random.default_rng(9).normal(0.0, 1e-4, time.size)
+    instants = 3.0 + 10.0 * np.arange(len(steps))
+    for step, at in zip(steps, instants, strict=True):
+        vt = vt + response(time, reference, step, at)
+    found = find_steps(time, vt)
+    assert [onset.at for onset in found] == pytest.approx(instants, abs=0.04)
+    assert [onset.size for onset in found] == pytest.approx(steps, rel=0.03)
+    assert found[0] == find_step(time, vt)
+
+
+def test_a_slow_drift_before_the_step_is_not_the_step():
+    time = np.arange(0.0, 20.0, 0.01)
+    vt = 1.0 + 2e-3 * np.exp(-time) + response(time, "reference_ac1a", 0.05, 5.0)
+    onset = find_step(time, vt + np.random.default_rng(6).normal(0.0, 1e-4, time.size))
+    assert onset.at == pytest.approx(5.0, abs=0.02)
+    assert onset.size == pytest.approx(0.05, rel=0.01)
+
+
+TIME = np.arange(0.0, 10.0, 0.01)
+
+
+def test_a_jump_between_two_samples_is_placed_between_them():
+    jump = np.where(TIME < 3.0, 1.0, 1.05) + np.random.default_rng(7).normal(0.0, 1e-4, TIME.size)
+    fast = 1.05 - 0.05 * np.exp(-np.maximum(TIME - 3.0, 0.0) / 0.02)
+    for vt in (jump, fast, fast + np.random.default_rng(8).normal(0.0, 1e-4, TIME.size)):
+        onset = find_step(TIME, vt)
+        assert onset.at == pytest.approx(3.0, abs=0.015)
+        assert onset.spread <= 0.015
+
+
+def test_spikes_at_the_ends_are_no_step():
+    vt = 1.0 + response(TIME, "reference_ac1a")
+    spiky = vt.copy()
+    spiky[[0, -1]] += 0.2
+    dirty, clean = find_step(TIME, spiky), find_step(TIME, vt)
+    assert dirty.at == pytest.approx(clean.at, abs=1e-3)
+    assert dirty.size == pytest.approx(clean.size, rel=1e-5)
+
+
+NO_STEPS = {
+    "constant": (np.ones(TIME.size), "no step stands out"),
+    "noise": (np.random.default_rng(1).normal(1.0, 1e-3, TIME.size), "no step stands out"),
+    "spikes": (np.where(np.arange(TIME.size) % 97 == 50, 1.05, 1.0), "no step stands out"),
+    "step in the noise": (
+        np.random.default_rng(2).normal(1.0, 0.02, TIME.size) + 0.02 * (TIME > 2.0),
+        "no step stands out",
+    ),
+    "ramp": (1.0 + 0.1 * np.sqrt(1.0 + TIME), "from the very beginning, 0 s"),
+    "step at the start": (
+        1.0 + response(TIME, "reference_ac1a", 0.05, 0.0),
+        "from the very beginning, 0 s",
+    ),
+    "step after five samples": (
+        1.0 + response(TIME, "reference_ac1a", 0.05, 0.05),
+        "from the very beginning, 0 s",
+    ),
+    "pulse": (1.0 + 0.05 * np.exp(-((TIME - 3.0) ** 2) / 0.02), "no lasting change"),
+    "few": (np.r_[np.ones(10), np.full(9, 1.05)], "19 samples"),
+}
+
+
+@pytest.mark.parametrize("case", NO_STEPS)
+def test_where_there_is_no_step_it_is_said(case):
+    samples, sentence = NO_STEPS[case]
+    with pytest.raises(ValueError, match=sentence):
+        find_step(TIME[: len(samples)], samples)
+
+
+def test_a_step_soon_after_the_start_is_found():
+    onset = find_step(TIME, 1.0 + response(TIME, "reference_ac1a", 0.05, 0.2))
+    assert onset.at == pytest.approx(0.2, abs=0.02)
+
+
+@settings(deadline=None, derandomize=True, max_examples=200)
+@given(
+    st.integers(20, 60).flatmap(
+        lambda count: arrays(float, count, elements=st.sampled_from([0.0, 0.1, 0.9, 1.0, 1.1]))
+    ),
+    st.integers(0, 20),
+)
+def test_whatever_is_recorded_gives_an_onset_within_it_or_a_sentence(samples, rest):
+    samples = np.r_[np.full(rest, samples[0]), samples]
+    time = 0.1 * np.arange(len(samples))
+    try:
+        onset = find_step(time, samples)
+    except ValueError:
+        return
+    assert time[9] <= onset.at <= time[-1]
+    assert onset.size != 0.0
+    assert 0.0 <= onset.spread <= time[-1]

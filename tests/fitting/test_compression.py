@@ -1,0 +1,186 @@
+"""Condensed records: the same cost, gradient and J'J as those of all samples, and when not."""
+
+import gc
+import weakref
+
+import numpy as np
+import pytest
+from records import UNIT, case_of, found_in, one, synthetic
+
+from exfit import workflows
+from exfit.fitting import compression as module
+from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.compression import condensed
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.uncertainty import knowledge, linearisation
+from exfit.inference import confidence
+from exfit.workflows import fit
+
+TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}, {"at": 2.0, "step": -0.03}]}
+SEED = 3
+DENSE = 20_000  # samples in 3 s, at random instants
+GRID = {"simulation": {"step": 0.01}}
+CHANNELS = {"vt": "vt", "efd": {"column": "efd", "weight": 0.02}}
+AGREE = 1e-10  # relative: what the rounding of sums of squares leaves
+
+
+def dense_case(folder, record=None, channels=None, sections=None, test=None):
+    """Return a case whose record has dozens of samples to each step of the simulation."""
+    rng = np.random.default_rng(SEED)
+    time = np.sort(rng.uniform(0.0, 3.0, DENSE))
+    synthetic(folder, TEST, time, signals=("vt", "efd"))
+    content = {**one(test or TEST, channels or CHANNELS, tuple(UNIT), **(record or {})), **GRID}
+    content["parameters"]["free"]["TE"]["prior"] = {"mean": 1.4, "std": "10 %"}
+    return case_of({**content, **(sections or {})}, folder)
+
+
+def residuals(case):
+    return residuals_of(case, [one.secured(case.values()) for one in fitted_trials(case)])
+
+
+def forms(found, theta):
+    """Return cost, gradient and J'J."""
+    r, slopes = found(theta), found.exact(theta)
+    return 0.5 * float(r @ r), slopes.T @ r, slopes.T @ slopes
+
+
+OF_RECORD = {
+    "vt0": found_in(1.0, 0.9, 1.1),
+    "vref": [
+        {"at": found_in(1.0, 0.8, 1.2), "step": 0.05},
+        {"at": 2.0, "step": found_in(-0.03, -0.05, -0.01)},
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("record", "test"),
+    [
+        ({}, TEST),
+        ({"mask": [[0.4, 0.7], [1.001, 1.004]]}, TEST),
+        ({"window": [0.2, 2.03], "delay": 0.0123}, TEST),
+        ({}, {**TEST, "begin": -0.5}),
+        ({}, OF_RECORD),
+    ],
+    ids=["whole", "mask", "ends with a step, late", "begins early", "of the record"],
+)
+def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, record, test):
+    """Where samples are left out, too, some steps of the grid whole; and the last parts of both."""
+    every = residuals(dense_case(tmp_path, record, test=test))
+    few = condensed(every)
+    assert module.WORTH * few.count < every.count
+    rng = np.random.default_rng(SEED)
+    for _ in range(3):
+        theta = every.start + rng.uniform(-0.3, 0.3, len(every.start))
+        for all_, ours in zip(forms(every, theta), forms(few, theta), strict=True):
+            assert ours == pytest.approx(all_, rel=AGREE, abs=AGREE * np.max(np.abs(all_)))
+
+
+def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
+    case = dense_case(tmp_path, sections={"estimate": {"strategy": "auto"}})
+    ours = fit(case)
+    for user in ("study", "knowledge", "straightness"):
+        monkeypatch.setattr(f"exfit.{user}.condensed", lambda whole: whole)
+    every = fit(case)
+    assert (ours.message, ours.nfev, ours.njev) == (every.message, every.nfev, every.njev)
+    assert ours.cost == pytest.approx(every.cost, rel=AGREE)
+    assert ours.knowledge.sentences == every.knowledge.sentences
+    for name, value in every.values.items():
+        assert ours.values[name] == pytest.approx(value, rel=1e-6)
+
+
+def test_errors_and_intervals_are_those_of_all_samples(tmp_path, monkeypatch):
+    whole = residuals(dense_case(tmp_path))
+    ours = confidence(linearisation(whole, whole.start, ()))
+    monkeypatch.setattr("exfit.fitting.uncertainty.condensed", lambda whole: whole)
+    every = confidence(linearisation(whole, whole.start, ()))
+    assert ours.dof == pytest.approx(every.dof, rel=1e-6)
+    for name, one_ in every.parameters.items():
+        assert ours.parameters[name].std_error == pytest.approx(one_.std_error, rel=1e-6)
+    for ours_, theirs in zip(ours.noise, every.noise, strict=True):
+        assert ours_.std == pytest.approx(theirs.std, rel=1e-9)
+        assert ours_.p_value == theirs.p_value
+
+
+def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
+    """What is known beforehand is one more residual of both."""
+    asked = {}
+
+    def stopped(residuals, start, *, good_enough, **_):
+        asked[len(residuals(start))] = good_enough
+        raise KeyboardInterrupt
+
+    case = dense_case(tmp_path)
+    every = residuals(case)
+    few = condensed(every)
+    monkeypatch.setattr("exfit.workflows.estimate.least_squares", stopped)
+    for search in (lambda whole: whole, condensed):
+        monkeypatch.setattr("exfit.workflows.condensed", search)
+        with pytest.raises(KeyboardInterrupt):
+            workflows.search(case, every, "auto", print, print)
+    squares = [count * limit**2 for count, limit in asked.items()]
+    assert set(asked) == {every.count + 1, few.count + 1}
+    assert squares[0] == pytest.approx(squares[1], rel=1e-12)
+
+
+def test_what_moves_is_told_at_the_instants_of_the_record(tmp_path, monkeypatch):
+    """A recorder's delay is in them, too."""
+    case = dense_case(tmp_path, {"delay": 0.2})
+    found = residuals(case)
+    theta = found.start
+    (ours, _) = knowledge(found, theta, ()).sensitivity
+    monkeypatch.setattr("exfit.fitting.uncertainty.condensed", lambda whole: whole)
+    (every, _) = knowledge(found, theta, ()).sensitivity
+    assert len(ours.time) < len(every.time)
+    later = ours.time <= every.time[-1]
+    for k in range(len(theta)):
+        line = np.interp(ours.time[later], every.time, every.moved[:, k])
+        # which lies between samples up to a millisecond apart
+        most = 1e-3 * np.max(np.abs(line))
+        np.testing.assert_allclose(ours.moved[later, k], line, rtol=0.0, atol=most)
+
+
+def test_a_record_is_condensed_once_whatever_comes_between_and_then_forgotten(tmp_path):
+    first = residuals(dense_case(tmp_path))
+    second = Residuals(first.experiments, first.free, first.fixed, first.ties)
+    few = condensed(first)
+    assert condensed(second) is not few
+    assert condensed(first) is few
+    gone = weakref.ref(few)
+    del first, few
+    gc.collect()
+    assert gone() is None
+
+
+def filtered(filter_):
+    return {"channels": {"vt": {"column": "vt", "filter": filter_}}}
+
+
+ONE_STEP = {"vt0": 1.0, "vref": [{"at": found_in(1.0, 0.8, 1.2), "step": 0.05}]}
+
+
+@pytest.mark.parametrize(
+    ("record", "sections", "test"),
+    [
+        (filtered({"median": 3}), {}, TEST),
+        ({"channels": {"vt": {"column": "vt", "averaged": 0.1}, "efd": "efd"}}, {}, TEST),
+        ({"delay": found_in(0.0, -0.1, 0.1)}, {}, TEST),
+        ({"channels": {"vt": {"column": "vt", "offset": found_in(0.0, -0.1, 0.1)}}}, {}, TEST),
+        ({"channels": {"vt": {"column": "vt", "scale": found_in(1.0, 0.9, 1.1)}}}, {}, TEST),
+        ({}, {"estimate": {"loss": "huber"}}, TEST),
+        ({"channels": {"vt": "vt"}}, {}, ONE_STEP),
+    ],
+    ids=["filter", "one averaged", "delay", "offset", "scale", "loss", "only instant"],
+)
+def test_what_is_not_a_quadratic_form_of_the_grid_stays_as_it_is(tmp_path, record, sections, test):
+    given = {key: value for key, value in record.items() if key != "channels"}
+    case = dense_case(tmp_path, given, record.get("channels"), sections, test)
+    every = residuals(case)
+    assert condensed(every) is every
+
+
+def test_a_record_with_few_samples_stays_as_it_is(tmp_path):
+    synthetic(tmp_path, TEST, np.arange(0.0, 3.0, 0.01))
+    every = residuals(case_of(one(TEST, free=("KA",)), tmp_path))
+    assert isinstance(every, Residuals)
+    assert condensed(every) is every

@@ -1,0 +1,319 @@
+"""What every stabiliser of the catalogue keeps to, and each against its transfer function."""
+
+import cmath
+
+import numpy as np
+import pytest
+from oracle import float_run, leads_of, vector
+
+from exfit.engine.kernel import Kernel, Span
+from exfit.engine.system import Rest, System
+from exfit.models import STABILISERS
+from exfit.models.blocks import SHORTEST
+from exfit.models.sheet import crossed_limits, typical
+from exfit.plants import Names
+from exfit.plants.parts import motion, values_named
+
+FREQUENCIES = np.geomspace(0.01, 10.0, 61)  # Hz: from inter-area to local modes and beyond
+SIGNALS = ("speed", "p", "vt")
+SIDES = ("vsi1", "vsi2")
+
+# washouts that T = 0 leaves out: there the limit is the long time constant
+LEFT_OUT = {"PSS2B": ("TW2", "TW4")}
+
+
+@pytest.fixture(params=list(STABILISERS))
+def stabiliser(request):
+    return STABILISERS[request.param]
+
+
+def inputs(*vsi):
+    return Names(**dict(zip(SIDES, vsi, strict=False)))
+
+
+def lively(model):
+    """Return typical data with no block bypassed."""
+    values = typical(model.sheet)
+    return values | {row.symbol: values[row.symbol] or 0.04 for row in model.sheet}
+
+
+def resting(model, p, u):
+    x = Names()
+    assert model.rest(0.0, u, p, x) is None
+    assert vars(x).keys() == set(model.states)
+    return x
+
+
+def motion_of(model, p, x, vsi):
+    """Return the slopes of states (n) and the output."""
+    d = Names()
+    s = Names(**dict(zip(model.states, x, strict=True)))
+    vs = model.equations(s, inputs(*vsi), p, d)
+    return np.array([getattr(d, name) for name in model.states]), vs
+
+
+def frequency_response(model, values):
+    """Return the output per unit of each input (frequencies, inputs), from central differences.
+
+    The equations are linear off their limits, and zero at rest: the differences err by the rounding
+    of a ratio alone, however small they are.
+    """
+    p, h, count = Names(**values), 1e-9, len(model.inputs)
+    rest = np.zeros(len(model.states) + count)
+    columns = []
+    for k in range(len(rest)):
+        ends = []
+        for side in (h, -h):
+            at = rest.copy()
+            at[k] += side
+            slopes, vs = motion_of(model, p, at[: len(model.states)], at[len(model.states) :])
+            ends.append(np.append(slopes, vs))
+        columns.append((ends[0] - ends[1]) / (2.0 * h))
+    whole = np.array(columns).T
+    n = len(model.states)
+    A, B, C, D = whole[:n, :n], whole[:n, n:], whole[n, :n], whole[n, n:]
+    return np.array(
+        [C @ np.linalg.solve(2j * np.pi * f * np.eye(n) - A, B) + D for f in FREQUENCIES]
+    )
+
+
+# --- the transfer functions, as the block diagrams print them -------------------------------------
+
+
+def lead(s, T1, T2):
+    return (1.0 + s * T1) / (1.0 + s * T2) if T2 > 0.0 else 1.0
+
+
+def washed(s, T):
+    return s * T / (1.0 + s * T) if T > 0.0 else 1.0
+
+
+def stab1(s, p):
+    shaped = lead(s, p["T1_T3"] * p["T3"], p["T3"]) * lead(s, p["T2_T4"] * p["T4"], p["T4"])
+    return [p["K_T"] * p["T"] * s / (1.0 + s * p["T"]) * shaped]
+
+
+def pss1a(s, p):
+    filtered = 1.0 / (1.0 + p["A1"] * s + p["A2"] * s * s)
+    shaped = lead(s, p["T1"], p["T2"]) * lead(s, p["T3"], p["T4"])
+    return [p["KS"] * washed(s, p["T5"]) / (1.0 + s * p["T6"]) * filtered * shaped]
+
+
+def pss2b(s, p):
+    speed = washed(s, p["TW1"]) * washed(s, p["TW2"]) / (1.0 + s * p["T6"])
+    power = washed(s, p["TW3"]) * washed(s, p["TW4"]) * p["KS2"] / (1.0 + s * p["T7"])
+    ramp = (1.0 + s * p["T8"]) / (1.0 + s * p["T9"]) ** p["M"]
+    shaped = p["KS1"] * lead(s, p["T1"], p["T2"]) * lead(s, p["T3"], p["T4"])
+    shaped *= lead(s, p["T10"], p["T11"])
+    return [ramp * speed * shaped, (ramp * p["KS3"] - 1.0) * power * shaped]
+
+
+FUNCTIONS = {"STAB1": stab1, "PSS1A": pss1a, "PSS2B": pss2b}
+
+
+def assert_is_its_function(model, values):
+    got = frequency_response(model, values)
+    expected = np.array([FUNCTIONS[model.name](2j * cmath.pi * f, values) for f in FREQUENCIES])
+    # rounding of the solution: its matrix holds rates from 1e-3 to 1e4 per second
+    assert np.abs(got - expected).max() < 1e-11 * np.abs(expected).max()
+
+
+def test_every_stabiliser_has_a_transfer_function_here():
+    assert FUNCTIONS.keys() == STABILISERS.keys()
+
+
+def test_the_response_is_the_product_of_the_blocks(stabiliser):
+    assert_is_its_function(stabiliser, typical(stabiliser.sheet))
+    assert_is_its_function(stabiliser, lively(stabiliser))
+
+
+def test_the_response_is_the_product_of_the_blocks_for_drawn_values(stabiliser):
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        values = lively(stabiliser)
+        moved = {name: value * 3.0 ** rng.uniform(-1.0, 1.0) for name, value in values.items()}
+        assert_is_its_function(stabiliser, moved | ({"M": 4.0} if "M" in values else {}))
+
+
+@pytest.mark.parametrize("lags", [1.0, 2.0, 3.0, 4.0, 5.0])
+def test_the_ramp_tracking_filter_has_as_many_lags_as_M(lags):
+    assert_is_its_function(STABILISERS["PSS2B"], lively(STABILISERS["PSS2B"]) | {"M": lags})
+
+
+@pytest.mark.parametrize("filtered", [{"A2": 0.0}, {"A1": 0.0, "A2": 0.0}])
+def test_the_filter_of_PSS1A_shrinks_with_its_coefficients(filtered):
+    model = STABILISERS["PSS1A"]
+    assert_is_its_function(model, typical(model.sheet) | filtered)
+
+
+def test_a_filter_with_a_pole_too_fast_to_see_is_a_lag():
+    model = STABILISERS["PSS1A"]
+    at = [
+        frequency_response(model, typical(model.sheet) | {"A2": A2})
+        for A2 in (0.99 * SHORTEST * 0.061, 1.01 * SHORTEST * 0.061)
+    ]
+    # the lag of 0.1 ms that is left out, at 10 Hz
+    assert np.abs(at[0] - at[1]).max() < 2.0 * np.pi * 10.0 * SHORTEST * np.abs(at[0]).max()
+
+
+def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(stabiliser):
+    for row in stabiliser.sheet:
+        if row.unit != "s" or row.low > 0.0 or row.symbol in LEFT_OUT.get(stabiliser.name, ()):
+            continue
+        rows = {one.symbol: one for one in stabiliser.sheet}
+        values = lively(stabiliser) | dict.fromkeys(leads_of(row.symbol, rows), 0.0)
+        if row.symbol == "A1":
+            values["A2"] = 0.0
+        none, small, twice = (
+            frequency_response(stabiliser, values | {row.symbol: T})
+            for T in (0.0, SHORTEST, 2.0 * SHORTEST)
+        )
+        # a T + b T^2 + ...: the small ones tell a; 2 (2 pi 10 Hz SHORTEST)^2 = 8e-5 remains, times
+        # ten where a lead keeps its ratio to the lag
+        assert np.abs(2.0 * small - twice - none).max() < 1e-3 * np.abs(none).max(), row.symbol
+
+
+def test_a_washout_that_zero_leaves_out_is_the_limit_of_a_long_one(stabiliser):
+    for symbol in LEFT_OUT.get(stabiliser.name, ()):
+        values = lively(stabiliser)
+        none, long = (frequency_response(stabiliser, values | {symbol: T}) for T in (0.0, 1e6))
+        # what 1 / (2 pi 0.01 Hz 1e6 s) = 1.6e-5 leaves
+        assert np.abs(long - none).max() < 2e-5 * np.abs(none).max(), symbol
+
+
+# --- rest, limits, compiled code ------------------------------------------------------------------
+
+
+def test_rest_is_rest_with_an_output_of_zero(stabiliser):
+    for values in (typical(stabiliser.sheet), lively(stabiliser)):
+        p = Names(**values)
+        for vsi in ((0.0, 0.0), (0.01, 0.8), (-0.5, -3.0), (0.2, 9.0)):
+            x = resting(stabiliser, p, inputs(*vsi))
+            at = [getattr(x, name) for name in stabiliser.states]
+            slopes, vs = motion_of(stabiliser, p, at, vsi)
+            np.testing.assert_array_equal(slopes, 0.0)
+            assert vs == 0.0
+
+
+def test_the_output_stays_within_its_limits_and_reaches_both(stabiliser):
+    values = typical(stabiliser.sheet)
+    high = values.get("VSTMAX", values.get("HLIM"))
+    low = values.get("VSTMIN", -high)
+    rng = np.random.default_rng(8)
+    outputs = [
+        motion_of(
+            stabiliser,
+            Names(**values),
+            rng.normal(0.0, 1.0, len(stabiliser.states)),
+            rng.normal(0.0, 1.0, 2),
+        )[1]
+        for _ in range(200)
+    ]
+    assert (min(outputs), max(outputs)) == (low, high)
+
+
+def test_an_input_beyond_its_limit_acts_as_the_limit_does():
+    model = STABILISERS["PSS2B"]
+    p, x = Names(**lively(model)), np.full(len(model.states), 0.01)
+    for beyond, limit in (
+        ((0.3, 0.0), (p.VSI1MAX, 0.0)),
+        ((-0.3, 0.0), (p.VSI1MIN, 0.0)),
+        ((0.0, 4.0), (0.0, p.VSI2MAX)),
+        ((0.0, -4.0), (0.0, p.VSI2MIN)),
+    ):
+        np.testing.assert_array_equal(
+            motion_of(model, p, x, beyond)[0], motion_of(model, p, x, limit)[0]
+        )
+
+
+def test_no_parameter_is_inert(stabiliser):
+    rng = np.random.default_rng(2)
+    values = lively(stabiliser)
+    probes = [
+        (size * rng.normal(size=len(stabiliser.states)), size * rng.normal(size=2))
+        for size in (1e-4, 0.03, 3.0)
+        for _ in range(20)
+    ]
+
+    def felt(changed):
+        p = Names(**changed)
+        return [np.append(*motion_of(stabiliser, p, x, vsi)) for x, vsi in probes]
+
+    before = felt(values)
+    for row in stabiliser.sheet:
+        after = felt(values | {row.symbol: 0.5 * values[row.symbol]})
+        assert np.abs(np.array(after) - before).max() > 1e-6, row.symbol
+
+
+def as_system(model):
+    """Return a stabiliser alone, driven by its inputs."""
+
+    def rest(p):
+        return Rest(vars(resting(model, Names(**p), inputs(0.0, 0.0))), {})
+
+    def course(p, r, x, u):
+        d = Names()
+        seen = inputs(*(u[name] for name in SIDES))
+        sheet = Names(**{row.symbol: p[row.symbol] for row in model.sheet})
+        vs = model.equations(values_named(x, model.states), seen, sheet, d)
+        return motion(d, model.states, {"vs": vs, **x})
+
+    return System(
+        parameters=tuple(row.symbol for row in model.sheet),
+        setpoints=(),
+        states=model.states,
+        inputs=SIDES,
+        outputs=("vs", *model.states),
+        time_constants=tuple(row.symbol for row in model.sheet if row.unit == "s"),
+        rest=rest,
+        motion=course,
+    )
+
+
+def test_compiled_code_gives_what_the_plain_equations_give(stabiliser):
+    system, values = as_system(stabiliser), lively(stabiliser)
+    swing = np.linspace(0.0, 12.0, 1001)
+    u = np.column_stack([0.02 * np.sin(swing), 0.3 * np.cos(swing) - 0.3])
+    spans = [Span(u, 4e-3, 1)]
+    code = Kernel(system, system.outputs)
+    p = vector(system, values)[:, None]
+    (got,) = code.run(p, code.start(p), spans)
+    (expected,) = float_run(system, values, system.outputs, spans)
+    size = np.abs(expected).max()
+    assert np.abs(got[:, :, 0] - expected).max() < 1e-11 * size
+    vs = got[:, 0, 0]
+    assert vs.max() == values.get("VSTMAX", values.get("HLIM"))
+
+
+# --- sheets and records ---------------------------------------------------------------------------
+
+
+def test_a_sheet_names_each_parameter_once_within_its_range(stabiliser):
+    for column in ("symbol", "meaning"):
+        entries = [getattr(row, column) for row in stabiliser.sheet]
+        assert len(set(entries)) == len(entries)
+    for row in stabiliser.sheet:
+        assert row.symbol.isidentifier()
+        assert row.unit
+        assert row.low <= row.typical <= row.high, row.symbol
+    assert list(crossed_limits(typical(stabiliser.sheet))) == []
+
+
+def test_a_drawing_is_narrow_and_shows_every_parameter(stabiliser):
+    text = stabiliser.title + stabiliser.drawing
+    assert stabiliser.title
+    assert max(map(len, stabiliser.drawing.splitlines())) <= 80
+    for row in stabiliser.sheet:
+        assert row.symbol in text, row.symbol
+
+
+def test_a_record_lists_every_parameter_once(stabiliser):
+    for record in stabiliser.records:
+        symbols = [row.symbol for row in stabiliser.sheet]
+        integers = [name for name, _ in record.icons if name in symbols]
+        assert sorted([*record.cons, *integers]) == sorted([*symbols, *dict(record.absent)])
+
+
+def test_the_inputs_are_signals_of_a_plant(stabiliser):
+    assert 1 <= len(stabiliser.inputs) <= 2
+    assert set(stabiliser.inputs) <= set(SIGNALS)

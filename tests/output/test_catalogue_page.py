@@ -1,0 +1,48 @@
+"""The page of all models: each has its figure, and settles where it should."""
+
+import numpy as np
+import pytest
+from oracle import WITHOUT_PLANT
+
+from exfit.models import MODELS
+from exfit.output import plots
+from exfit.output.catalogue_page import sample_response, write_overview
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+    return folder, write_overview(folder)
+
+
+def test_every_model_has_its_figure_and_the_page_shows_it(written):
+    folder, files = written
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    for name, model in MODELS.items():
+        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert f'src="{name}.png"' in page
+        assert model.title.partition("(")[0].replace("'", "&#x27;") in page
+    assert sorted(path.name for path in files) == sorted(path.name for path in folder.iterdir())
+
+
+def test_typical_data_give_a_step_that_settles(exciter):
+    """Whatever the regulator, vt ends near the new reference.
+
+    The standard's AC6A swings through by half of the step; DC3A has a motor that is still running,
+    and a dead band.
+    """
+    signals = sample_response(MODELS[exciter]).signals
+    vt = signals["vt"]
+    rise = vt[-1] - vt[0]
+    assert vt[0] == pytest.approx(1.0, abs=1e-9)
+    assert 0.9 * 0.05 < rise < 1.2 * 0.05
+    assert vt.max() - vt[-1] < 0.55 * rise
+    assert np.ptp(vt[-400:]) < 0.15 * rise
+    assert np.isfinite(signals["efd"]).all()
+
+
+@pytest.mark.parametrize("name", WITHOUT_PLANT)
+def test_a_model_without_a_plant_has_its_page_too(name):
+    response = sample_response(MODELS[name])
+    figure = plots.overview(name, MODELS[name].drawing, response)
+    assert plots.png(figure).startswith(b"\x89PNG")

@@ -1,0 +1,490 @@
+"""The report: all that a fit found is on the page, and nothing that it is not of."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from cases import FIRST_ORDER, TIME, TRUTH
+from pages import Page
+from records import TEST, config, found_in, recording, several, synthetic, write
+from records import TIME as OF_UNIT
+from records import one as ac1a
+
+from exfit import cli, workflows
+from exfit.case.case import load_case
+from exfit.errors import ExfitError
+from exfit.exchange.psse.export import export
+from exfit.output import run_folder
+from exfit.output.report import html, report_of, write_report
+from exfit.output.report.charts import Axis, Chart, Panel, Series, drawing, ticks
+from exfit.output.report.figures import data, figures
+
+MOST = 3_000_000  # bytes of a page
+ABOUT = {"Plant": "Höllental", "Unit": 2, "Rated": "120 MVA, 13.8 kV", "Tested by": "A & B"}
+HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
+NOISE = 1e-3  # of the records of the first-order system
+
+
+def noisy(truth, seed):
+    return truth + NOISE * np.random.default_rng(seed).standard_normal(len(truth))
+
+
+def made(folder, content, strategy=None, watch=lambda _: None):
+    """Fit a case in a folder; return the folder that the fit left."""
+    folder.mkdir(exist_ok=True)
+    path = folder / "case.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    result = workflows.fit(load_case(path), strategy, watch)
+    run_folder.write_fit(result, folder / "run", figures=False)
+    return folder / "run"
+
+
+def first_order(folder, **sections):
+    """Fit the first-order system in a folder, validated on a step down."""
+    folder.mkdir(exist_ok=True)
+    for name, values in (("up", noisy(TRUTH, 1)), ("down", noisy(2.0 - TRUTH, 2))):
+        rows = "\n".join(f"{t:.9g},{v:.9g}" for t, v in zip(TIME, values, strict=True))
+        (folder / f"{name}.csv").write_text(f"t,v\n{rows}\n")
+    down = {"vt0": 2.0, "vref": [{"at": 0.5, "step": -1.0}]}
+    content = {
+        **FIRST_ORDER,
+        "record": {"file": "up.csv", "time": "t", "channels": {"vt": "v"}},
+        "validate": [
+            {
+                "name": "down",
+                "test": down,
+                "record": {"file": "down.csv", "time": "t", "channels": {"vt": "v"}},
+            }
+        ],
+        **sections,
+    }
+    return made(folder, {key: value for key, value in content.items() if value is not None})
+
+
+@pytest.fixture(scope="module")
+def fits(tmp_path_factory):
+    """The folders that several fits left, made when they are asked for."""
+    room = tmp_path_factory.mktemp("fits")
+
+    def on_load():
+        content = config("ac8b_on_line")
+        content["test"]["network"] = [{"at": 3.0, "R": 0.0}]  # as it was
+        return made(room / "on-load", content)
+
+    makers = {
+        "first order": lambda: first_order(room / "first", about=ABOUT),
+        "ac1a": lambda: made(room / "ac1a", config("ac1a_typical")),
+        "ac8b": lambda: made(room / "ac8b", config("ac8b_unit1")),
+        "machine alone": lambda: made(room / "machine", config("machine_playback")),
+        "playback": lambda: made(room / "playback", config("exciter_playback")),
+        "on load": on_load,
+        "several": lambda: made(room / "several", several(*both(), free=FEW)),
+    }
+    known = {}
+
+    def fit(name):
+        if name not in known:
+            known[name] = makers[name]()
+        return known[name]
+
+    return fit
+
+
+FEW = {"KA": {"start": 300.0, "min": 76.6, "max": 7660.0}}
+EVERY = ("first order", "ac1a", "ac8b", "machine alone", "playback", "on load", "several")
+
+
+def both():
+    """Return two records, of which one leaves its instant open."""
+    instant = {"start": 1.02, "min": 0.9, "max": 1.1}
+    return recording("up"), recording("down", at=instant)
+
+
+@pytest.fixture(scope="module")
+def pages(fits):
+    """The pages of several fits, as they are read."""
+    known = {}
+
+    def page(name):
+        if name not in known:
+            known[name] = Page(html(report_of(fits(name))))
+        return known[name]
+
+    return page
+
+
+@pytest.fixture
+def own(fits, tmp_path):
+    """A copy of the fit of the first-order system, with its case and records, to be spoilt."""
+    shutil.copytree(fits("first order").parent, tmp_path / "own")
+    run = tmp_path / "own" / "run"
+    saved = json.loads((run / "result.json").read_text(encoding="utf-8"))
+    change(run, case=str(tmp_path / "own" / "case.yaml"))
+    assert Path(saved["case"]).name == "case.yaml"
+    return run
+
+
+def change(run, **entries):
+    """Write other entries into a result."""
+    path = run / "result.json"
+    saved = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps({**saved, **entries}), encoding="utf-8")
+
+
+def saved_of(run):
+    return json.loads((run / "result.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_fitted_parameter_is_told_with_its_interval_or_the_reason_why_there_is_none(
+    fits, pages, name
+):
+    rows = {row[0].split()[0]: row for row in pages(name).tables["Fitted parameters"][1:]}
+    fitted = saved_of(fits(name))["parameters"]
+    assert rows.keys() == fitted.keys()
+    for symbol, one in fitted.items():
+        row = rows[symbol]
+        assert row[1:3] == [f"{one['start']:.5g}", f"{one['value']:.5g}"]
+        if one["interval"] is None:
+            assert row[3] == one["why"].replace("`", "")
+        else:
+            assert row[3] == " … ".join(f"{limit:.5g}" for limit in one["interval"])
+        assert row[5] == f"{one['min']:.5g} … {one['max']:.5g}"
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_parameter_that_was_not_fitted_is_told_with_its_value_and_source(fits, pages, name):
+    saved = saved_of(fits(name))
+    told = {}
+    for caption, rows in pages(name).tables.items():
+        if caption.endswith(", not fitted"):
+            told[caption.split()[0].rstrip(",").lower()] = {row[0]: row for row in rows[1:]}
+    for kind, key in (
+        ("exciter", "fixed"),
+        *((k, k) for k in ("machine", "network", "stabiliser")),
+    ):
+        prefix = "" if key == "fixed" else f"{kind}."
+        for symbol, value in saved[key].items():
+            if prefix + symbol in saved["parameters"]:
+                continue
+            row = told[kind][symbol]
+            assert row[1] == f"{value:.6g}"
+            assert row[3] == ("typical" if prefix + symbol in saved["typical"] else "fixed")
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_signal_of_every_record_is_drawn_with_its_error(fits, pages, name):
+    saved, page = saved_of(fits(name)), pages(name)
+    matches = [*saved["records"], *saved["validation"]]
+    drawn = [f"overlay-{k}-{signal}" for k, one in enumerate(matches) for signal in one["channels"]]
+    assert [one for one in page.ids if one.startswith("overlay-") and one in drawn] == drawn
+    for one in matches:
+        for signal in one["channels"].values():
+            assert f"rmse {signal['rmse']:.3g} pu" in page.text
+        if one["features"]["measured"]:
+            told = f"{one['features']['measured']['final_value']:.5g}"
+            rows = page.tables[f"{one['name']}: features of the first step of the reference, in vt"]
+            assert ["final value", told] in [row[:2] for row in rows]
+    data = json.loads(page.scripts[0])
+    assert [one["key"] for one in data] == drawn
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_page_is_whole_self_contained_and_small(pages, name):
+    page = pages(name)
+    assert len(page.ids) == len(set(page.ids))
+    for tag, attrs in page.tags:
+        assert "src" not in attrs
+        assert attrs.get("href", "#")[0] == "#"
+        if tag == "svg" and attrs.get("role") == "img":
+            assert set(attrs["aria-labelledby"].split()) <= set(page.ids)
+        assert not attrs.get("href") or attrs["href"][1:] in page.ids
+    assert page.size < MOST
+    heads = "Unit and test, Model, Parameters, Search, Flat run, Small-signal view, Reproduction"
+    for head in heads.split(", "):
+        assert head in page.words
+
+
+def test_what_identifies_unit_and_test_is_told(pages):
+    for name, value in ABOUT.items():
+        assert f"{name} {value}" in pages("first order").text
+    assert "does not say which unit" in pages("ac1a").text
+
+
+def test_the_base_of_each_signal_is_told_and_a_step_that_the_fit_found(tmp_path):
+    vt = synthetic(tmp_path, TEST, OF_UNIT)["vt"]
+    write(tmp_path / "record.csv", t=OF_UNIT, u=15.75 * vt)
+    test = {**TEST, "vref": [{"at": found_in(1.02, 0.9, 1.1), "step": 0.05}]}
+    content = ac1a(test, {"vt": {"column": "u", "unit": "kV", "base": 15.75}}, ["KA"])
+    words = Page(html(report_of(made(tmp_path, content)))).text
+    assert "vt, 1 pu = 15.75 kV" in words
+    assert "vref +0.05 pu at about 1.02 s (found by the fit)" in words
+
+
+def test_a_signal_with_a_wrong_base_stands_in_the_verdict(tmp_path):
+    shown = synthetic(tmp_path, TEST, OF_UNIT, signals=("vt", "ifd"))
+    write(tmp_path / "record.csv", t=OF_UNIT, vt=shown["vt"], i=550.0 * shown["ifd"])
+    for base, told in ((550.0, False), (0.55, True)):
+        ifd = {"column": "i", "unit": "A", "base": base, "weight": 1e-9}
+        content = ac1a(TEST, {"vt": "vt", "ifd": ifd}, ["KA"])
+        verdict = report_of(made(tmp_path, content)).verdict.sentence
+        assert ("no better than by a constant matched: ifd" in verdict) == told
+
+
+def test_hashes_versions_case_and_commands_are_told(fits, pages):
+    run, page = fits("first order"), pages("first order")
+    for sha256 in saved_of(run)["inputs"].values():
+        assert sha256 in page.text
+    for version in saved_of(run)["versions"].values():
+        assert version in page.text
+    case = (run.parent / "case.yaml").read_text(encoding="utf-8")
+    assert " ".join(case.split()) in page.text
+    assert f"exfit fit {run.parent / 'case.yaml'} -o {run}" in page.text
+
+
+def test_findings_and_notes_are_told_word_by_word(fits, pages):
+    saved = saved_of(fits("ac1a"))
+    told = [*saved["notes"], *saved["knowledge"]["sentences"]]
+    assert len(told) > 1
+    for sentence in told:
+        assert " ".join(sentence.replace("`", " ").split()) in pages("ac1a").text.replace(" ,", ",")
+
+
+def test_the_dynamics_record_is_told_with_its_warnings_or_why_there_is_none(fits, pages):
+    found = export(fits("ac8b"), 1, "1")
+    assert " ".join(found.text.split()) in pages("ac8b").text
+    for warning in found.warnings:
+        assert warning.partition(": ")[2] in pages("ac8b").text
+    assert "FIRST_ORDER has no PSS/E record" in pages("first order").text
+
+
+def test_a_machine_alone_has_no_drawing_and_no_loop(pages):
+    page = pages("machine alone")
+    assert "the machine stands alone" in page.text
+    assert "there is no loop" in page.text
+
+
+def test_a_pole_of_the_first_order_system_is_what_was_fitted(fits, pages):
+    """k / (s + a) has its pole at -a, and falls by 3 dB at a / 2 pi."""
+    a = saved_of(fits("first order"))["parameters"]["a"]["value"]
+    (row,) = pages("first order").tables["Poles of the closed loop, fit"][1:]
+    assert row[:2] == [f"{-a:.5g}", "0"]
+    assert f"{a / (2 * np.pi):.4g} Hz" in pages("first order").text
+
+
+@pytest.mark.parametrize(
+    ("accept", "down", "word"),
+    [
+        (None, True, "Converged"),
+        (None, False, "Converged"),
+        (10 * NOISE, True, "Accepted"),
+        (NOISE / 10, True, "Not accepted"),
+    ],
+)
+def test_the_verdict_is_that_of_the_validation(tmp_path, accept, down, word):
+    sections = {"accept": None if accept is None else {"rmse": accept}}
+    run = first_order(tmp_path / "case", **sections, **({} if down else {"validate": None}))
+    report = report_of(run)
+    assert report.verdict.word == word
+    assert report.verdict.good is (None if accept is None else word == "Accepted")
+    assert "every parameter determined" in report.verdict.sentence
+    if not down:
+        assert "no record for a validation" in Page(html(report)).text
+
+
+def test_the_iterations_begin_with_the_start_and_end_with_the_fit_as_they_are_compared(tmp_path):
+    """The recorder's average is in them, and what is left out of the comparison is missing."""
+    channel = {"column": "v", "averaged": 0.3, "filter": {"median": 3}}
+    record = {"file": "up.csv", "time": "t", "channels": {"vt": channel}, "mask": [[1.0, 1.2]]}
+    report = report_of(first_order(tmp_path / "case", record=record))
+    (found,), fitted = report.simulated.courses, report.fits[0].samples.overlays["vt"]
+    assert np.isnan(fitted.measured).any()
+    last = max(found.simulated)
+    for ours, theirs in (
+        (found.measured, fitted.measured),
+        (found.simulated[0], fitted.start),
+        (found.simulated[last], fitted.simulated),
+    ):
+        # the table of the fit has nine digits
+        np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
+
+
+def test_a_switch_is_told_though_it_sets_nothing_but_a_zero(pages):
+    assert "network switched at 3 s: R 0 pu" in pages("on load").text
+
+
+def test_an_interrupted_fit_is_no_converged_one(tmp_path):
+    def stop(line):
+        if line.number == 1:
+            raise KeyboardInterrupt
+
+    run = made(tmp_path / "case", config("ac1a_typical"), watch=stop)
+    report = report_of(run)
+    page = Page(html(report))
+    assert report.verdict.word == "Interrupted"
+    assert report.verdict.good is False
+    for row in page.tables["Fitted parameters"][1:]:
+        assert row[3] == "the search was interrupted"
+    assert "Not known: the search did not end at a minimum" in page.text
+
+
+def test_a_search_that_ended_early_is_not_converged(own):
+    change(own, success=False, message="no more iterations")
+    assert report_of(own).verdict.word == "Not converged"
+
+
+def test_text_from_outside_stays_text(tmp_path):
+    run = first_order(tmp_path / "<b>case", about={HOSTILE: HOSTILE, "Unit": HOSTILE})
+    page = Page(html(report_of(run)))
+    plain = Page(html(report_of(first_order(tmp_path / "plain", about={"Unit": "1"}))))
+    assert page.count("script") == plain.count("script")
+    assert page.count("img") == page.count("b") == 0
+    assert HOSTILE in page.text
+    assert json.loads(page.scripts[0])
+
+
+def test_a_missing_table_of_samples_is_told(own):
+    (own / "response.csv").unlink()
+    page = Page(html(report_of(own)))
+    assert "No overlay: the table of its samples is not beside the result" in page.text
+    assert [one["key"] for one in json.loads(page.scripts[0])] == ["overlay-1-vt"]
+
+
+def test_a_damaged_table_of_samples_is_refused(own):
+    (own / "response.csv").write_text("t,vt_measured\n1,x\n")
+    with pytest.raises(ExfitError, match=r"response\.csv: not the samples of a fit"):
+        report_of(own)
+
+
+@pytest.mark.parametrize("file", ["up.csv", "down.csv", "case.yaml"])
+def test_what_was_changed_since_the_fit_is_refused_with_both_files_named(own, file):
+    path = own.parent / file
+    path.write_text(path.read_text(encoding="utf-8") + ("# \n" if file == "case.yaml" else "9,0\n"))
+    with pytest.raises(ExfitError) as refused:
+        report_of(own)
+    assert str(path) in str(refused.value)
+    assert str(own / "result.json") in str(refused.value)
+
+
+def test_the_case_is_looked_for_from_the_working_folder_and_beside_the_result(own, monkeypatch):
+    monkeypatch.chdir(own.parent)
+    change(own, case="case.yaml")
+    assert report_of(own).verdict.word == "Converged"
+    monkeypatch.chdir(own.parent.parent)
+    with pytest.raises(ExfitError, match="give --case FILE"):
+        report_of(own)
+    assert report_of(own, own.parent / "case.yaml").verdict.word == "Converged"
+    change(own, case="../case.yaml")
+    assert report_of(own).verdict.word == "Converged"
+
+
+@pytest.mark.parametrize("key", ["message", "history", "knowledge", "parameters", "inputs"])
+def test_a_result_with_a_hole_is_refused_with_its_place_or_read_without(own, key):
+    saved = saved_of(own)
+    del saved[key]
+    (own / "result.json").write_text(json.dumps(saved))
+    if key == "history":
+        assert "The result holds no history" in Page(html(report_of(own))).text
+    else:
+        with pytest.raises(ExfitError, match=key):
+            report_of(own)
+
+
+def test_a_report_is_replaced_and_another_file_is_not(own):
+    path = write_report(own)
+    assert path == own / "report.html"
+    first = path.read_text(encoding="utf-8")
+    assert write_report(own / "result.json").read_text(encoding="utf-8") == first
+    path.write_text("my own words")
+    with pytest.raises(ExfitError, match="exists already"):
+        write_report(own)
+    assert path.read_text() == "my own words"
+    assert write_report(own, force=True).read_text(encoding="utf-8") == first
+
+
+def test_the_command_writes_the_page_and_says_where(own, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["report", str(own), "-o", str(own / "handed-in.html")], prog_name="exfit")
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"written to {own / 'handed-in.html'}\n"
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["report", str(own.parent)], prog_name="exfit")
+    assert ended.value.code == 1
+    assert "cannot be read" in capsys.readouterr().err
+
+
+def test_a_long_record_makes_no_long_page(tmp_path):
+    folder = tmp_path / "case"
+    folder.mkdir()
+    time = np.linspace(0.0, 60.0, 20_001)
+    truth = np.where(time < 0.5, 0.0, 2.0 - 2.0 * np.exp(-2.0 * (time - 0.5)))
+    np.savetxt(
+        folder / "up.csv",
+        np.column_stack([time, noisy(truth, 3)]),
+        fmt="%.7g",
+        delimiter=",",
+        header="t,v",
+        comments="",
+    )
+    record = {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}
+    run = made(folder, {**FIRST_ORDER, "record": record})
+    assert len(html(report_of(run)).encode()) < MOST
+
+
+@pytest.mark.parametrize("low", [-3.0, 0.0, 0.99997, 1e4])
+@pytest.mark.parametrize("span", [1e-4, 0.07, 1.0, 9.99, 1e3])
+@pytest.mark.parametrize("most", [3, 8])
+def test_ticks_are_round_equally_spaced_and_inside(low, span, most):
+    axis = Axis(low, low + span, 100.0)
+    found = ticks(axis, most)
+    places = np.array([tick.at for tick in found])
+    assert 1 <= len(found) <= most + 1
+    assert np.all((places >= -1e-6) & (places <= 100.0 + 1e-6))
+    if len(found) > 1:
+        assert np.diff(places) == pytest.approx(np.diff(places)[0])
+        step = (places[1] - places[0]) / 100.0 * span
+        mantissa = step / 10.0 ** np.floor(np.log10(step) + 1e-9)
+        assert min(abs(mantissa - np.array([1.0, 2.0, 5.0, 10.0]))) < 1e-6
+        values = [float(tick.label) for tick in found]
+        assert values == pytest.approx(list(low + places / 100.0 * span), abs=1e-3 * step)
+
+
+def test_a_clock_that_began_long_ago_is_drawn_as_finely(tmp_path):
+    """Seconds since 1970 in the file of the recorder."""
+    ago = 1.6e9
+    rows = [f"{t + ago:.3f},{v:.9g}" for t, v in zip(TIME, noisy(TRUTH, 1), strict=True)]
+    (tmp_path / "ago.csv").write_text("\n".join(["t,v", *rows]) + "\n")
+    record = {"file": "../ago.csv", "time": "t", "channels": {"vt": "v"}}
+    test = {"vt0": 0.0, "vref": [{"at": ago + 0.5, "step": 1.0}]}
+    run = first_order(tmp_path / "case", record=record, test=test, validate=None)
+    report = report_of(run)
+    shown = report.fits[0].samples.time
+    np.testing.assert_allclose(np.diff(shown), np.diff(TIME), atol=1e-6)  # a double is that fine
+    page = figures(report)
+    (sent,) = data(page.overlays)
+    np.testing.assert_allclose(np.diff(sent["time"]), np.diff(TIME), atol=1e-6)
+    labels = [tick.label for tick in drawing(page.overlays[0].chart).x_ticks]
+    assert len(set(labels)) == len(labels) > 2
+
+
+def test_a_drawing_has_no_number_that_is_none():
+    time = np.linspace(0.0, 1.0, 50)
+    lines = {
+        "still": np.ones(50),
+        "gap": np.where(time < 0.5, np.nan, time),
+        "nothing": np.full(50, np.nan),
+        "zero": np.zeros(50),
+    }
+    for logarithmic in (False, True):
+        both = {
+            name: (Series(name, time, y, "p0"), Series(name, time, y, "p0", dots=True))
+            for name, y in lines.items()
+        }
+        panels = tuple(Panel(name, series, 100.0, logarithmic) for name, series in both.items())
+        drawn = drawing(Chart("k", "t", "x", "time (s)", panels))
+        paths = [mark.path for panel in drawn.panels for mark in panel.marks]
+        assert not any("nan" in path or "inf" in path for path in paths)
+        assert all(panel.y_ticks for panel in drawn.panels if panel.title != "nothing")

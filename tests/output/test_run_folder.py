@@ -1,0 +1,215 @@
+"""Files: each is written whole or not at all, and says the same as the result."""
+
+import csv
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from cases import FILES_OF_A_FIT
+from places import ROOT
+
+from exfit import workflows
+from exfit.case.case import load_case
+from exfit.errors import CaseError, ExfitError
+from exfit.fitting.overrides import read_parameters
+from exfit.output import run_folder
+from exfit.results.model import DIGITS, parameter_file, table, to_json, write
+
+CASE = ROOT / "configs" / "first_order.yaml"
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return workflows.fit(load_case(CASE))
+
+
+@pytest.fixture
+def folder(fitted, tmp_path, monkeypatch):
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    return tmp_path / "run"
+
+
+def columns(path):
+    header, *rows = csv.reader(path.read_text().splitlines())
+    return {name: [row[k] for row in rows] for k, name in enumerate(header)}
+
+
+def names(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def test_a_fit_leaves_these_files_and_no_others(fitted, tmp_path, monkeypatch):
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    run_folder.write_fit(fitted, tmp_path / "run", figures=True)
+    assert names(tmp_path / "run") == FILES_OF_A_FIT
+
+
+def test_without_figures_there_are_only_tables(folder):
+    assert names(folder) == {name for name in FILES_OF_A_FIT if not name.endswith(".png")}
+
+
+def test_the_result_holds_what_json_prints_and_the_history(fitted, folder):
+    stored = json.loads((folder / "result.json").read_text())
+    printed = json.loads(to_json(fitted.as_json()))
+    assert {key: stored[key] for key in printed} == printed
+    assert len(stored["history"]) == fitted.nit + 1
+
+
+def test_numbers_that_are_not_finite_become_null_in_json():
+    text = to_json({"a": [float("nan"), 1.0], "b": {"c": (float("inf"),)}})
+    assert json.loads(text, parse_constant=pytest.fail) == {"a": [None, 1.0], "b": {"c": [None]}}
+
+
+def test_the_history_has_a_line_per_iteration_from_the_start_on(fitted, folder):
+    history = columns(folder / "history.csv")
+    assert [int(number) for number in history["iteration"]] == list(range(fitted.nit + 1))
+    assert float(history["f"][0]) == pytest.approx(fitted.start_cost, rel=10.0**-DIGITS)
+    assert float(history["f"][-1]) == pytest.approx(
+        fitted.comparison.cost, rel=10.0 ** (1 - DIGITS)
+    )
+    for name, one in fitted.parameters.items():
+        assert float(history[name][0]) == one.start
+        assert float(history[name][-1]) == pytest.approx(one.value, rel=10.0 ** (1 - DIGITS))
+
+
+def test_the_response_holds_measured_start_fitted_and_residual_on_the_record_s_clock(
+    fitted, folder
+):
+    response = {
+        name: np.array(column, float) for name, column in columns(folder / "response.csv").items()
+    }
+    assert list(response) == ["t", "vt_measured", "vt_start", "vt_simulated", "vt_residual"]
+    np.testing.assert_array_equal(response["t"], fitted.comparison.time)
+    overlay = fitted.comparison.overlays["vt"]
+    np.testing.assert_array_equal(response["vt_measured"], overlay.measured)
+    # the digits that are printed, of a number up to 2
+    difference = response["vt_simulated"] - response["vt_measured"]
+    np.testing.assert_allclose(response["vt_residual"], difference, rtol=0, atol=1e-8)
+    cost = 0.5 * np.sum(response["vt_residual"] ** 2)
+    assert cost == pytest.approx(fitted.comparison.cost, rel=1e-4)
+
+
+def test_parameters_read_back_are_exactly_those_found(fitted, folder):
+    assert read_parameters(load_case(CASE), folder / "parameters.yaml") == fitted.values
+
+
+@pytest.mark.parametrize("begin", [0.0, -0.5, 45_000.0, 1.6e9])
+def test_instants_are_told_apart_whenever_the_clock_began(begin):
+    time = begin + np.linspace(0.0, 3.0, 3001)
+    rows = table(["t", "y"], [time, np.zeros(3001)]).splitlines()[1:]
+    shown = np.array([float(row.split(",")[0]) for row in rows])
+    # nine digits of three seconds, or as many as a double has
+    np.testing.assert_allclose(shown, time, rtol=1e-16, atol=1e-7)
+
+
+@pytest.mark.parametrize("value", [1e-05, 1.0, 1e16, 123456.789, 2.5e-07, 1e300])
+def test_every_yaml_reader_takes_a_parameter_for_the_same_number(fitted, value):
+    one = replace(fitted.parameters["k"], value=value)
+    text = parameter_file(replace(fitted, parameters={**fitted.parameters, "k": one}))
+    assert yaml.safe_load(text)["parameters"]["k"] == value
+
+
+def test_parameters_say_where_each_value_is_from(fitted):
+    one = replace(fitted.parameters["k"], at_bound="max")
+    text = parameter_file(
+        replace(
+            fitted,
+            parameters={"k": one},
+            fixed={"a": 2.0, "b": 3.0},
+            typical=("b",),
+            interrupted=True,
+        )
+    )
+    lines = text.splitlines()
+    assert lines[0].endswith("; interrupted")
+    assert any(line.startswith("  a:") and line.endswith("# fixed") for line in lines)
+    assert any(line.startswith("  b:") and line.endswith("# typical") for line in lines)
+    assert any(line.startswith("  k:") and line.endswith("# fitted, on its max") for line in lines)
+
+
+def test_a_table_keeps_its_digits():
+    text = table(["t", "x"], [np.array([0.0, 1.0]), np.array([1.0 / 3.0, 1e-7 / 3.0])])
+    assert text == "t,x\n0,0.333333333\n1,3.33333333e-08\n"
+
+
+def test_a_file_that_cannot_be_renamed_leaves_the_old_one_and_nothing_beside(tmp_path, monkeypatch):
+    path = tmp_path / "table.csv"
+    write(path, "old")
+
+    def full(self, target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(ExfitError, match=r"table\.csv: cannot be written: No space left"):
+        write(path, "new")
+    assert path.read_text() == "old"
+    assert names(tmp_path) == {"table.csv"}
+
+
+def test_a_place_below_a_file_is_refused_in_one_sentence(tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    for place in (tmp_path / "taken", tmp_path / "taken" / "below" / "it"):
+        with pytest.raises(ExfitError, match="taken is not a folder"):
+            run_folder.refuse_unwritable(place)
+        with pytest.raises(ExfitError, match="cannot be written"):
+            write(place / "table.csv", "new")
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_folder.os, "access", lambda place, mode: False)
+    with pytest.raises(ExfitError, match=f"no permission in {tmp_path}"):
+        run_folder.refuse_unwritable(tmp_path / "run")
+
+
+def test_a_folder_that_does_not_exist_yet_is_fine(tmp_path):
+    run_folder.refuse_unwritable(tmp_path / "a" / "b")
+    assert names(tmp_path) == set()
+
+
+def test_the_last_fit_of_a_case_is_found_by_any_of_its_paths(fitted, folder, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    found = run_folder.last_fit(Path("configs/../configs/first_order.yaml"))
+    assert run_folder.last_fit(CASE) == found
+    assert read_parameters(load_case(CASE), found) == fitted.values
+
+
+def test_a_last_fit_outlives_its_folder_and_another_case_that_takes_it(fitted, folder, tmp_path):
+    """Two cases of one name write to one folder: each keeps its own values."""
+    other = tmp_path / "first_order.yaml"
+    values = {name: replace(one, value=7.0) for name, one in fitted.parameters.items()}
+    run_folder.write_fit(replace(fitted, case=other, parameters=values), folder, figures=False)
+    assert read_parameters(load_case(CASE), run_folder.last_fit(CASE)) == fitted.values
+    assert set(read_parameters(load_case(CASE), run_folder.last_fit(other)).values()) == {7.0}
+    shutil.rmtree(folder)
+    assert read_parameters(load_case(CASE), run_folder.last_fit(CASE)) == fitted.values
+
+
+def test_a_fit_leaves_no_figure_or_result_of_a_former_one(fitted, folder):
+    for name in ("overlay.png", "convergence.png", "trajectories.png"):
+        (folder / name).write_text("of a former fit")
+    run_folder.write_fit(fitted, folder, figures=False)
+    assert not [name for name in names(folder) if name.endswith("s.png") or "overlay" in name]
+    assert not (folder / "convergence.png").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"a\0b", b"elsewhere"])
+def test_a_damaged_memory_of_the_last_fit_is_refused(folder, tmp_path, content):
+    (kept,) = (tmp_path / "cache" / "last-fit").iterdir()
+    kept.write_bytes(content)
+    with pytest.raises(CaseError):
+        read_parameters(load_case(CASE), run_folder.last_fit(CASE))
+
+
+def test_a_fit_is_written_even_where_it_cannot_be_remembered(fitted, tmp_path, monkeypatch):
+    (tmp_path / "cache").write_text("a file in its place")
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    assert "result.json" in names(tmp_path / "run")
+    with pytest.raises(CaseError, match="no fit of this case is known"):
+        run_folder.last_fit(CASE)

@@ -1,0 +1,472 @@
+"""Inspection: what a record holds is told as it was put there, and its steps are found."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import yaml
+from columns import Columns
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from places import REFERENCE, SAMPLES
+
+from exfit.case.suggestion import bump_section, record_section
+from exfit.dsp.quality import quantum, spikes, stuck
+from exfit.dsp.sampling import sampling_of
+from exfit.errors import RecordError
+from exfit.output import plots
+from exfit.records.channel_recognition import connection_of, guessed, three_phases
+from exfit.records.formats import open_table
+from exfit.records.inspection import inspect
+from exfit.records.record import read_columns
+from exfit.records.steps import Change, together
+from exfit.records.units import unit_in
+
+FIELD = "field_record"
+WITHIN = 0.02  # s
+SHARE = 0.05  # of the size
+
+
+def sample(path):
+    if path.stem == FIELD:
+        return open_table(path)
+    names = path.read_text().partition("\n")[0].split(",")
+    return Columns(read_columns(path, names), path=path)
+
+
+def reference(name):
+    names = (REFERENCE / name).read_text().partition("\n")[0].split(",")
+    return read_columns(REFERENCE / name, names)
+
+
+def moved(name, start, end):
+    """Return by how much vt moves without noise between two instants of a reference."""
+    columns = reference(name)
+    first, last = np.searchsorted(columns["t"], [start, end]).clip(max=len(columns["t"]) - 1)
+    return columns["vt"][last] - columns["vt"][first]
+
+
+def truth(record):
+    """Return the instants of a sample record's steps, and what its voltage changes by each."""
+    if record.startswith("first_order"):
+        return [(0.0, -2.0 if record.endswith("down") else 2.0)]  # k/a, and it begins with the step
+    if record == FIELD:  # the AC1A's step, of 15.75 kV
+        return [(2.137, 15.75 * moved("reference_ac1a.csv", 0.5, 10.0))]
+    if record == "ac8b_on_line":  # of 0.02 pu of the reference, vt keeps 0.018
+        return [(1.0, moved("andes_ac8b_ieee_smib.csv", 0.5, 10.0))]
+    unit = record.rpartition("_")[0]
+    up = (1.0, moved(f"reference_{unit}.csv", 0.5, 10.0))
+    down = (1.0, moved(f"reference_{unit}.csv", 10.5, 20.0))
+    if record == "ac1a_channels":
+        return [up, (11.0, down[1])]
+    return [up if record.endswith("up") else down]
+
+
+RECORDS = sorted(path.stem for path in SAMPLES.glob("*.csv"))
+
+
+@pytest.mark.parametrize("record", RECORDS)
+def test_every_step_of_a_sample_record_is_found_in_time_and_size(record):
+    found = inspect(sample(SAMPLES / f"{record}.csv"))
+    voltage = found.channel_of("vt").name
+    told = [(step.at, step.sizes[voltage]) for step in found.steps]
+    wanted = truth(record)
+    assert len(told) == len(wanted)
+    for (at, size), (made_at, change) in zip(told, wanted, strict=True):
+        assert at == pytest.approx(made_at, abs=WITHIN)
+        assert size == pytest.approx(change, rel=SHARE)
+
+
+@pytest.mark.parametrize("name", ["reference_ac1a", "reference_ac8b_unit1", "reference_ac8b_unit2"])
+def test_a_recorded_reference_tells_its_steps_to_the_sample(name):
+    found = inspect(Columns(reference(f"{name}.csv")))
+    own = found.channel_of("vref").steps
+    assert [one.at for one in own] == pytest.approx([1.0, 11.0], abs=0.005)  # one sample
+    assert [one.size for one in own] == pytest.approx([0.05, -0.05], rel=1e-6)
+    assert [step.at for step in found.steps] == pytest.approx([1.0, 11.0], abs=0.005)
+    suggested = yaml.safe_load("\n".join(bump_section(found)))["test"]["vref"]
+    assert [step["step"] for step in suggested] == pytest.approx([0.05, -0.05], rel=1e-6)
+
+
+def test_a_trigger_is_no_step_of_the_reference():
+    columns = dict(sample(SAMPLES / "ac1a_up.csv").content)
+    columns["trigger"] = np.where(columns["t"] > 1.12, 1.0, 0.0)
+    found = inspect(Columns(columns))
+    (step,) = found.steps
+    assert step.at == pytest.approx(1.0, abs=WITHIN)
+    assert "trigger" not in step.seen_in
+    assert next(one for one in found.channels if one.name == "trigger").steps == ()
+
+
+@pytest.mark.parametrize(
+    "record", [name for name in RECORDS if not name.startswith(("first", FIELD))]
+)
+def test_the_channels_of_a_sample_record_are_recognised(record):
+    found = inspect(sample(SAMPLES / f"{record}.csv"))
+    assert {one.name: one.signal for one in found.channels} == {
+        one.name: one.name for one in found.channels
+    }
+    assert found.sampling.even
+    assert found.sampling.step == pytest.approx(0.01)
+    assert found.findings == ()
+
+
+def test_the_field_record_is_told_as_it_was_made():
+    """sample_data/README.md says what was put into it, and where."""
+    found = inspect(sample(SAMPLES / f"{FIELD}.csv"))
+    assert found.clock.columns == ("Date", "Time")
+    assert not found.sampling.even
+    (gap,) = found.sampling.gaps
+    assert (gap.start, gap.end) == pytest.approx(
+        (9.0, 9.04), abs=0.005
+    )  # a sample before and after
+    vt, ifd = found.channel_of("vt"), found.channel_of("ifd")
+    assert (vt.name, vt.unit, ifd.name, ifd.unit) == ("Ugen", "kV", "If", "A")
+    assert vt.spikes_at == pytest.approx((1.3, 5.61, 7.94), abs=0.005)
+    assert ifd.spikes_at == pytest.approx((6.72,), abs=0.005)
+    assert (vt.quantum, ifd.quantum) == pytest.approx((5.5e-5 * 15.75, 0.1), rel=0.01)
+    # rounding adds a twelfth of its step squared; of 2500 samples the noise is known to 4 %
+    assert (vt.noise, ifd.noise) == pytest.approx((1.6e-3, 0.4), rel=0.1)
+
+
+# ---- a record with all that may be wrong with one
+
+RNG = np.random.default_rng(7)
+COUNT = 4000
+NOISE = {"vt": 1e-3, "ifd": 0.5, "efd": 0.6}
+
+
+def dirty():
+    """Return a record in kV, A and V, unevenly sampled, and what was done to it."""
+    clean = reference("reference_ac1a.csv")
+    time = 0.0048 * np.arange(COUNT) + RNG.uniform(-1e-4, 1e-4, COUNT)
+    course = {name: np.interp(time, clean["t"], clean[name]) for name in ("vt", "efd", "ifd")}
+    vt = 15.75 * course["vt"] + RNG.normal(0.0, NOISE["vt"], COUNT)
+    ifd = np.round(780.0 * course["ifd"] + RNG.normal(0.0, NOISE["ifd"], COUNT), 1)
+    efd = 120.0 * course["efd"] + RNG.normal(0.0, NOISE["efd"], COUNT)
+    vt[[500, 2900]] += [0.4, -0.3]
+    ifd[1500:1600] = ifd[1500]
+    efd[[5, 700, 701]] = np.nan
+    kept = np.ones(COUNT, bool)
+    kept[1000:1100] = False
+    columns = {"t": time, "Ugen": vt, "Ifd [A]": ifd, "Field voltage (V)": efd}
+    content = {name: column[kept] for name, column in columns.items()}
+    content["Temp"] = np.full(kept.sum(), 40.0)
+    return Columns({**content, "state": "closed"}, units={"Ugen": "kV"})
+
+
+DIRTY = dirty()
+FOUND = inspect(DIRTY)
+
+
+def test_the_clock_of_a_record_is_told():
+    (gap,) = FOUND.sampling.gaps
+    assert (gap.start, gap.end) == pytest.approx((999 * 0.0048, 1100 * 0.0048), abs=2e-4)
+    assert gap.lost == 100
+    assert not FOUND.sampling.even
+    assert FOUND.sampling.rate == pytest.approx(1.0 / 0.0048, rel=0.005)
+    assert 0.0046 <= FOUND.sampling.smallest < FOUND.sampling.largest <= 0.005
+
+
+def test_what_is_wrong_with_a_channel_is_told_where_it_is():
+    vt, ifd, efd = (FOUND.channel_of(name) for name in ("vt", "ifd", "efd"))
+    assert vt.spikes == 2
+    assert vt.spikes_at == pytest.approx((500 * 0.0048, 2900 * 0.0048), abs=2e-4)
+    assert (ifd.spikes, efd.spikes) == (0, 0)
+    (still,) = ifd.stuck
+    assert still == pytest.approx((1500 * 0.0048, 1599 * 0.0048), abs=0.02)
+    assert (vt.stuck, efd.stuck) == ((), ())
+    assert (vt.missing, ifd.missing, efd.missing) == (0, 0, 3)
+    assert ifd.quantum == pytest.approx(0.1)
+    for one in (vt, ifd, efd):
+        assert one.noise == pytest.approx(NOISE[one.signal], rel=0.1)
+    assert [one.name for one in FOUND.channels if one.constant] == ["Temp"]
+    assert list(FOUND.unreadable) == ["state"]
+    text = " | ".join(FOUND.findings)
+    for words in ("clock jumps", "2 spikes", "stands still", "3 samples", "never changes", "state"):
+        assert words in text
+
+
+def test_units_come_from_the_file_first_and_from_the_name_else():
+    told = {one.signal: (one.unit, one.unit_from) for one in FOUND.channels if one.signal}
+    assert told == {"vt": ("kV", "file"), "ifd": ("A", "name"), "efd": ("V", "name")}
+
+
+def test_the_steps_of_a_record_in_engineering_units_are_those_of_the_reference():
+    assert [step.at for step in FOUND.steps] == pytest.approx([1.0, 11.0], abs=WITHIN)
+    for step, sign in zip(FOUND.steps, (1, -1), strict=True):
+        assert step.sizes["Ugen"] == pytest.approx(sign * 15.75 * 0.04946, rel=0.01)
+        assert abs(step.at - round(step.at)) < 4.0 * step.error + 0.005
+
+
+def test_a_suggested_case_holds_no_base_that_nobody_gave():
+    section = yaml.safe_load("\n".join(record_section(FOUND, "dirty.csv")))["record"]
+    assert section["time"] == "t"
+    assert section["gaps"] == "skip"
+    assert section["channels"] == {
+        "vt": {"column": "Ugen", "unit": "kV", "base": "?", "outliers": 6},
+        "ifd": {"column": "Ifd [A]", "unit": "A", "base": "?"},
+        "efd": {"column": "Field voltage (V)", "unit": "V", "base": "?"},
+    }
+    (up, down) = yaml.safe_load("\n".join(bump_section(FOUND)))["test"]["vref"]
+    assert up["at"]["min"] < 1.0 < up["at"]["max"]
+    assert (up["step"], down["step"]) == ("?", "?")
+    shown = re.findall(r"vt changed by (\S+)", "\n".join(bump_section(FOUND)))
+    assert list(map(float, shown)) == pytest.approx([0.0495, -0.0471], rel=0.06)
+
+
+def test_every_suggestion_fits_a_terminal_of_80_columns_but_for_names():
+    lines = [*record_section(FOUND, "dirty.csv"), *bump_section(FOUND)]
+    assert max(map(len, lines)) <= 80
+
+
+def test_time_that_repeats_or_goes_back_is_told_by_place_and_left_out():
+    time = 0.01 * np.arange(200)
+    time[50], time[120] = time[49], 0.3
+    found = inspect(Columns({"t": time, "vt": RNG.normal(1.0, 1e-4, 200)}))
+    assert found.backward_at == ("record.csv:52", "record.csv:122")
+    assert len(found.time) == 198
+    assert np.all(np.diff(found.time) > 0.0)
+    assert any("record.csv:52, record.csv:122" in text for text in found.findings)
+
+
+@pytest.fixture(autouse=True)
+def few_dots(monkeypatch):
+    """Draw with few dots: nobody looks at these."""
+    monkeypatch.setattr(plots.style, "DPI", 40)
+
+
+# ---- laws
+
+
+@pytest.mark.parametrize("scale", [1.0, 15.75, -780.0])
+@pytest.mark.parametrize("origin", [0.0, 1e6])
+def test_the_unit_of_a_channel_and_the_origin_of_time_do_not_matter(scale, origin):
+    columns = sample(SAMPLES / "ac1a_channels.csv").content
+    plain = inspect(Columns({"t": columns["t"], "x": columns["vt"]}))
+    other = inspect(Columns({"t": columns["t"] + origin, "x": scale * columns["vt"]}))
+    assert len(plain.steps) == len(other.steps) == 2
+    for one, same in zip(plain.steps, other.steps, strict=True):
+        # a minimum is flat: its place rounds at the root of what samples and clock round at
+        assert same.at - origin == pytest.approx(one.at, abs=1e-4)
+        assert same.sizes["x"] == pytest.approx(scale * one.sizes["x"], rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [30_000, 300_000])
+def test_a_long_record_tells_its_steps_as_well_as_a_short_one(count):
+    clean = reference("reference_ac1a.csv")
+    time = np.linspace(0.0, 300.0, count)
+    vt = np.interp(time - 100.0, clean["t"], clean["vt"]) + RNG.normal(0.0, 1e-4, count)
+    vt[count // 2] += 0.1
+    found = inspect(Columns({"t": time, "vt": vt}))
+    assert [step.at for step in found.steps] == pytest.approx([101.0, 111.0], abs=WITHIN)
+    (one,) = found.channels
+    assert one.spikes == 1
+    assert one.noise == pytest.approx(1e-4, rel=0.05)
+
+
+@pytest.mark.parametrize("step", [1e-5, 5.5e-5, 0.1, 2.0])
+def test_the_step_of_rounded_numbers_is_found(step):
+    rounded = step * np.round(RNG.normal(100.0, 8.0, 5000))
+    assert quantum(rounded) == pytest.approx(step, rel=1e-6)
+    assert quantum(RNG.normal(0.0, 1.0, 5000)) is None
+    assert quantum(np.ones(50)) is None
+
+
+@pytest.mark.parametrize("coarse", [0.3, 1.0, 3.0])
+def test_rounding_alone_is_no_stuck_recorder(coarse):
+    for seed in range(20):
+        noisy = np.random.default_rng(seed).normal(0.0, 1.0, 3000)
+        rounded = coarse * np.round(noisy / coarse)
+        assert stuck(rounded) == ()
+        rounded[1000:1200] = rounded[1000]
+        ((first, last),) = stuck(rounded)
+        assert first <= 1000
+        assert last >= 1199
+
+
+def test_white_noise_has_no_spikes_and_each_spike_is_found_at_its_place():
+    time = 0.01 * np.arange(20_000)
+    noisy = RNG.normal(0.0, 1.0, time.size)
+    assert len(spikes(time, noisy, 1.0)) <= 1
+    places = np.arange(100, 20_000, 400)
+    noisy[places] += 25.0  # six times what seven samples of noise may scatter by
+    assert set(places) <= set(spikes(time, noisy, 1.0))
+
+
+def test_gaps_are_told_against_the_median_step():
+    time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(1.5, 2.0, 0.01)])
+    told = sampling_of(time)
+    assert [(gap.start, gap.end, gap.lost) for gap in told.gaps] == [
+        (pytest.approx(0.99), pytest.approx(1.5), 50)
+    ]
+    assert told.even
+    assert (told.smallest, told.largest) == pytest.approx((0.01, 0.01))
+
+
+# ---- names, units, phases
+
+NAMES = {
+    "vt": [
+        "vt",
+        "Vt",
+        "Ut",
+        "Ug",
+        "Ugen",
+        "Vgen",
+        "U_gen",
+        "VT(pu)",
+        "Generatorspannung",
+        "Klemmenspannung",
+    ],
+    "efd": ["efd", "Efd", "EFD_V", "Uf", "Vfd [V]", "Field Voltage (V)", "Erregerspannung"],
+    "ifd": ["ifd", "If", "IFD (A)", "Field current [A]", "Erregerstrom/A", "LAD IFD"],
+    "p": ["P", "Pe", "P_gen (MW)", "Active Power", "Wirkleistung in MW"],
+    "q": ["Q", "Qgen [Mvar]", "Reactive power", "Blindleistung"],
+    "vref": ["vref", "Vref", "U_ref", "Reference", "Sollwert", "Usoll (%)"],
+    None: ["Temp", "Speed", "f (Hz)", "Exciter field current (A)", "If (kV)", "Ia", "trigger"],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"), [(name, signal) for signal, names in NAMES.items() for name in names]
+)
+def test_a_name_tells_its_signal(name, signal):
+    units = {name: unit} if (unit := unit_in(name)) else {}
+    found = guessed([name], units)
+    assert (found[name].signal if found else None) == signal
+
+
+def test_each_signal_goes_to_the_surest_name_once():
+    found = guessed(["U", "Ugen", "V"], {})
+    assert {name: guess.signal for name, guess in found.items()} == {"Ugen": "vt"}
+    assert guessed(["channel 7"], {"channel 7": "MW"})["channel 7"].signal == "p"
+
+
+@pytest.mark.parametrize(
+    ("names", "grouped"),
+    [("Ua Ub Uc", True), ("UL1 UL2 UL3", True), ("V_A V_B V_C", True), ("U12 U23 U31", True),
+     ("UR US UT", True), ("Uab Ubc Uca", True), ("Ia Ib Ic", False), ("a b c", False),
+     ("Ua Ub Ux", False)],
+)  # fmt: skip
+def test_three_phases_of_a_voltage_are_recognised(names, grouped):
+    names = names.split()
+    expected = (tuple(names),) if grouped else ()
+    assert three_phases([*names, "If"], {}) == expected
+    assert three_phases(names, dict.fromkeys(names, "A")) == ()
+
+
+@pytest.mark.parametrize("names", ["U12 U23 U31", "Uab Ubc Uca", "U_RS U_ST U_TR"])
+def test_voltages_between_phases_are_told_from_those_to_ground(names):
+    assert connection_of(names.split()) == "phase-to-phase"
+    assert connection_of(["Ua", "Ub", "Uc"]) == connection_of(["UL1", "UL2", "UL3"])
+    assert connection_of(["Ua", "Ub", "Uc"]) == "phase-to-ground"
+
+
+@pytest.mark.parametrize("frequency", [50.02, 60.0])
+def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency):
+    clean = reference("reference_ac1a.csv")
+    time = np.arange(0.0, 6.0, 2e-4)
+    crest = 15.75 * np.sqrt(2.0 / 3.0) * np.interp(time, clean["t"], clean["vt"])
+    turns = 2.0 * np.pi * (frequency * time[:, None] - np.arange(3) / 3.0)
+    waves = crest[:, None] * np.cos(turns) + RNG.normal(0.0, 1e-3, (time.size, 3))
+    phases = {f"UL{k + 1}": waves[:, k] for k in range(3)}
+    units = dict.fromkeys(phases, "kV")
+    found = inspect(Columns({"t": time, **phases}, units=units))
+    (group,) = found.phases
+    assert (group.columns, group.kind) == (("UL1", "UL2", "UL3"), "waveform")
+    assert [one.frequency for one in found.channels] == pytest.approx([frequency] * 3, rel=1e-3)
+    (step,) = found.steps
+    assert step.at == pytest.approx(1.0, abs=WITHIN)
+    assert step.sizes[group.name] / group.level == pytest.approx(0.0495, rel=0.02)
+    text = "\n".join(record_section(found, "w.csv"))
+    assert yaml.safe_load(text)["record"]["channels"]["vt"] == {
+        "phases": ["UL1", "UL2", "UL3"], "kind": "waveform", "connection": "phase-to-ground",
+        "unit": "kV", "base": "?"
+    }  # fmt: skip
+
+
+# ---- what is refused, and what never fails
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        (Columns({"a": np.ones(3)}, clock=()), "--time names one: 'a'"),
+        (Columns({"t": np.arange(1.0), "vt": np.ones(1)}), "1 samples; at least 2"),
+        (Columns({"t": np.arange(3.0), "vt": "words"}), "no column of numbers"),
+        (
+            Columns({"t": np.array([0.0, np.nan, 1.0]), "vt": np.ones(3)}),
+            "record.csv:3: column 't': nan",
+        ),
+    ],
+)
+def test_what_is_no_record_is_refused_with_its_place(table, text):
+    with pytest.raises(RecordError, match=text):
+        inspect(table)
+
+
+def test_a_column_of_another_length_than_the_time_is_left_out():
+    table = Columns({"t": np.arange(6.0), "vt": np.ones(6), "slow": np.ones(3)})
+    found = inspect(table)
+    assert [one.name for one in found.channels] == ["vt"]
+    assert "'t' has 6 samples, 'slow' has 3" in found.unreadable["slow"]
+
+
+@settings(deadline=None, derandomize=True, max_examples=150)
+@given(
+    st.integers(2, 60).flatmap(
+        lambda count: st.tuples(
+            arrays(float, count, elements=st.sampled_from([0.0, 0.01, 0.01, 0.02, -0.01, 5.0])),
+            arrays(float, (count, 3), elements=st.sampled_from([0.0, 1.0, 1.05, np.nan, -1e9])),
+        )
+    )
+)
+def test_whatever_was_recorded_is_told_as_valid_json_and_yaml(content):
+    steps, columns = content
+    names = ("Ua", "Ub", "Uc") if columns[0, 0] == 1.0 else ("vt", "vref", "If [A]")
+    table = Columns({"t": np.cumsum(steps), **dict(zip(names, columns.T, strict=True))})
+    try:
+        found = inspect(table)
+    except RecordError:
+        return
+    json.dumps(found.as_json())
+    text = "\n".join([*record_section(found, "a: b.csv"), *bump_section(found)])
+    assert set(yaml.safe_load(text)) == {"record", "test"}
+
+
+@pytest.mark.parametrize("count", [1, 3, 40])
+def test_the_figure_has_a_panel_for_each_of_a_sensible_number_of_channels(count):
+    columns = {f"channel {k}": RNG.normal(k, 0.1, 3000) for k in range(count)}
+    columns["channel 0"][:] = np.nan
+    found = inspect(Columns({"t": 0.01 * np.arange(3000), **columns}))
+    figure = plots.inspection(found, "title")
+    assert len(figure.axes) == min(count, 10)
+    assert all("channel" in axes.get_ylabel() for axes in figure.axes)
+    assert ("not drawn" in figure.axes[-1].get_xlabel()) == (count > 10)
+    plots.png(figure)
+
+
+def test_the_figure_marks_steps_gaps_and_spikes():
+    figure = plots.inspection(FOUND, "dirty")
+    first = figure.axes[0]
+    assert [text.get_text() for text in first.texts] == [f"{s.at:.4g} s" for s in FOUND.steps]
+    assert len(first.patches) == 1  # the gap
+    rings = [line for line in first.lines if line.get_marker() == "o"]
+    assert [len(line.get_xdata()) for line in rings] == [2]
+    assert "Ugen" in first.get_ylabel()
+    plots.png(figure)
+
+
+def test_one_step_in_several_channels_is_told_by_the_mean_of_least_variance():
+    shown = {"a": (Change(1.0, 0.001, 0.1, 0.0),), "b": (Change(1.002, 0.002, 0.2, 0.0),)}
+    (step,) = together(shown)
+    assert step.at == pytest.approx((4.0 * 1.0 + 1.002) / 5.0)
+    assert step.error == pytest.approx(0.002 / 5.0**0.5)  # they scatter less than they err
+    (alone,) = together({**shown, "ref": (Change(1.01, 0.005, 0.1, 0.0, jumps=True),)})
+    assert (alone.at, alone.error) == (1.01, 0.005)
+    assert alone.seen_in == ("a", "b", "ref")
+    far = {"a": (Change(1.0, 0.001, 0.1, 0.0), Change(1.1, 0.001, 0.1, 0.0))}
+    assert len(together(far)) == 2  # of one channel, two are two

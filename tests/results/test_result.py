@@ -1,0 +1,62 @@
+"""What a result says of itself: the figures of an overlay, and the JSON of a fit."""
+
+import io
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from places import ROOT
+
+from exfit import workflows
+from exfit.case.case import load_case
+from exfit.results.model import FitResult, Overlay, table
+
+INSIDE = {"comparisons": "records", "parts": "machine_model"}  # under another name
+ELSEWHERE = {"name", "history"}  # in the name of the folder and in the history
+
+laws = settings(deadline=None, derandomize=True, max_examples=25)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))
+
+
+@laws
+@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 3.0))
+def test_the_fit_percentage_is_what_is_left_of_the_spread(seed, share):
+    """100 for the record itself, 0 for its mean, and in between as far as the error goes."""
+    measured = np.random.default_rng(seed).normal(1.0, 0.1, 50)
+    mean = np.full(50, measured.mean())
+    between = measured + share * (mean - measured)
+    # what rounding leaves of a difference of numbers near 1 that is 0.1 large
+    assert Overlay(measured, measured).fit_percent == 100.0
+    assert Overlay(measured, mean).fit_percent == pytest.approx(0.0, abs=1e-9)
+    assert Overlay(measured, between).fit_percent == pytest.approx(100.0 * (1 - share), abs=1e-9)
+
+
+def test_the_json_of_a_fit_has_every_field_with_its_value(fitted):
+    told = fitted.as_json()
+    names = {one.name for one in fields(FitResult)} - ELSEWHERE
+    assert {INSIDE.get(name, name) for name in names} <= told.keys()
+    for name in names:
+        value = getattr(fitted, name)
+        if isinstance(value, bool | int | float | str):
+            assert told[name] == value, name
+    assert tuple(told["typical"]) == fitted.typical
+    assert told["fit"] == fitted.comparison.as_json() == told["records"][0]
+
+
+def test_a_long_table_keeps_the_extremes_of_every_column(monkeypatch):
+    monkeypatch.setattr("exfit.results.model.MOST_ROWS", 1000)
+    time = np.linspace(0.0, 1.0, 50_001)
+    signals = np.random.default_rng(1).standard_normal((2, len(time)))
+    rows = np.loadtxt(
+        io.StringIO(table(["t", "a", "b"], [time, *signals])), delimiter=",", skiprows=1
+    )
+    assert len(rows) <= 1002
+    assert np.all(np.diff(rows[:, 0]) > 0.0)
+    assert rows[:, 1:].max(axis=0) == pytest.approx(signals.max(axis=1))
+    assert rows[:, 1:].min(axis=0) == pytest.approx(signals.min(axis=1))

@@ -1,0 +1,102 @@
+"""Cases with records of the AC1A: the sample records, and others that the simulator makes."""
+
+import numpy as np
+import yaml
+from places import ROOT
+
+from exfit.case.case import load_case
+from exfit.fitting.build import fitted_trials
+
+SAMPLES = ROOT / "sample_data"
+STEP = {"up": 0.05, "down": -0.05}  # pu, at 1 s, of all sample records
+NOISE = 1e-4  # pu, of vt in all sample records
+TIME = np.arange(0.0, 6.0, 0.01)
+TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}]}
+# where the fit of the sample record ends
+UNIT = {"KA": 332.83, "KF": 0.0444, "TE": 1.5238, "TF": 1.5754, "TA": 0.0545, "KC": 0.5111}
+UNIT["KD"] = 0.2477
+
+
+def config(name):
+    """Return a case of the collection, whose paths lead to the sample records."""
+    text = (ROOT / "configs" / f"{name}.yaml").read_text()
+    return yaml.safe_load(text.replace("../sample_data", SAMPLES.as_posix()))
+
+
+def found_in(start, low, high):
+    """Return a value that the fit finds."""
+    return {"start": start, "min": low, "max": high}
+
+
+def recording(name, file=None, at=1.0, step=None, channels=None, **record):
+    """Return an entry of records on a sample record of the AC1A."""
+    file = SAMPLES / f"ac1a_{name}.csv" if file is None else file
+    return {
+        "name": name,
+        "test": {"vref": [{"at": at, "step": STEP[name] if step is None else step}]},
+        "record": {
+            "file": str(file),
+            "time": "t",
+            "channels": {"vt": "vt"} if channels is None else channels,
+            **record,
+        },
+    }
+
+
+def several(*records, free=None, **sections):
+    """Return the AC1A's case with several records in place of one."""
+    content = config("ac1a_typical")
+    for key in ("test", "record", "validate"):
+        del content[key]
+    content["records"] = list(records)
+    if free is not None:
+        content["parameters"]["free"] = free
+    return {**content, **sections}
+
+
+def case_of(content, folder):
+    """Write a case into a folder and load it."""
+    path = folder / "case.yaml"
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    return load_case(path)
+
+
+def write(path, **columns):
+    """Write a record, gaps as empty cells."""
+    rows = np.column_stack(list(columns.values()))
+    lines = [",".join("" if np.isnan(x) else f"{x:.10g}" for x in row) for row in rows]
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    return path
+
+
+def one(test, channels=None, free=None, **record):
+    """Return the AC1A's case with one synthetic record, record.csv."""
+    content = config("ac1a_typical")
+    del content["validate"]
+    content["test"] = test
+    content["record"] = {
+        "file": "record.csv",
+        "time": "t",
+        "channels": {"vt": "vt"} if channels is None else channels,
+        **record,
+    }
+    content["parameters"]["fixed"] |= UNIT
+    content["parameters"]["free"] = {}
+    for name in free or ():
+        start = content["parameters"]["fixed"].pop(name)
+        content["parameters"]["free"][name] = found_in(start, start / 10, start * 10)
+    return content
+
+
+def synthetic(folder, test, time, seed=0, noise=NOISE, signals=("vt",)):
+    """Write the response of the unit to a test, with noise; return its signals."""
+    write(folder / "record.csv", t=time, vt=time)
+    case = case_of(one(test), folder)
+    values = case.values()
+    response = fitted_trials(case)[0].secured(values).response(values)
+    rng = np.random.default_rng(seed)
+    shown = {
+        name: response.signals[name] + noise * rng.standard_normal(len(time)) for name in signals
+    }
+    write(folder / "record.csv", t=time, **shown)
+    return shown
