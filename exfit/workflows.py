@@ -22,23 +22,18 @@ from exfit.analysis.diagnostics import (
     voltage_notes,
 )
 from exfit.analysis.iteration_responses import Sketch, course_notes, sketch, with_courses
-from exfit.case.case import SINGLE, Case, Unknown
+from exfit.case.case import SINGLE, Case
+from exfit.case.schema import Unknown
 from exfit.errors import CaseError, SimulationError
-from exfit.fitting.build import (
-    Trial,
-    fitted_trials,
-    plain_simulator,
-    residuals_of,
-    robust_of,
-    secured,
-    trial_of,
-    values_of,
-)
+from exfit.fitting.build import Trial, plain_simulator, robust_of, secured, trial_of, values_of
 from exfit.fitting.compression import condensed
 from exfit.fitting.nonlinearity import bent
-from exfit.fitting.residuals import JACOBIANS, Residuals
+from exfit.fitting.nuisance import unit_of
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import UNIT, fitted, names_of_records, search
 from exfit.fitting.uncertainty import Knowledge, knowledge
 from exfit.records.record import file_hash
+from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import (
     Comparison,
     FitResult,
@@ -54,8 +49,6 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
-UNITS: Mapping[str, str] = {"at": "s", "step": "pu", "vt0": "pu", "delay": "s", "offset": "pu"}
-UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
 def fit(
@@ -94,7 +87,7 @@ def fit(
     known = None if interrupted else told(residuals, found.x, trials)
     secure = [one.secured(values) for one in trials]
     compared = tuple(
-        with_courses(one.compare(one.name, values, begin), one, residuals, history)
+        with_courses(compare_with_record(one, one.name, values, begin), one, residuals, history)
         for one in secure
     )
     tried = tuple(tried_on(case, one, values) for one in validations)
@@ -135,18 +128,6 @@ def fit(
     )
 
 
-def fitted(case: Case) -> tuple[tuple[Trial, ...], Residuals]:
-    """Return the tests of a case with the records that it is fitted to, and what is made small.
-
-    Raises ExfitError where there is none, or one that cannot be fitted.
-    """
-    given = case.values()
-    trials = tuple(trial.secured(given) for trial in fitted_trials(case))
-    residuals = residuals_of(case, trials)
-    refuse_unfit(case, residuals)
-    return trials, residuals
-
-
 def told(residuals: Residuals, theta: Array, trials: Iterable[Trial]) -> Knowledge | None:
     """Return what the records tell at the solution theta (N,), in scaled parameters.
 
@@ -157,64 +138,6 @@ def told(residuals: Residuals, theta: Array, trials: Iterable[Trial]) -> Knowled
     except SimulationError:
         return None
     return replace(known, bent=bent(residuals, theta, known))
-
-
-def names_of_records(trials: Iterable[Trial]) -> tuple[str, ...]:
-    """Return the names of all that is found about the records themselves."""
-    return tuple(one.name for trial in trials for one in trial.free)
-
-
-def search(
-    case: Case,
-    residuals: Residuals,
-    method: estimate.Method,
-    announce: Callable[[estimate.Iteration], None],
-    progress: Callable[[estimate.Progress], None],
-) -> tuple[estimate.Result, estimate.Minima | None]:
-    """Return the best point found from the start of a case, or from all its starts."""
-    asked = case.estimate
-    fewer = condensed(residuals)
-    known = len(fewer.priors)
-    share = (fewer.samples + known) / (fewer.count + known)
-    good_enough = asked.good_enough.rmse * np.sqrt(share)
-    jacobian = JACOBIANS[asked.jacobian](fewer)
-    if asked.starts == 1:
-        found = estimate.least_squares(
-            fewer,
-            fewer.start,
-            jac=jacobian,
-            bounds=fewer.bounds,
-            method=method,
-            max_iterations=asked.iterations,
-            gtol=asked.tolerance.gradient,
-            xtol=asked.tolerance.step,
-            x_scale=UNIT,
-            good_enough=good_enough,
-            callback=announce,
-        )
-        return found, None
-    minima = estimate.multistart(
-        fewer,
-        jacobian,
-        fewer.bounds,
-        asked.starts,
-        x0=fewer.start,
-        screen=fewer.costs,
-        refine=asked.refine,
-        watch=progress,
-        method=method,
-        max_iterations=asked.iterations,
-        gtol=asked.tolerance.gradient,
-        xtol=asked.tolerance.step,
-        x_scale=UNIT,
-        good_enough=good_enough,
-    )
-    if not minima.minima:
-        raise KeyboardInterrupt
-    best = minima.minima[0].result
-    for line in best.history:
-        announce(line)
-    return best, minima
 
 
 def minima_of(residuals: Residuals, found: estimate.Minima) -> Minima:
@@ -272,7 +195,7 @@ def tried_on(case: Case, trial: Trial, values: Values, name: str | None = None) 
             x_scale=UNIT,
         )
         values = residuals.values(aligned.x)
-    return secured.compare(name or trial.name, values, None, limit)
+    return compare_with_record(secured, name or trial.name, values, None, limit)
 
 
 def record_notes(trial: Trial, compared: Comparison) -> Iterator[str]:
@@ -281,27 +204,6 @@ def record_notes(trial: Trial, compared: Comparison) -> Iterator[str]:
     if test.steady is not None and test.begin is None:
         yield from unsteady_notes(trial.record, test.steady, trial.channels)
         yield from level_notes(compared, test.steady)
-
-
-def refuse_unfit(case: Case, residuals: Residuals) -> None:
-    """Raise ExfitError where a record cannot be fitted: it is too short, flat, or out of scale."""
-    samples, unknown = residuals.count, len(residuals.free)
-    if samples < unknown:
-        raise CaseError([f"{case.path}: record: {samples} samples for {unknown} free parameters"])
-    for channel in residuals.channels:
-        measured = channel.measured[channel.kept]
-        if np.all(measured == measured[0]):
-            level = f"{channel.signal} is {measured[0]:g} pu throughout"
-            raise CaseError([f"{case.path}: record: {level}: it shows no test"])
-    with np.errstate(over="ignore"):
-        start = condensed(residuals)(residuals.start)
-        square = float(start @ start)
-    if not np.isfinite(square):
-        largest = float(np.max(np.abs(start)))
-        raise SimulationError(
-            f"{case.path}: the residuals at the start values are too large to be squared: "
-            f"up to {largest:.3g}; check scale, weight and start"
-        )
 
 
 def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, FittedParameter]:
@@ -318,12 +220,6 @@ def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, F
         )
         for one in residuals.free
     }
-
-
-def unit_of(name: str) -> str:
-    """Return the unit of a value that no data sheet has: what is found about a record."""
-    kind = name.rpartition(".")[2]
-    return UNITS.get(kind, "")
 
 
 def _iteration(line: estimate.Iteration, residuals: Residuals) -> Iteration:
@@ -372,7 +268,7 @@ def simulate(case: Case, changes: Values) -> Simulation:
     if case.recordings:
         trial = trial_of(case, case.recordings[0], values).secured(values)
         response = trial.response(values)
-        compared = trial.compare("record", values) if trial.channels else None
+        compared = compare_with_record(trial, "record", values) if trial.channels else None
         told = [] if compared is None else record_notes(trial, compared)
         return Simulation(response, compared, (*simulation_notes(case, response), *told))
     simulator, levels = plain_simulator(case, values)
@@ -410,6 +306,6 @@ def validate(case: Case, changes: Values, record: Path | None = None) -> list[Co
     seen = [trial_of(case, one, values).secured(values) for one in fitted]
     unseen = [trial_of(case, one, values) for one in others]
     return [
-        *(one.compare(one.name, values) for one in seen),
+        *(compare_with_record(one, one.name, values) for one in seen),
         *(tried_on(case, one, values) for one in unseen),
     ]

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from places import CONFIGS
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
+from exfit.fitting.recordings import measured
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 from exfit.workflows import simulate
@@ -30,4 +31,4 @@ def test_a_case_reads_and_its_records_are_there(path):
     case = load_case(path)
     assert case.recordings
     for one in (*case.recordings, *case.validations):
-        assert case.measure(one.test, one.record).time.size > 100
+        assert measured(case, one.test, one.record).time.size > 100

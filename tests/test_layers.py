@@ -62,7 +62,7 @@ MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py"))}
 
 def package(name):
     """Return the room of a module: what follows exfit in its name, "" for exfit itself."""
-    return (name.split(".") + [""])[1]
+    return ([*name.split("."), ""])[1]
 
 
 def imports(path, everywhere=True):

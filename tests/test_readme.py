@@ -9,8 +9,9 @@ import pytest
 from places import ROOT
 
 from exfit import workflows
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.cli import main
+from exfit.fitting.recordings import measured
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import run_folder
@@ -57,16 +58,16 @@ def test_the_case_of_the_readme_is_valid_and_its_records_can_be_read(folder):
     path = folder / "case.yaml"
     path.write_text(block("yaml"), encoding="utf-8")
     case = load_case(path)
-    assert case.measure(case.test, case.record).time.size > 1
+    assert measured(case, case.test, case.record).time.size > 1
     for one in case.validations:
-        assert case.measure(one.test, one.record).time.size > 1
+        assert measured(case, one.test, one.record).time.size > 1
 
 
 def test_the_record_of_the_readme_is_read_in_the_recorders_units(folder):
     head = block("yaml").partition("record:")[0]
     (folder / "case.yaml").write_text(head + block("yaml", 1), encoding="utf-8")
     case = load_case(folder / "case.yaml")
-    record = case.measure(case.test, case.record)
+    record = measured(case, case.test, case.record)
     assert record.signals["vt"][0] == pytest.approx(1.0, abs=0.01)
     assert record.signals["ifd"][0] == pytest.approx(1.12, abs=0.01)
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.fitting.build import fitted_trials, trial_of, values_of
 from exfit.plants import VT0
+from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit, simulate, validate
 
 REFERENCE = ROOT / "tests" / "reference"
@@ -33,7 +34,9 @@ def true_cost(name):
     known = {NAMES.get(key, key): value for key, value in truth.items()}
     wanted = [*loaded.parameters.free, "KA"]
     trial = fitted_trials(loaded)[0]
-    return trial.compare("truth", values_of(loaded, {key: known[key] for key in wanted})).cost
+    return compare_with_record(
+        trial, "truth", values_of(loaded, {key: known[key] for key in wanted})
+    ).cost
 
 
 @pytest.fixture(scope="module")

@@ -12,16 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.case import Case, InfiniteBus, OpenCircuit
-from exfit.case.messages import near
+from exfit.case.case import Case
+from exfit.case.schema import InfiniteBus, OpenCircuit
 from exfit.dsp.noise import noise
 from exfit.errors import CaseError
 from exfit.fitting.build import fitted_trials, free_of, planned, secured
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.residuals import Free, Residuals
+from exfit.fitting.parameters import Free
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import Knowledge, known_of, linearisation
 from exfit.inference import Confidence
 from exfit.simulation.simulator import Simulator
+from exfit.util.text import near
 
 Array = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.kernel import in_threads
 from exfit.fitting.build import Trial, compared
 from exfit.fitting.residuals import UNREACHABLE, Residuals
 from exfit.results.model import Comparison, Courses, Iteration, judged_of
+from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
-from exfit.case.messages import near
 from exfit.errors import CaseError
 from exfit.fitting.compression import condensed
+from exfit.fitting.nuisance import unit_of
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import UNIT, fitted, names_of_records, search
 from exfit.fitting.uncertainty import Knowledge, knowledge
 from exfit.inference import LEVEL
-from exfit.workflows import UNIT, fitted, names_of_records, search, unit_of
+from exfit.util.text import near
 
 Array = NDArray[np.float64]
 

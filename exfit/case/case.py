@@ -5,21 +5,16 @@ pydantic lives only here and in case_schema.
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import Field, PrivateAttr
 
-from exfit.case.checks.model import contradictions
-from exfit.case.messages import form_faults, show
-from exfit.case.parts import Part, Parts, parts_of, ties_of, with_network
+from exfit.case.parts import Part, Parts, with_network
 from exfit.case.schema import (
     ABOUT,
     BumpTest,
-    Channel,
     Estimate,
     Fact,
-    FindableStep,
     Free,
     Frozen,
     InfiniteBus,
@@ -29,51 +24,19 @@ from exfit.case.schema import (
     OnLine,
     OpenCircuit,
     Parameters,
-    Phases,
     Playback,
     RecordFile,
     Recording,
     Section,
     Simulation,
     Stabiliser,
-    Step,
-    Switch,
     Text,
-    TimeColumn,
-    Unknown,
     Value,
-    known,
 )
 from exfit.case.ties import Ties
-from exfit.case.yaml import Fault, Place, read_text, read_yaml
-from exfit.errors import CaseError, RecordError
-from exfit.records.record import ChannelLike, Clock, Record, ThreePhases, read_record
-
-__all__ = [
-    "BumpTest",
-    "Case",
-    "FindableStep",
-    "InfiniteBus",
-    "MachinePlayback",
-    "NoPlant",
-    "OpenCircuit",
-    "Playback",
-    "RecordFile",
-    "Recording",
-    "Step",
-    "Switch",
-    "Unknown",
-    "dotted",
-    "initial_level",
-    "initial_voltage",
-    "json_schema",
-    "known",
-    "load_case",
-    "parse_case",
-]
+from exfit.case.yaml import Place
 
 SINGLE = "fit"  # name of a record that stands alone
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 class Case(Section):
@@ -233,57 +196,6 @@ class Case(Section):
         own = next((part.symbols for part in self._parts.all if part.kind == "exciter"), ())
         return {name: value for name, value in given.items() if name not in own}
 
-    def measure(self, test: BumpTest, record: RecordFile) -> Record:
-        """Return the record of a test; raises RecordError where its steps lie outside it."""
-        channels: dict[str, ChannelLike | ThreePhases] = {
-            signal: source_of(channel) for signal, channel in record.channels.items()
-        }
-        path = self.folder / record.file
-        missing = record.gaps == "skip"
-        clock = clock_of(record)
-        per_unit = frozenset(
-            signal
-            for signal, channel in record.channels.items()
-            if self.plant.type != "none" and _as_it_stands(channel)
-        )
-        read = read_record(
-            path,
-            clock,
-            channels,
-            record.window,
-            missing,
-            record.sheet,
-            record.resample,
-            per_unit,
-        )
-        start, end = read.time[0], read.time[-1]
-        if test.begin is not None:
-            if test.begin > start:
-                raise RecordError(
-                    f"{path}: begins at {show(start)} s, before {self.path} begins to simulate it "
-                    f"at {show(test.begin)} s"
-                )
-            start = test.begin
-        for at in test.instants:
-            if not start <= at < end:
-                raise RecordError(
-                    f"{path}: holds {show(start)} ... {show(end)} s, "
-                    f"but {self.path} has a step at {show(at)} s"
-                )
-        steady = test.steady
-        if steady is not None and steady > end:
-            raise RecordError(
-                f"{path}: ends at {show(end)} s, before test.steady_until = {show(steady)} s "
-                f"of {self.path}"
-            )
-        if test.vt0 is None and steady is not None and not start < steady:
-            what = "the first step" if test.steady_until is None else "test.steady_until"
-            raise RecordError(
-                f"{path}: begins at {show(start)} s, with {what}: nothing before it tells "
-                f"vt0, and {self.path} does not give it"
-            )
-        return read
-
 
 def numbers_of(given: Mapping[str, float | str]) -> dict[str, float]:
     """Return those values that are numbers of their own."""
@@ -295,137 +207,3 @@ def _at(section: Any, place: Place) -> Any:
     for key in place:
         section = getattr(section, str(key))
     return section
-
-
-class Column(NamedTuple):
-    """Where a signal stands in a file and how it becomes per unit."""
-
-    column: str
-    scale: float
-    offset: float
-    unit: str | None
-    base: float | None
-
-
-def clock_of(record: RecordFile) -> Clock:
-    """Return where the time of a record stands."""
-    if isinstance(record.time, str):
-        return Clock((record.time,))
-    if isinstance(record.time, TimeColumn):
-        return Clock((record.time.column,), record.time.unit)
-    return Clock(record.time)
-
-
-def column_of(channel: Channel) -> Column:
-    """Return the column of a channel; where a fit finds scale or offset, with their starts."""
-    scale, offset = known(channel.scale), known(channel.offset)
-    return Column(
-        channel.column, 1.0 if scale is None else scale, offset or 0.0, channel.unit, channel.base
-    )
-
-
-def _as_it_stands(channel: Channel | Phases) -> bool:
-    """Tell whether a case takes the numbers of a column for per unit."""
-    if not isinstance(channel, Channel):
-        return False
-    return channel.unit is None and channel.base is None and channel.scale == 1.0
-
-
-def source_of(channel: Channel | Phases) -> Column | ThreePhases:
-    """Return where a signal stands: in a column, or in three."""
-    if isinstance(channel, Channel):
-        return column_of(channel)
-    return ThreePhases(
-        channel.phases,
-        channel.kind,
-        channel.unit,
-        channel.base,
-        channel.connection,
-        channel.cycles,
-    )
-
-
-def initial_level(test: BumpTest, record: Record, signal: str) -> float:
-    """Return the mean of a recorded signal while the unit is still at rest.
-
-    Raises RecordError where it has no sample there.
-    """
-    until = np.inf if test.steady is None else test.steady
-    rest = record.signals[signal][record.time < until]
-    rest = rest[np.isfinite(rest)]
-    if not len(rest):
-        raise RecordError(
-            f"{record.source}: {signal}: no sample before {show(until)} s tells where it starts"
-        )
-    return float(np.mean(rest))
-
-
-def initial_voltage(test: BumpTest, record: Record) -> float:
-    """Return the voltage before the first step: as the test gives it, else the record's mean."""
-    vt0 = known(test.vt0)
-    return initial_level(test, record, "vt") if vt0 is None else vt0
-
-
-def load_case(path: Path) -> Case:
-    """Return the case of a YAML file.
-
-    Raises CaseError with all faults of the file, each as ``file:line: place: what is wrong``.
-    """
-    return parse_case(read_text(path), path)
-
-
-def parse_case(text: str, path: Path) -> Case:
-    """Return the case of a YAML text, as if it stood in the file ``path``; raises CaseError."""
-    top, faults = read_yaml(text, path)
-    parts = parts_of(top.value, path.parent, faults)
-    ties = ties_of(top.value, parts, faults)
-    case = _checked(top.value, faults)
-    taken = {fault.place for fault in faults}
-    found = contradictions(top.value, parts, ties)
-    faults += [fault for fault in found if fault.place not in taken]
-    if faults or case is None:
-        lines = [(fault.line or top.line_of(fault.place), fault) for fault in faults]
-        raise CaseError(
-            f"{path}:{line}: {dotted(fault.place)}: {fault.text}"
-            for line, fault in sorted(lines, key=lambda found: found[0])
-        )
-    case._path, case._parts, case._ties = path, parts, ties
-    return case
-
-
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of the case file."""
-    from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-
-    class NoNulls(GenerateJsonSchema):
-        """A key that may be missing may not be null."""
-
-        def nullable_schema(self, schema: Any) -> JsonSchemaValue:
-            return self.generate_inner(schema["schema"])
-
-        def default_schema(self, schema: Any) -> JsonSchemaValue:
-            found = super().default_schema(schema)
-            return _without(found, "default") if found.get("default", 0) is None else found
-
-    schema = Case.model_json_schema(by_alias=True, schema_generator=NoNulls)
-    return {"$schema": DIALECT, **schema, "title": "exfit case"}
-
-
-def dotted(place: Place) -> str:
-    """Return a place as ``test.vref[0].at``."""
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place)[1:]
-
-
-def _without(mapping: dict[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in mapping.items() if name != key}
-
-
-def _checked(data: dict[str, Any], faults: list[Fault]) -> Case | None:
-    """Return the case if its data has the right form; add a fault for each that has not."""
-    try:
-        return Case.model_validate(data)
-    except ValidationError as error:
-        known = {fault.place for fault in faults}
-        found = form_faults(error.errors(include_url=False), json_schema())
-        faults += [fault for fault in found if fault.place not in known]
-        return None

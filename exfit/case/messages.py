@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from exfit.case.yaml import Fault, Place
+from exfit.util.text import near, show_value
 
 Data = Mapping[str, Any]
 
 FILL_IN = "'?'"  # what a new case has in place of a value that nobody gave, as it is shown
-SHOWN = 60  # characters of a wrong value
 FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
@@ -86,32 +86,6 @@ def _offered(schema: Data, place: Place) -> str:
     """Return the words that may stand at a place, as the end of a sentence."""
     words = [word for part in _at(schema, schema, place) for word in part.get("enum", ())]
     return f": {' or '.join(words)}?" if words else ""
-
-
-def near(word: str, known: Iterable[str]) -> str:
-    """Return a hint at the known word that is meant, or at all of them."""
-    import difflib
-
-    folded = {name.casefold(): name for name in known}
-    close = difflib.get_close_matches(word.casefold(), folded, n=1)
-    return f"did you mean {folded[close[0]]}?" if close else f"known: {', '.join(folded.values())}"
-
-
-def show(value: float) -> str:
-    """Return a number in as few digits as tell it."""
-    return f"{value:.12g}"
-
-
-def show_value(value: Any) -> str:
-    """Return a value as a message shows it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float):
-        return show(value)
-    if isinstance(value, list | dict):
-        return "a list" if isinstance(value, list) else "a mapping"
-    text = repr(value)
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 def _unknown(key: str, known: list[str]) -> str:

@@ -7,7 +7,6 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from exfit.case.messages import near
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
 from exfit.case.yaml import Fault, Place
 from exfit.errors import ModelError
@@ -16,6 +15,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
 from exfit.plants import MACHINE, NETWORK, STABILISER, flow_sheet
+from exfit.util.text import near
 
 Data = Mapping[str, Any]
 Contradictions = Iterator[tuple[str, str]]

@@ -6,7 +6,7 @@ from typing import Any
 
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.siblings import siblings
+from exfit.util.files import siblings
 
 RECORDS = ("record", "records", "validate")
 # where parameters stand, and how their names begin

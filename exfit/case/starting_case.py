@@ -9,7 +9,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Parameter, Sheet
 from exfit.records.inspection import Inspection
-from exfit.results.model import yaml_number
+from exfit.util.text import yaml_number
 
 ALONE = "FIRST_ORDER"  # the model whose output is vt itself
 ON_LOAD = 0.05  # pu of power at rest: with less the breaker is taken for open

@@ -12,7 +12,7 @@ from exfit.records.channel_recognition import connection_of
 from exfit.records.inspection import AT_REST_PU, Channel, Inspection, Phases
 from exfit.records.steps import Step
 from exfit.records.units import quantity_of
-from exfit.results.model import yaml_number
+from exfit.util.text import yaml_number
 
 FILL_IN = '"?"'  # no number: a case that holds it is refused by place
 AROUND = 0.25  # s: how far the instant of a step may be from where the record shows it

@@ -1,69 +1,8 @@
 """The case file that a unit of a PSS/E dynamics file makes: to be read, run, and edited."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
-from exfit.errors import DynamicsError
-from exfit.exchange.psse import Part, Unit, read_unit, text_of
-from exfit.models.sheet import Parameter, Sheet
-from exfit.results.model import yaml_number
+from exfit.models.sheet import Parameter
 
 MEANING_AT = 24  # column of the comments
-TEST = """\
-test:                   # a 5 % step; a record takes the place of the duration
-  vt0: 1.0
-  vref: [{at: 1.0, step: 0.05}]
-  duration: 10.0
-"""
-
-
-def import_unit(path: Path, bus: int | None = None, machine_id: str | None = None) -> Unit:
-    """Return a unit of a file as ``read_unit`` does; raises DynamicsError."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DynamicsError([f"{path}: cannot be read: {error.strerror}"]) from None
-    return read_unit(text_of(data, str(path)), str(path), bus, machine_id)
-
-
-def case_text(unit: Unit, file: str) -> str:
-    """Return the case of a unit on open circuit, with a comment for all that it rests on."""
-    lines = [*_heading(unit, file), *_exciter_name(unit.exciter), *_plant(unit.machine)]
-    if unit.stabiliser is not None:
-        name = unit.stabiliser.definition.model.name
-        lines += ["stabiliser:", commented(f"  model: {name}", _origin(unit.stabiliser))]
-        lines += ["  parameters:", *_values(unit.stabiliser, "    ")]
-    lines += [*TEST.splitlines(), "parameters:"]
-    lines += [commented("  fixed:", "what a fit shall find goes under free")]
-    lines += _values(unit.exciter, "    ")
-    return "\n".join(lines) + "\n"
-
-
-def _heading(unit: Unit, file: str) -> Iterator[str]:
-    yield f"# Unit {_plain(unit.id)} at bus {unit.bus} of {_plain(file)}, on open circuit."
-    for line, text in unit.warnings:
-        yield f"# Line {line}: {_plain(text)}."
-
-
-def _exciter_name(exciter: Part) -> Iterator[str]:
-    yield commented(f"model: {exciter.definition.model.name}", _origin(exciter))
-    if {"E1", "SE1", "E2", "SE2"} <= exciter.values.keys():
-        yield commented("saturation: quadratic", "as PSS/E")
-
-
-def _plant(machine: Part) -> Iterator[str]:
-    yield "plant:"
-    yield "  type: open-circuit"
-    yield commented(f"  machine: {machine.definition.model.name}", _origin(machine))
-    yield "  parameters:"
-    yield from _values(machine, "    ")
-
-
-def _values(part: Part, indent: str) -> Iterator[str]:
-    rows: Sheet = part.definition.model.sheet
-    for row in rows:
-        remark = "" if row.symbol in part.definition.names else "; typical, not in the file"
-        yield parameter_line(row, yaml_number(part.values[row.symbol]), indent, remark)
 
 
 def parameter_line(row: Parameter, value: str, indent: str, remark: str = "") -> str:
@@ -71,15 +10,6 @@ def parameter_line(row: Parameter, value: str, indent: str, remark: str = "") ->
     return commented(f"{indent}{row.symbol}: {value}", f"{row.unit}, {row.meaning}{remark}")
 
 
-def _origin(part: Part) -> str:
-    return f"{part.definition.record.name} on line {part.line}"
-
-
 def commented(text: str, comment: str) -> str:
     """Return a line of a case with a comment, at one place where the line is short."""
     return f"{text:{MEANING_AT}}# {comment}" if len(text) < MEANING_AT else f"{text}  # {comment}"
-
-
-def _plain(text: str) -> str:
-    """Return a text that fits into a comment."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)

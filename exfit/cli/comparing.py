@@ -50,7 +50,7 @@ def compare(
     from exfit.analysis.comparison import Asked
     from exfit.analysis.comparison import compare as compared
     from exfit.output import run_folder
-    from exfit.results.model import to_json
+    from exfit.util.text import to_json
 
     folder = output or Path("runs") / "compare"
     run_folder.refuse_unwritable(folder)

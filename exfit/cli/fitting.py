@@ -61,7 +61,7 @@ def fit(
         return
     from exfit import workflows
     from exfit.output import run_folder
-    from exfit.results.model import to_json
+    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "fit")
@@ -158,7 +158,7 @@ def validate(
     from exfit import workflows
     from exfit.fitting.overrides import read_parameters
     from exfit.output import run_folder
-    from exfit.results.model import to_json
+    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "validate")

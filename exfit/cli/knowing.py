@@ -47,7 +47,7 @@ def profile(
     """
     from exfit.analysis.profiles import profile as profiled
     from exfit.output import run_folder
-    from exfit.results.model import to_json
+    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "profile")
@@ -98,7 +98,7 @@ def identify(
     """
     from exfit.analysis.experiment_design import identify as identified
     from exfit.output import run_folder
-    from exfit.results.model import to_json
+    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "identify")

@@ -49,7 +49,7 @@ class Refusal(click.ClickException):
 
 def load(case: Path) -> "Case":
     """Return the case of a file; raises CaseError with all faults of it."""
-    from exfit.case.case import load_case
+    from exfit.case.load import load_case
 
     return load_case(case)
 
@@ -64,7 +64,7 @@ def refuse_existing(output: Path, force: bool) -> None:
 
 def write_text(text: str, output: Path | None, warnings: Iterable[str]) -> None:
     """Write a file, or to the terminal, and the warnings to standard error."""
-    from exfit.results.model import write
+    from exfit.util.files import write
 
     if output is None:
         click.echo(text, nl=False)

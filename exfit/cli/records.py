@@ -62,7 +62,7 @@ def inspect_(
     """
     from exfit.case.suggestion import bump_section, record_section
     from exfit.output import run_folder
-    from exfit.results.model import to_json
+    from exfit.util.text import to_json
 
     # files of one record in several formats have one stem
     folder = output or Path("runs") / f"{file.name}-inspect"

@@ -2,13 +2,12 @@
 
 import ctypes
 import hashlib
-import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -16,14 +15,14 @@ from numpy.typing import NDArray
 
 from exfit.engine.emit import linearisation, simulation, simulation_with_tangents
 from exfit.engine.system import System, differentiate, trace
+from exfit.util.cache import cache_folder
 from exfit.util.files import write_whole
+from exfit.util.threads import in_threads
 
 if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
+    pass
 
 Array = NDArray[np.float64]
-Item = TypeVar("Item")
-Done = TypeVar("Done")
 
 SIDE_BY_SIDE = 16  # parameter sets: two vectors of 512 bits hide each other's waiting
 DIRECTIONS = 8  # of differentiation in one run
@@ -51,16 +50,6 @@ class Span(NamedTuple):
     step: float
     parts: int
     du: Array | None = None
-
-
-def cache_folder() -> Path:
-    """Return where compiled code is kept: EXFIT_CACHE, or the user's cache folder."""
-    chosen = os.environ.get("EXFIT_CACHE")
-    if chosen:
-        return Path(chosen)
-    from platformdirs import user_cache_path
-
-    return user_cache_path("exfit", appauthor=False)
 
 
 @cache
@@ -139,18 +128,6 @@ def _function(engine: Any, name: str, arrays: int, extra: Sequence[Any] = ()) ->
 
 
 RUN_ARGUMENTS = (ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
-
-
-@cache
-def _workers() -> "ThreadPoolExecutor":
-    from concurrent.futures import ThreadPoolExecutor
-
-    return ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
-
-
-def in_threads(run: Callable[[Item], Done], items: Sequence[Item]) -> Iterable[Done]:
-    """Return run(item) of each, spread over the processors; a single one needs no thread."""
-    return map(run, items) if len(items) == 1 else _workers().map(run, items)
 
 
 class Kernel:

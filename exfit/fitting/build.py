@@ -11,34 +11,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case import schema
-from exfit.case.case import (
-    SINGLE,
+from exfit.case.case import SINGLE, Case
+from exfit.case.schema import (
     BumpTest,
-    Case,
+    Filter,
     InfiniteBus,
     MachinePlayback,
     OpenCircuit,
     Playback,
     RecordFile,
     Recording,
+    Signal,
     Step,
     Switch,
     Unknown,
-    column_of,
-    initial_level,
-    initial_voltage,
     known,
 )
-from exfit.case.schema import Filter, Signal
 from exfit.case.ties import Ties
-from exfit.dsp.features import Features, features
 from exfit.dsp.filtering import Conditioning, LowPass, Median, MovingAverage, outliers
 from exfit.dsp.robust_loss import LOSSES
 from exfit.engine.system import System, trace
 from exfit.errors import CaseError, ModelError, RecordError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisance import prefix_of, started, unknowns
-from exfit.fitting.residuals import Free, Known, Residuals, Robust
+from exfit.fitting.parameters import Free, Known
+from exfit.fitting.recordings import column_of, initial_level, initial_voltage, measured
+from exfit.fitting.residuals import Residuals, Robust
 from exfit.models.sheet import Model
 from exfit.plants import (
     DRIVING,
@@ -56,7 +54,6 @@ from exfit.plants import (
     playback,
 )
 from exfit.records.record import Record
-from exfit.results.model import Comparison, Overlay
 from exfit.simulation.inputs import MOST_STEPS, Change, Course, Played
 from exfit.simulation.simulator import Response, Simulator, parameters_used
 
@@ -205,49 +202,6 @@ class Trial:
         at = self.known(values)
         return self.experiment.moved(at).response(self.experiment.parameters(at))
 
-    def compare(
-        self, name: str, values: Values, start: Values | None = None, limit: float | None = None
-    ) -> Comparison:
-        """Return the response to the values beside the record; secure it first."""
-        at = self.known(values)
-        samples, substeps = self.experiment.samples(at)
-        first = None if start is None else self.experiment.samples(self.known(start))[0]
-        overlays = {
-            channel.signal: Overlay(
-                compared(channel, self.experiment.measured(channel, at)),
-                compared(channel, channel.shown(samples[:, k])),
-                None if first is None else compared(channel, channel.shown(first[:, k])),
-            )
-            for k, channel in enumerate(self.channels)
-        }
-        errors = self.experiment.compared(samples, at)
-        vt = overlays.get("vt")
-        return Comparison(
-            name=name,
-            time=self.record.time,
-            overlays=overlays,
-            cost=0.5 * float(errors @ errors),
-            measured=None if vt is None else self._features(vt.measured, at),
-            simulated=None if vt is None else self._features(vt.simulated, at),
-            record=self.record.source,
-            sha256=self.record.sha256,
-            substeps=substeps,
-            rmse_limit=limit,
-        )
-
-    def _features(self, signal: Array, values: Values) -> Features | None:
-        """Read off the first step of the reference that the record shows."""
-        kept = np.isfinite(signal)
-        time = self.record.time[kept]
-        simulator = self.experiment.moved(values)
-        shown = [step._replace(at=step.at + simulator.delay) for step in simulator.course.steps]
-        inside = [change for change in shown if change.at >= time[0]]
-        if not inside or inside[0].signal != "vref":
-            return None
-        later = [change.at for change in inside if change.at > inside[0].at]
-        until = later[0] if later else float(time[-1])
-        return features(time, signal[kept], inside[0].at, until)
-
 
 def compared(channel: Channel, samples: Array) -> Array:
     """Return samples (M,) as they are compared, nan where they are left out."""
@@ -299,7 +253,7 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
     view, file = case.seen_from(recording), recording.record
     system = system_of(view)
     driving = [signal for signal in file.channels if signal in system.inputs]
-    record = _without_masked(case.measure(recording.test, file), file, driving)
+    record = _without_masked(measured(case, recording.test, file), file, driving)
     test = started(case, recording, record)
     if view is not case:
         own = {name: v for name, v in view.values().items() if name.startswith(NETWORK)}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.residuals import Residuals
-from exfit.simulation.inputs import NEIGHBOURS, Sampling
+from exfit.simulation.interpolation import NEIGHBOURS, Sampling
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]

@@ -1,27 +1,19 @@
 """What a fit finds about a record beside the parameters of the unit: instants, sizes, levels."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import inf
 from typing import Literal
 
 import numpy as np
 
-from exfit.case.case import (
-    SINGLE,
-    BumpTest,
-    Case,
-    FindableStep,
-    RecordFile,
-    Recording,
-    Unknown,
-    known,
-)
+from exfit.case.case import SINGLE, Case
+from exfit.case.schema import BumpTest, FindableStep, RecordFile, Recording, Unknown, known
 from exfit.dsp.filtering import outliers
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.experiment import Nuisance
-from exfit.fitting.residuals import Free
+from exfit.fitting.parameters import Free
 from exfit.records.record import Record
 from exfit.simulation.inputs import Change
 
@@ -171,3 +163,12 @@ def _free(name: str, value: Unknown) -> Free:
     if value.start == "auto" or value.min is None or value.max is None:
         raise TypeError(f"{name} has no start or bounds")
     return Free(name, value.start, value.min, value.max, logarithmic=False)
+
+
+UNITS: Mapping[str, str] = {"at": "s", "step": "pu", "vt0": "pu", "delay": "s", "offset": "pu"}
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a value that no data sheet has: what is found about a record."""
+    kind = name.rpartition(".")[2]
+    return UNITS.get(kind, "")

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from exfit.case.case import Case
-from exfit.case.messages import near
 from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.fitting.build import values_of
 from exfit.fitting.nuisance import names_of
 from exfit.models.sheet import Parameter
+from exfit.util.text import near
 
 
 def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[str, float]:

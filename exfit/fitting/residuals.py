@@ -6,7 +6,6 @@ They are functions of the scaled free parameters; what is known beforehand adds 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,11 @@ from numpy.typing import NDArray
 from exfit.case.ties import TieError, Ties
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.robust_loss import Loss
-from exfit.engine.kernel import SIDE_BY_SIDE, in_threads
+from exfit.engine.kernel import SIDE_BY_SIDE
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.parameters import Free, Known
+from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
 
@@ -24,50 +25,6 @@ CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
 FINEST = 1e-7  # pu: no recorder's noise is less
-
-
-@dataclass(frozen=True)
-class Known:
-    """What is known of a parameter beforehand: its mean and standard deviation."""
-
-    mean: float
-    std: float
-
-
-@dataclass(frozen=True)
-class Free:
-    """A parameter that the fit may move, between ``low`` and ``high``.
-
-    The estimator sees its logarithm, or its place in the interval where zero may be reached.
-    """
-
-    name: str
-    start: float
-    low: float
-    high: float
-    logarithmic: bool
-    prior: Known | None = None
-
-    def scaled(self, value: float) -> float:
-        """Return the number that the estimator moves."""
-        return float(np.log(value)) if self.logarithmic else value / (self.high - self.low)
-
-    def value(self, scaled: float) -> float:
-        """Return the parameter's own value; at a bound, exactly that bound."""
-        for bound in (self.low, self.high):
-            if scaled == self.scaled(bound):
-                return bound
-        return float(np.exp(scaled)) if self.logarithmic else scaled * (self.high - self.low)
-
-    def bound(self, value: float) -> Literal["min", "max"] | None:
-        """Return which bound a value lies on."""
-        if value == self.low:
-            return "min"
-        return "max" if value == self.high else None
-
-    def slope(self, scaled: float) -> float:
-        """Return d value / d scaled."""
-        return float(np.exp(scaled)) if self.logarithmic else self.high - self.low
 
 
 @dataclass(frozen=True)

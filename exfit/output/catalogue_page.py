@@ -10,9 +10,9 @@ from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Model, typical
 from exfit.plants import MACHINE, SATURATION, VT0, alone, open_circuit
-from exfit.results.model import write
 from exfit.simulation.inputs import Change, Course
 from exfit.simulation.simulator import Response, Simulator
+from exfit.util.files import write
 
 MACHINE_DATA: Mapping[str, float] = {
     "Tpd0": 6.0, "Tppd0": 0.035, "Xd": 1.8, "Xpd": 0.3, "Xppd": 0.25, "Xl": 0.2,

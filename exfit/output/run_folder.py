@@ -14,22 +14,21 @@ from exfit.analysis.comparison import Agreement
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.case.case import SINGLE
-from exfit.engine.kernel import cache_folder
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.uncertainty import Knowledge
 from exfit.records.inspection import Inspection
-from exfit.results.model import (
+from exfit.results.model import Comparison, FitResult
+from exfit.results.tables import (
     DIGITS,
-    Comparison,
-    FitResult,
     comparison_table,
     courses_table,
     history_table,
     parameter_file,
     table,
-    to_json,
-    write,
 )
+from exfit.util.cache import cache_folder
+from exfit.util.files import write
+from exfit.util.text import to_json
 from exfit.workflows import Simulation
 
 Array = NDArray[np.float64]

@@ -6,8 +6,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from exfit.case.messages import show_value
 from exfit.errors import ExfitError
+from exfit.util.text import show_value
 
 Data = Mapping[str, Any]
 

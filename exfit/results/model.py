@@ -1,28 +1,17 @@
 """What a fit, a simulation or a validation leaves behind: data, written and read back."""
 
-import csv
-import io
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
-from math import floor, log10
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.decimation import kept_rows
 from exfit.dsp.features import Features
-from exfit.errors import ExfitError
 from exfit.fitting.uncertainty import Knowledge
-from exfit.util.files import write_whole
 
 Array = NDArray[np.float64]
-
-MOST_ROWS = 100_000  # of a table of samples: of more, those of all extremes
-DIGITS = 9  # significant digits of a number in a table of samples
-MOST_DIGITS = 17  # of a double
 
 
 @dataclass(frozen=True)
@@ -379,144 +368,3 @@ class FitResult:
             content[kind] = {} if part is None else self.values_of(part.prefix)
             content[f"{kind}_model"] = None if part is None else part.name
         return content
-
-
-def to_json(content: Mapping[str, Any]) -> str:
-    """Return JSON that every reader takes: numbers that are not finite become null."""
-    return json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n"
-
-
-def _finite(content: Any) -> Any:
-    if isinstance(content, Mapping):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [_finite(value) for value in content]
-    if isinstance(content, float) and not np.isfinite(content):
-        return None
-    return content
-
-
-def write(path: Path, content: str | bytes) -> None:
-    """Write a file, whole or not at all; raises ExfitError where the place cannot be written."""
-    try:
-        write_whole(path, content.encode() if isinstance(content, str) else content)
-    except OSError as fault:
-        raise ExfitError(f"{path}: cannot be written: {fault.strerror}") from fault
-
-
-def table(header: Sequence[str], columns: Sequence[Array]) -> str:
-    """Return samples as CSV, one column after the other, the time first.
-
-    Of more than MOST_ROWS those stay that hold the least and greatest of each column in each of
-    many stretches. The time has as many digits as its instants need to stay apart.
-    """
-    out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerow(header)
-    signals = columns[1:]
-    shown = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
-    np.savetxt(
-        out,
-        np.column_stack([column[shown] for column in columns]),
-        fmt=[f"%.{clock_digits(columns[0], DIGITS)}g", *[f"%.{DIGITS}g"] * (len(columns) - 1)],
-        delimiter=",",
-    )
-    return out.getvalue()
-
-
-def clock_digits(time: Array, digits: int) -> int:
-    """Return how many digits instants (M,) need to be told as finely as so many from zero on."""
-    span = float(np.ptp(time))
-    if span == 0.0:
-        return digits
-    return min(digits + max(floor(log10(np.max(np.abs(time)) / span)), 0), MOST_DIGITS)
-
-
-def comparison_table(comparison: Comparison) -> str:
-    """Return measured, start, fitted and residual of every signal on the record's clock, as CSV."""
-    header, columns = ["t"], [comparison.time]
-    for signal, overlay in comparison.overlays.items():
-        named = {
-            "measured": overlay.measured,
-            "start": overlay.start,
-            "simulated": overlay.simulated,
-            "residual": overlay.error,
-        }
-        for label, samples in named.items():
-            if samples is not None:
-                header.append(f"{signal}_{label}")
-                columns.append(samples)
-    return table(header, columns)
-
-
-def courses_table(time: Array, courses: Courses) -> str:
-    """Return the response after each iteration that is kept, on the record's clock, as CSV."""
-    header = ["t", *(f"{courses.signal}_{number}" for number in courses.numbers)]
-    return table(header, [time, *courses.samples])
-
-
-def history_table(result: FitResult) -> str:
-    """Return the history as CSV, a line per iteration."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    first = (
-        "iteration",
-        "phase",
-        "f",
-        "gradient_norm",
-        "step_norm",
-        "damping",
-        "inner",
-        "nfev",
-        "njev",
-        "quality",
-    )
-    writer.writerow([*first, *result.parameters])
-    for line in result.history:
-        numbers = (line.cost, line.gradient_norm, line.step_norm, line.damping)
-        counts = (line.inner, line.nfev, line.njev)
-        writer.writerow(
-            [
-                line.number,
-                line.phase,
-                *(f"{number:.{DIGITS}g}" for number in numbers),
-                *counts,
-                f"{line.quality:.4g}",
-                *(f"{line.values[name]:.{DIGITS}g}" for name in result.parameters),
-            ]
-        )
-    return out.getvalue()
-
-
-def parameter_file(result: FitResult) -> str:
-    """Return the values as YAML, to be read back by simulate and validate."""
-    state = "interrupted" if result.interrupted else result.message
-    matches = (f"{one.record.name}: rmse {one.rmse:.4g} pu" for one in result.comparisons)
-    lines = [
-        f"# {result.model} fitted to {', '.join(matches)}; {state}",
-        f"model: {result.model}",
-        "parameters:",
-    ]
-    of_records = {name: one for name, one in result.parameters.items() if one.of_record}
-    for name, value in result.values.items():
-        one = result.parameters.get(name)
-        if name in of_records:
-            continue
-        if one is None and name not in result.values_of(""):
-            continue  # as the case has it
-        if one is None:
-            origin = "typical" if name in result.typical else result.ties.get(name, "fixed")
-        else:
-            origin = f"fitted, on its {one.at_bound}" if one.at_bound else "fitted"
-        lines.append(f"  {name}: {yaml_number(value)}  # {origin}")
-    if of_records:
-        lines += ["records:  # what was found about them"]
-        lines += [f"  {name}: {yaml_number(one.value)}" for name, one in of_records.items()]
-    return "\n".join(lines) + "\n"
-
-
-def yaml_number(value: float) -> str:
-    """Return a number that gives the same float back to every reader of YAML."""
-    text = repr(float(value))
-    mantissa, e, exponent = text.partition("e")
-    # YAML 1.1 takes 1e-05 for text, 1.0e-05 for a number
-    return f"{mantissa}{'' if '.' in mantissa else '.0'}{e}{exponent}"

@@ -1,9 +1,8 @@
 """The course of a test on the grid of its simulation: inputs, steps, and how it is read."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -11,31 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
+from exfit.simulation.grid import ON_GRID, Stretch
 
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1e7  # three hours at 1 ms
-ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
-BLOCK = 1 << 16  # samples whose interpolation is kept
-NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
-
-
-class Stretch(NamedTuple):
-    """Equal steps of the grid between two changes of the inputs."""
-
-    start: float
-    step: float
-    steps: int
-
-    @property
-    def end(self) -> float:
-        """Where it ends, s."""
-        return self.start + self.step * self.steps
-
-    @property
-    def times(self) -> Array:
-        """Its grid points (n + 1,), s."""
-        return np.linspace(self.start, self.end, self.steps + 1)
 
 
 class Change(NamedTuple):
@@ -140,143 +119,3 @@ def stretches(course: Course, step: float) -> list[Stretch]:
         count = max(1, math.ceil((end - start) / step - ON_GRID))
         result.append(Stretch(start, (end - start) / count, count))
     return result
-
-
-@cache
-def lagrange(points: int) -> Array:
-    """Return the polynomials that are one at one of some points a step apart, zero at the others.
-
-    A row of coefficients each, from the lowest power of the distance from their middle up, and
-    below them those of their slopes: zero where there are fewer points than NEIGHBOURS,
-    (2 NEIGHBOURS, NEIGHBOURS).
-    """
-    places = np.arange(points) - 0.5 * (points - 1)  # about the middle powers stay small
-    values = np.zeros((NEIGHBOURS, NEIGHBOURS))
-    values[:points, :points] = np.linalg.inv(np.vander(places, increasing=True)).T
-    slopes = np.roll(values * np.arange(NEIGHBOURS), -1, axis=1)
-    return np.vstack([values, slopes])
-
-
-class Sampling:
-    """Reads a run, whose stretches lie one behind the other, at given times less a delay (s).
-
-    Between grid points it interpolates with a polynomial that never reaches across an exact step of
-    the inputs; at the instant of such a step it gives the values before the step. Before the start
-    and after the end it gives the values there. What it needs for that is kept for BLOCK times, and
-    found anew for each block of more.
-    """
-
-    def __init__(self, grid: Sequence[Stretch], times: Array, delay: float = 0.0) -> None:
-        # with a delay no sample is moved to the grid: what is read must follow it without a jump
-        near = ON_GRID if delay == 0.0 else 0.0
-        wanted = times - delay
-        read = np.clip(wanted, grid[0].start, grid[-1].end)
-        self._still = np.abs(wanted - read) > near * grid[0].step
-        start, step, count, end = np.array([(*part, part.end) for part in grid]).T
-        owner = np.minimum(np.searchsorted(end, read - near * step[0]), len(grid) - 1)
-        position, last = (read - start[owner]) / step[owner], count[owner]
-        self._kinds = {min(NEIGHBOURS, part.steps + 1) for part in grid}
-        self._step, self._points = step[owner], np.minimum(NEIGHBOURS, last + 1.0)
-        first = np.clip(np.floor(position) - 1.0, 0.0, last + 1.0 - self._points)
-        self._from_middle = position - first - 0.5 * (self._points - 1.0)
-        before = np.cumsum(count + 1.0) - count - 1.0
-        self.first = (before[owner] + first).astype(np.int64)
-        self.last = int(before[-1] + count[-1])
-        nearest = np.clip(np.rint(position), 0.0, last)
-        self._on_grid = self._still | (np.abs(position - nearest) < near)
-        self._nearest = (before[owner] + nearest).astype(np.int64)
-        self._exact: list[NDArray[np.int64]] | None = None
-        if np.all(self._on_grid):
-            within = nearest.astype(np.int64)
-            self._exact = [within[owner == k] for k in range(len(grid))]
-
-    @property
-    def blocks(self) -> list[slice]:
-        """The samples, so many at a time that what belongs to them takes little memory."""
-        count = len(self.first)
-        return [slice(first, min(first + BLOCK, count)) for first in range(0, count, BLOCK)]
-
-    def __call__(self, run: Sequence[Array]) -> Array:
-        """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
-        if self._exact is None:
-            return self._read(run, self.weights)
-        # each stretch by itself: a copy of the whole run costs more than a simulation's tenth
-        return np.concatenate([part[k] for part, k in zip(run, self._exact, strict=True)])
-
-    def slope(self, run: Sequence[Array]) -> Array:
-        """Return the time derivatives (M, ...), per s, of what a run gives as samples."""
-        return self._read(run, self._slopes)
-
-    def rows(self, block: slice) -> NDArray[np.int64]:
-        """Return which points of a run each sample of a block is read from, (NEIGHBOURS, block)."""
-        if block == slice(0, len(self.first)):
-            return self._all_rows
-        return self._rows_of(block)
-
-    def weights(self, block: slice) -> Array:
-        """Return how much each of these points counts, (NEIGHBOURS, block)."""
-        if block == slice(0, len(self.first)):
-            return self._all_weights
-        return self._weights_of(block)
-
-    @cached_property
-    def _all_rows(self) -> NDArray[np.int64]:
-        return self._rows_of(slice(0, len(self.first)))
-
-    @cached_property
-    def _all_weights(self) -> Array:
-        return self._weights_of(slice(0, len(self.first)))
-
-    def _rows_of(self, block: slice) -> NDArray[np.int64]:
-        return np.asarray(np.minimum(self.first[block] + np.arange(NEIGHBOURS)[:, None], self.last))
-
-    def _weights_of(self, block: slice) -> Array:
-        weights = self._polynomials(block, slice(0, NEIGHBOURS))
-        on_grid = self._on_grid[block]
-        if np.any(on_grid):
-            # by their own places: behind the end, one row stands for all
-            exact = self.first[block] + np.arange(NEIGHBOURS)[:, None] == self._nearest[block]
-            weights[:, on_grid] = exact[:, on_grid]
-        return weights
-
-    def _slopes(self, block: slice) -> Array:
-        slopes = self._polynomials(block, slice(NEIGHBOURS, 2 * NEIGHBOURS)) / self._step[block]
-        slopes[:, self._still[block]] = 0.0
-        return np.asarray(slopes)
-
-    def _polynomials(self, block: slice, rows: slice) -> Array:
-        """Return rows of ``lagrange`` at the samples of a block, (NEIGHBOURS, block)."""
-        away, points = self._from_middle[block], self._points[block]
-        powers = np.ones((NEIGHBOURS, len(away)))
-        for k in range(1, NEIGHBOURS):
-            powers[k] = powers[k - 1] * away
-        if len(self._kinds) == 1:
-            return np.asarray(lagrange(*self._kinds)[rows] @ powers)
-        found = np.zeros((NEIGHBOURS, len(away)))
-        for n in self._kinds:
-            found += lagrange(n)[rows] @ (powers * (points == n))
-        return found
-
-    def _read(self, run: Sequence[Array], weights: Callable[[slice], Array]) -> Array:
-        whole = joined(run)
-        found = np.empty((len(self.first), *whole.shape[1:]))
-        for block in self.blocks:
-            np.einsum("km,km...->m...", weights(block), whole[self.rows(block)], out=found[block])
-        return found
-
-
-class WholeRun:
-    """Reads a run at all points of its grid, one stretch behind the other."""
-
-    def __call__(self, run: Sequence[Array]) -> Array:
-        """Return all points (G, ...) of a run."""
-        return joined(run)
-
-    def slope(self, run: Sequence[Array]) -> Array:
-        """Raise: a delay is one of samples."""
-        raise NotImplementedError("a delay between points of the grid")
-
-
-def joined(run: Sequence[Array]) -> Array:
-    """Return a run (G, ...) of one array (n + 1, ...) per stretch, these one behind the other."""
-    return np.concatenate(run) if len(run) > 1 else run[0]

@@ -1,170 +1,149 @@
-"""Which limits a response has met, for how long, and how near it came to the others."""
+"""The limits in a system's equations: what each holds, and the parameter that sets it."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from exfit.engine.system import System, Trace, trace
+from exfit.engine.trace import Node, evaluate, in_order
 
-from exfit.engine.trace import evaluate
-from exfit.simulation.limiters import Limiter, at_rest, limiters, traced
-from exfit.simulation.simulator import Run, Simulator
-
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-ROUNDING = 1e-9  # of a limit: a state put back on it stands that near, one that passes by does not
-POINTS_AT_ONCE = 16384  # of a run: the values of a whole graph along them take 50 MB
-FAR = 100.0  # times what a signal moves: a limit beyond that is a number that stands for none
 
+class Limiter(NamedTuple):
+    """A value of the graph that stops at a limit: a ceiling where ``sign`` is 1, a floor at -1.
 
-class LimitHit(NamedTuple):
-    """A limit that a response has met.
-
-    ``limit`` is the parameter that sets it, "0" for a state that cannot become negative;
-    ``signal`` the state that was held or cut, "" where it was no state; ``value`` the limit when
-    it was first met (pu, of the signal: VFEMAX limits VE where VFE reaches it); ``seconds`` how
-    long in all, and which ``share`` of the test that is; ``first`` when (s).
+    ``limit`` is the parameter that sets it, "0" for a state that cannot become negative; ``signal``
+    is the state that is held or cut, "" where the value is none. A value that ``stands`` is never
+    beyond its limit, as a state; any other is what the limited one would be without it.
     """
 
     limit: str
     signal: str
-    value: float
-    seconds: float
-    first: float
-    share: float
+    sign: float
+    value: Node
+    bound: Node
+    stands: bool
 
 
-class Nearest(NamedTuple):
-    """How near a response came to a limit that it did not meet.
+@cache
+def traced(system: System) -> Trace:
+    """Return the graph of a system, with all its outputs."""
+    return trace(system, system.outputs)
 
-    ``percent`` is the smallest distance, of the range between the floor and the ceiling; ``at`` is
-    when (s), ``value`` the limit then.
+
+def at_rest(of: Trace, values: Values) -> dict[Node, Any]:
+    """Return what the symbols of a graph are at rest."""
+    p = {node: values[_name(node)] for node in of.p}
+    found = evaluate(of.rest, p)
+    starts = zip((*of.x, *of.r), (found[node] for node in of.rest), strict=True)
+    return {**p, **dict(starts), **dict.fromkeys(of.u, 0.0)}
+
+
+def limits_passed(system: System, values: Values) -> str:
+    """Name the limits that the start would have to pass, with both values."""
+    of = traced(system)
+    everything = evaluate([*of.slopes, *of.outputs, *of.clamped], at_rest(of, values))
+    found = []
+    for node in [node for node in everything if node.op == "clip"]:
+        x, low, high = (everything[operand] for operand in node.operands)
+        for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
+            name = limit_name(node.operands[limit])
+            if passed and name:
+                found.append(
+                    f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
+                )
+    return "; ".join(dict.fromkeys(found))
+
+
+def limit_name(node: Node) -> str:
+    """Return the parameter that gives a limit: of all it is computed from, the one named so."""
+    symbols = [n for n in in_order([node]) if n.op == "symbol" and not n.varies]
+    limits = [_name(n) for n in symbols if _is_limit(n)]
+    return ", ".join(limits or map(_name, symbols))
+
+
+@cache
+def limiters(system: System) -> tuple[Limiter, ...]:
+    """Return every limit of a system that is not infinite, in the order of the signal.
+
+    They are its states' non-windup limits, its clamps, gates to a fixed parameter, and contacts
+    that force a value to one; neither the arcs of a rectifier nor what only cannot be negative.
     """
-
-    limit: str
-    signal: str
-    value: float
-    percent: float
-    at: float
-
-
-class Followed(NamedTuple):
-    """A limiter along a run: its value and its bound (n,), and where it is held."""
-
-    limiter: Limiter
-    value: Array
-    bound: Array
-    held: NDArray[np.bool_]
+    of = traced(system)
+    states = {node: node for node in of.x}
+    clamps = [(node, held) for node, held in zip(of.x, of.clamped, strict=True) if node is not held]
+    found = []
+    for state, held in clamps:
+        _, low, high = held.operands
+        found += [_limiter(state, bound, sign, state) for bound, sign in ((low, -1.0), (high, 1.0))]
+    ours = {held for _, held in clamps}
+    for node in in_order([*of.slopes, *of.outputs, *of.clamped]):
+        if node not in ours:
+            found += list(_clamp(node, states))
+    known = (one for one in found if one is not None)
+    return tuple(sorted(dict.fromkeys(known), key=lambda one: one.value.index))
 
 
-def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
-    """Return the limits that the response to these values meets, in the order of their instants.
-
-    A state is at its non-windup limit while it stands on it, within rounding; any other value
-    while it wants to be beyond. Found at every point of the simulation's grid, whose step is how
-    exactly the times are known. ``values`` are the parameters of the system; per unit.
-
-    Raises SimulationError where the start is no rest.
-    """
-    run = simulator.run(values)
-    found = [_hit(same, run, simulator.delay) for same in _alike(_followed(simulator, values, run))]
-    return tuple(sorted((hit for hit in found if hit is not None), key=lambda hit: hit.first))
+def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]:
+    """Yield the limits of a node that is a clamp, or a choice between a limit and a value."""
+    if node.op == "clip":
+        x, low, high = node.operands
+        for bound, sign in ((low, -1.0), (high, 1.0)):
+            clamped_there = x.op == "clip" and any(bound is one for one in x.operands)
+            if limit_name(bound) and not clamped_there:
+                yield _limiter(x, bound, sign, _state_in(x, states))
+    elif node.op == "select" and node.operands[0].varies:
+        yield from _choice(node, states)
 
 
-def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
-    """Return how near the response came to each limit that it did not meet, the nearest first.
-
-    Left out are limits on one side only, and those that are a hundred times further away than the
-    signal ever moved, as 9999 is where there is none. Raises SimulationError where the start is no
-    rest.
-    """
-    run = simulator.run(values)
-    followed = _followed(simulator, values, run)
-    met = {_key(one.limiter) for one in followed if np.any(one.held)}
-    found: dict[tuple[str, str, float], Nearest] = {}
-    for one, other in _ranges(followed):
-        distance = one.limiter.sign * (one.bound - one.value)
-        at = int(np.argmin(distance))
-        width = abs(one.bound[at] - other.bound[at])
-        moved = float(np.ptp(one.value))
-        if _key(one.limiter) not in met and 0.0 < distance[at] <= FAR * moved and width > 0.0:
-            limit, signal = one.limiter.limit, one.limiter.signal
-            share = 100.0 * float(distance[at]) / float(width)
-            near = Nearest(
-                limit, signal, float(one.bound[at]), share, float(run.time[at] + simulator.delay)
+def _choice(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]:
+    """Yield the limits of the higher or lower of two values, or of one forced by a contact."""
+    condition, chosen, other = node.operands
+    gate = condition.op == "<" and {*condition.operands} == {chosen, other}
+    for bound, x in ((chosen, other), (other, chosen)):
+        if gate and not bound.varies and any(_is_limit(n) for n in in_order([bound])):
+            ceiling = chosen is condition.operands[0]
+            yield _limiter(x, bound, 1.0 if ceiling else -1.0, _state_in(x, states))
+        elif not gate and _is_limit(bound):
+            yield Limiter(
+                _given(bound), "", 1.0 if "MAX" in _name(bound) else -1.0, node, bound, True
             )
-            found.setdefault(_key(one.limiter), near)
-    return tuple(sorted(found.values(), key=lambda near: near.percent))
 
 
-def _followed(simulator: Simulator, values: Values, run: Run) -> list[Followed]:
-    """Return every limiter of the system along a run."""
-    system = simulator.system
-    of, every = traced(system), limiters(system)
-    fixed = at_rest(of, values)
-    blocks: list[list[tuple[Array, Array]]] = []
-    for first in range(0, len(run.time), POINTS_AT_ONCE):
-        now = slice(first, first + POINTS_AT_ONCE)
-        courses = [run.outputs[name] for name in system.states]
-        courses += [run.inputs[name] for name in system.inputs]
-        pairs = zip((*of.x, *of.u), courses, strict=True)
-        targets = [node for one in every for node in (one.value, one.bound)]
-        known = evaluate(targets, {**fixed, **{node: course[now] for node, course in pairs}})
-        count = len(run.time[now])
-        blocks.append(
-            [(_along(known[one.value], count), _along(known[one.bound], count)) for one in every]
-        )
-    return [_follow(one, [block[k] for block in blocks]) for k, one in enumerate(every)]
-
-
-def _along(value: Array | float, count: int) -> Array:
-    return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
-
-
-def _follow(limiter: Limiter, parts: Sequence[tuple[Array, Array]]) -> Followed:
-    value, bound = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    beyond = limiter.sign * (value - bound)
-    near = ROUNDING * np.maximum(np.abs(bound), np.abs(value))
-    # a limit of zero has no size of its own
-    near = np.maximum(near, ROUNDING * np.max(np.abs(value), initial=0.0))
-    held = beyond >= -near if limiter.stands else beyond > near
-    return Followed(limiter, value, bound, held & np.isfinite(bound))
-
-
-def _key(limiter: Limiter) -> tuple[str, str, float]:
-    return limiter.limit, limiter.signal, limiter.sign
-
-
-def _alike(followed: Iterable[Followed]) -> Iterable[list[Followed]]:
-    """Return the limiters together that hold one signal at one limit: a drawing has it once."""
-    together: dict[tuple[str, str, float], list[Followed]] = {}
-    for one in followed:
-        together.setdefault(_key(one.limiter), []).append(one)
-    return together.values()
-
-
-def _hit(same: Sequence[Followed], run: Run, delay: float) -> LimitHit | None:
-    held = np.any([one.held for one in same], axis=0)
-    if not np.any(held):
+def _limiter(value: Node, bound: Node, sign: float, state: Node | None) -> Limiter | None:
+    """Return a limit, None where it is infinite."""
+    fixed = bound.constant
+    if fixed is not None and abs(fixed) == float("inf"):
         return None
-    first = int(np.argmax(held))
-    one = next(one for one in same if one.held[first])
-    seconds = float(np.trapezoid(held.astype(np.float64), run.time))
-    return LimitHit(
-        limit=one.limiter.limit,
-        signal=one.limiter.signal,
-        value=float(one.bound[first]),
-        seconds=seconds,
-        first=float(run.time[first]) + delay,
-        share=seconds / float(run.time[-1] - run.time[0]),
+    name = _given(bound) if fixed is None else f"{fixed:g}"
+    signal = "" if state is None else _name(state)
+    return Limiter(name, signal, sign, value, bound, value is state)
+
+
+def _given(bound: Node) -> str:
+    """Return the parameter that gives a limit, also where it is computed at the start.
+
+    Where a parameter may ask for that by being 0, the setpoint has its name with a 0 behind it.
+    """
+    computed = any(n.op == "symbol" and n.args[0].startswith("r.") for n in in_order([bound]))
+    return limit_name(bound).removesuffix("0") if computed else limit_name(bound)
+
+
+def _state_in(node: Node, states: Mapping[Node, Node]) -> Node | None:
+    """Return the state that a node is, or is unless its lag is bypassed."""
+    if node.op == "select":
+        found = (_state_in(branch, states) for branch in node.operands[1:])
+        return next((one for one in found if one is not None), None)
+    return states.get(node)
+
+
+def _is_limit(node: Node) -> bool:
+    return (
+        node.op == "symbol" and not node.varies and ("MAX" in _name(node) or "MIN" in _name(node))
     )
 
 
-def _ranges(followed: Sequence[Followed]) -> Iterator[tuple[Followed, Followed]]:
-    """Yield each limiter with the one on the other side of the same value."""
-    sides = {(one.limiter.value, one.limiter.sign): one for one in followed}
-    for (value, sign), one in sides.items():
-        other = sides.get((value, -sign))
-        if other is not None:
-            yield one, other
+def _name(symbol: Node) -> str:
+    """Return the name of what a symbol of a trace stands for."""
+    return str(symbol.args[0]).partition(".")[2]

@@ -9,31 +9,16 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.kernel import (
-    SIDE_BY_SIDE,
-    Kernel,
-    LinearKernel,
-    Span,
-    Start,
-    TangentKernel,
-    in_threads,
-)
+from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, LinearKernel, Span, Start, TangentKernel
 from exfit.engine.system import System, trace
 from exfit.engine.trace import in_order
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
-from exfit.simulation.inputs import (
-    ON_GRID,
-    Change,
-    Course,
-    Direction,
-    Sampling,
-    Stretch,
-    WholeRun,
-    joined,
-    stretches,
-)
-from exfit.simulation.limiters import limits_passed
+from exfit.simulation.grid import ON_GRID, Stretch
+from exfit.simulation.inputs import Change, Course, Direction, stretches
+from exfit.simulation.interpolation import Sampling, WholeRun, joined
+from exfit.simulation.limits import limits_passed
+from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

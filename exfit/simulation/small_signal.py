@@ -17,7 +17,7 @@ from exfit.engine.system import System, Tangents, Trace, differentiate, trace
 from exfit.engine.trace import Node, evaluate
 from exfit.errors import SimulationError
 from exfit.plants import MEASURED
-from exfit.simulation.limiters import at_rest, limits_passed
+from exfit.simulation.limits import at_rest, limits_passed
 from exfit.simulation.simulator import REST_TOLERANCE, ROUNDING, fastest
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from places import CONFIGS
 from records import UNIT, case_of, found_in, recording, several
 
 from exfit.analysis.experiment_design import NOISE, identify
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import CaseError
 from exfit.workflows import fit
 

@@ -10,11 +10,12 @@ from records import case_of, config, recording, several
 
 from exfit import workflows
 from exfit.analysis import iteration_responses
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.output import plots, run_folder
-from exfit.results.model import DIGITS, Courses
+from exfit.results.model import Courses
+from exfit.results.tables import DIGITS
 
 CASE = ROOT / "configs" / "first_order.yaml"
 

@@ -7,7 +7,7 @@ import pytest
 from places import ROOT
 
 from exfit.analysis.model_check import AGREEMENT, STEPS, check, deviations, flat_drift
-from exfit.case.case import load_case, parse_case
+from exfit.case.load import load_case, parse_case
 from exfit.fitting.build import fitted_trials, residuals_of
 from exfit.fitting.residuals import Residuals
 

@@ -9,12 +9,13 @@ from places import CONFIGS
 
 import exfit.analysis.profiles as module
 from exfit.analysis.profiles import profile
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import CaseError
 from exfit.estimate import Stop, least_squares
 from exfit.fitting.build import fitted_trials, residuals_of
 from exfit.fitting.residuals import Residuals
-from exfit.workflows import UNIT, fit
+from exfit.fitting.search import UNIT
+from exfit.workflows import fit
 
 # what the record of AC1A was made with: sample_data/README.md
 TRUTH = {"KA": 364.1523, "KF": 0.0413, "TE": 1.6724, "TF": 1.458, "TA": 0.0542, "KC": 0.486}

@@ -26,10 +26,11 @@ from oracle import system_of, typical_values
 
 from exfit.estimate import least_squares
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.residuals import Free, Residuals
+from exfit.fitting.parameters import Free
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import UNIT
 from exfit.simulation.inputs import Change, Course
 from exfit.simulation.simulator import Simulator
-from exfit.workflows import UNIT
 
 RECORD = Path(__file__).parents[2] / "sample_data" / "ac1a_up.csv"
 TYPICAL = {"KA": 766, "KF": 0.024, "TE": 1.3, "TF": 1.0, "TA": 0.02, "KC": 0.486, "KD": 0.3556}

@@ -15,10 +15,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.estimate import multistart
 from exfit.fitting.build import fitted_trials, residuals_of
-from exfit.workflows import UNIT
+from exfit.fitting.search import UNIT
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
 COUNT = 1000

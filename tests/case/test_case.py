@@ -10,9 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from exfit.case.case import Case, dotted, initial_voltage, json_schema, load_case, parse_case
+from exfit.case.case import Case
+from exfit.case.load import dotted, json_schema, load_case, parse_case
 from exfit.case.yaml import scalar
 from exfit.errors import CaseError, RecordError
+from exfit.fitting.recordings import initial_voltage, measured
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import MACHINE, SATURATION
@@ -228,7 +230,7 @@ record:
 """
         )
     )
-    one, other = (case.measure(case.test, case.record) for case in (plain, field))
+    one, other = (measured(case, case.test, case.record) for case in (plain, field))
     assert np.array_equal(one.time, other.time)
     for signal in ("vt", "ifd"):
         assert other.signals[signal] == pytest.approx(one.signals[signal], rel=1e-6)
@@ -736,7 +738,7 @@ def write_record(folder, times, rise=0.05):
 def test_a_record_is_read_beside_the_case(case_file, tmp_path):
     write_record(tmp_path / "data", np.arange(0.0, 5.0, 0.01))
     case = load_case(case_file(EXAMPLE))
-    record = case.measure(case.test, case.record)
+    record = measured(case, case.test, case.record)
     assert record.source == tmp_path / "data" / "up.csv"
     assert set(record.signals) == {"vt", "efd"}
     assert np.all(record.signals["efd"] == 0.0)
@@ -745,9 +747,9 @@ def test_a_record_is_read_beside_the_case(case_file, tmp_path):
 def test_the_initial_voltage_is_given_or_the_mean_before_the_first_step(case_file, tmp_path):
     write_record(tmp_path / "data", np.arange(0.0, 5.0, 0.01))
     case = load_case(case_file(changed("vt0: 1.0", "vt0: 1.02")))
-    assert initial_voltage(case.test, case.measure(case.test, case.record)) == 1.02
+    assert initial_voltage(case.test, measured(case, case.test, case.record)) == 1.02
     case = load_case(case_file(changed("  vt0: 1.0\n", "")))
-    assert initial_voltage(case.test, case.measure(case.test, case.record)) == 1.0
+    assert initial_voltage(case.test, measured(case, case.test, case.record)) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -766,7 +768,7 @@ def test_a_record_that_does_not_hold_its_test_is_refused(case_file, tmp_path, ti
     write_record(tmp_path / "data", times)
     case = load_case(case_file(text))
     with pytest.raises(RecordError) as caught:
-        case.measure(case.test, case.record)
+        measured(case, case.test, case.record)
     for part in named:
         assert part in str(caught.value)
 
@@ -797,15 +799,15 @@ def test_numbers_in_kv_are_not_taken_for_per_unit(case_file, tmp_path, model, vt
     case = load_case(case_file(IN_KV.format(model=model[0], plant=model[1], vt=vt)))
     if refused:
         with pytest.raises(RecordError, match=r"up\.csv: column 'Ut \[kV\]': in kV .* unit: kV"):
-            case.measure(case.test, case.record)
+            measured(case, case.test, case.record)
     else:
-        assert len(case.measure(case.test, case.record).time) == 3
+        assert len(measured(case, case.test, case.record).time) == 3
 
 
 def test_a_missing_record_is_told_when_it_is_read(case_file):
     case = load_case(case_file(EXAMPLE))
     with pytest.raises(RecordError, match=r"up\.csv: cannot be read"):
-        case.measure(case.test, case.record)
+        measured(case, case.test, case.record)
 
 
 LINES = EXAMPLE.splitlines(keepends=True)

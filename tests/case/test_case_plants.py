@@ -5,7 +5,7 @@ import pytest
 from places import ROOT
 
 from exfit.analysis.diagnostics import typical_notes
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import changes, inputs_of, system_of
 from exfit.fitting.overrides import changed_values, read_parameters

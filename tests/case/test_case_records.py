@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from exfit.case.case import json_schema, parse_case
+from exfit.case.load import json_schema, parse_case
 from exfit.cli import main
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import fitted_trials, residuals_of

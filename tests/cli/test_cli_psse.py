@@ -15,7 +15,7 @@ from dynamics import SAMPLE, SOUND, THREE, garbage, replaced
 from places import ROOT
 
 from exfit import cli
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.exchange.psse import definition_of, read_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record

@@ -8,7 +8,7 @@ import yaml
 from columns import Columns
 from places import SAMPLES
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.case.starting_case import bounds_of, free_of, starting_case
 from exfit.errors import CaseError
 from exfit.models import MODELS

@@ -11,8 +11,7 @@ from dynamics import SAMPLE, SOUND, THREE, garbage, replaced
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from exfit.case.case import parse_case
-from exfit.case.templates import case_text, import_unit
+from exfit.case.load import parse_case
 from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
 from exfit.exchange.psse import (
@@ -26,6 +25,7 @@ from exfit.exchange.psse import (
     record_text,
     text_of,
 )
+from exfit.exchange.psse.import_case import case_text, import_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record, typical
 

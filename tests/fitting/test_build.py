@@ -10,10 +10,12 @@ from cases import FIRST_ORDER, TIME, TRUTH
 from places import ROOT
 
 from exfit.analysis.profiles import profile
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.build import fitted_trials, values_of
+from exfit.fitting.recordings import measured
 from exfit.plants import SATURATION, VT0
+from exfit.results.compare_with_record import compare_with_record
 from exfit.simulation.simulator import Simulator
 from exfit.workflows import fit, simulate
 
@@ -57,7 +59,7 @@ def test_only_the_samples_within_the_window_are_measured_and_fitted(load):
     """Outside it the record is spoilt; both ends belong to it."""
     inside = (TIME > 0.24) & (TIME < 2.51)
     case = load(changed(CASE, "record", window=[0.25, 2.5]), vt=np.where(inside, TRUTH, 9.0))
-    record = case.measure(case.test, case.record)
+    record = measured(case, case.test, case.record)
     assert record.time == pytest.approx(TIME[inside], abs=1e-9)
     assert (record.time[0], record.time[-1]) == (0.25, 2.5)
     found = fit(case)
@@ -72,7 +74,7 @@ def test_the_cost_is_half_the_sum_of_the_weighted_errors_squared(load):
     rng = np.random.default_rng(1)
     signals = {"vt": rng.normal(1.0, 0.01, 61), "efd": rng.normal(1.1, 0.5, 61)}
     case = load(changed(MACHINE_CASE, "record", channels=channels), **signals)
-    compared = fitted_trials(case)[0].compare("fit", values_of(case, {}))
+    compared = compare_with_record(fitted_trials(case)[0], "fit", values_of(case, {}))
     assert compared.overlays.keys() == weights.keys()
     expected = sum(
         0.5 * np.sum((weights[name] * one.error) ** 2) for name, one in compared.overlays.items()

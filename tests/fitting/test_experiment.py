@@ -11,6 +11,7 @@ from exfit.fitting.build import fitted_trials, residuals_of
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import noise_of
 from exfit.fitting.uncertainty import knowledge
+from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit
 
 LOSSES = ("least-squares", "huber", "soft-l1")
@@ -130,12 +131,12 @@ def test_what_is_drawn_is_what_is_compared(tmp_path):
     case, trial = averaged_case(tmp_path, lost=30)
     values = case.values()
     start = {**values, "KA": 0.5 * values["KA"]}
-    found = trial.compare("up", values, start)
+    found = compare_with_record(trial, "up", values, start)
     vt = found.overlays["vt"]
     errors = trial.channels[0].weight * (vt.simulated - vt.measured)
     assert 0.5 * np.nansum(errors**2) == pytest.approx(found.cost, rel=1e-12)
     assert np.isnan(errors).sum() == 30
-    first = trial.compare("up", start).overlays["vt"].simulated
+    first = compare_with_record(trial, "up", start).overlays["vt"].simulated
     assert np.array_equal(vt.start, first, equal_nan=True)
 
 

@@ -26,7 +26,8 @@ from exfit.fitting.build import fitted_trials, residuals_of, trial_of
 from exfit.fitting.nuisance import names_of
 from exfit.plants import VT0
 from exfit.records.record import read_columns
-from exfit.results.model import parameter_file
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.tables import parameter_file
 from exfit.workflows import fit, simulate, tried_on, validate
 
 REFERENCE = SAMPLES.parent / "tests" / "reference"
@@ -206,8 +207,10 @@ def test_a_delay_moves_the_features_of_both_signals_alike(tmp_path):
     prompt = fitted_trials(case_of(one(TEST), tmp_path))[0]
     late = fitted_trials(case_of(one(TEST, delay=0.5), tmp_path))[0]
     values = case_of(one(TEST), tmp_path).values()
-    peak = prompt.compare("prompt", values).simulated.peak_time
-    assert late.compare("late", values).simulated.peak_time == pytest.approx(peak, abs=1e-3)
+    peak = compare_with_record(prompt, "prompt", values).simulated.peak_time
+    assert compare_with_record(late, "late", values).simulated.peak_time == pytest.approx(
+        peak, abs=1e-3
+    )
 
 
 def test_an_early_recorder_sees_beyond_the_end_of_its_own_clock(tmp_path):
@@ -372,7 +375,7 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     assert after.rmse == pytest.approx(before.rmse, rel=0.05)
     trial = trial_of(case, case.validations[0], found.values)
     assert tried_on(case, trial, found.values).rmse == after.rmse
-    unaligned = trial.secured(found.values).compare("start", found.values)
+    unaligned = compare_with_record(trial.secured(found.values), "start", found.values)
     assert unaligned.rmse > 10 * after.rmse
 
 

@@ -15,13 +15,12 @@ from exfit.dsp.noise import noise
 from exfit.dsp.robust_loss import LOSSES
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.parameters import Free, Known
 from exfit.fitting.residuals import (
     CENTRAL_STEP,
     FINEST,
     JACOBIANS,
     ONE_SIDED_STEP,
-    Free,
-    Known,
     Residuals,
     Robust,
 )

@@ -11,13 +11,14 @@ from scipy.optimize import curve_fit
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.estimate import least_squares
 from exfit.fitting.build import fitted_trials, residuals_of
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import UNIT
 from exfit.fitting.uncertainty import knowledge
 from exfit.inference import LEVEL
-from exfit.workflows import UNIT, fit
+from exfit.workflows import fit
 
 # percent, of the record as it is kept; how they come about is tested against SciPy
 AC1A_ERRORS = {"TA": 0.7, "KC": 6.8, "KF": 7.1, "TF": 7.5, "KA": 9.7, "TE": 10.1, "KD": 50.6}

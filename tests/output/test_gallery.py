@@ -22,7 +22,7 @@ from gallery import (
 )
 
 from exfit import workflows
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.output import plots
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect

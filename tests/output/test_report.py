@@ -14,7 +14,7 @@ from records import TIME as OF_UNIT
 from records import one as ac1a
 
 from exfit import cli, workflows
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.exchange.psse.export import export
 from exfit.output import run_folder

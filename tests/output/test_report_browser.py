@@ -17,7 +17,7 @@ from matplotlib.image import imread
 from records import config, recording, several
 
 from exfit import workflows
-from exfit.case.case import parse_case
+from exfit.case.load import parse_case
 from exfit.output import run_folder
 from exfit.output.report import write_report
 

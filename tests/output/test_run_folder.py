@@ -13,11 +13,13 @@ from cases import FILES_OF_A_FIT
 from places import ROOT
 
 from exfit import workflows
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.overrides import read_parameters
 from exfit.output import run_folder
-from exfit.results.model import DIGITS, parameter_file, table, to_json, write
+from exfit.results.tables import DIGITS, parameter_file, table
+from exfit.util.files import write
+from exfit.util.text import to_json
 
 CASE = ROOT / "configs" / "first_order.yaml"
 

@@ -16,15 +16,7 @@ from exfit.engine.kernel import LinearKernel
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
-from exfit.plants import (
-    MACHINE,
-    NETWORK,
-    STABILISER,
-    VT0,
-    Stabilised,
-    infinite_bus,
-    open_circuit,
-)
+from exfit.plants import MACHINE, NETWORK, STABILISER, VT0, Stabilised, infinite_bus, open_circuit
 from exfit.simulation.inputs import Change, Course, each
 from exfit.simulation.simulator import Simulator, parameters_used
 

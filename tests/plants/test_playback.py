@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from places import REFERENCE as RECORDED
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import CaseError, RecordError, SimulationError
 from exfit.fitting.build import fitted_trials
 from exfit.simulation.simulator import Simulator

@@ -5,7 +5,7 @@ import pytest
 import yaml
 from records import UNIT, case_of, one, synthetic, write
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import fitted_trials
 from exfit.workflows import fit

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from places import ROOT
 
 from exfit import workflows
-from exfit.case.case import load_case
-from exfit.results.model import FitResult, Overlay, table
+from exfit.case.load import load_case
+from exfit.results.model import FitResult, Overlay
+from exfit.results.tables import table
 
 INSIDE = {"comparisons": "records", "parts": "machine_model"}  # under another name
 ELSEWHERE = {"name", "history"}  # in the name of the folder and in the history
@@ -50,7 +51,7 @@ def test_the_json_of_a_fit_has_every_field_with_its_value(fitted):
 
 
 def test_a_long_table_keeps_the_extremes_of_every_column(monkeypatch):
-    monkeypatch.setattr("exfit.results.model.MOST_ROWS", 1000)
+    monkeypatch.setattr("exfit.results.tables.MOST_ROWS", 1000)
     time = np.linspace(0.0, 1.0, 50_001)
     signals = np.random.default_rng(1).standard_normal((2, len(time)))
     rows = np.loadtxt(

@@ -8,12 +8,12 @@ from oracle import lively_values, system_of, typical_values
 from places import CONFIGS
 from scipy.integrate import solve_ivp
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.fitting.build import fitted_trials, free_of
 from exfit.models import MODELS
 from exfit.simulation.inputs import Change, Course
-from exfit.simulation.limiters import limiters
-from exfit.simulation.limits import limits_hit, nearest
+from exfit.simulation.limit_hits import limits_hit, nearest
+from exfit.simulation.limits import limiters
 from exfit.simulation.simulator import Simulator
 
 STEP = 1e-3  # s

@@ -21,16 +21,9 @@ from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.plants import SATURATION, VT0, open_circuit
-from exfit.simulation.inputs import (
-    Change,
-    Course,
-    Direction,
-    Played,
-    Sampling,
-    Stretch,
-    each,
-    stretches,
-)
+from exfit.simulation.grid import Stretch
+from exfit.simulation.inputs import Change, Course, Direction, Played, each, stretches
+from exfit.simulation.interpolation import Sampling
 from exfit.simulation.simulator import MOST_SUBSTEPS, Simulator, parameters_used
 
 UP = Course(0.0, 2.0, (Change(0.5, 3e-4),))  # off the limits

@@ -29,13 +29,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from linearised import autoregressive
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.estimate import least_squares
 from exfit.fitting.build import fitted_trials, residuals_of
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import UNIT
 from exfit.fitting.uncertainty import knowledge
 from exfit.inference import LEVEL
-from exfit.workflows import UNIT
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
 # what the record of that case was made with: sample_data/README.md

@@ -14,7 +14,7 @@ import numpy as np
 import yaml
 from places import ROOT
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.workflows import simulate
 
 FILE = ROOT / "sample_data" / "field_record.csv"

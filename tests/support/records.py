@@ -4,7 +4,7 @@ import numpy as np
 import yaml
 from places import ROOT
 
-from exfit.case.case import load_case
+from exfit.case.load import load_case
 from exfit.fitting.build import fitted_trials
 
 SAMPLES = ROOT / "sample_data"

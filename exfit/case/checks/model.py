@@ -10,7 +10,7 @@ from math import inf
 
 from exfit.case.checks.data import Data, is_number, list_of, numbers_in, section_of
 from exfit.case.checks.record import noise_faults, outside, repeated_names, trial_faults
-from exfit.case.messages import PERCENT, near, show, show_value
+from exfit.case.messages import PERCENT
 from exfit.case.parts import (
     WITHOUT_EXCITER,
     Part,
@@ -25,6 +25,7 @@ from exfit.case.ties import TieError, Ties, is_tie
 from exfit.case.yaml import Fault, Place
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
+from exfit.util.text import near, show, show_value
 
 Contradictions = Iterable[tuple[str, str]]
 

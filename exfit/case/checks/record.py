@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from exfit.case.checks.data import Data, is_pair, list_of, numbers_in, section_of, starts_in
-from exfit.case.messages import show
 from exfit.case.yaml import Fault, Place
 from exfit.plants import DRIVING
 from exfit.records.units import needs_base
+from exfit.util.text import show
 
 TAKEN = (
     "fit",

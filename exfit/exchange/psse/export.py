@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from exfit import __version__
-from exfit.case.messages import near, show
 from exfit.errors import ExfitError
 from exfit.exchange.psse import Definition, alternatives, definitions, record_text
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.results.io import Saved, read_saved
+from exfit.util.text import near, show
 
 WIDTH = 80  # columns
 NO_LIMIT = 99.0  # pu: data sheets write limits that never act as 99 or 999

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from math import isfinite
 from typing import NamedTuple
 
-from exfit.case.messages import show_value
 from exfit.errors import DynamicsError
+from exfit.util.text import show_value
 
 COMMENTS = ("//", "@!")
 FIELD = re.compile(

@@ -4,11 +4,11 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from exfit.case.messages import show
 from exfit.exchange.psse.fields import Fault, Field, number, whole
 from exfit.models import MODELS, STABILISERS, sheet
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Record, Sheet, typical
+from exfit.util.text import show
 
 WIDTH = 80  # columns of a file
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first

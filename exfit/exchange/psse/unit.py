@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from exfit.case.messages import near, show_value
 from exfit.errors import DynamicsError
 from exfit.exchange.psse.fields import Fault, Field, Fields, read_records, refuse
 from exfit.exchange.psse.records import Definition, definition_of, definitions, read_values
+from exfit.util.text import near, show_value
 
 NEEDED = ("machine", "exciter")
 LISTED = 20  # units in a message

@@ -6,7 +6,7 @@ from exfit.errors import ExfitError
 from exfit.output.report.content import Report, report_of
 from exfit.output.report.page import html, is_page
 from exfit.results.io import read_saved
-from exfit.results.model import write
+from exfit.util.files import write
 
 __all__ = ["Report", "html", "report_of", "write_report"]
 

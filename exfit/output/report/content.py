@@ -7,19 +7,19 @@ from pathlib import Path
 from typing import Any
 
 from exfit import __version__
-from exfit.case.case import BumpTest, Case, Recording, Unknown, known
-from exfit.case.messages import show
+from exfit.case.case import Case
 from exfit.case.parts import Part
-from exfit.case.schema import Channel, Phases
+from exfit.case.schema import BumpTest, Channel, Phases, Recording, Unknown, known
 from exfit.dsp.features import Features
 from exfit.errors import ExfitError
 from exfit.exchange.psse.export import export
 from exfit.fitting.build import Trial
+from exfit.fitting.nuisance import unit_of
 from exfit.inference.wording import listed
 from exfit.output.report.simulated import Simulated, simulated
 from exfit.output.report.sources import Samples, Sources, sources
 from exfit.results.io import Saved, read_saved
-from exfit.workflows import unit_of
+from exfit.util.text import show
 
 PLANTS: Mapping[str, str] = {
     "open-circuit": "breaker open, rated speed",

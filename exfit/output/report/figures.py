@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.messages import show
 from exfit.dsp.decimation import envelope, kept_rows
 from exfit.output.report.charts import SMALL, Chart, Panel, Rule, Series
 from exfit.output.report.content import Fitted, Iteration, Match, Report, Signal
 from exfit.output.report.simulated import Courses, Moved, Small
-from exfit.results.model import clock_digits
+from exfit.results.tables import clock_digits
+from exfit.util.text import show
 
 if TYPE_CHECKING:
     from exfit.simulation.small_signal import Bode, Margins

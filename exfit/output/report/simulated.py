@@ -13,13 +13,13 @@ from exfit.errors import SimulationError
 from exfit.fitting.build import Trial, compared, residuals_of
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import names_of_records
 from exfit.fitting.uncertainty import linearisation, sensitivity
 from exfit.output.report.sources import Sources
 from exfit.results.model import judged_of
-from exfit.workflows import names_of_records
 
 if TYPE_CHECKING:
-    from exfit.simulation.limits import LimitHit
+    from exfit.simulation.limit_hits import LimitHit
     from exfit.simulation.small_signal import SmallSignal
 
 Array = NDArray[np.float64]
@@ -150,7 +150,7 @@ def _small(experiments: Sequence[Experiment], values: Values) -> Iterator[Small]
 
 
 def _limited(trials: Sequence[Trial], values: Values) -> Iterator[Limited]:
-    from exfit.simulation.limits import limits_hit
+    from exfit.simulation.limit_hits import limits_hit
 
     for one in trials:
         at = one.known(values)

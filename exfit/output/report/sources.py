@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.case import SINGLE, Case, load_case
+from exfit.case.case import SINGLE, Case
+from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.fitting.build import Trial, trial_of
+from exfit.fitting.search import fitted
 from exfit.records.record import file_hash
 from exfit.results.io import Saved
 from exfit.results.model import Overlay
-from exfit.workflows import fitted, inputs
+from exfit.workflows import inputs
 
 Array = NDArray[np.float64]
 

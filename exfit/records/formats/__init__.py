@@ -5,7 +5,7 @@ from pathlib import Path
 from exfit.errors import RecordError
 from exfit.records.formats.table import Table
 from exfit.records.formats.text import read_text_table
-from exfit.siblings import siblings
+from exfit.util.files import siblings
 
 __all__ = ["Table", "open_table"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from exfit.errors import RecordError
 from exfit.records.formats.table import read_bytes
-from exfit.siblings import siblings
+from exfit.util.files import siblings
 
 _SECTION = re.compile(
     rb"^--- *file type: *([a-z]+)(?: +([a-z0-9]+))?(?: *: *([0-9]{1,15}))? *---[ \t]*\r?\n",

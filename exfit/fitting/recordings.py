@@ -1,0 +1,135 @@
+"""The records of a case: read, and checked against its tests."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from exfit.case.case import Case
+from exfit.case.schema import BumpTest, Channel, Phases, RecordFile, TimeColumn, known
+from exfit.errors import RecordError
+from exfit.records.record import Clock, Record, ThreePhases, read_record
+from exfit.util.text import show
+
+
+class Column(NamedTuple):
+    """Where a signal stands in a file and how it becomes per unit."""
+
+    column: str
+    scale: float
+    offset: float
+    unit: str | None
+    base: float | None
+
+
+def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
+    """Return the record of a test of a case, read from its file.
+
+    Raises RecordError where it cannot be read, or where the steps of the test lie outside it.
+    """
+    path = case.folder / file.file
+    record = read_record(
+        path,
+        clock_of(file),
+        {signal: source_of(channel) for signal, channel in file.channels.items()},
+        file.window,
+        file.gaps == "skip",
+        file.sheet,
+        file.resample,
+        frozenset(
+            signal
+            for signal, channel in file.channels.items()
+            if case.plant.type != "none" and _as_it_stands(channel)
+        ),
+    )
+    _refuse_steps_outside(case, test, record, path)
+    return record
+
+
+def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path) -> None:
+    """Raise RecordError where a record does not hold the test that the case describes."""
+    start, end = record.time[0], record.time[-1]
+    if test.begin is not None:
+        if test.begin > start:
+            raise RecordError(
+                f"{path}: begins at {show(start)} s, before {case.path} begins to simulate it "
+                f"at {show(test.begin)} s"
+            )
+        start = test.begin
+    for at in test.instants:
+        if not start <= at < end:
+            raise RecordError(
+                f"{path}: holds {show(start)} ... {show(end)} s, "
+                f"but {case.path} has a step at {show(at)} s"
+            )
+    steady = test.steady
+    if steady is not None and steady > end:
+        raise RecordError(
+            f"{path}: ends at {show(end)} s, before test.steady_until = {show(steady)} s "
+            f"of {case.path}"
+        )
+    if test.vt0 is None and steady is not None and not start < steady:
+        what = "the first step" if test.steady_until is None else "test.steady_until"
+        raise RecordError(
+            f"{path}: begins at {show(start)} s, with {what}: nothing before it tells "
+            f"vt0, and {case.path} does not give it"
+        )
+
+
+def clock_of(record: RecordFile) -> Clock:
+    """Return where the time of a record stands."""
+    if isinstance(record.time, str):
+        return Clock((record.time,))
+    if isinstance(record.time, TimeColumn):
+        return Clock((record.time.column,), record.time.unit)
+    return Clock(record.time)
+
+
+def column_of(channel: Channel) -> Column:
+    """Return the column of a channel; where a fit finds scale or offset, with their starts."""
+    scale, offset = known(channel.scale), known(channel.offset)
+    return Column(
+        channel.column, 1.0 if scale is None else scale, offset or 0.0, channel.unit, channel.base
+    )
+
+
+def _as_it_stands(channel: Channel | Phases) -> bool:
+    """Tell whether a case takes the numbers of a column for per unit."""
+    if not isinstance(channel, Channel):
+        return False
+    return channel.unit is None and channel.base is None and channel.scale == 1.0
+
+
+def source_of(channel: Channel | Phases) -> Column | ThreePhases:
+    """Return where a signal stands: in a column, or in three."""
+    if isinstance(channel, Channel):
+        return column_of(channel)
+    return ThreePhases(
+        channel.phases,
+        channel.kind,
+        channel.unit,
+        channel.base,
+        channel.connection,
+        channel.cycles,
+    )
+
+
+def initial_level(test: BumpTest, record: Record, signal: str) -> float:
+    """Return the mean of a recorded signal while the unit is still at rest.
+
+    Raises RecordError where it has no sample there.
+    """
+    until = np.inf if test.steady is None else test.steady
+    rest = record.signals[signal][record.time < until]
+    rest = rest[np.isfinite(rest)]
+    if not len(rest):
+        raise RecordError(
+            f"{record.source}: {signal}: no sample before {show(until)} s tells where it starts"
+        )
+    return float(np.mean(rest))
+
+
+def initial_voltage(test: BumpTest, record: Record) -> float:
+    """Return the voltage before the first step: as the test gives it, else the record's mean."""
+    vt0 = known(test.vt0)
+    return initial_level(test, record, "vt") if vt0 is None else vt0

@@ -1,0 +1,61 @@
+"""A simulated response beside its record."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.features import Features, features
+from exfit.fitting.build import Trial, compared
+from exfit.results.model import Comparison, Overlay
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+
+def compare_with_record(
+    trial: Trial, name: str, values: Values, start: Values | None = None, limit: float | None = None
+) -> Comparison:
+    """Return the response to the values, and to the ``start`` values, beside the record.
+
+    The trial has sub-steps enough for both; ``limit`` is the largest rmse to be accepted, in pu.
+    """
+    at = trial.known(values)
+    samples, substeps = trial.experiment.samples(at)
+    first = None if start is None else trial.experiment.samples(trial.known(start))[0]
+    overlays = {
+        channel.signal: Overlay(
+            compared(channel, trial.experiment.measured(channel, at)),
+            compared(channel, channel.shown(samples[:, k])),
+            None if first is None else compared(channel, channel.shown(first[:, k])),
+        )
+        for k, channel in enumerate(trial.channels)
+    }
+    errors = trial.experiment.compared(samples, at)
+    vt = overlays.get("vt")
+    return Comparison(
+        name=name,
+        time=trial.record.time,
+        overlays=overlays,
+        cost=0.5 * float(errors @ errors),
+        measured=None if vt is None else _features(trial, vt.measured, at),
+        simulated=None if vt is None else _features(trial, vt.simulated, at),
+        record=trial.record.source,
+        sha256=trial.record.sha256,
+        substeps=substeps,
+        rmse_limit=limit,
+    )
+
+
+def _features(trial: Trial, signal: Array, values: Values) -> Features | None:
+    """Return the features of the first step of the reference that the record holds."""
+    kept = np.isfinite(signal)
+    time = trial.record.time[kept]
+    simulator = trial.experiment.moved(values)
+    steps = [step._replace(at=step.at + simulator.delay) for step in simulator.course.steps]
+    inside = [change for change in steps if change.at >= time[0]]
+    if not inside or inside[0].signal != "vref":
+        return None
+    later = [change.at for change in inside if change.at > inside[0].at]
+    until = later[0] if later else float(time[-1])
+    return features(time, signal[kept], inside[0].at, until)
