@@ -21,17 +21,29 @@ from exfit.analysis.diagnostics import (
     validation_notes,
     voltage_notes,
 )
-from exfit.analysis.iteration_responses import Sketch, course_notes, sketch, with_courses
+from exfit.analysis.iteration_responses import (
+    LiveResponse,
+    live_response,
+    skipped_response_notes,
+    with_iteration_responses,
+)
 from exfit.case.case import SINGLE, Case
 from exfit.case.schema import Unknown
 from exfit.errors import CaseError, SimulationError
-from exfit.fitting.build import Trial, plain_simulator, robust_of, secured, trial_of, values_of
-from exfit.fitting.compression import condensed
-from exfit.fitting.nonlinearity import bent
+from exfit.fitting.build import (
+    ExperimentSetup,
+    build_experiment,
+    plain_simulator,
+    robust_of,
+    values_of,
+    with_enough_substeps,
+)
+from exfit.fitting.compression import compressed
+from exfit.fitting.nonlinearity import nonlinear_parameters
 from exfit.fitting.nuisance import unit_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
-from exfit.fitting.uncertainty import Knowledge, knowledge
+from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.records.record import file_hash
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import (
@@ -56,7 +68,7 @@ def fit(
     strategy: estimate.Method | None = None,
     watch: Callable[[Iteration], None] = lambda _: None,
     progress: Callable[[estimate.Progress], None] = lambda _: None,
-    look: Callable[[Sketch], None] | None = None,
+    look: Callable[[LiveResponse], None] | None = None,
 ) -> FitResult:
     """Fit the free parameters of a case to its records, and try the result on its other records.
 
@@ -67,15 +79,15 @@ def fit(
     began = clock.perf_counter()
     given = case.values()
     trials, residuals = fitted(case)
-    validations = tuple(trial_of(case, one, given) for one in case.validations)
-    fewer = condensed(residuals)
+    validations = tuple(build_experiment(case, one, given) for one in case.validations)
+    fewer = compressed(residuals)
     before = fewer.simulations
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
-    def announce(line: estimate.Iteration) -> None:
+    def announce(line: estimate.SolverIteration) -> None:
         history.append(_iteration(line, residuals))
-        seen = None if look is None else sketch(trials[0], residuals, line.x)
+        seen = None if look is None else live_response(trials[0], residuals, line.x)
         if look is not None and seen is not None:
             look(seen)
         watch(history[-1])
@@ -85,9 +97,11 @@ def fit(
     values, begin = residuals.values(found.x), residuals.values(residuals.start)
     interrupted = found.stop is estimate.Stop.INTERRUPTED
     known = None if interrupted else told(residuals, found.x, trials)
-    secure = [one.secured(values) for one in trials]
+    secure = [one.with_enough_substeps(values) for one in trials]
     compared = tuple(
-        with_courses(compare_with_record(one, one.name, values, begin), one, residuals, history)
+        with_iteration_responses(
+            compare_with_record(one, one.name, values, begin), one, residuals, history
+        )
         for one in secure
     )
     tried = tuple(tried_on(case, one, values) for one in validations)
@@ -119,7 +133,7 @@ def fit(
         notes=(
             *_notes(case, residuals, found, trials, compared, tried),
             *(() if known is None else misfit_notes(residuals, known)),
-            *course_notes(compared),
+            *skipped_response_notes(compared),
         ),
         validation=tried,
         versions=versions(),
@@ -128,23 +142,25 @@ def fit(
     )
 
 
-def told(residuals: Residuals, theta: Array, trials: Iterable[Trial]) -> Knowledge | None:
+def told(
+    residuals: Residuals, theta: Array, trials: Iterable[ExperimentSetup]
+) -> UncertaintyAnalysis | None:
     """Return what the records tell at the solution theta (N,), in scaled parameters.
 
     None where the derivatives there are not finite.
     """
     try:
-        known = knowledge(residuals, theta, names_of_records(trials))
+        known = uncertainty_at(residuals, theta, names_of_records(trials))
     except SimulationError:
         return None
-    return replace(known, bent=bent(residuals, theta, known))
+    return replace(known, nonlinear=nonlinear_parameters(residuals, theta, known))
 
 
-def minima_of(residuals: Residuals, found: estimate.Minima) -> Minima:
+def minima_of(residuals: Residuals, found: estimate.MultistartResult) -> Minima:
     """Return the minima that were found, in the parameters' own values."""
     names = [one.name for one in residuals.free]
 
-    def minimum(one: estimate.Minimum) -> Minimum:
+    def minimum(one: estimate.LocalMinimum) -> Minimum:
         values = residuals.values(one.x)
         return Minimum({name: values[name] for name in names}, one.cost, one.starts)
 
@@ -156,7 +172,7 @@ def _notes(
     case: Case,
     residuals: Residuals,
     found: estimate.Result,
-    trials: Sequence[Trial],
+    trials: Sequence[ExperimentSetup],
     compared: Sequence[Comparison],
     tried: Sequence[Comparison],
 ) -> Iterator[str]:
@@ -175,17 +191,19 @@ def _notes(
     yield from validation_notes(compared, tried)
 
 
-def tried_on(case: Case, trial: Trial, values: Values, name: str | None = None) -> Comparison:
+def tried_on(
+    case: Case, trial: ExperimentSetup, values: Values, name: str | None = None
+) -> Comparison:
     """Return how fitted values do on a record that the fit never saw.
 
     What that record leaves open about itself (its instants, its levels) is found on it, with the
     parameters of the unit as they are.
     """
     limit = None if case.accept is None else case.accept.rmse
-    secured = trial.secured(values)
+    with_enough_substeps = trial.with_enough_substeps(values)
     if trial.free:
         robust = robust_of(case)
-        residuals = Residuals([secured.experiment], trial.free, values, robust=robust)
+        residuals = Residuals([with_enough_substeps.experiment], trial.free, values, robust=robust)
         aligned = estimate.least_squares(
             residuals,
             residuals.start,
@@ -195,10 +213,10 @@ def tried_on(case: Case, trial: Trial, values: Values, name: str | None = None) 
             x_scale=UNIT,
         )
         values = residuals.values(aligned.x)
-    return compare_with_record(secured, name or trial.name, values, None, limit)
+    return compare_with_record(with_enough_substeps, name or trial.name, values, None, limit)
 
 
-def record_notes(trial: Trial, compared: Comparison) -> Iterator[str]:
+def record_notes(trial: ExperimentSetup, compared: Comparison) -> Iterator[str]:
     """Yield what the steady part of a record says against the case."""
     test = trial.test
     if test.steady is not None and test.begin is None:
@@ -222,7 +240,7 @@ def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, F
     }
 
 
-def _iteration(line: estimate.Iteration, residuals: Residuals) -> Iteration:
+def _iteration(line: estimate.SolverIteration, residuals: Residuals) -> Iteration:
     """Return a line of the log with the parameters' own values for the scaled ones."""
     values = residuals.values(line.x)
     kept = {name: value for name, value in vars(line).items() if name != "x"}
@@ -240,7 +258,7 @@ def versions() -> dict[str, str]:
     }
 
 
-def inputs(case: Case, *trials: Trial) -> dict[str, str]:
+def inputs(case: Case, *trials: ExperimentSetup) -> dict[str, str]:
     """Return the SHA-256 of every file that went into a result."""
     files = {"case": file_hash(case.path)}
     if case.model is not None and case.model.endswith(".py"):
@@ -251,7 +269,7 @@ def inputs(case: Case, *trials: Trial) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class Simulation:
+class SimulationResult:
     """A response of a case, with the record beside it where there is one."""
 
     response: Response
@@ -259,22 +277,22 @@ class Simulation:
     notes: tuple[str, ...]
 
 
-def simulate(case: Case, changes: Values) -> Simulation:
+def simulate(case: Case, changes: Values) -> SimulationResult:
     """Simulate a case at its start values, with changes upon them; of several records the first.
 
     Raises ExfitError for input that cannot be used.
     """
     values = values_of(case, changes)
     if case.recordings:
-        trial = trial_of(case, case.recordings[0], values).secured(values)
+        trial = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
         response = trial.response(values)
         compared = compare_with_record(trial, "record", values) if trial.channels else None
         told = [] if compared is None else record_notes(trial, compared)
-        return Simulation(response, compared, (*simulation_notes(case, response), *told))
+        return SimulationResult(response, compared, (*simulation_notes(case, response), *told))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
-    response = secured(simulator, at, case.path).response(at)
-    return Simulation(response, None, tuple(simulation_notes(case, response)))
+    response = with_enough_substeps(simulator, at, case.path).response(at)
+    return SimulationResult(response, None, tuple(simulation_notes(case, response)))
 
 
 def simulation_notes(case: Case, response: Response) -> Iterator[str]:
@@ -303,8 +321,8 @@ def validate(case: Case, changes: Values, record: Path | None = None) -> list[Co
     if not fitted + others:
         raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
     values = values_of(case, changes)
-    seen = [trial_of(case, one, values).secured(values) for one in fitted]
-    unseen = [trial_of(case, one, values) for one in others]
+    seen = [build_experiment(case, one, values).with_enough_substeps(values) for one in fitted]
+    unseen = [build_experiment(case, one, values) for one in others]
     return [
         *(compare_with_record(one, one.name, values) for one in seen),
         *(tried_on(case, one, values) for one in unseen),

@@ -7,7 +7,7 @@ import pytest
 from places import ROOT
 
 from exfit.case.load import load_case
-from exfit.fitting.build import fitted_trials, trial_of, values_of
+from exfit.fitting.build import build_experiment, build_experiments, values_of
 from exfit.plants import VT0
 from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit, simulate, validate
@@ -33,7 +33,7 @@ def true_cost(name):
     truth = json.loads(reference.read_text())["params_in_effect"]
     known = {NAMES.get(key, key): value for key, value in truth.items()}
     wanted = [*loaded.parameters.free, "KA"]
-    trial = fitted_trials(loaded)[0]
+    trial = build_experiments(loaded)[0]
     return compare_with_record(
         trial, "truth", values_of(loaded, {key: known[key] for key in wanted})
     ).cost
@@ -178,12 +178,12 @@ def test_an_interrupted_fit_keeps_the_best_point_so_far():
 def test_the_initial_voltage_is_the_mean_before_the_step_where_the_case_gives_none():
     loaded = case("ac1a_typical")
     down = loaded.validations[0]
-    trial = trial_of(loaded, down, loaded.values())
+    trial = build_experiment(loaded, down, loaded.values())
     before = trial.record.time < 1.0
     assert trial.experiment.own[VT0] == pytest.approx(
         np.mean(trial.record.signals["vt"][before]), rel=1e-12
     )
-    assert fitted_trials(loaded)[0].experiment.own[VT0] == 1.0
+    assert build_experiments(loaded)[0].experiment.own[VT0] == 1.0
 
 
 def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):

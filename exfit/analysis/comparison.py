@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import TAIL, Features, features
-from exfit.dsp.step_detection import Onset, find_step
+from exfit.dsp.step_detection import DetectedStep, find_step
 from exfit.errors import RecordError
 from exfit.records.formats import Table, open_table
 from exfit.records.formats.table import listed, refuse_uneven
@@ -339,7 +339,7 @@ def _durations(time: Array) -> Array:
     return np.asarray(0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)))
 
 
-def _step_of(curve: Curve, signal: str) -> Onset | None:
+def _step_of(curve: Curve, signal: str) -> DetectedStep | None:
     kept = np.isfinite(curve.signals[signal])
     try:
         return find_step(curve.time[kept], curve.signals[signal][kept])
@@ -359,7 +359,7 @@ def _features_of(curves: Sequence[Curve], signal: str, at: float) -> Iterator[tu
 
 
 def _notes(
-    curves: Sequence[Curve], steps: Mapping[str, Onset | None], shift: float
+    curves: Sequence[Curve], steps: Mapping[str, DetectedStep | None], shift: float
 ) -> Iterator[str]:
     for one in curves:
         if one.repeated:

@@ -10,7 +10,7 @@ from exfit.case.case import Case
 from exfit.fitting.build import system_of
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import Residuals, noise_of
-from exfit.fitting.uncertainty import Knowledge
+from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.records.record import Record
 from exfit.results.model import Comparison
 from exfit.simulation.simulator import parameters_used
@@ -34,7 +34,7 @@ def notes(
     values = residuals.values(found.x)
     yield from typical_notes(case)
     for one, match in zip(residuals.experiments, compared, strict=True):
-        simulator, at = one.moved(values), one.parameters(values)
+        simulator, at = one.with_inputs(values), one.parameters(values)
         for signal, moved in simulator.step_errors(at, one.signals).items():
             error = match.overlays[signal].error
             rmse = float(np.sqrt(np.nanmean(error**2)))
@@ -68,7 +68,7 @@ def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:
             yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
 
 
-def misfit_notes(residuals: Residuals, known: Knowledge) -> Iterator[str]:
+def misfit_notes(residuals: Residuals, known: UncertaintyAnalysis) -> Iterator[str]:
     """Yield the channels that the fit misses by more than their noise, which none gave.
 
     A given noise is compared with the residuals where the intervals are made.
@@ -135,7 +135,7 @@ def unsteady_notes(
     record: Record, steady: float, channels: Sequence[Channel] = ()
 ) -> Iterator[str]:
     """Yield the signals that drift while the case calls the unit steady."""
-    smooth = {one.signal: one.conditioning.smooth_over for one in channels if one.conditioning}
+    smooth = {one.signal: one.filtering.smooth_over for one in channels if one.filtering}
     before = record.time < steady
     for signal, samples in record.signals.items():
         still = samples[before & np.isfinite(samples)]

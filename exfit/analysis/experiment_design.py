@@ -16,11 +16,11 @@ from exfit.case.case import Case
 from exfit.case.schema import InfiniteBus, OpenCircuit
 from exfit.dsp.noise import noise
 from exfit.errors import CaseError
-from exfit.fitting.build import fitted_trials, free_of, planned, secured
+from exfit.fitting.build import build_experiments, free_parameters, planned, with_enough_substeps
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.parameters import Free
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.uncertainty import Knowledge, known_of, linearisation
+from exfit.fitting.uncertainty import UncertaintyAnalysis, linearisation, uncertainty_of
 from exfit.inference import Confidence
 from exfit.simulation.simulator import Simulator
 from exfit.util.text import near
@@ -50,7 +50,7 @@ class Design:
     """
 
     name: str
-    own: Knowledge
+    own: UncertaintyAnalysis
     plans: tuple[Plan, ...]
     noise: Mapping[str, float]
 
@@ -76,8 +76,8 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
     unit; else it is the case's, else the record's, else `NOISE`. Raises ExfitError for input that
     cannot be used.
     """
-    trials = fitted_trials(case) if case.recordings else ()
-    free = free_of(case, trials)
+    trials = build_experiments(case) if case.recordings else ()
+    free = free_parameters(case, trials)
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty: there is nothing to identify"])
     values = {**case.values(), **{one.name: one.start for one in free}}
@@ -87,17 +87,19 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
     finest = min(min(noises.values()) for noises in levels)
     fixed = {name: v for name, v in values.items() if name not in {one.name for one in free}}
 
-    def told(experiments: Sequence[Experiment]) -> Knowledge:
+    def told(experiments: Sequence[Experiment]) -> UncertaintyAnalysis:
         at = {**values, **_steps(experiments)}
         pairs = zip(experiments, levels, strict=True)
-        seen = [secured(_seen(one, noises, finest), at, case.path) for one, noises in pairs]
+        seen = [
+            with_enough_substeps(_seen(one, noises, finest), at, case.path) for one, noises in pairs
+        ]
         residuals = Residuals(seen, _moved(free, experiments), fixed, case.ties)
         names = tuple(one.name for trial in trials for one in trial.free)
         still = np.zeros(residuals.count)
         linear = linearisation(residuals, residuals.start, names, still)
         # a start on its bound is no result
         linear = replace(linear, held=(None,) * len(linear.names))
-        return known_of(residuals, residuals.start, linear)
+        return uncertainty_of(residuals, residuals.start, linear)
 
     plans = [Plan(label, told(one).confidence) for label, one in _variants(case, own)]
     return Design(
@@ -123,14 +125,14 @@ def _refuse_noise(given: Mapping[str, float]) -> None:
 def _steps(experiments: Sequence[Experiment]) -> dict[str, float]:
     """Return the sizes that the tests have of steps which a fit would find."""
     return {
-        unknown.name: one.simulator.course.steps[unknown.step].step
+        unknown.name: one.simulator.inputs.steps[unknown.step].step
         for one in experiments
         for unknown in one.nuisances
         if unknown.kind == "step"
     }
 
 
-def _moved(free: Sequence[Free], experiments: Sequence[Experiment]) -> list[Free]:
+def _moved(free: Sequence[FreeParameter], experiments: Sequence[Experiment]) -> list[FreeParameter]:
     """Return what is free, with the sizes of the tests' steps to start from."""
     sizes = _steps(experiments)
     return [replace(one, start=sizes.get(one.name, one.start)) for one in free]
@@ -195,7 +197,7 @@ def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
 
 def _scaled(one: Experiment, size: float) -> Experiment:
     """Return a test whose first step of the reference has a given size, others in proportion."""
-    steps = one.simulator.course.steps
+    steps = one.simulator.inputs.steps
     first = next((change.step for change in steps if change.signal == "vref"), None)
     if first is None:
         return one
@@ -204,17 +206,17 @@ def _scaled(one: Experiment, size: float) -> Experiment:
         change._replace(step=share * change.step) if change.signal in ("vref", "vs") else change
         for change in steps
     )
-    return replace(one, simulator=one.simulator.moved(moved, one.simulator.delay))
+    return replace(one, simulator=one.simulator.with_inputs(moved, one.simulator.delay))
 
 
 def _longer(one: Experiment) -> Experiment:
     """Return a test that goes on as long as it is."""
     old = one.simulator
     times = np.concatenate([old.times, old.times[1:] + (old.times[-1] - old.times[0])])
-    course = replace(old.course, end=float(times[-1]) + max(0.0, -old.delay))
+    course = replace(old.inputs, end=float(times[-1]) + max(0.0, -old.delay))
     simulator = Simulator(old.system, course, times, old.step, old.least, old.delay)
     still = np.zeros(len(times))
-    channels = tuple(replace(c, measured=still, conditioning=None) for c in one.channels)
+    channels = tuple(replace(c, measured=still, filtering=None) for c in one.channels)
     return replace(one, simulator=simulator, channels=channels)
 
 

@@ -6,20 +6,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.fitting.build import Trial, compared
+from exfit.fitting.build import ExperimentSetup, compared
 from exfit.fitting.residuals import UNREACHABLE, Residuals
-from exfit.results.model import Comparison, Courses, Iteration, judged_of
+from exfit.results.model import Comparison, Iteration, IterationResponses, judged_of
 from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-MOST_COURSES = 40  # colours that an eye still tells apart, and columns of a table
+MOST_RESPONSES = 40  # colours that an eye still tells apart, and columns of a table
 MOST_SAMPLES = 20_000  # of a record, 20 s at 1 kHz: a table of 9 MB, written within a second
 
 
 @dataclass(frozen=True, eq=False)
-class Sketch:
+class LiveResponse:
     """A signal of a record and the response to the values of now, (M,) each, per unit.
 
     ``time`` (M,) is in s. What is left out of the comparison is not among them.
@@ -31,7 +31,9 @@ class Sketch:
     simulated: Array
 
 
-def sketch(trial: Trial, residuals: Residuals, theta: Array) -> Sketch | None:
+def live_response(
+    trial: ExperimentSetup, residuals: Residuals, theta: Array
+) -> LiveResponse | None:
     """Return the judged signal of the first trial at scaled parameters theta (N,).
 
     It mostly costs no simulation. None where there is no response, and of a record of more than
@@ -47,19 +49,22 @@ def sketch(trial: Trial, residuals: Residuals, theta: Array) -> Sketch | None:
         values = residuals.values(theta)
     except UNREACHABLE:
         return None
-    measured = channel.conditioned(trial.experiment.measured(channel, values))
+    measured = channel.filtered(trial.experiment.measured(channel, values))
     simulated = measured + errors / channel.weight
-    return Sketch(channel.signal, trial.record.time[channel.kept], measured, simulated)
+    return LiveResponse(channel.signal, trial.record.time[channel.kept], measured, simulated)
 
 
 def chosen(count: int) -> list[int]:
     """Return which of so many iterations are kept: evenly some, the first and last among them."""
-    kept = np.linspace(0, count - 1, min(count, MOST_COURSES))
+    kept = np.linspace(0, count - 1, min(count, MOST_RESPONSES))
     return [int(k) for k in np.rint(kept)]
 
 
-def with_courses(
-    comparison: Comparison, trial: Trial, residuals: Residuals, history: Sequence[Iteration]
+def with_iteration_responses(
+    comparison: Comparison,
+    trial: ExperimentSetup,
+    residuals: Residuals,
+    history: Sequence[Iteration],
 ) -> Comparison:
     """Return the comparison of a secured trial with the courses of the fit that led to it.
 
@@ -70,16 +75,20 @@ def with_courses(
         return comparison
     signal = comparison.judged_by
     lines = [history[k] for k in chosen(len(history))]
-    found = list(in_threads(lambda line: course_of(trial, residuals, signal, line.values), lines))
+    found = list(
+        in_threads(lambda line: iteration_response(trial, residuals, signal, line.values), lines)
+    )
     kept = [(line.number, one) for line, one in zip(lines, found, strict=True) if one is not None]
     if not kept:
         return comparison
     numbers = tuple(number for number, _ in kept)
     samples = np.stack([one for _, one in kept])
-    return replace(comparison, courses=Courses(signal, numbers, samples))
+    return replace(comparison, iteration_responses=IterationResponses(signal, numbers, samples))
 
 
-def course_of(trial: Trial, residuals: Residuals, signal: str, values: Values) -> Array | None:
+def iteration_response(
+    trial: ExperimentSetup, residuals: Residuals, signal: str, values: Values
+) -> Array | None:
     """Return the response (M,) to the values of an iteration, None where there is none."""
     place = trial.experiment.signals.index(signal)
     channel = trial.channels[place]
@@ -87,11 +96,11 @@ def course_of(trial: Trial, residuals: Residuals, signal: str, values: Values) -
         samples, _ = trial.experiment.samples(residuals.completed(values))
     except UNREACHABLE:
         return None
-    found = compared(channel, channel.shown(samples[:, place]))
+    found = compared(channel, channel.as_recorded(samples[:, place]))
     return found if np.isfinite(found[channel.kept]).all() else None
 
 
-def course_notes(comparisons: Sequence[Comparison]) -> list[str]:
+def skipped_response_notes(comparisons: Sequence[Comparison]) -> list[str]:
     """Say of which records the iterations are not kept for their size."""
     return [
         f"{one.record.name}: {len(one.time)} samples: the response after each iteration is kept of "

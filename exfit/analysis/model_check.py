@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from exfit.analysis.diagnostics import typical_notes
 from exfit.case.case import Case
-from exfit.fitting.build import fitted_trials, free_of, planned
+from exfit.fitting.build import build_experiments, free_parameters, planned
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
-from exfit.simulation.inputs import Course
+from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -57,17 +57,20 @@ class Check:
 def check(case: Case) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
     if case.recordings:
-        trials = fitted_trials(case)
-        experiments = [trial.secured(trial.known(case.values())).experiment for trial in trials]
+        trials = build_experiments(case)
+        experiments = [
+            trial.with_enough_substeps(trial.with_start_values(case.values())).experiment
+            for trial in trials
+        ]
     else:
         trials, experiments = (), [planned(case)]
-    free = free_of(case, trials)
+    free = free_parameters(case, trials)
     names = {one.name for one in free}
     values = {**{one.name: one.start for one in free}, **case.values()}
     fixed = {name: value for name, value in values.items() if name not in names}
     drift, error = 0.0, 0.0
     for one in experiments:
-        simulator, at = one.moved(values), one.parameters(values)
+        simulator, at = one.with_inputs(values), one.parameters(values)
         drift = max(drift, flat_drift(simulator, at, one.signals))
         error = max(error, simulator.step_error(at, one.signals))
     first = experiments[0].simulator
@@ -89,7 +92,7 @@ def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("
     ``values`` are the parameters of the simulator's system. Raises SimulationError where the start
     is no rest.
     """
-    still = Simulator(simulator.system, Course(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
+    still = Simulator(simulator.system, Inputs(0.0, FLAT_SECONDS, ()), FLAT_TIMES, simulator.step)
     flat, _ = still.samples(values, tuple(signals))
     return float(np.max(np.abs(flat - flat[0])))
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.compression import condensed
+from exfit.fitting.compression import compressed
 from exfit.fitting.nuisance import unit_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
-from exfit.fitting.uncertainty import Knowledge, knowledge
+from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import LEVEL
 from exfit.util.text import near
 
@@ -25,11 +25,11 @@ ALIKE = 6  # digits: rises that differ less are equal but for rounding
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 ENDS = {
-    estimate.End.RISE: "",
-    estimate.End.BOUND: "the record refutes no value down or up to its bound",
-    estimate.End.FLAT: "the cost hardly rises",
-    estimate.End.FAILED: "there is no response beyond",
-    estimate.End.INTERRUPTED: "interrupted",
+    estimate.ProfileEnd.RISE: "",
+    estimate.ProfileEnd.BOUND: "the record refutes no value down or up to its bound",
+    estimate.ProfileEnd.FLAT: "the cost hardly rises",
+    estimate.ProfileEnd.FAILED: "there is no response beyond",
+    estimate.ProfileEnd.INTERRUPTED: "interrupted",
 }
 
 
@@ -111,10 +111,10 @@ def profile(
     notes = [] if found.success else [f"the fit did not end at a minimum: {found.message}"]
     x = found.x
     for _ in range(MOST_MINIMA):
-        known = knowledge(residuals, x, names_of_records(trials))
+        known = uncertainty_at(residuals, x, names_of_records(trials))
         rises = {free.index(name): known.rises[name] for name in wanted}
         sides = _sides(residuals, x, rises, watch)
-        interrupted = any(estimate.End.INTERRUPTED in one.ends for one in sides)
+        interrupted = any(estimate.ProfileEnd.INTERRUPTED in one.ends for one in sides)
         if interrupted or not sides[0].moved:
             break
         x = sides[0].x  # its residuals, and so the rise, are others
@@ -134,13 +134,13 @@ def _sides(
     x: Array,
     rises: Mapping[int, float],
     watch: Callable[[estimate.Progress], None],
-) -> list[estimate.Profile]:
+) -> list[estimate.CostProfile]:
     """Return the profiles about x, those of like rises side by side; if x is a minimum, of all."""
-    fewer = condensed(residuals)
+    fewer = compressed(residuals)
     alike: dict[str, list[int]] = {}
     for index, rise in rises.items():
         alike.setdefault(f"{rise:.{ALIKE}e}", []).append(index)
-    found: dict[int, estimate.Profile] = {}
+    found: dict[int, estimate.CostProfile] = {}
     for indices in alike.values():
 
         def tell(progress: estimate.Progress, done: int = 2 * len(found)) -> None:
@@ -159,13 +159,13 @@ def _sides(
         found |= {one.index: one for one in profiles}
         if profiles[0].moved:
             return list(profiles)
-        if any(estimate.End.INTERRUPTED in one.ends for one in profiles):
+        if any(estimate.ProfileEnd.INTERRUPTED in one.ends for one in profiles):
             break
     return [found[index] for index in rises if index in found]
 
 
 def _profile(
-    case: Case, residuals: Residuals, known: Knowledge, found: estimate.Profile
+    case: Case, residuals: Residuals, known: UncertaintyAnalysis, found: estimate.CostProfile
 ) -> Profile:
     """Return a profile in the parameter's own values."""
     one = residuals.free[found.index]

@@ -15,7 +15,7 @@ from exfit.case.schema import (
     BumpTest,
     Estimate,
     Fact,
-    Free,
+    FreeSection,
     Frozen,
     InfiniteBus,
     Limit,
@@ -28,7 +28,7 @@ from exfit.case.schema import (
     RecordFile,
     Recording,
     Section,
-    Simulation,
+    SimulationSection,
     Stabiliser,
     Text,
     Value,
@@ -75,8 +75,8 @@ class Case(Section):
     estimate: Estimate = Field(
         default_factory=Estimate, description="How the free parameters are found."
     )
-    simulation: Simulation = Field(
-        default_factory=Simulation, description="The grid of the simulation."
+    simulation: SimulationSection = Field(
+        default_factory=SimulationSection, description="The grid of the simulation."
     )
     validations: tuple[Recording, ...] = Field(
         default=(), alias="validate", description="Records on which the result is tried."
@@ -159,7 +159,7 @@ class Case(Section):
         helpers |= numbers_of(self._helpers(self.parameters.fixed))
         return self._ties.apply({**values, **helpers})
 
-    def free(self) -> dict[str, Free]:
+    def free(self) -> dict[str, FreeSection]:
         """Return the free parameters, as the system names them."""
         own = {
             part.prefix + symbol: free
@@ -187,8 +187,8 @@ class Case(Section):
         found: Mapping[str, float | str] = _at(self, part.fixed)
         return {symbol: found[symbol] for symbol in found if symbol in part.symbols}
 
-    def _free(self, part: Part) -> Mapping[str, Free]:
-        found: Mapping[str, Free] = {} if part.free is None else _at(self, part.free)
+    def _free(self, part: Part) -> Mapping[str, FreeSection]:
+        found: Mapping[str, FreeSection] = {} if part.free is None else _at(self, part.free)
         return {symbol: found[symbol] for symbol in found if symbol in part.symbols}
 
     def _helpers(self, given: Mapping[str, Value]) -> dict[str, Value]:

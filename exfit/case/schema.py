@@ -99,7 +99,7 @@ class Section(BaseModel):
     )
 
 
-class Prior(Section):
+class PriorSection(Section):
     """What is known of a parameter beside the record: a value with its standard deviation."""
 
     mean: Number = Field(description="Value, as a data sheet has it.")
@@ -113,7 +113,7 @@ class Prior(Section):
         return self.std
 
 
-class Free(Section):
+class FreeSection(Section):
     """A parameter that the fit may change."""
 
     start: Number = Field(description="Value from which the fit starts.")
@@ -122,7 +122,7 @@ class Free(Section):
     scale: Literal["log", "linear"] = Field(
         default="log", description="Scale on which the fit moves it; log needs min > 0."
     )
-    prior: Prior | None = Field(default=None, description="What is known of it beforehand.")
+    prior: PriorSection | None = Field(default=None, description="What is known of it beforehand.")
 
 
 class Unknown(Section):
@@ -168,7 +168,7 @@ class OpenCircuit(Section):
     type: Literal["open-circuit"] = Field(description="What surrounds the exciter.")
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[Free] = MACHINE_FREE
+    free: Frozen[FreeSection] = MACHINE_FREE
 
 
 class InfiniteBus(Section):
@@ -177,7 +177,7 @@ class InfiniteBus(Section):
     type: Literal["infinite-bus"] = Field(description="What surrounds the exciter.")
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[Free] = MACHINE_FREE
+    free: Frozen[FreeSection] = MACHINE_FREE
     network: Frozen[Number] = Field(
         description="f0 (Hz); R and X to the source; P and Q, or P and E (the source's voltage) at "
         "the start; Rc and Xc of the load compensation; pu on the machine's base."
@@ -201,7 +201,7 @@ class MachinePlayback(Section):
     type: Literal["machine-playback"] = Field(description="The machine alone; there is no model.")
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
-    free: Frozen[Free] = MACHINE_FREE
+    free: Frozen[FreeSection] = MACHINE_FREE
 
 
 class NoPlant(Section):
@@ -223,10 +223,12 @@ class Stabiliser(Section):
         default_factory=_nothing,
         description="Its data; what is missing takes its typical value.",
     )
-    free: Frozen[Free] = Field(default_factory=_nothing, description="Values that are fitted.")
+    free: Frozen[FreeSection] = Field(
+        default_factory=_nothing, description="Values that are fitted."
+    )
 
 
-class Step(Section):
+class StepSection(Section):
     """A step of a signal."""
 
     at: Number = Field(description="Instant, s.")
@@ -276,7 +278,7 @@ class BumpTest(Section):
     vs: tuple[FindableStep, ...] = Field(
         default=(), min_length=1, description="Steps of the stabiliser's signal, in its place."
     )
-    E: tuple[Step, ...] = Field(
+    E: tuple[StepSection, ...] = Field(
         default=(), min_length=1, description="Steps of the source's voltage; infinite-bus."
     )
     network: tuple[Switch, ...] = Field(
@@ -301,25 +303,25 @@ class BumpTest(Section):
         return self.instants[0] if self.instants else None
 
 
-class LowPass(Section):
+class LowPassSection(Section):
     """A low-pass filter, run forwards and backwards."""
 
     lowpass: Positive = Field(description="Cut-off frequency, Hz.")
 
 
-class Median(Section):
+class MedianSection(Section):
     """A running median."""
 
     median: Count = Field(description="Samples, an odd number.")
 
 
 def _is_median(value: Any) -> str:
-    median = isinstance(value, Median) or (isinstance(value, dict) and "median" in value)
+    median = isinstance(value, MedianSection) or (isinstance(value, dict) and "median" in value)
     return "[median]" if median else "[lowpass]"
 
 
 Filter = Annotated[
-    Annotated[LowPass, Tag("[lowpass]")] | Annotated[Median, Tag("[median]")],
+    Annotated[LowPassSection, Tag("[lowpass]")] | Annotated[MedianSection, Tag("[median]")],
     Discriminator(_is_median),
 ]
 
@@ -349,7 +351,7 @@ class Compared(Section):
     )
 
 
-class Channel(Compared):
+class ChannelSection(Compared):
     """Where a signal stands and how it becomes per unit: column / base * scale + offset."""
 
     column: Text = Field(description="Name of the column.")
@@ -371,7 +373,7 @@ class Channel(Compared):
     )
 
 
-class Phases(Compared):
+class PhasesSection(Compared):
     """The terminal voltage from three phases: that of the positive sequence."""
 
     phases: tuple[Text, Text, Text] = Field(
@@ -392,12 +394,12 @@ class Phases(Compared):
 
 
 def _kind_of_channel(value: Any) -> str:
-    phases = isinstance(value, Phases) or (isinstance(value, dict) and "phases" in value)
+    phases = isinstance(value, PhasesSection) or (isinstance(value, dict) and "phases" in value)
     return "[phases]" if phases else "[column]"
 
 
 Entry = Annotated[
-    Annotated[Channel, Tag("[column]")] | Annotated[Phases, Tag("[phases]")],
+    Annotated[ChannelSection, Tag("[column]")] | Annotated[PhasesSection, Tag("[phases]")],
     Discriminator(_kind_of_channel),
 ]
 
@@ -469,7 +471,9 @@ class Parameters(Section):
         default_factory=_nothing,
         description="Values that stay, or follow others: numbers, or arithmetic such as =-VAMAX.",
     )
-    free: Frozen[Free] = Field(default_factory=_nothing, description="Values that are fitted.")
+    free: Frozen[FreeSection] = Field(
+        default_factory=_nothing, description="Values that are fitted."
+    )
 
 
 class Tolerance(Section):
@@ -519,10 +523,10 @@ class Estimate(Section):
     )
 
 
-class Simulation(Section):
+class SimulationSection(Section):
     """The grid of the simulation."""
 
-    step: Positive = Field(default=0.001, description="Step of the integration, s.")
+    step: Positive = Field(default=0.001, description="StepSection of the integration, s.")
     output_step: Positive = Field(
         default=0.005, description="Spacing of the output where there is no record, s."
     )

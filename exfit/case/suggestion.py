@@ -9,8 +9,8 @@ import yaml
 
 from exfit.case.templates import commented
 from exfit.records.channel_recognition import connection_of
-from exfit.records.inspection import AT_REST_PU, Channel, Inspection, Phases
-from exfit.records.steps import Step
+from exfit.records.inspection import AT_REST_PU, InspectedChannel, InspectedPhases, Inspection
+from exfit.records.steps import RecordedStep
 from exfit.records.units import quantity_of
 from exfit.util.text import yaml_number
 
@@ -77,7 +77,7 @@ def bump_section(found: Inspection, vt0: bool = False) -> list[str]:
     return lines
 
 
-def in_per_unit(one: Channel) -> bool:
+def in_per_unit(one: InspectedChannel) -> bool:
     """Tell whether a channel seems to be in per unit: it says so, or nothing, and looks so."""
     if one.unit is not None:
         return one.unit == "pu"
@@ -86,7 +86,7 @@ def in_per_unit(one: Channel) -> bool:
     return max(abs(one.low), abs(one.high)) <= LARGEST_PU
 
 
-def _step(found: Inspection, step: Step) -> Iterator[str]:
+def _step(found: Inspection, step: RecordedStep) -> Iterator[str]:
     reference = found.channel_of("vref")
     if reference is not None and reference.name in step.seen_in:
         own = min((one.at for one in reference.steps), key=lambda at: abs(at - step.at))
@@ -108,7 +108,7 @@ def _step(found: Inspection, step: Step) -> Iterator[str]:
     yield commented(f"      step: {FILL_IN}", f"pu, as it was keyed in{shown}")
 
 
-def _shown(found: Inspection, step: Step) -> str:
+def _shown(found: Inspection, step: RecordedStep) -> str:
     """Return by how much vt changed for good, where that is known."""
     voltage = found.channel_of("vt")
     if voltage is not None and voltage.name in step.sizes:
@@ -120,19 +120,19 @@ def _shown(found: Inspection, step: Step) -> str:
     return ""
 
 
-def _voltage(found: Inspection, channels: list[Channel]) -> tuple[Phases, ...]:
+def _voltage(found: Inspection, channels: list[InspectedChannel]) -> tuple[InspectedPhases, ...]:
     """Return the phases that vt is made of, where no channel is vt by itself."""
     return () if any(one.signal == "vt" for one in channels) else found.phases[:1]
 
 
-def _phases(found: Inspection, group: Phases) -> str:
+def _phases(found: Inspection, group: InspectedPhases) -> str:
     columns = ", ".join(_text(name) for name in group.columns)
     unit = next(one.unit for one in found.channels if one.name == group.columns[0])
     known = f"kind: {group.kind}, connection: {connection_of(group.columns)}"
     return f"{{phases: [{columns}], {known}, unit: {unit or FILL_IN}, base: {FILL_IN}}}"
 
 
-def _about_phases(found: Inspection, group: Phases) -> Iterator[str]:
+def _about_phases(found: Inspection, group: InspectedPhases) -> Iterator[str]:
     first = next(one for one in found.channels if one.name == group.columns[0])
     unit = first.unit or "the unit of the columns"
     yield f"three phases by their names; base: rated voltage, line to line, in {unit};"
@@ -143,7 +143,7 @@ def _about_phases(found: Inspection, group: Phases) -> Iterator[str]:
         yield f"waveforms of {first.frequency:.4g} Hz, crest {max(first.high, -first.low):.5g}"
 
 
-def _about(one: Channel) -> str:
+def _about(one: InspectedChannel) -> str:
     """Return what to check of a channel."""
     why = f"{one.signal} by {one.why}"
     if in_per_unit(one):
@@ -153,7 +153,7 @@ def _about(one: Channel) -> str:
     return f"{why}; {one.level:.5g} {one.unit or '?'} at rest; base: {HINTS[str(one.signal)]}"
 
 
-def _channel(one: Channel, noisy: bool) -> str:
+def _channel(one: InspectedChannel, noisy: bool) -> str:
     entries = {"column": _text(one.name)}
     if one.unit == "%":
         entries["scale"] = "0.01"

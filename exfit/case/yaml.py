@@ -38,12 +38,12 @@ class Fault(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Node:
+class YamlNode:
     """A value, the line on which it starts, and the nodes of its entries by key or index."""
 
     value: Any
     line: int
-    entries: Mapping[str | int, "Node"] = field(default_factory=dict)
+    entries: Mapping[str | int, "YamlNode"] = field(default_factory=dict)
 
     def line_of(self, place: Place) -> int:
         """Return the line of a place, or of what is nearest above it."""
@@ -69,7 +69,7 @@ def read_text(path: Path) -> str:
         raise CaseError([f"{path}:{line}: not UTF-8 text: byte 0x{byte:02x}"]) from None
 
 
-def read_yaml(text: str, path: Path) -> tuple[Node, list[Fault]]:
+def read_yaml(text: str, path: Path) -> tuple[YamlNode, list[Fault]]:
     """Return the mapping a YAML text holds, and the faults of single keys and values.
 
     Raises CaseError, which names the line, where the text is no YAML or its top is no mapping.
@@ -109,9 +109,9 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self.events: Iterator[Any] = yaml.parse(text, Loader=LOADER)
         self.faults: list[Fault] = []
-        self.anchors: dict[str, Node] = {}
+        self.anchors: dict[str, YamlNode] = {}
 
-    def document(self) -> Node | None:
+    def document(self) -> YamlNode | None:
         """Return the node of the only document, None where there is none."""
         next(self.events)
         if isinstance(next(self.events), yaml.StreamEndEvent):
@@ -123,7 +123,7 @@ class _Reader:
             raise _NoYaml(_line(after), "a second document begins; one is allowed")
         return top
 
-    def node(self, event: Any, place: Place) -> Node:
+    def node(self, event: Any, place: Place) -> YamlNode:
         """Return the node that begins with an event."""
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
@@ -138,16 +138,16 @@ class _Reader:
             self.anchors[event.anchor] = found
         return found
 
-    def _content(self, event: Any, place: Place) -> Node:
+    def _content(self, event: Any, place: Place) -> YamlNode:
         if isinstance(event, yaml.MappingStartEvent):
             return self._mapping(event, place)
         if isinstance(event, yaml.SequenceStartEvent):
             return self._sequence(event, place)
         plain = event.implicit[0]
-        return Node(scalar(event.value) if plain else event.value, _line(event))
+        return YamlNode(scalar(event.value) if plain else event.value, _line(event))
 
-    def _mapping(self, start: Any, place: Place) -> Node:
-        entries: dict[str | int, Node] = {}
+    def _mapping(self, start: Any, place: Place) -> YamlNode:
+        entries: dict[str | int, YamlNode] = {}
         while not isinstance(event := next(self.events), yaml.MappingEndEvent):
             if not isinstance(event, yaml.ScalarEvent):
                 raise _NoYaml(_line(event), "a key must be a plain word")
@@ -160,18 +160,18 @@ class _Reader:
                 first = entries[key].line
                 self.faults.append(Fault(here, f"stands twice, first on line {first}", line))
             else:
-                entries[key] = Node(found.value, line, found.entries)
-        return Node({key: node.value for key, node in entries.items()}, _line(start), entries)
+                entries[key] = YamlNode(found.value, line, found.entries)
+        return YamlNode({key: node.value for key, node in entries.items()}, _line(start), entries)
 
-    def _sequence(self, start: Any, place: Place) -> Node:
-        items: list[Node] = []
+    def _sequence(self, start: Any, place: Place) -> YamlNode:
+        items: list[YamlNode] = []
         while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
             here = (*place, len(items))
             found = self.node(event, here)
             if found.value is None:
                 self.faults.append(Fault(here, "has no value", _line(event)))
-            items.append(Node(found.value, _line(event), found.entries))
-        return Node([item.value for item in items], _line(start), dict(enumerate(items)))
+            items.append(YamlNode(found.value, _line(event), found.entries))
+        return YamlNode([item.value for item in items], _line(start), dict(enumerate(items)))
 
 
 def scalar(text: str) -> str | bool | int | float | None:

@@ -56,7 +56,7 @@ class MovingAverage:
 
 
 @dataclass(frozen=True, eq=False)
-class Conditioning:
+class Filtering:
     """How a signal (M,) on the clock ``time`` (s) is filtered, and which samples are ``kept``.
 
     Samples that are not kept, which may be nan, are bridged in a line between their kept
@@ -82,7 +82,7 @@ class Conditioning:
         if self.averaged is not None:
             _check_average(self.time, self.averaged.window)
 
-    def shown(self, simulated: Array) -> Array:
+    def as_recorded(self, simulated: Array) -> Array:
         """Return simulated values (M, ...) as the record shows them: averaged, where it is so.
 
         Beyond the ends they go on in a line. It is linear: derivatives are averaged as values.

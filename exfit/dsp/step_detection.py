@@ -27,7 +27,7 @@ FITTED = 4  # level, steepness, instant and lag
 
 
 @dataclass(frozen=True)
-class Onset:
+class DetectedStep:
     """A step of the reference as the response shows it.
 
     ``at`` is its instant (s), ``size`` the change of the response that lasts, with its sign, and
@@ -42,7 +42,7 @@ class Onset:
     rise: float
 
 
-def find_step(time: Array, samples: Array) -> Onset:
+def find_step(time: Array, samples: Array) -> DetectedStep:
     """Return the first step of a reference from its response (M,), which is at rest before it.
 
     A voltage follows a step of its reference late and smoothly: up to a quarter of the step (more
@@ -63,7 +63,7 @@ def find_step(time: Array, samples: Array) -> Onset:
     return _step(time, samples)[0]
 
 
-def find_steps(time: Array, samples: Array) -> tuple[Onset, ...]:
+def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
     """Return all steps of a reference from its response (M,), the first as ``find_step`` does.
 
     The next one is looked for where the response to the one before has settled; what is slower than
@@ -80,7 +80,7 @@ def find_steps(time: Array, samples: Array) -> tuple[Onset, ...]:
         found.append(onset)
 
 
-def _step(time: Array, samples: Array) -> tuple[Onset, int]:
+def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
     """Return the first step, and where the response to it has settled."""
     if len(samples) < 2 * BEFORE:
         raise ValueError(f"{len(samples)} samples: a step shows from {2 * BEFORE} on")
@@ -98,7 +98,7 @@ def _step(time: Array, samples: Array) -> tuple[Onset, int]:
     at, spread = _fitted(time, clean, left, gone)
     if at < time[BEFORE - 1]:
         raise _early(time)
-    return Onset(at, size, level, spread, float(time[gone] - time[left])), start
+    return DetectedStep(at, size, level, spread, float(time[gone] - time[left])), start
 
 
 def _early(time: Array) -> ValueError:

@@ -15,7 +15,7 @@ from exfit.engine.writer import INTRINSICS, Shape, Values, Writer
 
 
 @dataclass(frozen=True)
-class Part:
+class TracePart:
     """The values of a trace, or their tangents: the same arrays and steps for either."""
 
     shape: Shape
@@ -42,7 +42,7 @@ class Part:
 
 def simulation(traced: Trace, lanes: int) -> str:
     """Return the IR of ``rest`` and ``run`` for parameter sets side by side."""
-    parts = [Part(Shape(lanes), "", *_fields(traced))]
+    parts = [TracePart(Shape(lanes), "", *_fields(traced))]
     return _module(parts, {"rest": _rest(parts), "run": _run(parts)})
 
 
@@ -58,14 +58,17 @@ def linearisation(traced: Trace, derived: Tangents, directions: int) -> str:
     return _module(parts, {"rest": _rest(parts), "motion": _motion(parts)})
 
 
-def _with_tangents(traced: Trace, derived: Tangents, directions: int) -> list[Part]:
-    return [Part(Shape(1), "", *_fields(traced)), Part(Shape(directions), "d", *_fields(derived))]
+def _with_tangents(traced: Trace, derived: Tangents, directions: int) -> list[TracePart]:
+    return [
+        TracePart(Shape(1), "", *_fields(traced)),
+        TracePart(Shape(directions), "d", *_fields(derived)),
+    ]
 
 
 STEPS = {"rest": [], "motion": [], "run": ["double %h", "i64 %n", "i64 %m"]}
 
 
-def _module(parts: Sequence[Part], functions: Mapping[str, Writer]) -> str:
+def _module(parts: Sequence[TracePart], functions: Mapping[str, Writer]) -> str:
     shapes = dict.fromkeys(part.shape for part in parts)
     declarations = [
         f"declare {shape.type} @llvm.{name}.{shape.suffix}({shape.type})\n"
@@ -84,7 +87,7 @@ def _fields(source: Trace | Tangents) -> tuple[tuple[Node, ...], ...]:
     return tuple(getattr(source, name) for name in names)
 
 
-def _function(name: str, body: Writer, parts: Sequence[Part]) -> str:
+def _function(name: str, body: Writer, parts: Sequence[TracePart]) -> str:
     arrays = [
         f"ptr noalias %{part.mark}{array}" for part in parts for array in ("p", "r", "x", "out")
     ]
@@ -95,11 +98,11 @@ def _function(name: str, body: Writer, parts: Sequence[Part]) -> str:
     return "\n".join([head, "entry:", *body.lines, "  ret void", "}", ""])
 
 
-def _writer(parts: Sequence[Part]) -> Writer:
+def _writer(parts: Sequence[TracePart]) -> Writer:
     return Writer(parts[0].shape, parts[-1].shape)
 
 
-def _rest(parts: Sequence[Part]) -> Writer:
+def _rest(parts: Sequence[TracePart]) -> Writer:
     w = _writer(parts)
     values: Values = {}
     for part in parts:
@@ -113,7 +116,7 @@ def _rest(parts: Sequence[Part]) -> Writer:
     return w
 
 
-def _motion(parts: Sequence[Part]) -> Writer:
+def _motion(parts: Sequence[TracePart]) -> Writer:
     w = _writer(parts)
     values: Values = {}
     for part in parts:
@@ -126,7 +129,7 @@ def _motion(parts: Sequence[Part]) -> Writer:
     return w
 
 
-def _read(w: Writer, part: Part, array: str, nodes: Sequence[Node | None]) -> Values:
+def _read(w: Writer, part: TracePart, array: str, nodes: Sequence[Node | None]) -> Values:
     return {
         node: w.load(f"%{part.mark}{array}", row, part.shape)
         for row, node in enumerate(nodes)
@@ -134,7 +137,7 @@ def _read(w: Writer, part: Part, array: str, nodes: Sequence[Node | None]) -> Va
     }
 
 
-def _run(parts: Sequence[Part]) -> Writer:
+def _run(parts: Sequence[TracePart]) -> Writer:
     w = _writer(parts)
     fixed: Values = {}
     for part in parts:
@@ -189,12 +192,12 @@ def _run(parts: Sequence[Part]) -> Writer:
     return w
 
 
-def _fraction(w: Writer, parts: Sequence[Part], divisor: int) -> Mapping[Shape, str]:
+def _fraction(w: Writer, parts: Sequence[TracePart], divisor: int) -> Mapping[Shape, str]:
     value = w.let(f"fdiv double %h, {Shape(1).number(divisor)}")
     return {part.shape: w.spread(value, part.shape) for part in parts}
 
 
-def _slots(w: Writer, parts: Sequence[Part]) -> dict[Node, str]:
+def _slots(w: Writer, parts: Sequence[TracePart]) -> dict[Node, str]:
     slots = {}
     for part in parts:
         for row, node in enumerate(part.x):
@@ -204,7 +207,7 @@ def _slots(w: Writer, parts: Sequence[Part]) -> dict[Node, str]:
     return slots
 
 
-def _states(w: Writer, parts: Sequence[Part], slots: Mapping[Node, str]) -> Values:
+def _states(w: Writer, parts: Sequence[TracePart], slots: Mapping[Node, str]) -> Values:
     return {
         node: w.let(f"load {part.shape.type}, ptr {slots[node]}, align 64")
         for part in parts
@@ -212,7 +215,9 @@ def _states(w: Writer, parts: Sequence[Part], slots: Mapping[Node, str]) -> Valu
     }
 
 
-def _inputs(w: Writer, part: Part, step: str, share: str | None) -> tuple[list[str], list[str]]:
+def _inputs(
+    w: Writer, part: TracePart, step: str, share: str | None
+) -> tuple[list[str], list[str]]:
     """Read the inputs at a step, and by how much they change over one of its sub-steps."""
     shape, count = part.input_shape, len(part.inputs)
     if not count:
@@ -228,7 +233,7 @@ def _inputs(w: Writer, part: Part, step: str, share: str | None) -> tuple[list[s
 
 
 def _levels(
-    w: Writer, part: Part, now: Sequence[str], change: Sequence[str], at: str
+    w: Writer, part: TracePart, now: Sequence[str], change: Sequence[str], at: str
 ) -> list[Values]:
     """Write the inputs where a sub-step begins, in its middle and where it ends."""
     shape = part.input_shape
@@ -239,7 +244,7 @@ def _levels(
     return [_in_every_lane(w, part, u) for u in (begin, half, end)]
 
 
-def _in_every_lane(w: Writer, part: Part, inputs: Sequence[str]) -> Values:
+def _in_every_lane(w: Writer, part: TracePart, inputs: Sequence[str]) -> Values:
     one_for_all = part.input_shape != part.shape
     return {
         node: w.spread(u, part.shape) if one_for_all else u
@@ -251,7 +256,7 @@ def _merged(parts: Iterable[Values]) -> Values:
     return {node: name for values in parts for node, name in values.items()}
 
 
-def _write_outputs(w: Writer, part: Part, values: Values, row: str) -> None:
+def _write_outputs(w: Writer, part: TracePart, values: Values, row: str) -> None:
     offset = w.let(f"mul i64 {row}, {len(part.outputs) * part.shape.lanes}")
     base = w.address(f"%{part.mark}out", offset)
     for column, result in enumerate(w.compute(part.outputs, values, part.shape)):
@@ -260,7 +265,7 @@ def _write_outputs(w: Writer, part: Part, values: Values, row: str) -> None:
 
 def _runge_kutta(
     w: Writer,
-    parts: Sequence[Part],
+    parts: Sequence[TracePart],
     fixed: Values,
     levels: Sequence[Values],
     x: Values,

@@ -16,22 +16,22 @@ Sources: Levenberg 1944; Marquardt 1963; Armijo 1966; Moré 1978 (the Levenberg-
 algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10.
 """
 
-from exfit.estimate.answer import STATUS, Iteration, Progress, Result, Stop
-from exfit.estimate.profile import End, Profile, profile, profiles
+from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
+from exfit.estimate.profile import CostProfile, ProfileEnd, profile, profiles
 from exfit.estimate.solver import least_squares
-from exfit.estimate.starts import Minima, Minimum, multistart
+from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart
 from exfit.estimate.strategies import Method
 
 __all__ = [
     "STATUS",
-    "End",
-    "Iteration",
+    "CostProfile",
+    "LocalMinimum",
     "Method",
-    "Minima",
-    "Minimum",
-    "Profile",
+    "MultistartResult",
+    "ProfileEnd",
     "Progress",
     "Result",
+    "SolverIteration",
     "Stop",
     "least_squares",
     "multistart",

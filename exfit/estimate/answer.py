@@ -43,7 +43,7 @@ STATUS = {
 
 
 @dataclass(frozen=True)
-class Iteration:
+class SolverIteration:
     """One line of the log, announced when the iteration is over.
 
     number         0 is the start; counts on through the phases, and once where one restarts
@@ -94,7 +94,7 @@ class Result:
     status: int
     message: str
     success: bool
-    history: tuple[Iteration, ...]
+    history: tuple[SolverIteration, ...]
     stop: Stop
 
 

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from exfit.estimate.answer import Stop
-from exfit.estimate.linear import Linear, solve
+from exfit.estimate.linear import LinearModel, solve
 from exfit.estimate.problem import Problem
 from exfit.estimate.search import MOST_TRIALS, Move, gain_ratio, shorten
 
@@ -21,7 +21,7 @@ class FullStep:
 
     phase: str = "gn"
 
-    def advance(self, problem: Problem, linear: Linear) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
         """Take the full step."""
         if linear.singular[0] > WORST_CONDITION * linear.singular[linear.rank - 1]:
             return Move(None, 1.0, 0, stop=Stop.ILL_CONDITIONED), self
@@ -43,7 +43,7 @@ class LineSearch:
     reach: float = 1.0
     phase: str = "dgn"
 
-    def advance(self, problem: Problem, linear: Linear) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
         """Try lambda = 1, then less."""
         move = shorten(problem, linear, solve(linear, reach=self.reach), MOST_TRIALS)
         if move.point is None:

@@ -13,7 +13,7 @@ from exfit.estimate.problem import Point, Problem
 
 
 @dataclass(frozen=True)
-class Step:
+class DampedStep:
     """Where the full step leads, its slope g^T d, and the decrease the model promises for it."""
 
     origin: Array
@@ -31,7 +31,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearModel:
     """The linear model at a point, in scaled variables y = scale * d within low <= y <= high.
 
     J / scale = U diag(singular) directions; amounts = U^T residuals; unseen: the share of the
@@ -62,7 +62,7 @@ class Linear:
         return int(np.count_nonzero(self.singular > self.unseen * max(self.singular[0], TINY)))
 
     @cached_property
-    def full(self) -> Step:
+    def full(self) -> DampedStep:
         """The Gauss-Newton step: least squares within the bounds, of minimum norm."""
         return solve(self)
 
@@ -76,16 +76,16 @@ class Linear:
         return float(np.linalg.norm(self.scale * (x - self.point.x)))
 
 
-def linearise(problem: Problem, point: Point, before: Linear | None = None) -> Linear:
+def linearise(problem: Problem, point: Point, before: LinearModel | None = None) -> LinearModel:
     """Return the linear model at a point, scaled no less than the one before."""
     J = problem.jacobian(point)
     return factored(problem, point, J, before) if np.isfinite(J).all() else blind(problem, point, J)
 
 
-def blind(problem: Problem, point: Point, J: Array) -> Linear:
+def blind(problem: Problem, point: Point, J: Array) -> LinearModel:
     """Return the model at a point where J is not finite: there are no directions."""
     unknown, none = np.full(len(point.x), nan), np.zeros(0)
-    return Linear(
+    return LinearModel(
         point=point,
         jacobian=J,
         gradient=unknown,
@@ -101,7 +101,7 @@ def blind(problem: Problem, point: Point, J: Array) -> Linear:
     )
 
 
-def factored(problem: Problem, point: Point, J: Array, before: Linear | None) -> Linear:
+def factored(problem: Problem, point: Point, J: Array, before: LinearModel | None) -> LinearModel:
     """Factor J: QR first, for the many residuals, then the singular values of the corner."""
     box, n = problem.box, len(point.x)
     gradient = J.T @ point.residuals
@@ -109,7 +109,7 @@ def factored(problem: Problem, point: Point, J: Array, before: Linear | None) ->
     both = np.column_stack([J / scale, point.residuals])
     corner = np.asarray(np.linalg.qr(both, mode="r"), dtype=np.float64)
     left, singular, directions = np.linalg.svd(corner[:, :n], full_matrices=False)
-    return Linear(
+    return LinearModel(
         point=point,
         jacobian=J,
         gradient=gradient,
@@ -125,7 +125,7 @@ def factored(problem: Problem, point: Point, J: Array, before: Linear | None) ->
     )
 
 
-def column_scale(J: Array, before: Linear | None) -> Array:
+def column_scale(J: Array, before: LinearModel | None) -> Array:
     """Return the largest norm each column has had (Moré 1978, section 6)."""
     norms: Array = np.linalg.norm(J, axis=0)
     if before is not None and before.finite:
@@ -133,7 +133,7 @@ def column_scale(J: Array, before: Linear | None) -> Array:
     return np.where(norms > 0.0, norms, 1.0)
 
 
-def solve(linear: Linear, nu: float = 0.0, reach: float = inf) -> Step:
+def solve(linear: LinearModel, nu: float = 0.0, reach: float = inf) -> DampedStep:
     """Minimise |J d + R|^2 + nu |scale d|^2 within the bounds and |d| <= reach, unit by unit."""
     k = linear.rank
     s, V, b = linear.singular[:k], linear.directions[:k], linear.amounts[:k]
@@ -148,7 +148,7 @@ def solve(linear: Linear, nu: float = 0.0, reach: float = inf) -> Step:
     return step_to(linear, y)
 
 
-def step_to(linear: Linear, y: Array) -> Step:
+def step_to(linear: LinearModel, y: Array) -> DampedStep:
     """Return the step d = y / scale; where it reaches a bound it ends on it exactly."""
     x, box = linear.point.x, linear.box
     target = box.inside(x + y / linear.scale)
@@ -156,4 +156,4 @@ def step_to(linear: Linear, y: Array) -> Step:
     d = target - x
     change = linear.singular * (linear.directions @ (linear.scale * d))
     promise = -float(change @ (linear.amounts + 0.5 * change))
-    return Step(x, target, float(linear.gradient @ d), promise)
+    return DampedStep(x, target, float(linear.gradient @ d), promise)

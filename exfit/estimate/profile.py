@@ -33,7 +33,7 @@ LOWER = 1e-3  # of the rise: what is farther below the minimum refutes it
 MOST_MINIMA = 5
 
 
-class End(Enum):
+class ProfileEnd(Enum):
     """Why one side of a profile ends."""
 
     RISE = "the cost has risen as far as asked"
@@ -44,7 +44,7 @@ class End(Enum):
 
 
 @dataclass(frozen=True)
-class Profile:
+class CostProfile:
     """The least cost for given values of one parameter, the others fitted anew for each.
 
     index      which parameter
@@ -63,7 +63,7 @@ class Profile:
     xs: Array
     low: float | None
     high: float | None
-    ends: tuple[End, End]
+    ends: tuple[ProfileEnd, ProfileEnd]
     x: Array
     cost: float
     moved: bool
@@ -143,7 +143,7 @@ class Side:
     index: int
     sign: int
     spots: list[Spot]
-    end: End = End.INTERRUPTED
+    end: ProfileEnd = ProfileEnd.INTERRUPTED
     crossing: float | None = None
 
     def place(self, k: int) -> float:
@@ -162,7 +162,7 @@ def profile(
     points: int = POINTS,
     x_scale: ArrayLike | None = None,
     watch: Callable[[Progress], object] = lambda _: None,
-) -> Profile:
+) -> CostProfile:
     """Return the profile of one parameter about the minimum x (N,); see `profiles`."""
     return profiles(
         fun, jac, x, (index,), bounds, rise, points=points, workers=1, x_scale=x_scale, watch=watch
@@ -181,7 +181,7 @@ def profiles(
     workers: int | None = None,
     x_scale: ArrayLike | None = None,
     watch: Callable[[Progress], object] = lambda _: None,
-) -> tuple[Profile, ...]:
+) -> tuple[CostProfile, ...]:
     """Return the profiles of some parameters about the minimum x (N,) of 1/2 sum(fun^2).
 
     On either side a parameter moves in about ``points`` steps, up to where the cost has risen by
@@ -226,10 +226,10 @@ def bottom_near(valley: Valley, x: Array) -> Array:
     return least_squares(valley.fun, x, valley.jac, bounds, "lm-then-dgn", x_scale=unit).x
 
 
-def joined(below: Side, above: Side, bottom: Spot, moved: bool) -> Profile:
+def joined(below: Side, above: Side, bottom: Spot, moved: bool) -> CostProfile:
     """Return the profile of two sides."""
     spots = [*below.spots[:0:-1], *above.spots]
-    return Profile(
+    return CostProfile(
         index=below.index,
         at=np.array([spot.x[below.index] for spot in spots]),
         costs=np.array([spot.cost for spot in spots]),
@@ -258,7 +258,7 @@ def walk_all(
         while not fallen.is_set() and go_on(valley, side):
             if side.spots[-1].cost < limit:
                 fallen.set()
-        if side.end is End.RISE and not fallen.is_set():
+        if side.end is ProfileEnd.RISE and not fallen.is_set():
             side.crossing = crossing(valley, side)
 
     def tell(_: None) -> None:
@@ -276,10 +276,10 @@ def go_on(valley: Valley, side: Side) -> bool:
     """Add a point to a side; return whether there are more to come."""
     here, bound = side.place(-1), (valley.box.low, valley.box.high)[side.sign > 0][side.index]
     if here == bound:
-        side.end = End.BOUND
+        side.end = ProfileEnd.BOUND
         return False
     if len(side.spots) > MOST_POINTS * valley.points:
-        side.end = End.FLAT
+        side.end = ProfileEnd.FLAT
         return False
     direction, step = ahead(valley, side, abs(bound - here))
     for _ in range(MOST_HALVINGS + 1):
@@ -291,11 +291,11 @@ def go_on(valley: Valley, side: Side) -> bool:
             break
         step *= 0.5
     if spot is None:
-        side.end = End.FAILED
+        side.end = ProfileEnd.FAILED
         return False
     side.spots.append(spot)
     if spot.height >= 1.0:
-        side.end = End.RISE
+        side.end = ProfileEnd.RISE
     return spot.height < 1.0
 
 

@@ -6,9 +6,9 @@ from math import inf, nan
 
 import numpy as np
 
-from exfit.estimate.answer import STATUS, Iteration, Result, Stop
+from exfit.estimate.answer import STATUS, Result, SolverIteration, Stop
 from exfit.estimate.arrays import Array
-from exfit.estimate.linear import Linear, blind, linearise
+from exfit.estimate.linear import LinearModel, blind, linearise
 from exfit.estimate.problem import Point, Problem
 from exfit.estimate.search import Move, Search
 from exfit.estimate.stopping import Rules
@@ -18,7 +18,7 @@ from exfit.estimate.stopping import Rules
 class Outcome:
     """Where a phase ended and why."""
 
-    linear: Linear
+    linear: LinearModel
     stop: Stop
 
     @property
@@ -27,18 +27,18 @@ class Outcome:
         return STATUS[self.stop] > 0
 
 
-class Run:
+class SearchRun:
     """A search from its start to its end, perhaps in several phases."""
 
     def __init__(
-        self, problem: Problem, rules: Rules, callback: Callable[[Iteration], object] | None
+        self, problem: Problem, rules: Rules, callback: Callable[[SolverIteration], object] | None
     ) -> None:
         self.problem, self.rules, self.callback = problem, rules, callback
-        self.history: list[Iteration] = []
+        self.history: list[SolverIteration] = []
         self.iterations = 0
-        self.best: Linear | None = None
+        self.best: LinearModel | None = None
 
-    def begin(self, x0: Array) -> Linear:
+    def begin(self, x0: Array) -> LinearModel:
         """Return the linear model at the start, or raise ValueError."""
         point = self.problem.evaluate(x0)
         if point.cost == inf:
@@ -47,14 +47,14 @@ class Run:
         self.rules = self.rules.starting_at(start)
         return start
 
-    def linearise(self, point: Point, before: Linear | None = None) -> Linear:
+    def linearise(self, point: Point, before: LinearModel | None = None) -> LinearModel:
         """Return the linear model at a point; remember the best one."""
         linear = linearise(self.problem, point, before)
         if self.best is None or point.cost <= self.best.point.cost:
             self.best = linear
         return linear
 
-    def descend(self, search: Search, linear: Linear) -> Outcome:
+    def descend(self, search: Search, linear: LinearModel) -> Outcome:
         """Go down from a point until there is a reason to stop."""
         if not self.history or not np.array_equal(self.history[-1].x, linear.point.x):
             self.announce(search.phase, linear)
@@ -76,12 +76,16 @@ class Run:
         return Outcome(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)
 
     def announce(
-        self, phase: str, linear: Linear, move: Move | None = None, before: Linear | None = None
+        self,
+        phase: str,
+        linear: LinearModel,
+        move: Move | None = None,
+        before: LinearModel | None = None,
     ) -> None:
         """Write a line of the log and tell the callback."""
         x = linear.point.x
         move = move or Move(None, nan, 0)
-        line = Iteration(
+        line = SolverIteration(
             number=len(self.history),
             phase=phase,
             x=x.copy(),

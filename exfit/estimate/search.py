@@ -6,7 +6,7 @@ from typing import Protocol, Self
 
 from exfit.estimate.answer import Stop
 from exfit.estimate.arrays import EPS
-from exfit.estimate.linear import Linear, Step
+from exfit.estimate.linear import DampedStep, LinearModel
 from exfit.estimate.problem import Point, Problem
 
 ARMIJO = 1e-4  # share of the promised decrease that makes a trial good enough
@@ -31,7 +31,7 @@ class Search(Protocol):
     def phase(self) -> str:
         """The name in the log."""
 
-    def advance(self, problem: Problem, linear: Linear) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
         """Return the move made, and the search to go on with."""
 
 
@@ -40,7 +40,7 @@ def gain_ratio(decrease: float, promise: float) -> float:
     return decrease / promise if promise > 0.0 else nan
 
 
-def shorten(problem: Problem, linear: Linear, step: Step, trials: int) -> Move:
+def shorten(problem: Problem, linear: LinearModel, step: DampedStep, trials: int) -> Move:
     """Shorten the step until Armijo's rule holds or its promise can no longer be seen.
 
     Source: Armijo 1966.

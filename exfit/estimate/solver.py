@@ -5,10 +5,10 @@ from math import inf
 
 from numpy.typing import ArrayLike
 
-from exfit.estimate.answer import Iteration, Result
+from exfit.estimate.answer import Result, SolverIteration
 from exfit.estimate.box import checked
 from exfit.estimate.problem import RELATIVE_STEP, Differences, Function, Problem
-from exfit.estimate.run import Run
+from exfit.estimate.run import SearchRun
 from exfit.estimate.stopping import Rules
 from exfit.estimate.strategies import STRATEGIES, Method
 
@@ -26,7 +26,7 @@ def least_squares(
     xtol: float = 1e-10,
     x_scale: ArrayLike | None = None,
     good_enough: float | None = None,
-    callback: Callable[[Iteration], object] | None = None,
+    callback: Callable[[SolverIteration], object] | None = None,
 ) -> Result:
     """Minimise f(x) = 1/2 sum(fun(x)^2) within bounds, from x0 (N,).
 
@@ -64,7 +64,7 @@ def least_squares(
     if not callable(jac) and jac not in RELATIVE_STEP:
         raise ValueError(f"jac: {jac!r} is neither callable nor one of {', '.join(RELATIVE_STEP)}")
     problem = Problem(fun, jac, box, x_scale is not None)
-    run = Run(problem, Rules(max_iterations, gtol, ftol, xtol), callback)
+    run = SearchRun(problem, Rules(max_iterations, gtol, ftol, xtol), callback)
     try:
         outcome = run.best_of(STRATEGIES[method](run, run.begin(start), good_enough))
     except KeyboardInterrupt:

@@ -22,7 +22,7 @@ UNTOLD = 0.5  # standard errors: a difference that no record shows
 
 
 @dataclass(frozen=True)
-class Minimum:
+class LocalMinimum:
     """A minimum: its point x (N,), its cost, how many starts led there, the best of their ends."""
 
     x: Array
@@ -32,7 +32,7 @@ class Minimum:
 
 
 @dataclass(frozen=True)
-class Minima:
+class MultistartResult:
     """What a search from many starts found: the distinct ``minima``, the lowest first.
 
     start_costs  (count,) of the starts, the user's own first; inf where not finite, nan where an
@@ -42,7 +42,7 @@ class Minima:
     unrefined    other starts that were not refined, or not to their end
     """
 
-    minima: tuple[Minimum, ...]
+    minima: tuple[LocalMinimum, ...]
     start_costs: Array
     end_costs: Array
     failed: int
@@ -73,7 +73,7 @@ def multistart(
     xtol: float = 1e-10,
     x_scale: ArrayLike | None = None,
     good_enough: float | None = None,
-) -> Minima:
+) -> MultistartResult:
     """Minimise f(x) = 1/2 sum(fun(x)^2) from ``count`` starts spread over finite bounds (N,).
 
     The starts are x0, if there is one, and points of a scrambled Sobol sequence. The ``refine``
@@ -96,7 +96,7 @@ def multistart(
     Source: Sobol 1967; Owen 1998 (scrambling).
     """
     points = spread(bounds, count, x0, seed)
-    stop, ends = Event(), dict[int, End]()
+    stop, ends = Event(), dict[int, StartOutcome]()
     costs = screened(until(stop, fun), points, screen, workers, watch, stop)
     order = np.argsort(costs, kind="stable")[: np.count_nonzero(np.isfinite(costs))]
     if x0 is not None and np.isfinite(costs[0]):
@@ -130,7 +130,7 @@ def multistart(
     end_costs = np.full(count, nan)
     end_costs[list(ends)] = [end.result.cost for end in ends.values()]
     failed = int(np.count_nonzero(np.isinf(costs)))
-    return Minima(
+    return MultistartResult(
         minima=tuple(minimum(group, fun, jac) for group in distinct(ends[k] for k in sorted(ends))),
         start_costs=costs,
         end_costs=end_costs,
@@ -190,7 +190,7 @@ def one_by_one(fun: Function, points: Array) -> list[float]:
 
 
 @dataclass(frozen=True)
-class End:
+class StartOutcome:
     """Where a refinement ended, without residuals and J: thousands would not fit into the memory.
 
     ``triangle`` (N, N) has the lengths of J; ``step`` is what half a standard error costs.
@@ -201,17 +201,19 @@ class End:
     step: float
 
 
-def end_of(found: Result, nothing: float) -> End:
+def end_of(found: Result, nothing: float) -> StartOutcome:
     """Return the end that a refinement came to; ``nothing`` is what a perfect match may cost."""
     freedom = max(1, len(found.fun) - len(found.x))
     step = UNTOLD**2 * found.cost / freedom + nothing
     triangle = np.asarray(np.linalg.qr(found.jac, mode="r"), dtype=np.float64)
-    return End(replace(found, fun=np.zeros(0), jac=np.zeros((0, len(found.x)))), triangle, step)
+    return StartOutcome(
+        replace(found, fun=np.zeros(0), jac=np.zeros((0, len(found.x)))), triangle, step
+    )
 
 
-def distinct(ends: Iterable[End]) -> list[list[End]]:
+def distinct(ends: Iterable[StartOutcome]) -> list[list[StartOutcome]]:
     """Return the ends of each minimum, the best first."""
-    groups: list[list[End]] = []
+    groups: list[list[StartOutcome]] = []
     for end in sorted(ends, key=lambda end: end.result.cost):
         for group in groups:
             if same(group[0], end):
@@ -222,15 +224,15 @@ def distinct(ends: Iterable[End]) -> list[list[End]]:
     return groups
 
 
-def same(best: End, other: End) -> bool:
+def same(best: StartOutcome, other: StartOutcome) -> bool:
     """Tell whether two ends are one minimum, by the rule that `multistart` states."""
     way = best.triangle @ (other.result.x - best.result.x)
     rise = other.result.cost - best.result.cost
     return max(rise, 0.5 * float(way @ way)) <= best.step
 
 
-def minimum(group: Sequence[End], fun: Function, jac: Function) -> Minimum:
+def minimum(group: Sequence[StartOutcome], fun: Function, jac: Function) -> LocalMinimum:
     """Return the minimum that some ends are, with its residuals and Jacobian again."""
     best = group[0].result
     result = replace(best, fun=residuals_at(fun, best.x), jac=exact(jac, best.x))
-    return Minimum(best.x, best.cost, len(group), result)
+    return LocalMinimum(best.x, best.cost, len(group), result)

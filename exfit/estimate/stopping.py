@@ -7,10 +7,10 @@ from typing import Self
 
 import numpy as np
 
-from exfit.estimate.answer import Iteration, Stop
+from exfit.estimate.answer import SolverIteration, Stop
 from exfit.estimate.arrays import EPS, TINY, Array
 from exfit.estimate.box import Box
-from exfit.estimate.linear import Linear
+from exfit.estimate.linear import LinearModel
 from exfit.estimate.search import Move
 
 LULL = 10  # iterations
@@ -29,11 +29,11 @@ class Rules:
     first_cost: float = nan
     first_gradient: float = nan
 
-    def starting_at(self, start: Linear) -> Self:
+    def starting_at(self, start: LinearModel) -> Self:
         """Return the rules that measure by the start."""
         return replace(self, first_cost=start.point.cost, first_gradient=start.gradient_norm)
 
-    def at_rest(self, linear: Linear) -> Stop | None:
+    def at_rest(self, linear: LinearModel) -> Stop | None:
         """Return why there is nothing to gain from a point, if so."""
         if not linear.finite:
             return Stop.JACOBIAN
@@ -43,7 +43,7 @@ class Rules:
             return Stop.GRADIENT
         return Stop.STEP if self.tiny(full.target, full.origin, linear.box) else None
 
-    def after(self, before: Linear, linear: Linear, move: Move) -> Stop | None:
+    def after(self, before: LinearModel, linear: LinearModel, move: Move) -> Stop | None:
         """Return why to stop after an iteration, if so."""
         cost = before.point.cost
         if not linear.finite:
@@ -56,7 +56,7 @@ class Rules:
             return self.at_rest(linear) or stuck(linear, Stop.STALLED)
         return move.stop
 
-    def creeping(self, log: Sequence[Iteration], linear: Linear) -> Stop | None:
+    def creeping(self, log: Sequence[SolverIteration], linear: LinearModel) -> Stop | None:
         """Return why to stop after these iterations of a phase: a valley of kinks has no end.
 
         It is no minimum where the linear model still promises much: then the search has stalled.
@@ -75,7 +75,7 @@ class Rules:
         return bool(np.all(abs(there - here) <= self.xtol * size))
 
 
-def stuck(linear: Linear, stop: Stop | None) -> Stop | None:
+def stuck(linear: LinearModel, stop: Stop | None) -> Stop | None:
     """Return why to stop at a point from where no step led lower."""
     promise = linear.full.promise / linear.point.cost
     if stop is Stop.ILL_CONDITIONED:

@@ -6,13 +6,13 @@ from typing import Literal
 
 from exfit.estimate.answer import Stop
 from exfit.estimate.gauss_newton import FullStep, LineSearch
-from exfit.estimate.linear import Linear
-from exfit.estimate.run import Outcome, Run
+from exfit.estimate.linear import LinearModel
+from exfit.estimate.run import Outcome, SearchRun
 from exfit.estimate.search import Search
 from exfit.estimate.trust_region import TrustRegion
 
 Method = Literal["gn", "dgn", "lm", "lm-then-dgn", "auto", "robust"]
-Strategy = Callable[[Run, Linear, float | None], Outcome]
+Strategy = Callable[[SearchRun, LinearModel, float | None], Outcome]
 
 
 def alone(search: Search) -> Strategy:
@@ -20,7 +20,7 @@ def alone(search: Search) -> Strategy:
     return lambda run, start, _: run.descend(search, start)
 
 
-def lm_then_dgn(run: Run, start: Linear, _: float | None) -> Outcome:
+def lm_then_dgn(run: SearchRun, start: LinearModel, _: float | None) -> Outcome:
     """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on."""
     outcome = relay(run, start, TrustRegion(hand_over=True), LineSearch())
     if outcome.stop is not Stop.STALLED:
@@ -28,12 +28,12 @@ def lm_then_dgn(run: Run, start: Linear, _: float | None) -> Outcome:
     return run.descend(TrustRegion(), outcome.linear)
 
 
-def robust(run: Run, start: Linear, _: float | None) -> Outcome:
+def robust(run: SearchRun, start: LinearModel, _: float | None) -> Outcome:
     """Go on with lm where gn quits."""
     return relay(run, start, FullStep(), TrustRegion())
 
 
-def relay(run: Run, start: Linear, first: Search, second: Search) -> Outcome:
+def relay(run: SearchRun, start: LinearModel, first: Search, second: Search) -> Outcome:
     """Go on with the second search where the first ends short of a minimum."""
     outcome = run.descend(first, start)
     if outcome.converged or outcome.stop is Stop.JACOBIAN:
@@ -41,7 +41,7 @@ def relay(run: Run, start: Linear, first: Search, second: Search) -> Outcome:
     return run.descend(second, outcome.linear)
 
 
-def auto(run: Run, start: Linear, good_enough: float | None) -> Outcome:
+def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Outcome:
     """Try dgn; where that is not good enough, lm and dgn from the same start."""
     first = run.descend(LineSearch(), start)
     if matches(first, good_enough):

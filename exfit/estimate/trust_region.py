@@ -8,7 +8,7 @@ import numpy as np
 
 from exfit.estimate.answer import Stop
 from exfit.estimate.arrays import EPS, TINY, Array
-from exfit.estimate.linear import Linear, Step, solve
+from exfit.estimate.linear import DampedStep, LinearModel, solve
 from exfit.estimate.problem import Problem
 from exfit.estimate.search import ARMIJO, MOST_TRIALS, Move, gain_ratio, shorten, shortened
 
@@ -37,7 +37,7 @@ class TrustRegion:
     patience: int = PATIENCE
     phase: str = "lm"
 
-    def advance(self, problem: Problem, linear: Linear) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
         """Shrink the radius until a trial lowers the cost, and enlarge it after a good one."""
         if self.timid < self.patience:
             return self.within(problem, linear, 0)
@@ -48,7 +48,7 @@ class TrustRegion:
         radius = max(self.radius, linear.scaled_length(move.point.x))
         return replace(move, damping=0.0), replace(self, timid=0, patience=PATIENCE, radius=radius)
 
-    def within(self, problem: Problem, linear: Linear, spent: int) -> tuple[Move, Self]:
+    def within(self, problem: Problem, linear: LinearModel, spent: int) -> tuple[Move, Self]:
         """Return the best move that the trust region allows."""
         cost, search = linear.point.cost, self
         if self.radius == inf:
@@ -69,7 +69,7 @@ class TrustRegion:
                 return move, replace(search, timid=timid)
         return Move(None, nu, rejections, stop=Stop.STALLED), search
 
-    def resized(self, linear: Linear, step: Step, nu: float, decrease: float) -> Self:
+    def resized(self, linear: LinearModel, step: DampedStep, nu: float, decrease: float) -> Self:
         """Return the search with the radius that the trial suggests."""
         quality = gain_ratio(decrease, step.promise)
         length = linear.scaled_length(step.target)
@@ -81,14 +81,14 @@ class TrustRegion:
         return replace(self, radius=share * min(self.radius, 10.0 * length))
 
 
-def first_radius(problem: Problem, linear: Linear) -> float:
+def first_radius(problem: Problem, linear: LinearModel) -> float:
     """Return the radius to begin with, no longer than the full step."""
     full = linear.scaled_length(linear.full.target)
     size = float(np.linalg.norm(linear.scale * linear.box.unit))
     return min(1.0 if problem.scaled else FIRST_RADIUS * size, max(full, TINY))
 
 
-def damping(linear: Linear, radius: float) -> float:
+def damping(linear: LinearModel, radius: float) -> float:
     """Return nu for which the free part of the step is as long as the radius, to a tenth.
 
     Source: Moré 1978, section 5 (Newton's iteration on 1/|y|, safeguarded).
@@ -110,7 +110,7 @@ def damping(linear: Linear, radius: float) -> float:
     return nu
 
 
-def free_part(linear: Linear) -> tuple[Array, Array]:
+def free_part(linear: LinearModel) -> tuple[Array, Array]:
     """Return singular values and amounts of the variables that no bound holds; both (K,)."""
     free, k = linear.projected != 0.0, linear.rank
     if free.all():

@@ -22,19 +22,19 @@ from exfit.case.schema import (
     RecordFile,
     Recording,
     Signal,
-    Step,
+    StepSection,
     Switch,
     Unknown,
     known,
 )
 from exfit.case.ties import Ties
-from exfit.dsp.filtering import Conditioning, LowPass, Median, MovingAverage, outliers
+from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage, outliers
 from exfit.dsp.robust_loss import LOSSES
 from exfit.engine.system import System, trace
 from exfit.errors import CaseError, ModelError, RecordError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.nuisance import prefix_of, started, unknowns
-from exfit.fitting.parameters import Free, Known
+from exfit.fitting.nuisance import nuisance_parameters, prefix_of, with_detected_steps
+from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.fitting.recordings import column_of, initial_level, initial_voltage, measured
 from exfit.fitting.residuals import Residuals, Robust
 from exfit.models.sheet import Model
@@ -54,7 +54,7 @@ from exfit.plants import (
     playback,
 )
 from exfit.records.record import Record
-from exfit.simulation.inputs import MOST_STEPS, Change, Course, Played
+from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInputs
 from exfit.simulation.simulator import Response, Simulator, parameters_used
 
 Array = NDArray[np.float64]
@@ -154,19 +154,19 @@ def values_of(case: Case, changed: Values) -> dict[str, float]:
     return Ties(following).apply({**case.values(), **changed})
 
 
-def secured(one: Securable, values: Values, case: Path) -> Securable:
+def with_enough_substeps(one: Securable, values: Values, case: Path) -> Securable:
     """Return a simulator, or what has one, with sub-steps enough all along the response to values.
 
     Raises SimulationError, naming the case, where they have no start or no finite response.
     """
     try:
-        return one.secured(values)
+        return one.with_enough_substeps(values)
     except SimulationError as fault:
         raise SimulationError(f"{case}: {fault}") from fault
 
 
 @dataclass(frozen=True)
-class Trial:
+class ExperimentSetup:
     """A test of a case beside its record, ready to be simulated.
 
     ``test`` has a number for everything; ``free`` are those of its values that a fit finds.
@@ -176,7 +176,7 @@ class Trial:
     test: BumpTest
     record: Record
     experiment: Experiment
-    free: tuple[Free, ...]
+    free: tuple[FreeParameter, ...]
 
     @property
     def name(self) -> str:
@@ -188,48 +188,52 @@ class Trial:
         """The signals that are compared."""
         return self.experiment.channels
 
-    def known(self, values: Values) -> dict[str, float]:
+    def with_start_values(self, values: Values) -> dict[str, float]:
         """Return the values with a start for what the fit finds about this record."""
         return {**{one.name: one.start for one in self.free}, **values}
 
-    def secured(self, values: Values) -> "Trial":
+    def with_enough_substeps(self, values: Values) -> "ExperimentSetup":
         """Return the trial with sub-steps enough all along the response to the values."""
-        experiment = secured(self.experiment, self.known(values), self.case)
+        experiment = with_enough_substeps(
+            self.experiment, self.with_start_values(values), self.case
+        )
         return replace(self, experiment=experiment)
 
     def response(self, values: Values) -> Response:
         """Return everything that the simulation gives, on the clock of the record."""
-        at = self.known(values)
-        return self.experiment.moved(at).response(self.experiment.parameters(at))
+        at = self.with_start_values(values)
+        return self.experiment.with_inputs(at).response(self.experiment.parameters(at))
 
 
 def compared(channel: Channel, samples: Array) -> Array:
     """Return samples (M,) as they are compared, nan where they are left out."""
-    if channel.conditioning is None:
+    if channel.filtering is None:
         return samples
     found = np.full(len(samples), np.nan)
-    found[channel.kept] = channel.conditioned(samples)
+    found[channel.kept] = channel.filtered(samples)
     return found
 
 
-def changes(case: Case, test: BumpTest, values: Values) -> list[Change]:
+def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
     """Return what a test changes, in the order of time; a switch says what is from then on.
 
     ``values`` are those of the network at the start. Raises CaseError where the source would lose
     its voltage.
     """
     found = [
-        Change(known(step.at) or 0.0, known(step.step) or 0.0, signal, isinstance(step.at, Unknown))
+        InputStep(
+            known(step.at) or 0.0, known(step.step) or 0.0, signal, isinstance(step.at, Unknown)
+        )
         for signal in ("vref", "vs")
         for step in getattr(test, signal)
     ]
     now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
-    events: list[Step | Switch] = [*test.E, *test.network]
+    events: list[StepSection | Switch] = [*test.E, *test.network]
     for event in sorted(events, key=lambda event: event.at):
         for name, level in now.items():
             step = _step_of(event, name, level)
             if step is not None:
-                found.append(Change(event.at, step, name))
+                found.append(InputStep(event.at, step, name))
                 now[name] = None if level is None else level + step
         if now["E"] is not None and now["E"] <= 0.0:
             text = f"at {event.at:g} s the source falls to {now['E']:g} pu; it must stay above 0"
@@ -237,15 +241,15 @@ def changes(case: Case, test: BumpTest, values: Values) -> list[Change]:
     return sorted(found, key=lambda change: change.at)
 
 
-def _step_of(event: Step | Switch, name: str, level: float | None) -> float | None:
+def _step_of(event: StepSection | Switch, name: str, level: float | None) -> float | None:
     """Return by how much an event changes R, X or E; None where it leaves it."""
-    if isinstance(event, Step):
+    if isinstance(event, StepSection):
         return event.step if name == "E" else None
     then: float | None = getattr(event, name)
     return None if then is None or level is None else then - level
 
 
-def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
+def build_experiment(case: Case, recording: Recording, values: Values) -> ExperimentSetup:
     """Return a test of a case with its record read; ``values`` are those it begins with.
 
     Raises RecordError where the record cannot be used, CaseError where a signal is not simulated.
@@ -254,7 +258,7 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
     system = system_of(view)
     driving = [signal for signal in file.channels if signal in system.inputs]
     record = _without_masked(measured(case, recording.test, file), file, driving)
-    test = started(case, recording, record)
+    test = with_detected_steps(case, recording, record)
     if view is not case:
         own = {name: v for name, v in view.values().items() if name.startswith(NETWORK)}
         values = {**values, **own}
@@ -262,8 +266,8 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
         own = {}
     prefix = prefix_of(recording)
     begin = float(record.time[0]) if test.begin is None else test.begin
-    steps = tuple(changes(view, test, values))
-    nuisances, free = unknowns(prefix, test, file, steps)
+    steps = tuple(input_steps(view, test, values))
+    nuisances, free = nuisance_parameters(prefix, test, file, steps)
     if any(one.kind == "shift" for one in nuisances):
         steps = tuple(change._replace(smooth=False) for change in steps)
     delay = known(file.delay) or 0.0
@@ -273,13 +277,13 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
         for one, nuisance in zip(free, nuisances, strict=True)
         if nuisance.kind in ("delay", "shift")
     ]
-    course = Course(begin, float(record.time[-1]) + max(0.0, sum(early) - delay), steps)
+    course = Inputs(begin, float(record.time[-1]) + max(0.0, sum(early) - delay), steps)
     if driving:
         heard: dict[str, Array] = {signal: _moved(test, record, signal) for signal in driving}
-        course = replace(course, played=Played(record.time, heard))
+        course = replace(course, recorded=RecordedInputs(record.time, heard))
     simulator = Simulator(system, course, record.time, case.simulation.step)
     experiment = Experiment(
-        simulator.moved(steps, delay) if delay else simulator,
+        simulator.with_inputs(steps, delay) if delay else simulator,
         tuple(
             channel_of(case, file, record, signal)
             for signal in file.channels
@@ -289,7 +293,7 @@ def trial_of(case: Case, recording: Recording, values: Values) -> Trial:
         nuisances,
         recording.name,
     )
-    return Trial(case.path, test, record, experiment, free)
+    return ExperimentSetup(case.path, test, record, experiment, free)
 
 
 def _without_masked(record: Record, file: RecordFile, driving: Sequence[str]) -> Record:
@@ -322,7 +326,7 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> 
     if np.count_nonzero(kept) < FEWEST:
         raise RecordError(f"{record.source}: {signal}: fewer than {FEWEST} samples are left")
     most = len(samples) // WIDEST
-    if isinstance(entry.filter, schema.Median) and entry.filter.median > most:
+    if isinstance(entry.filter, schema.MedianSection) and entry.filter.median > most:
         text = (
             f"filter: median: {entry.filter.median} samples; at most {most}, a tenth of the record"
         )
@@ -332,12 +336,12 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> 
     if entry.filter is not None or window is not None or not kept.all():
         average = None if window is None else MovingAverage(window)
         try:
-            conditioning = Conditioning(record.time, kept, _filter(entry.filter), average)
+            conditioning = Filtering(record.time, kept, _filter(entry.filter), average)
         except ValueError as fault:
             what = "filter" if window is None else "filter or average"
             raise RecordError(f"{record.source}: {signal}: {what}: {fault}") from fault
     weight = entry.weight if entry.noise is None else finest_noise(case, entry.noise) / entry.noise
-    if not isinstance(entry, schema.Channel):
+    if not isinstance(entry, schema.ChannelSection):
         return Channel(signal, samples, weight, conditioning, entry.noise)
     own = column_of(entry)
     return Channel(signal, samples, weight, conditioning, entry.noise, own.scale, own.offset)
@@ -346,7 +350,7 @@ def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> 
 def _filter(chosen: Filter | None) -> LowPass | Median | None:
     if chosen is None:
         return None
-    if isinstance(chosen, schema.Median):
+    if isinstance(chosen, schema.MedianSection):
         return Median(chosen.median)
     return LowPass(chosen.lowpass)
 
@@ -390,12 +394,12 @@ def _refuse_impossible(vt0: float, record: Record) -> None:
         )
 
 
-def fitted_trials(case: Case) -> tuple[Trial, ...]:
+def build_experiments(case: Case) -> tuple[ExperimentSetup, ...]:
     """Return the tests of a case with the records that it is fitted to; CaseError without any."""
     if not case.recordings:
         raise CaseError([f"{case.path}: record: missing; a fit needs a record"])
     values = case.values()
-    return tuple(trial_of(case, one, values) for one in case.recordings)
+    return tuple(build_experiment(case, one, values) for one in case.recordings)
 
 
 def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, float]]:
@@ -420,7 +424,7 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
             ]
         )
     times = np.linspace(0.0, test.duration, round(count) + 1)
-    course = Course(0.0, test.duration, tuple(changes(case, test, values)))
+    course = Inputs(0.0, test.duration, tuple(input_steps(case, test, values)))
     return Simulator(system_of(case), course, times, case.simulation.step), {VT0: vt0}
 
 
@@ -428,18 +432,18 @@ def planned(case: Case, signals: Sequence[str] = ("vt",)) -> Experiment:
     """Return the test of a case without a record, of which some signals are seen."""
     values = case.values()
     simulator, levels = plain_simulator(case, values)
-    simulator = secured(simulator, {**values, **levels}, case.path)
+    simulator = with_enough_substeps(simulator, {**values, **levels}, case.path)
     still = np.zeros(len(simulator.times))
     seen = tuple(Channel(signal, still) for signal in signals)
     return Experiment(simulator, seen, levels)
 
 
-def residuals_of(case: Case, trials: Sequence[Trial]) -> Residuals:
+def residuals_of(case: Case, trials: Sequence[ExperimentSetup]) -> Residuals:
     """Return the residuals of a case as functions of its free parameters.
 
     Raises CaseError where nothing is free.
     """
-    free = free_of(case, trials)
+    free = free_parameters(case, trials)
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
     names = {one.name for one in free}
@@ -455,16 +459,16 @@ def robust_of(case: Case) -> Robust | None:
     return Robust(LOSSES[asked.loss], asked.loss_scale)
 
 
-def free_of(case: Case, trials: Sequence[Trial] = ()) -> list[Free]:
+def free_parameters(case: Case, trials: Sequence[ExperimentSetup] = ()) -> list[FreeParameter]:
     """Return the free parameters of a case, then what is found about its records."""
     shared = [
-        Free(
+        FreeParameter(
             name,
             one.start,
             one.min,
             one.max,
             one.scale == "log",
-            None if one.prior is None else Known(one.prior.mean, one.prior.sigma),
+            None if one.prior is None else Prior(one.prior.mean, one.prior.sigma),
         )
         for name, one in case.free().items()
     ]

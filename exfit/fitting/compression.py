@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.residuals import Residuals
-from exfit.simulation.interpolation import NEIGHBOURS, Sampling
+from exfit.simulation.interpolation import NEIGHBOURS, Interpolation
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -42,12 +42,12 @@ class Form:
 
 
 @dataclass(frozen=True, eq=False)
-class CondensedChannel(Channel):
+class CompressedChannel(Channel):
     """A channel whose simulated samples are all points of the grid (G,)."""
 
     form: Form = field(kw_only=True)
 
-    def conditioned(self, samples: Array) -> Array:
+    def filtered(self, samples: Array) -> Array:
         """Return what is compared of samples (G,): (6 K + 1,)."""
         found = np.einsum("kij,kj->ki", self.form.maps, samples[self.form.rows])
         return np.append(found, 0.0)
@@ -71,7 +71,7 @@ class CondensedChannel(Channel):
 KNOWN: MutableMapping[Residuals, Residuals | None] = WeakKeyDictionary()  # for as long as it lives
 
 
-def condensed(residuals: Residuals) -> Residuals:
+def compressed(residuals: Residuals) -> Residuals:
     """Return residuals with the same cost and gradient at every point, but fewer of them.
 
     The Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the
@@ -114,18 +114,18 @@ def _condensed(one: Experiment) -> Experiment:
     )
 
 
-def _condensed_channel(channel: Channel, sampling: Sampling) -> CondensedChannel:
-    return CondensedChannel(
+def _condensed_channel(channel: Channel, sampling: Interpolation) -> CompressedChannel:
+    return CompressedChannel(
         signal=channel.signal,
         measured=channel.measured,
         weight=channel.weight,
-        conditioning=channel.conditioning,
+        filtering=channel.filtering,
         noise=channel.noise,
         form=form_of(sampling, channel.measured, channel.kept),
     )
 
 
-def form_of(sampling: Sampling, measured: Array, kept: NDArray[np.bool_]) -> Form:
+def form_of(sampling: Interpolation, measured: Array, kept: NDArray[np.bool_]) -> Form:
     """Return the form of a record's kept samples (M,)."""
     first = sampling.first[kept]
     starts = np.flatnonzero(np.diff(first, prepend=-1))

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.filtering import Conditioning
+from exfit.dsp.filtering import Filtering
 from exfit.plants import VT0
-from exfit.simulation.inputs import Change, Direction
+from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -43,39 +43,39 @@ class Channel:
     signal: str
     measured: Array
     weight: float = 1.0
-    conditioning: Conditioning | None = None
+    filtering: Filtering | None = None
     noise: float | None = None
     scale: float = 1.0
     offset: float = 0.0
 
-    def conditioned(self, samples: Array) -> Array:
+    def filtered(self, samples: Array) -> Array:
         """Return samples (M,) as they are compared: filtered, without those left out."""
-        return samples if self.conditioning is None else self.conditioning.apply(samples)
+        return samples if self.filtering is None else self.filtering.apply(samples)
 
-    def shown(self, simulated: Array) -> Array:
+    def as_recorded(self, simulated: Array) -> Array:
         """Return simulated values (M, ...) as the recorder shows them, before they are conditioned.
 
         Where it records averages, these are averaged alike; so are derivatives.
         """
-        return simulated if self.conditioning is None else self.conditioning.shown(simulated)
+        return simulated if self.filtering is None else self.filtering.as_recorded(simulated)
 
     def slopes(self, samples: Array, slopes: Array) -> Array:
         """Return the derivatives of conditioned samples, given those (M, N) of the samples."""
-        if self.conditioning is None:
+        if self.filtering is None:
             return slopes
-        return self.conditioning.tangents(samples, slopes)
+        return self.filtering.tangents(samples, slopes)
 
     @cached_property
     def record(self) -> Array:
         """The record as it is compared: filtering it for every evaluation would double the work."""
-        return self.conditioned(self.measured)
+        return self.filtered(self.measured)
 
     @property
     def kept(self) -> NDArray[np.bool_]:
         """Which samples are compared, (M,)."""
-        if self.conditioning is None:
+        if self.filtering is None:
             return np.ones(len(self.measured), dtype=bool)
-        return self.conditioning.kept
+        return self.filtering.kept
 
     @property
     def samples(self) -> int:
@@ -90,9 +90,9 @@ class Channel:
     @property
     def plain(self) -> bool:
         """Whether samples are compared as they stand."""
-        if self.conditioning is None:
+        if self.filtering is None:
             return True
-        return self.conditioning.filter is None and self.conditioning.averaged is None
+        return self.filtering.filter is None and self.filtering.averaged is None
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +132,11 @@ class Experiment:
                 found[VT0] = values[one.name]
         return found
 
-    def moved(self, values: Values) -> Simulator:
+    def with_inputs(self, values: Values) -> Simulator:
         """Return the simulator with the steps and the delay that the values give."""
         if not self.moves:
             return self.simulator
-        steps: list[Change] = list(self.simulator.course.steps)
+        steps: list[InputStep] = list(self.simulator.inputs.steps)
         delay = self.simulator.delay
         for one in self.nuisances:
             if one.kind == "at":
@@ -148,7 +148,7 @@ class Experiment:
         shifts = [
             values[one.name] - steps[one.step].at for one in self.nuisances if one.kind == "shift"
         ]
-        return self.simulator.moved(tuple(steps), sum(shifts, start=delay))
+        return self.simulator.with_inputs(tuple(steps), sum(shifts, start=delay))
 
     def measured(self, channel: Channel, values: Values) -> Array:
         """Return a record (M,) in per unit, by the scale and offset that the values give."""
@@ -162,7 +162,7 @@ class Experiment:
 
     def samples(self, values: Values) -> tuple[Array, int]:
         """Return the simulated signals (M, channels), and the number of sub-steps."""
-        return self.moved(values).samples(self.parameters(values), self.signals)
+        return self.with_inputs(values).samples(self.parameters(values), self.signals)
 
     def errors(self, values: Values) -> tuple[Array, int]:
         """Return the weighted errors, one channel behind the other, and the sub-steps."""
@@ -183,8 +183,8 @@ class Experiment:
         for k, channel in enumerate(self.channels):
             measured = self.measured(channel, values)
             same = measured is channel.measured
-            theirs = channel.record if same else channel.conditioned(measured)
-            ours = channel.conditioned(channel.shown(samples[:, k]))
+            theirs = channel.record if same else channel.filtered(measured)
+            ours = channel.filtered(channel.as_recorded(samples[:, k]))
             blocks.append(channel.weight * ours - channel.weight * theirs)
         return np.concatenate(blocks)
 
@@ -193,19 +193,23 @@ class Experiment:
 
         Each of ``moves`` (N) is a direction: by how much it changes which value.
         """
-        samples, slopes = self.course(values, moves)
+        samples, slopes = self.response_with_derivatives(values, moves)
         blocks = []
         for k, channel in enumerate(self.channels):
-            ours = channel.slopes(channel.shown(samples[:, k]), channel.shown(slopes[:, k]))
+            ours = channel.slopes(
+                channel.as_recorded(samples[:, k]), channel.as_recorded(slopes[:, k])
+            )
             theirs = self._measured_slopes(channel, values, moves)
             blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
         return self.compared(samples, values), np.concatenate(blocks)
 
-    def course(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
+    def response_with_derivatives(
+        self, values: Values, moves: Sequence[Values]
+    ) -> tuple[Array, Array]:
         """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
         directions = [self._direction(move) for move in moves]
         moving = [k for k, direction in enumerate(directions) if direction != Direction()]
-        samples, found = self.moved(values).tangents(
+        samples, found = self.with_inputs(values).tangents(
             self.parameters(values), self.signals, [directions[k] for k in moving]
         )
         if len(moving) == len(moves):
@@ -251,9 +255,9 @@ class Experiment:
                 columns[:, k] += by * move.get(one.name, 0.0)
         return channel.slopes(self.measured(channel, values), columns)
 
-    def secured(self, values: Values) -> "Experiment":
+    def with_enough_substeps(self, values: Values) -> "Experiment":
         """Return the experiment with sub-steps enough all along the response to the values."""
-        steps, delay = self.simulator.course.steps, self.simulator.delay
-        simulator = self.moved(values).secured(self.parameters(values))
+        steps, delay = self.simulator.inputs.steps, self.simulator.delay
+        simulator = self.with_inputs(values).with_enough_substeps(self.parameters(values))
         # moved back: what the values shift must not be shifted twice
-        return replace(self, simulator=simulator.moved(steps, delay))
+        return replace(self, simulator=simulator.with_inputs(steps, delay))

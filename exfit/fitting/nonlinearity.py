@@ -6,16 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.estimate.problem import half_square
-from exfit.fitting.compression import condensed
+from exfit.fitting.compression import compressed
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.uncertainty import Knowledge
+from exfit.fitting.uncertainty import UncertaintyAnalysis
 
 Array = NDArray[np.float64]
 
 BENT = 2.0  # times the rise that the theory tells: there an end may be 30 % off
 
 
-def bent(residuals: Residuals, theta: Array, known: Knowledge) -> tuple[str, ...]:
+def nonlinear_parameters(
+    residuals: Residuals, theta: Array, known: UncertaintyAnalysis
+) -> tuple[str, ...]:
     """Return the parameters over whose intervals the response is not linear.
 
     Each end of an interval is visited along the linear trace, on which the other parameters follow,
@@ -24,7 +26,7 @@ def bent(residuals: Residuals, theta: Array, known: Knowledge) -> tuple[str, ...
 
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
-    residuals = condensed(residuals)
+    residuals = compressed(residuals)
     least, rises, linear = half_square(residuals(theta)), known.rises, known.linear
     found = [
         name
@@ -35,7 +37,9 @@ def bent(residuals: Residuals, theta: Array, known: Knowledge) -> tuple[str, ...
     return tuple(name for name in dict.fromkeys(found) if not of_record[name])
 
 
-def _ends(residuals: Residuals, theta: Array, known: Knowledge) -> Iterator[tuple[str, Array]]:
+def _ends(
+    residuals: Residuals, theta: Array, known: UncertaintyAnalysis
+) -> Iterator[tuple[str, Array]]:
     """Yield both ends of each interval, with the others along, unless a bound comes before."""
     low, high = residuals.bounds
     own = np.array([one.slope(float(x)) for one, x in zip(residuals.free, theta, strict=True)])

@@ -13,9 +13,9 @@ from exfit.dsp.filtering import outliers
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.experiment import Nuisance
-from exfit.fitting.parameters import Free
+from exfit.fitting.parameters import FreeParameter
 from exfit.records.record import Record
-from exfit.simulation.inputs import Change
+from exfit.simulation.inputs import InputStep
 
 JUMPS = ("efd",)  # signals that follow a step at once
 
@@ -23,7 +23,7 @@ AROUND = 0.25  # s: how far the instant may be from where a record shows the ste
 SHARE = 0.5  # of the size that a record shows: how far the size may be from it
 
 
-def started(case: Case, recording: Recording, record: Record) -> BumpTest:
+def with_detected_steps(case: Case, recording: Recording, record: Record) -> BumpTest:
     """Return the test of a recording with a start and bounds for all that a fit finds.
 
     Where the instant of a step is to be found, the record is at rest until its lower bound.
@@ -96,7 +96,7 @@ def _bounded(place: str, step: FindableStep, record: Record, limit: float | None
     return step.model_copy(update=update)
 
 
-def shifted(test: BumpTest, file: RecordFile, steps: Sequence[Change]) -> bool:
+def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> bool:
     """Tell whether the instant of a step can be found by shifting the whole response.
 
     That leaves the simulation as it is, and with it the steps at which limits are met; a smooth
@@ -114,27 +114,29 @@ def prefix_of(recording: Recording) -> str:
 def names_of(recording: Recording) -> tuple[str, ...]:
     """Return the names of all that a fit finds about a record."""
     test, file = recording.test, recording.record
-    steps = [Change(0.0, 0.0, signal) for signal in ("vref", "vs") for _ in getattr(test, signal)]
+    steps = [
+        InputStep(0.0, 0.0, signal) for signal in ("vref", "vs") for _ in getattr(test, signal)
+    ]
     return tuple(one.name for one, _ in _found(prefix_of(recording), test, file, steps))
 
 
-def unknowns(
-    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[Change]
-) -> tuple[tuple[Nuisance, ...], tuple[Free, ...]]:
+def nuisance_parameters(
+    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep]
+) -> tuple[tuple[Nuisance, ...], tuple[FreeParameter, ...]]:
     """Return what a fit finds about a record; the names begin with ``prefix``."""
     found = [*_found(prefix, test, file, steps)]
     return tuple(one for one, _ in found), tuple(_free(one.name, value) for one, value in found)
 
 
 def _found(
-    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[Change]
+    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep]
 ) -> Iterator[tuple[Nuisance, Unknown]]:
     yield from _of_steps(prefix, test, steps, shifted(test, file, steps))
     yield from _of_record(prefix, test, file)
 
 
 def _of_steps(
-    prefix: str, test: BumpTest, steps: Sequence[Change], shift: bool
+    prefix: str, test: BumpTest, steps: Sequence[InputStep], shift: bool
 ) -> Iterator[tuple[Nuisance, Unknown]]:
     for signal in ("vref", "vs"):
         places = [place for place, change in enumerate(steps) if change.signal == signal]
@@ -159,10 +161,10 @@ def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[
                 yield Nuisance(f"{prefix}{signal}.{kind}", kind, signal=signal), value
 
 
-def _free(name: str, value: Unknown) -> Free:
+def _free(name: str, value: Unknown) -> FreeParameter:
     if value.start == "auto" or value.min is None or value.max is None:
         raise TypeError(f"{name} has no start or bounds")
-    return Free(name, value.start, value.min, value.max, logarithmic=False)
+    return FreeParameter(name, value.start, value.min, value.max, logarithmic=False)
 
 
 UNITS: Mapping[str, str] = {"at": "s", "step": "pu", "vt0": "pu", "delay": "s", "offset": "pu"}

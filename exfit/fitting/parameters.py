@@ -7,7 +7,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Known:
+class Prior:
     """What is known of a parameter beforehand: its mean and standard deviation."""
 
     mean: float
@@ -15,7 +15,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeParameter:
     """A parameter that the fit may move, between ``low`` and ``high``.
 
     The estimator sees its logarithm, or its place in the interval where zero may be reached.
@@ -26,7 +26,7 @@ class Free:
     low: float
     high: float
     logarithmic: bool
-    prior: Known | None = None
+    prior: Prior | None = None
 
     def scaled(self, value: float) -> float:
         """Return the number that the estimator moves."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, Channel, Phases, RecordFile, TimeColumn, known
+from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, RecordFile, TimeColumn, known
 from exfit.errors import RecordError
 from exfit.records.record import Clock, Record, ThreePhases, read_record
 from exfit.util.text import show
@@ -85,7 +85,7 @@ def clock_of(record: RecordFile) -> Clock:
     return Clock(record.time)
 
 
-def column_of(channel: Channel) -> Column:
+def column_of(channel: ChannelSection) -> Column:
     """Return the column of a channel; where a fit finds scale or offset, with their starts."""
     scale, offset = known(channel.scale), known(channel.offset)
     return Column(
@@ -93,16 +93,16 @@ def column_of(channel: Channel) -> Column:
     )
 
 
-def _as_it_stands(channel: Channel | Phases) -> bool:
+def _as_it_stands(channel: ChannelSection | PhasesSection) -> bool:
     """Tell whether a case takes the numbers of a column for per unit."""
-    if not isinstance(channel, Channel):
+    if not isinstance(channel, ChannelSection):
         return False
     return channel.unit is None and channel.base is None and channel.scale == 1.0
 
 
-def source_of(channel: Channel | Phases) -> Column | ThreePhases:
+def source_of(channel: ChannelSection | PhasesSection) -> Column | ThreePhases:
     """Return where a signal stands: in a column, or in three."""
-    if isinstance(channel, Channel):
+    if isinstance(channel, ChannelSection):
         return column_of(channel)
     return ThreePhases(
         channel.phases,

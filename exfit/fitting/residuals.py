@@ -16,7 +16,7 @@ from exfit.dsp.robust_loss import Loss
 from exfit.engine.kernel import SIDE_BY_SIDE
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.parameters import Free, Known
+from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class Residuals:
     def __init__(
         self,
         experiments: Sequence[Experiment],
-        free: Sequence[Free],
+        free: Sequence[FreeParameter],
         fixed: Mapping[str, float],
         ties: Ties | None = None,
         robust: Robust | None = None,
@@ -155,7 +155,7 @@ class Residuals:
         return loss.influence(errors, self._scales), loss.curvature(errors, self._scales)
 
     @property
-    def priors(self) -> dict[int, Known]:
+    def priors(self) -> dict[int, Prior]:
         """What is known beforehand, by the place of the parameter among the free ones."""
         return {k: one.prior for k, one in enumerate(self.free) if one.prior is not None}
 
@@ -256,7 +256,7 @@ def noise_of(channel: Channel) -> float:
     if channel.noise is not None:
         return channel.noise
     measured = channel.measured[channel.kept]
-    apart = 1 if channel.conditioning is None else channel.conditioning.smooth_over
+    apart = 1 if channel.filtering is None else channel.filtering.smooth_over
     # neighbours in one window of an average scatter little: they share most of it
     return max(noise(measured[::apart] if len(measured) > NEIGHBOURS * apart else measured), FINEST)
 

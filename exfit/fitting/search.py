@@ -7,26 +7,26 @@ import numpy as np
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
-from exfit.fitting.build import Trial, fitted_trials, residuals_of
-from exfit.fitting.compression import condensed
+from exfit.fitting.build import ExperimentSetup, build_experiments, residuals_of
+from exfit.fitting.compression import compressed
 from exfit.fitting.residuals import JACOBIANS, Residuals
 
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
-def fitted(case: Case) -> tuple[tuple[Trial, ...], Residuals]:
+def fitted(case: Case) -> tuple[tuple[ExperimentSetup, ...], Residuals]:
     """Return the tests of a case with the records that it is fitted to, and what is made small.
 
     Raises ExfitError where there is none, or one that cannot be fitted.
     """
     given = case.values()
-    trials = tuple(trial.secured(given) for trial in fitted_trials(case))
+    trials = tuple(trial.with_enough_substeps(given) for trial in build_experiments(case))
     residuals = residuals_of(case, trials)
     refuse_unfit(case, residuals)
     return trials, residuals
 
 
-def names_of_records(trials: Iterable[Trial]) -> tuple[str, ...]:
+def names_of_records(trials: Iterable[ExperimentSetup]) -> tuple[str, ...]:
     """Return the names of all that is found about the records themselves."""
     return tuple(one.name for trial in trials for one in trial.free)
 
@@ -35,12 +35,12 @@ def search(
     case: Case,
     residuals: Residuals,
     method: estimate.Method,
-    announce: Callable[[estimate.Iteration], None],
+    announce: Callable[[estimate.SolverIteration], None],
     progress: Callable[[estimate.Progress], None],
-) -> tuple[estimate.Result, estimate.Minima | None]:
+) -> tuple[estimate.Result, estimate.MultistartResult | None]:
     """Return the best point found from the start of a case, or from all its starts."""
     asked = case.estimate
-    fewer = condensed(residuals)
+    fewer = compressed(residuals)
     known = len(fewer.priors)
     share = (fewer.samples + known) / (fewer.count + known)
     good_enough = asked.good_enough.rmse * np.sqrt(share)
@@ -95,7 +95,7 @@ def refuse_unfit(case: Case, residuals: Residuals) -> None:
             level = f"{channel.signal} is {measured[0]:g} pu throughout"
             raise CaseError([f"{case.path}: record: {level}: it shows no test"])
     with np.errstate(over="ignore"):
-        start = condensed(residuals)(residuals.start)
+        start = compressed(residuals)(residuals.start)
         square = float(start @ start)
     if not np.isfinite(square):
         largest = float(np.max(np.abs(start)))

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.fitting.compression import condensed
+from exfit.fitting.compression import compressed
 from exfit.fitting.residuals import Residuals
 from exfit.inference import (
-    Channel,
     Confidence,
     Identifiability,
     Linearisation,
-    Prior,
+    PriorRow,
+    ResidualBlock,
     confidence,
     identifiability,
     rises,
@@ -26,7 +26,7 @@ from exfit.inference.wording import listed
 Array = NDArray[np.float64]
 
 
-class Moved(NamedTuple):
+class Sensitivity(NamedTuple):
     """By how much a signal moves over ``time`` (S,) in s for 100 % of each parameter: (S, N), pu.
 
     What counts as 100 % says `Linearisation.size`: the value, for most.
@@ -38,7 +38,7 @@ class Moved(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Knowledge:
+class UncertaintyAnalysis:
     """Confidence and identifiability at the solution, with the linearisation that they are of.
 
     ``sensitivity`` is one course for each channel. ``bent`` names the parameters over whose
@@ -48,15 +48,15 @@ class Knowledge:
     linear: Linearisation
     confidence: Confidence
     identifiability: Identifiability
-    sensitivity: tuple[Moved, ...]
-    bent: tuple[str, ...] = ()
+    sensitivity: tuple[Sensitivity, ...]
+    nonlinear: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures, without the samples."""
         return {
             "confidence": self.confidence.as_json(),
             "identifiability": self.identifiability.as_json(),
-            "not_linear": list(self.bent),
+            "not_linear": list(self.nonlinear),
             "sentences": list(self.sentences),
         }
 
@@ -82,37 +82,41 @@ class Knowledge:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What a reader must know of it, in words."""
-        names = ", ".join(self.bent)
+        names = ", ".join(self.nonlinear)
         told = f"the response is not linear over the intervals of {names}: see `exfit profile`"
         return (*self.confidence.sentences, *([told] if names else []), *self.open)
 
 
-def knowledge(residuals: Residuals, theta: Array, of_record: tuple[str, ...]) -> Knowledge:
+def uncertainty_at(
+    residuals: Residuals, theta: Array, of_record: tuple[str, ...]
+) -> UncertaintyAnalysis:
     """Return what the records tell at the scaled parameters theta (N,).
 
     ``of_record`` names what belongs to a record and is no parameter of the unit. Raises
     SimulationError where a derivative is not finite.
     """
     linear = linearisation(residuals, theta, of_record)
-    return known_of(residuals, theta, linear)
+    return uncertainty_of(residuals, theta, linear)
 
 
-def known_of(residuals: Residuals, theta: Array, linear: Linearisation) -> Knowledge:
+def uncertainty_of(
+    residuals: Residuals, theta: Array, linear: Linearisation
+) -> UncertaintyAnalysis:
     """Return what a linearisation of the residuals at theta (N,) tells."""
     known, courses = confidence(linear), tuple(sensitivity(residuals, theta, linear))
-    return Knowledge(linear, known, identifiability(linear, known), courses)
+    return UncertaintyAnalysis(linear, known, identifiability(linear, known), courses)
 
 
-def sensitivity(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Moved]:
+def sensitivity(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:
     """Yield what each channel shows: at the record's samples or, where condensed, of the grid."""
     values, moves = residuals.values(theta), residuals.moves(theta)
     size = linear.size / slopes_of(residuals, theta)
     labels = iter(linear.channels)
-    for one, whole in zip(condensed(residuals).experiments, residuals.experiments, strict=True):
-        _, slopes = one.course(values, moves)
+    for one, whole in zip(compressed(residuals).experiments, residuals.experiments, strict=True):
+        _, slopes = one.response_with_derivatives(values, moves)
         late = 0.0 if one is whole else one.simulator.delay  # the grid is the simulation's
         for k in range(len(one.channels)):
-            yield Moved(next(labels).label, one.simulator.times + late, slopes[:, k] * size)
+            yield Sensitivity(next(labels).label, one.simulator.times + late, slopes[:, k] * size)
 
 
 def slopes_of(residuals: Residuals, theta: Array) -> Array:
@@ -129,7 +133,7 @@ def linearisation(
     ``errors`` takes the place of those at theta. Raises SimulationError where a derivative is not
     finite.
     """
-    values, fewer = residuals.values(theta), condensed(residuals)
+    values, fewer = residuals.values(theta), compressed(residuals)
     found, slopes = fewer.errors(theta)
     if not np.isfinite(slopes).all():
         at = ", ".join(f"{one.name} = {values[one.name]:g}" for one in residuals.free)
@@ -151,14 +155,14 @@ def linearisation(
         curvature=curvature,
         channels=tuple(_channels(residuals, fewer.sizes)),
         priors=tuple(
-            Prior(k, known.mean, known.std, residuals.noise)
+            PriorRow(k, known.mean, known.std, residuals.noise)
             for k, known in residuals.priors.items()
         ),
         nuisances=tuple(one.name in of_record for one in free),
     )
 
 
-def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[Channel]:
+def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[ResidualBlock]:
     """Yield where the errors of each channel stand among those of all, and its rows."""
     several = len(residuals.experiments) > 1
     each = [(one, channel) for one in residuals.experiments for channel in one.channels]
@@ -166,7 +170,7 @@ def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[Channel]:
     for (one, channel), (own, errors) in zip(each, places, strict=True):
         label = f"{one.name} {channel.signal}" if several else channel.signal
         noise = None if channel.noise is None else channel.noise * channel.weight
-        yield Channel(label, own, noise, channel.weight, errors)
+        yield ResidualBlock(label, own, noise, channel.weight, errors)
 
 
 def slices(sizes: Sequence[int]) -> list[slice]:

@@ -4,7 +4,7 @@ Arrays in, results out: a `Linearisation` of the fit at its minimum gives `confi
 errors, intervals) and `identifiability` (what can move together unseen, and what to fix).
 """
 
-from exfit.inference.combinations import WEAK, Change, Combination
+from exfit.inference.combinations import WEAK, Combination, ParameterShift
 from exfit.inference.confidence import (
     LEVEL,
     UNDETERMINED,
@@ -15,22 +15,22 @@ from exfit.inference.confidence import (
 )
 from exfit.inference.fixings import Fixing
 from exfit.inference.identifiability import Identifiability, identifiability
-from exfit.inference.linear import Channel, Linearisation, Prior
+from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
 from exfit.inference.noise import Noise
 
 __all__ = [
     "LEVEL",
     "UNDETERMINED",
     "WEAK",
-    "Change",
-    "Channel",
     "Combination",
     "Confidence",
     "Fixing",
     "Identifiability",
     "Linearisation",
     "Noise",
-    "Prior",
+    "ParameterShift",
+    "PriorRow",
+    "ResidualBlock",
     "Uncertainty",
     "confidence",
     "identifiability",

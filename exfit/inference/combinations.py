@@ -22,7 +22,7 @@ TIED = 6  # digits: components that differ less are equal but for rounding
 
 
 @dataclass(frozen=True)
-class Change:
+class ParameterShift:
     """By how much a signal moves: root mean square, in pu and in standard deviations of noise."""
 
     signal: str
@@ -40,7 +40,7 @@ class Combination:
     """
 
     moves: tuple[tuple[str, float], ...]
-    changes: tuple[Change, ...]
+    changes: tuple[ParameterShift, ...]
     error: float | None
     exact: bool
     sentence: str
@@ -77,7 +77,7 @@ def exact_combinations(lin: Linearisation, noise: Sequence[Noise]) -> Iterator[C
     """Yield what nothing tells apart, those on a bound too: it may be why they are there."""
     factors = factored(lin, np.ones(len(lin.names), dtype=bool))
     signals = listed([one.label for one in lin.channels])
-    still = tuple(Change(one.label, 0.0, 0.0) for one in lin.channels)
+    still = tuple(ParameterShift(one.label, 0.0, 0.0) for one in lin.channels)
     for k in np.flatnonzero(~factors.seen):
         name = lin.names[k]
         text = f"{name} has no effect on {signals}: fix it"
@@ -104,14 +104,16 @@ def weak_combinations(
         yield Combination(named(lin, moves), changes, 1.0 / float(value), False, told)
 
 
-def changes_of(lin: Linearisation, noise: Sequence[Noise], moved: Array) -> Iterator[Change]:
+def changes_of(
+    lin: Linearisation, noise: Sequence[Noise], moved: Array
+) -> Iterator[ParameterShift]:
     """Yield what each channel does when the weighted errors move (M,)."""
     for channel, one in zip(lin.channels, noise, strict=True):
         rms = float(np.linalg.norm(moved[channel.rows])) / sqrt(one.samples)
-        yield Change(channel.label, rms / channel.weight, rms / one.std if one.std else inf)
+        yield ParameterShift(channel.label, rms / channel.weight, rms / one.std if one.std else inf)
 
 
-def effects(changes: Sequence[Change]) -> str:
+def effects(changes: Sequence[ParameterShift]) -> str:
     """Return "vt changes by 3e-6 pu rms, 0.03 of its noise; efd by 5e-4 pu, 0.02"."""
     first, *others = changes
     told = (

@@ -15,7 +15,7 @@ LEAST_CURVATURE = 1e-3  # of least squares: a loss that takes nearly every sampl
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class ResidualBlock:
     """The errors of one signal in one record, on one clock, in the order of time.
 
     label   "vt", or "up vt" where there are several records
@@ -38,7 +38,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Prior:
+class PriorRow:
     """What was known of a parameter: it adds the residual noise * (x - mean) / std to the fit.
 
     noise is what the fit took as the standard deviation of a weighted error.
@@ -81,8 +81,8 @@ class Linearisation:
     jacobian: Array
     influence: Array
     curvature: Array
-    channels: tuple[Channel, ...]
-    priors: tuple[Prior, ...] = ()
+    channels: tuple[ResidualBlock, ...]
+    priors: tuple[PriorRow, ...] = ()
     nuisances: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
@@ -126,7 +126,7 @@ class Linearisation:
         """The derivative of the errors to relative changes, (R, N)."""
         return np.asarray(self.jacobian * self.size)
 
-    def mean_curvature(self, channel: Channel) -> float:
+    def mean_curvature(self, channel: ResidualBlock) -> float:
         """Return psi' of the loss over a channel, on average: 1 for least squares."""
         return max(float(np.mean(self.curvature[channel.samples])), LEAST_CURVATURE)
 

@@ -7,7 +7,7 @@ from math import nan, sqrt
 import numpy as np
 
 from exfit.inference.factors import Factors
-from exfit.inference.linear import Array, Channel
+from exfit.inference.linear import Array, ResidualBlock
 from exfit.inference.wording import digits
 
 SURPRISING = 0.01  # of tests of what is true reject it
@@ -79,7 +79,7 @@ def noise_of(factors: Factors) -> tuple[Noise, ...]:
     return tuple(_noise(factors, channel, share) for channel in lin.channels)
 
 
-def _noise(factors: Factors, channel: Channel, share: float) -> Noise:
+def _noise(factors: Factors, channel: ResidualBlock, share: float) -> Noise:
     lin = factors.lin
     influence = lin.influence[channel.samples]
     samples = len(influence)

@@ -31,7 +31,7 @@ def sheet(*rows: Row) -> Sheet:
 
 
 @dataclass(frozen=True)
-class Record:
+class DynamicsRecord:
     """How a PSS/E file lists a model: the symbols of its constants (CONs) in their order.
 
     ``icons`` are the integers before them, each a symbol and the only value that the model stands
@@ -56,9 +56,9 @@ def record(
     absent: Mapping[str, float] | None = None,
     ignored: str = "",
     doubt: str = "",
-) -> Record:
+) -> DynamicsRecord:
     """Return a PSS/E record from its symbols in one text, ``"TR KA TA"``."""
-    return Record(
+    return DynamicsRecord(
         name,
         tuple(cons.split()),
         tuple((icons or {}).items()),
@@ -86,7 +86,7 @@ class Model:
     sheet: Sheet
     states: tuple[str, ...]
     setpoints: tuple[str, ...]
-    records: tuple[Record, ...]
+    records: tuple[DynamicsRecord, ...]
     inputs: tuple[str, ...]
     equations: Callable[..., Any]
     rest: Callable[..., Any]

@@ -10,7 +10,7 @@ from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Model, typical
 from exfit.plants import MACHINE, SATURATION, VT0, alone, open_circuit
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Response, Simulator
 from exfit.util.files import write
 
@@ -19,7 +19,7 @@ MACHINE_DATA: Mapping[str, float] = {
     "S10": 0.12, "S12": 0.4,
 }  # fmt: skip
 WITHOUT_PLANT = ("FIRST_ORDER",)
-STEP = Change(1.0, 0.05)
+STEP = InputStep(1.0, 0.05)
 SECONDS = 10.0
 SAMPLES = 2001
 GRID = 0.001  # s
@@ -49,7 +49,7 @@ ABOUT = (
 
 def sample_response(model: Model) -> Response:
     """Return the response of a model with its typical data to a step of 5 %."""
-    course, times = Course(0.0, SECONDS, (STEP,)), np.linspace(0.0, SECONDS, SAMPLES)
+    course, times = Inputs(0.0, SECONDS, (STEP,)), np.linspace(0.0, SECONDS, SAMPLES)
     if model.name in WITHOUT_PLANT:
         values = {**typical(model.sheet), VT0: 1.0}
         return Simulator(alone(model), course, times, GRID).response(values)
@@ -58,7 +58,7 @@ def sample_response(model: Model) -> Response:
     values = {**typical(model.sheet), VT0: 1.0}
     values |= {MACHINE + symbol: value for symbol, value in of_machine.items()}
     system = open_circuit(model, machine, SATURATION["quadratic"])
-    return Simulator(system, course, times, GRID).secured(values).response(values)
+    return Simulator(system, course, times, GRID).with_enough_substeps(values).response(values)
 
 
 def write_overview(folder: Path) -> list[Path]:

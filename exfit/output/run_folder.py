@@ -15,21 +15,21 @@ from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.case.case import SINGLE
 from exfit.errors import CaseError, ExfitError
-from exfit.fitting.uncertainty import Knowledge
+from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.records.inspection import Inspection
 from exfit.results.model import Comparison, FitResult
 from exfit.results.tables import (
     DIGITS,
     comparison_table,
-    courses_table,
     history_table,
+    iteration_responses_table,
     parameter_file,
     table,
 )
 from exfit.util.cache import cache_folder
 from exfit.util.files import write
 from exfit.util.text import to_json
-from exfit.workflows import Simulation
+from exfit.workflows import SimulationResult
 
 Array = NDArray[np.float64]
 
@@ -73,12 +73,12 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
     for one in result.comparisons:
         name = ITERATIONS if one.name == SINGLE else f"{one.name}-{ITERATIONS}"
         (folder / name).unlink(missing_ok=True)
-        if one.courses is not None:
-            write(folder / name, courses_table(one.time, one.courses))
+        if one.iteration_responses is not None:
+            write(folder / name, iteration_responses_table(one.time, one.iteration_responses))
     if figures:
         from exfit.output import plots
 
-        if any(one.courses is not None for one in result.comparisons):
+        if any(one.iteration_responses is not None for one in result.comparisons):
             write(folder / "iterations.png", plots.png(plots.iterations(result)))
         if result.comparison.name == SINGLE:
             title = f"{result.name}: {result.model} fitted to {result.comparison.record.name}"
@@ -95,7 +95,7 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
         write(_kept(result.case), parameter_file(result))
 
 
-def write_knowledge_figures(known: Knowledge, name: str, folder: Path) -> None:
+def write_knowledge_figures(known: UncertaintyAnalysis, name: str, folder: Path) -> None:
     """Write what each parameter does to each signal over time, and how they are correlated."""
     from exfit.output import plots
 
@@ -152,7 +152,7 @@ def write_inspection(found: Inspection, folder: Path, figures: bool) -> None:
     write(folder / "inspect.json", to_json(found.as_json()))
 
 
-def write_simulation(simulation: Simulation, name: str, folder: Path, figures: bool) -> None:
+def write_simulation(simulation: SimulationResult, name: str, folder: Path, figures: bool) -> None:
     """Write a response, and its figures."""
     response = simulation.response
     header = ["t", *response.signals]

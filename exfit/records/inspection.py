@@ -18,8 +18,8 @@ from exfit.records.record import Clock, check_finite
 from exfit.records.steps import (
     ROUNDING,
     SAME_STEP,
-    Change,
-    Step,
+    LevelChange,
+    RecordedStep,
     changes_of,
     from_start,
     switches,
@@ -40,7 +40,7 @@ AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a ste
 
 
 @dataclass(frozen=True)
-class Channel:
+class InspectedChannel:
     """A column of numbers, in its own unit.
 
     ``level`` is where it rests before the first step, the median without one. ``spikes`` are all
@@ -62,7 +62,7 @@ class Channel:
     spikes_at: tuple[float, ...]
     stuck: tuple[tuple[float, float], ...]
     frequency: float | None
-    steps: tuple[Change, ...]
+    steps: tuple[LevelChange, ...]
     remark: str
     signal: str | None = None
     why: str = ""
@@ -74,7 +74,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Phases:
+class InspectedPhases:
     """Three columns that are one voltage: its waveforms, or their effective values.
 
     ``level`` is the effective value at rest, in the unit of the columns.
@@ -102,14 +102,14 @@ class Inspection:
     clock: Clock
     sampling: Sampling
     backward_at: tuple[str, ...]
-    channels: tuple[Channel, ...]
-    phases: tuple[Phases, ...]
-    steps: tuple[Step, ...]
+    channels: tuple[InspectedChannel, ...]
+    phases: tuple[InspectedPhases, ...]
+    steps: tuple[RecordedStep, ...]
     unreadable: Mapping[str, str]
     time: Array
     samples: Mapping[str, Array]
 
-    def channel_of(self, signal: str) -> Channel | None:
+    def channel_of(self, signal: str) -> InspectedChannel | None:
         """Return the channel that seems to be a signal, None without one."""
         return next((one for one in self.channels if one.signal == signal), None)
 
@@ -240,9 +240,9 @@ def _described(
     unit_from: str,
     time: Array,
     column: Array,
-    changes: "tuple[Change, ...] | str",
-    steps: Sequence[Step],
-) -> Channel:
+    changes: "tuple[LevelChange, ...] | str",
+    steps: Sequence[RecordedStep],
+) -> InspectedChannel:
     """Return what there is to say of one channel."""
     seen = np.isfinite(column)
     t, y = (time, column) if seen.all() else (time[seen], column[seen])
@@ -250,7 +250,7 @@ def _described(
     remark = changes if isinstance(changes, str) else ""
     own = () if isinstance(changes, str) else changes
     if not len(y):
-        return Channel(
+        return InspectedChannel(
             name, unit, unit_from, 0.0, 0.0, 0.0, 0.0, None, missing, 0, (), (), None, (), remark
         )
     frequency = mains_frequency(t, y)
@@ -262,7 +262,7 @@ def _described(
     # what is rounded more coarsely than its noise stands still most of the time
     noisy = scatter > max(NOISELESS * float(np.ptp(y)), ABOVE * ROUNDING * (rounding or 0.0))
     still = stuck(y) if noisy and not frequency else ()
-    return Channel(
+    return InspectedChannel(
         name=name,
         unit=unit,
         unit_from=unit_from,
@@ -282,7 +282,7 @@ def _described(
 
 
 def _guesses(
-    samples: Mapping[str, Array], groups: Sequence[Phases], units: Mapping[str, str]
+    samples: Mapping[str, Array], groups: Sequence[InspectedPhases], units: Mapping[str, str]
 ) -> dict[str, Guess]:
     """Return the signals that channels seem to be; none for one that never changes or a phase."""
     phases = {name for group in groups for name in group.columns}
@@ -290,7 +290,7 @@ def _guesses(
     return guessed([name for name in moving if name not in phases], units)
 
 
-def _with_signal(channel: Channel, guesses: Mapping[str, Guess]) -> Channel:
+def _with_signal(channel: InspectedChannel, guesses: Mapping[str, Guess]) -> InspectedChannel:
     """Return a channel with the signal that it seems to be."""
     guess = guesses.get(channel.name)
     return channel if guess is None else replace(channel, signal=guess.signal, why=guess.why)
@@ -298,7 +298,7 @@ def _with_signal(channel: Channel, guesses: Mapping[str, Guess]) -> Channel:
 
 def _phases(
     time: Array, samples: Mapping[str, Array], units: Mapping[str, str]
-) -> tuple[Phases, ...]:
+) -> tuple[InspectedPhases, ...]:
     """Return the three-phase voltages among the columns."""
     found = []
     for group in three_phases(tuple(samples), units):
@@ -306,7 +306,7 @@ def _phases(
         if len(waves) == 1:
             effective = _effective(samples, group)
             level = float(np.nanmedian(effective[: max(len(effective) // 10, 1)]))
-            found.append(Phases(group, "waveform" if waves == {True} else "rms", level))
+            found.append(InspectedPhases(group, "waveform" if waves == {True} else "rms", level))
     return tuple(found)
 
 
@@ -315,7 +315,7 @@ def _effective(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
     return np.asarray(np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0)))
 
 
-def _settled(channel: Channel, steps: Sequence[Step]) -> Channel:
+def _settled(channel: InspectedChannel, steps: Sequence[RecordedStep]) -> InspectedChannel:
     """Return a channel whose steps have the size that lasts until the next step."""
     changes = []
     for one in channel.steps:
@@ -347,7 +347,7 @@ def _of_clock(found: Inspection) -> Iterable[str]:
             yield f"steps at {before.at:.4g} and {after.at:.4g} s: which is which?"
 
 
-def _of_channel(one: Channel) -> Iterable[str]:
+def _of_channel(one: InspectedChannel) -> Iterable[str]:
     if one.missing:
         yield f"{one.name}: {one.missing} samples are missing"
     if one.constant:

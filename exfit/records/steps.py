@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.quality import mains_frequency, noise_of
-from exfit.dsp.step_detection import BEFORE, Onset, find_step, find_steps
+from exfit.dsp.step_detection import BEFORE, DetectedStep, find_step, find_steps
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ ROUNDING = 12.0**-0.5  # standard deviation of what is uniform, over its width
 
 
 @dataclass(frozen=True)
-class Change:
+class LevelChange:
     """A step of one channel: its instant and standard error (s), its size and level before it.
 
     Where the channel moves from its first sample on, the step was made there or before it; where it
@@ -41,7 +41,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Step:
+class RecordedStep:
     """A step of the test, its instant told from all channels that show it, ``seen_in``.
 
     ``sizes`` is by how much each channel stands elsewhere at the end of it, those without a lasting
@@ -55,7 +55,7 @@ class Step:
     from_start: bool
 
 
-def changes_of(time: Array, column: Array, reference: bool) -> "tuple[Change, ...] | str":
+def changes_of(time: Array, column: Array, reference: bool) -> "tuple[LevelChange, ...] | str":
     """Return the steps of a channel, or why it shows none; what switches must be a reference."""
     seen = np.isfinite(column)
     t, y = (time, column) if seen.all() else (time[seen], column[seen])
@@ -86,9 +86,9 @@ def _coarse(time: Array, samples: Array, block: int) -> tuple[Array, Array]:
     )
 
 
-def _finer(time: Array, samples: Array, found: Onset, block: int) -> Change:
+def _finer(time: Array, samples: Array, found: DetectedStep, block: int) -> LevelChange:
     """Return a step whose instant is told from fewer, whole samples around it."""
-    coarse = Change(found.at, _error(found), found.size, found.level)
+    coarse = LevelChange(found.at, _error(found), found.size, found.level)
     if block == 1:
         return coarse
     at, far = int(np.searchsorted(time, found.at)), AROUND * block
@@ -102,7 +102,7 @@ def _finer(time: Array, samples: Array, found: Onset, block: int) -> Change:
     return replace(coarse, at=onset.at, error=_error(onset)) if same else coarse
 
 
-def _error(onset: Onset) -> float:
+def _error(onset: DetectedStep) -> float:
     """Return the standard error of an instant: what noise leaves, and the shape of the rise."""
     return float(np.hypot(onset.spread, SHAPE * onset.rise))
 
@@ -114,10 +114,10 @@ def switches(samples: Array) -> bool:
     return 0 < len(jumps) < LEVELS and bool(np.min(np.diff(ends)) >= BEFORE)
 
 
-def _switched(time: Array, samples: Array) -> tuple[Change, ...]:
+def _switched(time: Array, samples: Array) -> tuple[LevelChange, ...]:
     """Return the steps of a channel that jumps: each between two samples."""
     return tuple(
-        Change(
+        LevelChange(
             at=float(time[k] + time[k + 1]) / 2.0,
             error=float(time[k + 1] - time[k]) * ROUNDING,
             size=float(samples[k + 1] - samples[k]),
@@ -129,10 +129,10 @@ def _switched(time: Array, samples: Array) -> tuple[Change, ...]:
 
 
 def from_start(
-    time: Array, samples: Mapping[str, Array], found: Mapping[str, "tuple[Change, ...] | str"]
-) -> dict[str, tuple[Change, ...]]:
+    time: Array, samples: Mapping[str, Array], found: Mapping[str, "tuple[LevelChange, ...] | str"]
+) -> dict[str, tuple[LevelChange, ...]]:
     """Return the changes of channels that move from their first sample on and then settle."""
-    changes: dict[str, tuple[Change, ...]] = {}
+    changes: dict[str, tuple[LevelChange, ...]] = {}
     for name, column in samples.items():
         y = column[np.isfinite(column)]
         if not isinstance(found[name], str) or len(y) < 2 * BEFORE or mains_frequency(time, column):
@@ -142,18 +142,20 @@ def from_start(
         settled = np.ptp(end) < SETTLED * abs(size)
         if settled and abs(size) > SMALL_CHANGE * noise_of(y):
             error = float(time[1] - time[0])
-            changes[name] = (Change(float(time[0]), error, size, float(y[0]), from_start=True),)
+            changes[name] = (
+                LevelChange(float(time[0]), error, size, float(y[0]), from_start=True),
+            )
     return changes
 
 
-def together(changes: Mapping[str, "tuple[Change, ...] | str"]) -> tuple[Step, ...]:
+def together(changes: Mapping[str, "tuple[LevelChange, ...] | str"]) -> tuple[RecordedStep, ...]:
     """Return the steps of the test: what several channels show at one time is one step."""
     shown = sorted(
         ((one.at, name, one) for name, some in changes.items() if isinstance(some, tuple)
          for one in some),
         key=lambda entry: entry[:2],
     )  # fmt: skip
-    groups: list[list[tuple[str, Change]]] = []
+    groups: list[list[tuple[str, LevelChange]]] = []
     for at, name, one in shown:
         near = groups and any(
             at - other.at <= SAME_STEP + ERRORS * (one.error + other.error)
@@ -166,7 +168,7 @@ def together(changes: Mapping[str, "tuple[Change, ...] | str"]) -> tuple[Step, .
     return tuple(_step(dict(group)) for group in groups)
 
 
-def _step(shown: Mapping[str, Change]) -> Step:
+def _step(shown: Mapping[str, LevelChange]) -> RecordedStep:
     """Return the step that channels show, its instant their mean, weighted by standard errors.
 
     Where they scatter more than these say, so much more is the error of the mean (Birge 1932).
@@ -183,15 +185,15 @@ def _step(shown: Mapping[str, Change]) -> Step:
         error *= max(1.0, float(np.sqrt(weights @ (at - mean) ** 2 / (len(at) - 1))))
     sizes = {name: one.size for name, one in shown.items()}
     at_start = all(one.from_start for one in shown.values())
-    return Step(mean, error, tuple(shown), sizes, at_start)
+    return RecordedStep(mean, error, tuple(shown), sizes, at_start)
 
 
 def with_sizes(
-    steps: tuple[Step, ...],
+    steps: tuple[RecordedStep, ...],
     courses: Mapping[str, Array],
     noises: Mapping[str, float],
     time: Array,
-) -> tuple[Step, ...]:
+) -> tuple[RecordedStep, ...]:
     """Return the steps with the change of each channel: between the ends of what lies before and
     behind."""
     edges = [float(time[0]), *(one.at for one in steps), float(time[-1])]

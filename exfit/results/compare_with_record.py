@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
-from exfit.fitting.build import Trial, compared
+from exfit.fitting.build import ExperimentSetup, compared
 from exfit.results.model import Comparison, Overlay
 
 Array = NDArray[np.float64]
@@ -14,20 +14,24 @@ Values = Mapping[str, float]
 
 
 def compare_with_record(
-    trial: Trial, name: str, values: Values, start: Values | None = None, limit: float | None = None
+    trial: ExperimentSetup,
+    name: str,
+    values: Values,
+    start: Values | None = None,
+    limit: float | None = None,
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
     The trial has sub-steps enough for both; ``limit`` is the largest rmse to be accepted, in pu.
     """
-    at = trial.known(values)
+    at = trial.with_start_values(values)
     samples, substeps = trial.experiment.samples(at)
-    first = None if start is None else trial.experiment.samples(trial.known(start))[0]
+    first = None if start is None else trial.experiment.samples(trial.with_start_values(start))[0]
     overlays = {
         channel.signal: Overlay(
             compared(channel, trial.experiment.measured(channel, at)),
-            compared(channel, channel.shown(samples[:, k])),
-            None if first is None else compared(channel, channel.shown(first[:, k])),
+            compared(channel, channel.as_recorded(samples[:, k])),
+            None if first is None else compared(channel, channel.as_recorded(first[:, k])),
         )
         for k, channel in enumerate(trial.channels)
     }
@@ -47,12 +51,12 @@ def compare_with_record(
     )
 
 
-def _features(trial: Trial, signal: Array, values: Values) -> Features | None:
+def _features(trial: ExperimentSetup, signal: Array, values: Values) -> Features | None:
     """Return the features of the first step of the reference that the record holds."""
     kept = np.isfinite(signal)
     time = trial.record.time[kept]
-    simulator = trial.experiment.moved(values)
-    steps = [step._replace(at=step.at + simulator.delay) for step in simulator.course.steps]
+    simulator = trial.experiment.with_inputs(values)
+    steps = [step._replace(at=step.at + simulator.delay) for step in simulator.inputs.steps]
     inside = [change for change in steps if change.at >= time[0]]
     if not inside or inside[0].signal != "vref":
         return None

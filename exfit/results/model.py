@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import Features
-from exfit.fitting.uncertainty import Knowledge
+from exfit.fitting.uncertainty import UncertaintyAnalysis
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def judged_of(signals: Iterable[str]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Courses:
+class IterationResponses:
     """The response after some iterations of a fit: ``samples`` (K, M) of one signal, per unit.
 
     ``numbers`` (K,) are those of the iterations, in rising order; 0 is the start. What is left out
@@ -124,7 +124,7 @@ class Comparison:
     sha256: str
     substeps: int
     rmse_limit: float | None = None
-    courses: Courses | None = None
+    iteration_responses: IterationResponses | None = None
 
     @property
     def judged_by(self) -> str:
@@ -244,7 +244,7 @@ class FitResult:
     parts: tuple[PartOf, ...]
     cost: float
     comparisons: tuple[Comparison, ...]
-    knowledge: Knowledge | None
+    knowledge: UncertaintyAnalysis | None
     minima: Minima | None
     status: int
     message: str

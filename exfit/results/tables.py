@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import kept_rows
-from exfit.results.model import Comparison, Courses, FitResult
+from exfit.results.model import Comparison, FitResult, IterationResponses
 from exfit.util.text import yaml_number
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def comparison_table(comparison: Comparison) -> str:
     return table(header, columns)
 
 
-def courses_table(time: Array, courses: Courses) -> str:
+def iteration_responses_table(time: Array, courses: IterationResponses) -> str:
     """Return the response after each iteration that is kept, on the record's clock, as CSV."""
     header = ["t", *(f"{courses.signal}_{number}" for number in courses.numbers)]
     return table(header, [time, *courses.samples])

@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 ON_GRID = 1e-6  # of a step: a sample that near to a grid point lies on it
 
 
-class Stretch(NamedTuple):
+class GridSegment(NamedTuple):
     """Equal steps of the grid between two changes of the inputs."""
 
     start: float

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.simulation.grid import ON_GRID, Stretch
+from exfit.simulation.grid import ON_GRID, GridSegment
 
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1e7  # three hours at 1 ms
 
 
-class Change(NamedTuple):
+class InputStep(NamedTuple):
     """A step of an input, by default of the reference: when (s) and by how much (pu).
 
     It falls on the grid exactly, and divides it; or, ``smooth``, it leaves the grid as it is, and
@@ -31,7 +31,7 @@ class Change(NamedTuple):
     signal: str = "vref"
     smooth: bool = False
 
-    def share(self, part: Stretch) -> Array:
+    def share(self, part: GridSegment) -> Array:
         """Return how much of the step the grid points (n + 1,) of a stretch have seen."""
         if not self.smooth:
             return np.full(part.steps + 1, 1.0 if self.at <= part.start else 0.0)
@@ -39,7 +39,7 @@ class Change(NamedTuple):
         seen[near], seen[near.stop :] = 0.5 + x - 0.5 * x * np.abs(x), 1.0
         return seen
 
-    def share_slope(self, part: Stretch) -> Array:
+    def share_slope(self, part: GridSegment) -> Array:
         """Return the derivative of ``share`` to the instant, 1/s; only a smooth step has it."""
         if not self.smooth:
             raise ValueError(f"the step of {self.signal} at {self.at:g} s is not smooth: it stays")
@@ -47,7 +47,7 @@ class Change(NamedTuple):
         slope[near] = (np.abs(x) - 1.0) / part.step
         return slope
 
-    def _near(self, part: Stretch) -> tuple[slice, Array]:
+    def _near(self, part: GridSegment) -> tuple[slice, Array]:
         """Return the grid points less than a step from the instant, and how far beyond it."""
         position = (self.at - part.start) / part.step
         first, stop = np.clip(math.floor(position) + np.array([0, 2]), 0, part.steps + 1)
@@ -55,7 +55,7 @@ class Change(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class RecordedInputs:
     """Recorded inputs: ``time`` (M,) in s, and what each signal (M,) deviates from the start."""
 
     time: Array
@@ -63,24 +63,24 @@ class Played:
 
 
 @dataclass(frozen=True)
-class Course:
+class Inputs:
     """A test from ``start`` to ``end`` (s): steps of the inputs, and recorded ones played back."""
 
     start: float
     end: float
-    steps: tuple[Change, ...]
-    played: Played | None = None
+    steps: tuple[InputStep, ...]
+    recorded: RecordedInputs | None = None
 
     def level(self, signal: str, at: float) -> float:
         """Return the sum of an input's exact steps at an instant; each counts from its own on."""
         made = (c.step for c in self.steps if c.signal == signal and not c.smooth and c.at <= at)
         return sum(made, start=0.0)
 
-    def input(self, signal: str, part: Stretch) -> Array:
+    def input(self, signal: str, part: GridSegment) -> Array:
         """Return an input at the grid points (n + 1,) of a stretch."""
         u = np.full(part.steps + 1, self.level(signal, part.start))
-        if self.played is not None and signal in self.played.signals:
-            u += np.interp(part.times, self.played.time, self.played.signals[signal])
+        if self.recorded is not None and signal in self.recorded.signals:
+            u += np.interp(part.times, self.recorded.time, self.recorded.signals[signal])
         for change in self.steps:
             if change.smooth and change.signal == signal:
                 u += change.step * change.share(part)
@@ -105,7 +105,7 @@ def each(names: Iterable[str]) -> tuple[Direction, ...]:
     return tuple(Direction({name: 1.0}) for name in names)
 
 
-def stretches(course: Course, step: float) -> list[Stretch]:
+def grid_segments(course: Inputs, step: float) -> list[GridSegment]:
     """Divide a course at its exact changes, which so fall on the grid, into steps of ``step``."""
     if (course.end - course.start) / step > MOST_STEPS:
         raise SimulationError(
@@ -117,5 +117,5 @@ def stretches(course: Course, step: float) -> list[Stretch]:
     result = []
     for start, end in pairwise([course.start, *sorted(instants), course.end]):
         count = max(1, math.ceil((end - start) / step - ON_GRID))
-        result.append(Stretch(start, (end - start) / count, count))
+        result.append(GridSegment(start, (end - start) / count, count))
     return result

@@ -6,7 +6,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.simulation.grid import ON_GRID, Stretch
+from exfit.simulation.grid import ON_GRID, GridSegment
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ def lagrange(points: int) -> Array:
     return np.vstack([values, slopes])
 
 
-class Sampling:
+class Interpolation:
     """Reads a run, whose stretches lie one behind the other, at given times less a delay (s).
 
     Between grid points it interpolates with a polynomial that never reaches across an exact step of
@@ -38,7 +38,7 @@ class Sampling:
     found anew for each block of more.
     """
 
-    def __init__(self, grid: Sequence[Stretch], times: Array, delay: float = 0.0) -> None:
+    def __init__(self, grid: Sequence[GridSegment], times: Array, delay: float = 0.0) -> None:
         # with a delay no sample is moved to the grid: what is read must follow it without a jump
         near = ON_GRID if delay == 0.0 else 0.0
         wanted = times - delay

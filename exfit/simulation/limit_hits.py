@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.engine.trace import evaluate
-from exfit.simulation.limits import Limiter, at_rest, limiters, traced
+from exfit.simulation.limits import EquationLimit, at_rest, equation_limits, traced
 from exfit.simulation.simulator import Run, Simulator
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class Nearest(NamedTuple):
 class Followed(NamedTuple):
     """A limiter along a run: its value and its bound (n,), and where it is held."""
 
-    limiter: Limiter
+    limiter: EquationLimit
     value: Array
     bound: Array
     held: NDArray[np.bool_]
@@ -101,7 +101,7 @@ def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
 def _followed(simulator: Simulator, values: Values, run: Run) -> list[Followed]:
     """Return every limiter of the system along a run."""
     system = simulator.system
-    of, every = traced(system), limiters(system)
+    of, every = traced(system), equation_limits(system)
     fixed = at_rest(of, values)
     blocks: list[list[tuple[Array, Array]]] = []
     for first in range(0, len(run.time), POINTS_AT_ONCE):
@@ -122,7 +122,7 @@ def _along(value: Array | float, count: int) -> Array:
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
 
 
-def _follow(limiter: Limiter, parts: Sequence[tuple[Array, Array]]) -> Followed:
+def _follow(limiter: EquationLimit, parts: Sequence[tuple[Array, Array]]) -> Followed:
     value, bound = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     beyond = limiter.sign * (value - bound)
     near = ROUNDING * np.maximum(np.abs(bound), np.abs(value))
@@ -132,7 +132,7 @@ def _follow(limiter: Limiter, parts: Sequence[tuple[Array, Array]]) -> Followed:
     return Followed(limiter, value, bound, held & np.isfinite(bound))
 
 
-def _key(limiter: Limiter) -> tuple[str, str, float]:
+def _key(limiter: EquationLimit) -> tuple[str, str, float]:
     return limiter.limit, limiter.signal, limiter.sign
 
 

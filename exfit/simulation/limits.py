@@ -10,7 +10,7 @@ from exfit.engine.trace import Node, evaluate, in_order
 Values = Mapping[str, float]
 
 
-class Limiter(NamedTuple):
+class EquationLimit(NamedTuple):
     """A value of the graph that stops at a limit: a ceiling where ``sign`` is 1, a floor at -1.
 
     ``limit`` is the parameter that sets it, "0" for a state that cannot become negative; ``signal``
@@ -64,7 +64,7 @@ def limit_name(node: Node) -> str:
 
 
 @cache
-def limiters(system: System) -> tuple[Limiter, ...]:
+def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     """Return every limit of a system that is not infinite, in the order of the signal.
 
     They are its states' non-windup limits, its clamps, gates to a fixed parameter, and contacts
@@ -85,7 +85,7 @@ def limiters(system: System) -> tuple[Limiter, ...]:
     return tuple(sorted(dict.fromkeys(known), key=lambda one: one.value.index))
 
 
-def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]:
+def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[EquationLimit | None]:
     """Yield the limits of a node that is a clamp, or a choice between a limit and a value."""
     if node.op == "clip":
         x, low, high = node.operands
@@ -97,7 +97,7 @@ def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]:
         yield from _choice(node, states)
 
 
-def _choice(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]:
+def _choice(node: Node, states: Mapping[Node, Node]) -> Iterator[EquationLimit | None]:
     """Yield the limits of the higher or lower of two values, or of one forced by a contact."""
     condition, chosen, other = node.operands
     gate = condition.op == "<" and {*condition.operands} == {chosen, other}
@@ -106,19 +106,19 @@ def _choice(node: Node, states: Mapping[Node, Node]) -> Iterator[Limiter | None]
             ceiling = chosen is condition.operands[0]
             yield _limiter(x, bound, 1.0 if ceiling else -1.0, _state_in(x, states))
         elif not gate and _is_limit(bound):
-            yield Limiter(
+            yield EquationLimit(
                 _given(bound), "", 1.0 if "MAX" in _name(bound) else -1.0, node, bound, True
             )
 
 
-def _limiter(value: Node, bound: Node, sign: float, state: Node | None) -> Limiter | None:
+def _limiter(value: Node, bound: Node, sign: float, state: Node | None) -> EquationLimit | None:
     """Return a limit, None where it is infinite."""
     fixed = bound.constant
     if fixed is not None and abs(fixed) == float("inf"):
         return None
     name = _given(bound) if fixed is None else f"{fixed:g}"
     signal = "" if state is None else _name(state)
-    return Limiter(name, signal, sign, value, bound, value is state)
+    return EquationLimit(name, signal, sign, value, bound, value is state)
 
 
 def _given(bound: Node) -> str:

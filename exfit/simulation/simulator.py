@@ -14,9 +14,9 @@ from exfit.engine.system import System, trace
 from exfit.engine.trace import in_order
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
-from exfit.simulation.grid import ON_GRID, Stretch
-from exfit.simulation.inputs import Change, Course, Direction, stretches
-from exfit.simulation.interpolation import Sampling, WholeRun, joined
+from exfit.simulation.grid import ON_GRID, GridSegment
+from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
+from exfit.simulation.interpolation import Interpolation, WholeRun, joined
 from exfit.simulation.limits import limits_passed
 from exfit.util.threads import in_threads
 
@@ -92,36 +92,36 @@ class Simulator:
     def __init__(
         self,
         system: System,
-        course: Course,
+        course: Inputs,
         times: Array,
         step: float,
         least: int = 1,
         delay: float = 0.0,
     ) -> None:
-        self.system, self.course, self.times = system, course, times
+        self.system, self.inputs, self.times = system, course, times
         self.step, self.least, self.delay = step, least, delay
-        self._grid = stretches(course, step)
+        self._grid = grid_segments(course, step)
         self._inputs = [self._inputs_of(part) for part in self._grid]
-        self._sampling: Sampling | WholeRun = Sampling(self._grid, times, delay)
+        self._sampling: Interpolation | WholeRun = Interpolation(self._grid, times, delay)
         self._known: dict[bytes, int] = {}  # the sub-steps of values asked for lately
 
-    def moved(self, steps: tuple[Change, ...], delay: float) -> "Simulator":
+    def with_inputs(self, steps: tuple[InputStep, ...], delay: float) -> "Simulator":
         """Return the simulator of the same course, whose steps and delay (s) are others.
 
         The instant of a smooth step may be another, and the size of any. It costs little: the grid
         and what is known of the sub-steps are shared. Raises ValueError where a step is another.
         """
-        if [_fixed(change) for change in steps] != [_fixed(change) for change in self.course.steps]:
+        if [_fixed(change) for change in steps] != [_fixed(change) for change in self.inputs.steps]:
             raise ValueError("only sizes, and the instants of smooth steps, can be moved")
-        pairs = zip(steps, self.course.steps, strict=True)
+        pairs = zip(steps, self.inputs.steps, strict=True)
         others = {new.signal for new, old in pairs if new != old}
         result = copy(self)
-        result.course, result.delay = replace(self.course, steps=steps), delay
+        result.inputs, result.delay = replace(self.inputs, steps=steps), delay
         if others:
             known = zip(self._inputs, self._grid, strict=True)
             result._inputs = [result._inputs_with(others, u, part) for u, part in known]
         if delay != self.delay:
-            result._sampling = Sampling(self._grid, self.times, delay)
+            result._sampling = Interpolation(self._grid, self.times, delay)
         return result
 
     def on_grid(self) -> "Simulator":
@@ -133,11 +133,13 @@ class Simulator:
         result.times, result._sampling = np.concatenate([p.times for p in self._grid]), WholeRun()
         return result
 
-    def sampling(self) -> Sampling:
+    def sampling(self) -> Interpolation:
         """Return what reads the response at the sample times from the points of its grid."""
         known = self._sampling
         return (
-            known if isinstance(known, Sampling) else Sampling(self._grid, self.times, self.delay)
+            known
+            if isinstance(known, Interpolation)
+            else Interpolation(self._grid, self.times, self.delay)
         )
 
     @cached_property
@@ -179,7 +181,7 @@ class Simulator:
         jacobians = np.stack([code.motion(p, r, x, u)[1] for x, u in pairs])
         return self._parts(values, fastest(jacobians))
 
-    def secured(self, values: Values) -> "Simulator":
+    def with_enough_substeps(self, values: Values) -> "Simulator":
         """Return a simulator whose sub-steps are enough all along the response to these values.
 
         Raises SimulationError where that response does not stay finite.
@@ -204,9 +206,9 @@ class Simulator:
         At the points of the grid: a record with many more samples shows no more.
         """
         times = np.unique(np.concatenate([part.times for part in self._grid]))
-        coarse = Simulator(self.system, self.course, times, self.step, self.least)
+        coarse = Simulator(self.system, self.inputs, times, self.step, self.least)
         samples, parts = coarse.samples(values, outputs)
-        finer = Simulator(self.system, self.course, times, self.step / 2.0, parts)
+        finer = Simulator(self.system, self.inputs, times, self.step / 2.0, parts)
         moved = np.max(np.abs(samples - finer.samples(values, outputs)[0]), axis=0)
         return dict(zip(outputs, map(float, moved), strict=True))
 
@@ -261,7 +263,7 @@ class Simulator:
         columns = [k for k, one in enumerate(directions) if one.parameters or one.steps]
         driving = [directions[k] for k in columns]
         free = {name for one in driving for name in one.parameters}
-        inputs = {self.course.steps[k].signal for one in driving for k in one.steps}
+        inputs = {self.inputs.steps[k].signal for one in driving for k in one.steps}
         code = tangent_kernel(
             self.system,
             outputs,
@@ -291,13 +293,13 @@ class Simulator:
         return seeds
 
     def _moving(
-        self, part: Stretch, inputs: Sequence[str], directions: Sequence[Direction]
+        self, part: GridSegment, inputs: Sequence[str], directions: Sequence[Direction]
     ) -> Array:
         """Return how inputs move in each direction at a stretch's grid points, (n + 1, nu, N)."""
         du = np.zeros((part.steps + 1, len(inputs), len(directions)))
         for column, direction in enumerate(directions):
             for index, (at, step) in direction.steps.items():
-                change = self.course.steps[index]
+                change = self.inputs.steps[index]
                 if change.signal in inputs:
                     row = du[:, inputs.index(change.signal), column]
                     if at:
@@ -307,19 +309,19 @@ class Simulator:
         return du
 
     def _with(self, step: float, least: int) -> "Simulator":
-        return Simulator(self.system, self.course, self.times, step, least, self.delay)
+        return Simulator(self.system, self.inputs, self.times, step, least, self.delay)
 
-    def _inputs_of(self, part: Stretch) -> Array:
+    def _inputs_of(self, part: GridSegment) -> Array:
         """Return the inputs at the grid points of a stretch, (n + 1, nu)."""
-        inputs = [self.course.input(name, part) for name in self.system.inputs]
+        inputs = [self.inputs.input(name, part) for name in self.system.inputs]
         return np.ascontiguousarray(np.stack(inputs, axis=1))
 
-    def _inputs_with(self, others: Container[str], known: Array, part: Stretch) -> Array:
+    def _inputs_with(self, others: Container[str], known: Array, part: GridSegment) -> Array:
         """Return known inputs with the others of them computed anew."""
         u = known.copy()
         for column, name in enumerate(self.system.inputs):
             if name in others:
-                u[:, column] = self.course.input(name, part)
+                u[:, column] = self.inputs.input(name, part)
         return u
 
     def _vector(self, values: Values) -> Array:
@@ -378,7 +380,7 @@ class Simulator:
         )
 
 
-def _fixed(change: Change) -> Change:
+def _fixed(change: InputStep) -> InputStep:
     """Return what of a step cannot be moved."""
     return change._replace(at=0.0 if change.smooth else change.at, step=0.0)
 

@@ -124,7 +124,7 @@ class StateSpace:
         return StateSpace(self.A - np.outer(self.b, self.c), self.b, -self.c, 0.0)
 
 
-class Linear(NamedTuple):
+class LinearSystem(NamedTuple):
     """A linearisation: the Jacobian A of the moving states, and columns and rows by name."""
 
     states: tuple[str, ...]
@@ -183,7 +183,7 @@ def _traced(system: System) -> tuple[System, Trace, Tangents]:
     return from_outside, traced, differentiate(traced, from_outside, (), from_outside.inputs)
 
 
-def linearised(system: System, values: Values) -> Linear:
+def linearised(system: System, values: Values) -> LinearSystem:
     """Return the exact linearisation of a system at rest, without the states of bypassed blocks.
 
     Raises SimulationError where the values have no state of rest.
@@ -216,7 +216,7 @@ def linearised(system: System, values: Values) -> Linear:
     out = dict(zip(outputs, rows(derived.outputs), strict=True))
     columns = {name: count + k for k, name in enumerate(system.inputs)}
     kept = np.flatnonzero(moves)
-    return Linear(
+    return LinearSystem(
         states=tuple(system.states[k] for k in kept),
         A=slopes[np.ix_(kept, kept)],
         B={name: slopes[kept, column] for name, column in columns.items()},
@@ -235,7 +235,7 @@ def _refuse_motion(
         raise SimulationError(f"no state of rest: {why}")
 
 
-def poles_of(linear: Linear) -> tuple[Pole, ...]:
+def poles_of(linear: LinearSystem) -> tuple[Pole, ...]:
     """Return the modes of a linear system, the slowest first."""
     from scipy.linalg import eig
 

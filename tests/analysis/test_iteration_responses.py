@@ -14,7 +14,7 @@ from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.output import plots, run_folder
-from exfit.results.model import Courses
+from exfit.results.model import IterationResponses
 from exfit.results.tables import DIGITS
 
 CASE = ROOT / "configs" / "first_order.yaml"
@@ -39,21 +39,21 @@ def columns(path):
 
 def with_many(result, count):
     """Return a fit that took so many iterations more than it did."""
-    kept = result.comparison.courses
+    kept = result.comparison.iteration_responses
     numbers = tuple(range(count))
-    many = Courses(kept.signal, numbers, np.tile(kept.samples[:1], (count, 1)))
-    return replace(result, comparisons=(replace(result.comparison, courses=many),))
+    many = IterationResponses(kept.signal, numbers, np.tile(kept.samples[:1], (count, 1)))
+    return replace(result, comparisons=(replace(result.comparison, iteration_responses=many),))
 
 
 def test_the_first_course_is_the_start_and_the_last_the_fit(fitted):
-    found, overlay = fitted.comparison.courses, fitted.comparison.judged
+    found, overlay = fitted.comparison.iteration_responses, fitted.comparison.judged
     np.testing.assert_array_equal(found.samples[0], overlay.start)
     # the last line of the history holds the fitted values themselves
     np.testing.assert_array_equal(found.samples[-1], overlay.simulated)
 
 
 def test_every_course_costs_what_its_iteration_did(fitted):
-    found, measured = fitted.comparison.courses, fitted.comparison.judged.measured
+    found, measured = fitted.comparison.iteration_responses, fitted.comparison.judged.measured
     costs = 0.5 * np.sum((found.samples - measured) ** 2, axis=1)
     lines = {line.number: line.cost for line in fitted.history}
     # the sub-steps are those of the fitted values: what they move is far below a thousandth
@@ -75,7 +75,7 @@ def test_what_is_found_about_a_record_moves_with_the_iterations(tmp_path):
     content = config("ac1a_typical")
     content["test"]["vref"][0]["at"] = {"start": 1.1, "min": 0.9, "max": 1.2}
     result = workflows.fit(case_of(content, tmp_path))
-    found, overlay = result.comparison.courses, result.comparison.judged
+    found, overlay = result.comparison.iteration_responses, result.comparison.judged
     np.testing.assert_array_equal(found.samples[0], overlay.start)
     np.testing.assert_array_equal(found.samples[-1], overlay.simulated)
 
@@ -83,7 +83,7 @@ def test_what_is_found_about_a_record_moves_with_the_iterations(tmp_path):
 @pytest.mark.parametrize("count", [1, 2, 40, 41, 1000])
 def test_of_many_iterations_some_are_kept_evenly_with_the_first_and_the_last(count):
     kept = iteration_responses.chosen(count)
-    assert len(kept) == min(count, iteration_responses.MOST_COURSES)
+    assert len(kept) == min(count, iteration_responses.MOST_RESPONSES)
     assert (kept[0], kept[-1]) == (0, count - 1)
     steps = np.diff(kept)
     assert not len(steps) or 1 <= np.max(steps) <= np.min(steps) + 1
@@ -98,16 +98,16 @@ def test_an_iteration_without_a_response_is_left_out(fitted, monkeypatch, tmp_pa
             raise SimulationError("no state of rest")
         return whole(self, values)
 
-    result_of = workflows.with_courses
+    result_of = workflows.with_iteration_responses
 
     def failing(*given):
         monkeypatch.setattr(Experiment, "samples", samples)
         return result_of(*given)
 
-    monkeypatch.setattr(workflows, "with_courses", failing)
+    monkeypatch.setattr(workflows, "with_iteration_responses", failing)
     result = workflows.fit(load_case(CASE))
-    assert 1 not in result.comparison.courses.numbers
-    assert len(result.comparison.courses.numbers) == len(result.history) - 1
+    assert 1 not in result.comparison.iteration_responses.numbers
+    assert len(result.comparison.iteration_responses.numbers) == len(result.history) - 1
     run_folder.write_fit(result, tmp_path / "run", figures=True)
     assert "vt_1" not in columns(tmp_path / "run" / "iterations.csv")
 
@@ -119,14 +119,14 @@ def test_an_interruption_keeps_the_iterations_until_then():
 
     result = workflows.fit(load_case(CASE), watch=stop)
     assert result.interrupted
-    assert result.comparison.courses.numbers == (0, 1, 2)
+    assert result.comparison.iteration_responses.numbers == (0, 1, 2)
 
 
 def test_a_large_record_leaves_no_courses_and_says_so(fitted, monkeypatch, tmp_path):
     run_folder.write_fit(fitted, tmp_path / "run", figures=True)
     monkeypatch.setattr(iteration_responses, "MOST_SAMPLES", 100)
     result = workflows.fit(load_case(CASE))
-    assert result.comparison.courses is None
+    assert result.comparison.iteration_responses is None
     assert any("up to 100" in note for note in result.notes)
     run_folder.write_fit(result, tmp_path / "run", figures=True)  # over the former ones
     assert not list((tmp_path / "run").glob("*iterations*"))
@@ -158,5 +158,5 @@ def test_a_line_is_drawn_for_every_course_and_the_bar_names_first_and_last(fitte
 
 
 def test_a_fit_without_courses_has_an_empty_figure(fitted):
-    bare = replace(fitted, comparisons=(replace(fitted.comparison, courses=None),))
+    bare = replace(fitted, comparisons=(replace(fitted.comparison, iteration_responses=None),))
     assert plots.iterations(bare).axes == []

@@ -8,7 +8,7 @@ from places import ROOT
 
 from exfit.analysis.model_check import AGREEMENT, STEPS, check, deviations, flat_drift
 from exfit.case.load import load_case, parse_case
-from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.build import build_experiments, residuals_of
 from exfit.fitting.residuals import Residuals
 
 WITHOUT_RECORD = """\
@@ -59,7 +59,7 @@ def test_a_derivative_that_is_lost_is_found(first_order, monkeypatch):
 
 
 def test_central_differences_gain_two_digits_for_each_smaller_step(first_order):
-    rows = deviations(residuals_of(first_order, fitted_trials(first_order)))
+    rows = deviations(residuals_of(first_order, build_experiments(first_order)))
     for row in rows.values():
         # the error is of second order in the step, until rounding takes over
         assert np.array(row[1:3]) == pytest.approx(np.array(row[:2]) / 100.0, rel=0.2)
@@ -72,9 +72,9 @@ def test_a_run_without_a_step_stays_flat(first_order):
 
 
 def test_the_drift_of_a_flat_run_can_be_asked_for_alone(first_order):
-    (trial,) = fitted_trials(first_order)
+    (trial,) = build_experiments(first_order)
     one, values = trial.experiment, {"k": 4.0, "a": 2.0} | first_order.values()
-    assert flat_drift(one.moved(values), one.parameters(values)) < 1e-12
+    assert flat_drift(one.with_inputs(values), one.parameters(values)) < 1e-12
 
 
 def test_a_run_that_drifts_is_found(first_order, monkeypatch):

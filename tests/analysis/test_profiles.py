@@ -12,7 +12,7 @@ from exfit.analysis.profiles import profile
 from exfit.case.load import load_case
 from exfit.errors import CaseError
 from exfit.estimate import Stop, least_squares
-from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.build import build_experiments, residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT
 from exfit.workflows import fit
@@ -93,7 +93,7 @@ def test_kd_of_ac1a_is_open_down_to_its_bound(kd):
 def test_at_the_end_of_the_interval_no_refit_costs_less_than_the_rise(kd):
     (one,) = kd.profiles
     case = case_of("ac1a_typical")
-    whole = residuals_of(case, fitted_trials(case))
+    whole = residuals_of(case, build_experiments(case))
     free = [other for other in whole.free if other.name != "KD"]
     residuals = Residuals(whole.experiments, free, {**whole.fixed, "KD": one.high}, whole.ties)
     best = fit(case).values

@@ -21,7 +21,7 @@ from simulate import bump, timed
 
 from exfit.engine.kernel import Kernel
 from exfit.models import MODELS
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 ROUNDS = 100
@@ -37,9 +37,9 @@ def run_of(name):
 
 def substeps(name):
     """Return the sub-steps that the model's typical data ask for at 1 ms."""
-    course, values = Course(0.0, 10.0, (Change(1.0, 0.05),)), typical_values(name)
+    course, values = Inputs(0.0, 10.0, (InputStep(1.0, 0.05),)), typical_values(name)
     simulator = Simulator(system_of(name), course, np.linspace(0.0, 10.0, 101), 1e-3)
-    return simulator.secured(values).substeps(values)
+    return simulator.with_enough_substeps(values).substeps(values)
 
 
 def main():

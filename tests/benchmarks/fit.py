@@ -26,10 +26,10 @@ from oracle import system_of, typical_values
 
 from exfit.estimate import least_squares
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.parameters import Free
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 RECORD = Path(__file__).parents[2] / "sample_data" / "ac1a_up.csv"
@@ -63,9 +63,9 @@ def record():
 def problem(start):
     """Return the residuals of a start; its bounds are a tenth and ten times of it."""
     times, measured = record()
-    course = Course(times[0], times[-1], (Change(STEP_AT, RISE),))
+    course = Inputs(times[0], times[-1], (InputStep(STEP_AT, RISE),))
     simulator = Simulator(SYSTEM, course, times, 1e-3)
-    free = [Free(name, v, 0.1 * v, 10.0 * v, True) for name, v in start.items()]
+    free = [FreeParameter(name, v, 0.1 * v, 10.0 * v, True) for name, v in start.items()]
     return Residuals([Experiment(simulator, (Channel("vt", measured),))], free, FIXED)
 
 

@@ -26,7 +26,7 @@ from fit import ByHand
 from oracle import system_of, typical_values, vector
 
 from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
-from exfit.simulation.inputs import Change, Course, Direction, each
+from exfit.simulation.inputs import Direction, Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
 HERE = Path(__file__).parent
@@ -84,14 +84,14 @@ def tangents():
 
 def simulator(smooth=False):
     """Return exfit's own way of a fit: sub-steps found, samples at the times of a recorder."""
-    times, change = np.arange(1001) / 100.0, Change(AT * STEP, RISE, smooth=smooth)
-    return Simulator(SYSTEM, Course(0.0, STEPS * STEP, (change,)), times, STEP)
+    times, change = np.arange(1001) / 100.0, InputStep(AT * STEP, RISE, smooth=smooth)
+    return Simulator(SYSTEM, Inputs(0.0, STEPS * STEP, (change,)), times, STEP)
 
 
 def fitted_step(values):
     """Return a function for the Jacobian of a fit of the step's instant and size as well."""
     study = simulator(smooth=True)
-    (change,) = study.course.steps
+    (change,) = study.inputs.steps
     directions = (
         *each(FREE),
         Direction(steps={0: (1.0, 0.0)}),
@@ -102,7 +102,7 @@ def fitted_step(values):
     def run():
         now = next(values)
         moved = change._replace(at=change.at + now["KA"] - VALUES["KA"])
-        return study.moved((moved,), 0.0123).tangents(now, ("vt",), directions)
+        return study.with_inputs((moved,), 0.0123).tangents(now, ("vt",), directions)
 
     return run
 

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from exfit.case.load import load_case
 from exfit.estimate import multistart
-from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.build import build_experiments, residuals_of
 from exfit.fitting.search import UNIT
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
@@ -30,7 +30,9 @@ METHODS = ("lm-then-dgn",)
 def problem():
     """Return the residuals of the case."""
     case = load_case(CASE)
-    return residuals_of(case, [trial.secured(case.values()) for trial in fitted_trials(case)])
+    return residuals_of(
+        case, [trial.with_enough_substeps(case.values()) for trial in build_experiments(case)]
+    )
 
 
 def timed(p, count, workers, method):

@@ -7,7 +7,7 @@ from places import ROOT
 from exfit.analysis.diagnostics import typical_notes
 from exfit.case.load import load_case
 from exfit.errors import CaseError, SimulationError
-from exfit.fitting.build import changes, inputs_of, system_of
+from exfit.fitting.build import input_steps, inputs_of, system_of
 from exfit.fitting.overrides import changed_values, read_parameters
 from exfit.output.run_folder import PARAMETERS, write_fit
 from exfit.workflows import fit, simulate
@@ -31,9 +31,9 @@ parameters: {fixed: {K: 50, EMAX: 9, EMIN: -9}}
 """
 
 
-def written(folder, *changes):
+def written(folder, *input_steps):
     text = ON_LOAD
-    for old, new in changes:
+    for old, new in input_steps:
         assert old in text, old
         text = text.replace(old, new)
     path = folder / "case.yaml"
@@ -87,7 +87,7 @@ def test_steps_and_switches_of_the_source_follow_each_other(tmp_path):
     events = "  E: [{at: 1.5, step: -0.05}]\n  network: [{at: 3.0, E: 1.0}]\n"
     steps = "  network: [{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}]\n"
     case = load_case(written(tmp_path, *source, (steps, events)))
-    found = changes(case, case.test, case.values())
+    found = input_steps(case, case.test, case.values())
     assert [(one.at, one.signal) for one in found] == [(1.0, "vref"), (1.5, "E"), (3.0, "E")]
     assert found[1].step + found[2].step == pytest.approx(0.0, abs=1e-15)
     gone = events.replace("-0.05", "-1.5")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from exfit.case.load import json_schema, parse_case
 from exfit.cli import main
 from exfit.errors import CaseError, ExfitError
-from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.build import build_experiments, residuals_of
 
 EXAMPLE = yaml.safe_load("""\
 model: AC1A
@@ -601,7 +601,7 @@ def beside_a_record(tmp_path_factory):
 
 def test_the_example_can_be_fitted(beside_a_record):
     case = parse_case(yaml.safe_dump(EXAMPLE), beside_a_record / "case.yaml")
-    assert residuals_of(case, fitted_trials(case)).count > 0
+    assert residuals_of(case, build_experiments(case)).count > 0
 
 
 PLACES = [
@@ -698,7 +698,7 @@ def test_junk_in_the_new_keys_gives_a_case_or_its_refusal(beside_a_record, chang
     except CaseError:
         return
     try:
-        trials = fitted_trials(case)
+        trials = build_experiments(case)
     except ExfitError:
         return
     residuals = residuals_of(case, trials)

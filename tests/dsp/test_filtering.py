@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.ndimage import median_filter
 
-from exfit.dsp.filtering import Conditioning, LowPass, Median, MovingAverage, outliers
+from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage, outliers
 
 RATE = 100.0
 TIME = np.arange(0.0, 10.0, 1.0 / RATE)
@@ -28,7 +28,7 @@ def white(size, seed=0, count=TIME.size):
 
 
 def test_without_a_filter_and_with_all_kept_the_samples_are_the_answer():
-    conditioning = Conditioning(TIME, ALL)
+    conditioning = Filtering(TIME, ALL)
     samples, slopes = RESPONSE, np.ones((TIME.size, 2))
     assert conditioning.apply(samples) is samples
     assert conditioning.tangents(samples, slopes) is slopes
@@ -37,13 +37,13 @@ def test_without_a_filter_and_with_all_kept_the_samples_are_the_answer():
 def test_without_a_filter_the_kept_samples_are_the_answer():
     kept = some_lost()
     samples = np.where(kept, RESPONSE, np.nan)
-    assert np.array_equal(Conditioning(TIME, kept).apply(samples), RESPONSE[kept])
+    assert np.array_equal(Filtering(TIME, kept).apply(samples), RESPONSE[kept])
 
 
 @every_filter
 def test_what_stands_in_a_lost_sample_does_not_matter(filter):
     kept = some_lost()
-    conditioning = Conditioning(TIME, kept, filter)
+    conditioning = Filtering(TIME, kept, filter)
     signal = RESPONSE + white(1e-3)
     expected = conditioning.apply(signal)
     assert expected.shape == (kept.sum(),)
@@ -56,7 +56,7 @@ def test_a_line_passes_whatever_is_lost_of_it(filter):
     kept = some_lost()
     kept[[0, -1]] = True  # beyond the ends a lost sample is the nearest one, not on the line
     line = 1.0 + 0.1 * TIME
-    got = Conditioning(TIME, kept, filter).apply(np.where(kept, line, np.nan))
+    got = Filtering(TIME, kept, filter).apply(np.where(kept, line, np.nan))
     inner = slice(200, -200) if filter else slice(None)  # far from where a filter starts
     assert got[inner] == pytest.approx(line[kept][inner], rel=1e-12)
 
@@ -64,7 +64,7 @@ def test_a_line_passes_whatever_is_lost_of_it(filter):
 def test_lost_samples_are_bridged_in_time_not_in_number():
     time = np.array([0.0, 1.0, 5.0, 6.0, 8.0])
     kept = np.array([False, True, False, True, False])
-    conditioning = Conditioning(time, kept, Median(1))
+    conditioning = Filtering(time, kept, Median(1))
     assert conditioning._bridged(np.array([9.0, 1.0, 9.0, 2.0, 9.0])).tolist() == [
         1.0,
         1.0,
@@ -77,7 +77,7 @@ def test_lost_samples_are_bridged_in_time_not_in_number():
 @every_filter
 def test_a_constant_passes_to_its_ends(filter):
     kept = some_lost()
-    got = Conditioning(TIME, kept, filter).apply(np.where(kept, 1.05, np.nan))
+    got = Filtering(TIME, kept, filter).apply(np.where(kept, 1.05, np.nan))
     assert got == pytest.approx(np.full(kept.sum(), 1.05), rel=1e-12)
 
 
@@ -85,7 +85,7 @@ def test_a_constant_passes_to_its_ends(filter):
 def test_the_low_pass_is_a_butterworth_filter_twice_without_delay(frequency):
     cutoff = 5.0
     wave = np.exp(2j * np.pi * frequency * TIME)
-    low = Conditioning(TIME, ALL, LowPass(cutoff))
+    low = Filtering(TIME, ALL, LowPass(cutoff))
     got = low.apply(wave.real) + 1j * low.apply(wave.imag)
     # the analogue law at the frequencies that the bilinear transform puts in place of these
     warped = np.tan(np.pi * frequency / RATE) / np.tan(np.pi * cutoff / RATE)
@@ -98,19 +98,19 @@ def test_the_median_is_that_of_scipy():
     signal[::50] += 0.05
     for samples in (1, 3, 7, 31):
         expected = median_filter(signal, samples, mode="nearest")
-        assert np.array_equal(Conditioning(TIME, ALL, Median(samples)).apply(signal), expected)
+        assert np.array_equal(Filtering(TIME, ALL, Median(samples)).apply(signal), expected)
 
 
 def test_a_median_wider_than_the_record_is_held_at_the_ends():
     few = np.array([1.0, 5.0, 2.0])
-    got = Conditioning(np.arange(3.0), np.ones(3, bool), Median(9)).apply(few)
+    got = Filtering(np.arange(3.0), np.ones(3, bool), Median(9)).apply(few)
     assert np.array_equal(got, median_filter(few, 9, mode="nearest"))
 
 
 @every_filter
 @pytest.mark.parametrize("kept", [ALL, some_lost()], ids=["all", "some"])
 def test_tangents_are_the_derivatives_of_apply(filter, kept):
-    conditioning = Conditioning(TIME, kept, filter)
+    conditioning = Filtering(TIME, kept, filter)
     slopes = np.stack([np.sin(TIME), np.cos(7 * TIME), TIME**2], axis=1)
     signal = RESPONSE + white(1e-3)
     got = conditioning.tangents(signal, slopes)
@@ -126,7 +126,7 @@ def test_tangents_are_the_derivatives_of_apply(filter, kept):
 @every_filter
 def test_tangents_do_not_see_lost_samples(filter):
     kept = some_lost()
-    conditioning = Conditioning(TIME, kept, filter)
+    conditioning = Filtering(TIME, kept, filter)
     slopes = np.stack([TIME, np.sin(TIME)], axis=1)
     lost = np.where(kept, RESPONSE, np.nan)
     expected = conditioning.tangents(RESPONSE, slopes)
@@ -138,8 +138,8 @@ def test_a_spike_that_is_not_kept_leaves_no_trace():
     kept[[300, 301, 700]] = False
     spiky = RESPONSE + np.where(kept, 0.0, 0.05)
     for filter in FILTERS:
-        got = Conditioning(TIME, kept, filter).apply(spiky)
-        clean = Conditioning(TIME, ALL, filter).apply(RESPONSE)[kept]
+        got = Filtering(TIME, kept, filter).apply(spiky)
+        clean = Filtering(TIME, ALL, filter).apply(RESPONSE)[kept]
         # a bridge of three steps of 0.01 s across a curvature of 0.05 * 3^2 pu/s^2
         assert got == pytest.approx(clean, abs=1e-4)
 
@@ -148,10 +148,10 @@ def test_uneven_sampling_is_refused_to_a_low_pass_only():
     time = TIME.copy()
     time[500] += 0.0004
     for filter in (None, Median(3)):
-        Conditioning(time, ALL, filter)
+        Filtering(time, ALL, filter)
     with pytest.raises(ValueError, match=r"differs by 4 %.* 0\.01 s, allowed is 1 %"):
-        Conditioning(time, ALL, LowPass(5.0))
-    Conditioning(np.round(TIME + 5e-6, 5), ALL, LowPass(5.0))  # rounded stamps are even
+        Filtering(time, ALL, LowPass(5.0))
+    Filtering(np.round(TIME + 5e-6, 5), ALL, LowPass(5.0))  # rounded stamps are even
 
 
 UNEVEN = np.cumsum(np.random.default_rng(0).uniform(0.001, 0.02, 500))
@@ -162,18 +162,18 @@ every_window = pytest.mark.parametrize("window", WINDOWS)
 
 def averaging(window, time=UNEVEN, kept=None, filter=None):
     kept = np.ones(len(time), dtype=bool) if kept is None else kept
-    return Conditioning(time, kept, filter, MovingAverage(window))
+    return Filtering(time, kept, filter, MovingAverage(window))
 
 
 def test_without_an_average_a_simulation_is_shown_as_it_is():
-    assert Conditioning(TIME, some_lost(), LowPass(5.0)).shown(RESPONSE) is RESPONSE
+    assert Filtering(TIME, some_lost(), LowPass(5.0)).as_recorded(RESPONSE) is RESPONSE
 
 
 @every_window
 def test_an_average_is_the_integral_of_the_line_through_the_samples(window):
     signal = np.random.default_rng(1).normal(1.0, 0.1, UNEVEN.size)
     line, half = make_interp_spline(UNEVEN, signal, k=1), window / 2
-    got = averaging(window).shown(signal)
+    got = averaging(window).as_recorded(signal)
     inside = (UNEVEN - half >= UNEVEN[0]) & (UNEVEN + half <= UNEVEN[-1])
     expected = [line.integrate(t - half, t + half) / window for t in UNEVEN[inside]]
     assert got[inside] == pytest.approx(np.array(expected, dtype=float), abs=1e-11)
@@ -182,31 +182,33 @@ def test_an_average_is_the_integral_of_the_line_through_the_samples(window):
 @every_window
 def test_an_average_leaves_a_constant_and_a_line_as_they_are_to_their_ends(window):
     average = averaging(window)
-    assert np.array_equal(average.shown(np.full(UNEVEN.size, 1.05)), np.full(UNEVEN.size, 1.05))
+    assert np.array_equal(
+        average.as_recorded(np.full(UNEVEN.size, 1.05)), np.full(UNEVEN.size, 1.05)
+    )
     line = 1.0 + 0.3 * UNEVEN
-    assert average.shown(line) == pytest.approx(line, abs=1e-11)
+    assert average.as_recorded(line) == pytest.approx(line, abs=1e-11)
 
 
 @every_window
 def test_derivatives_are_averaged_as_values_are(window):
     columns = np.random.default_rng(2).normal(0.0, 1.0, (UNEVEN.size, 3))
     average = averaging(window)
-    expected = np.stack([average.shown(column) for column in columns.T], axis=1)
-    assert average.shown(columns) == pytest.approx(expected, abs=1e-11)
+    expected = np.stack([average.as_recorded(column) for column in columns.T], axis=1)
+    assert average.as_recorded(columns) == pytest.approx(expected, abs=1e-11)
 
 
 @every_filter
 def test_a_record_is_not_averaged_once_more(filter):
     kept = some_lost()
     measured = np.where(kept, RESPONSE, np.nan)
-    plain, average = Conditioning(TIME, kept, filter), averaging(0.1, TIME, kept, filter)
+    plain, average = Filtering(TIME, kept, filter), averaging(0.1, TIME, kept, filter)
     assert np.array_equal(average.apply(measured), plain.apply(measured))
 
 
 def test_a_kink_between_two_samples_errs_by_what_the_line_cuts_off():
     step, window, at = 0.005, 0.02, 1.0025
     time = np.arange(0.0, 2.0, step)
-    got = averaging(window, time).shown(np.maximum(time - at, 0.0))
+    got = averaging(window, time).as_recorded(np.maximum(time - at, 0.0))
     expected = np.clip(time - at + window / 2, 0.0, window) ** 2 / (2.0 * window)
     expected += np.maximum(time - at - window / 2, 0.0)
     assert np.abs(got - expected).max() == pytest.approx(step**2 / (8.0 * window), rel=1e-6)
@@ -228,14 +230,14 @@ def test_an_average_over_more_than_the_record_is_refused():
 @pytest.mark.parametrize("cutoff", [-1.0, 0.0, 50.0, 60.0, np.nan])
 def test_a_cutoff_outside_half_the_sampling_rate_is_refused(cutoff):
     with pytest.raises(ValueError, match=f"cutoff of {cutoff:g} Hz.* 50 Hz"):
-        Conditioning(TIME, ALL, LowPass(cutoff))
+        Filtering(TIME, ALL, LowPass(cutoff))
 
 
 def test_the_shortest_record_is_filtered_and_a_shorter_one_refused():
     low = LowPass(5.0)
-    assert Conditioning(TIME[:10], ALL[:10], low).apply(RESPONSE[:10]).shape == (10,)
+    assert Filtering(TIME[:10], ALL[:10], low).apply(RESPONSE[:10]).shape == (10,)
     with pytest.raises(ValueError, match="9 samples"):
-        Conditioning(TIME[:9], ALL[:9], low)
+        Filtering(TIME[:9], ALL[:9], low)
 
 
 @pytest.mark.parametrize("samples", [-1, 0, 2, 10])
@@ -246,7 +248,7 @@ def test_a_median_over_an_even_number_is_refused(samples):
 
 def test_nothing_kept_is_refused():
     with pytest.raises(ValueError, match="no sample is kept"):
-        Conditioning(TIME, ~ALL)
+        Filtering(TIME, ~ALL)
 
 
 # courses without noise that have no spikes, over time in s

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from oracle import lively_values, system_of
 
-from exfit.dsp.filtering import Conditioning, MovingAverage
+from exfit.dsp.filtering import Filtering, MovingAverage
 from exfit.dsp.three_phase import mean_rms, positive_sequence, vt_of_rms, vt_of_waveforms
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 RATES = [1000.0, 1234.5, 4800.0, 20_000.0]  # Hz
@@ -146,16 +146,16 @@ def test_rounded_stamps_are_even():
 def test_a_simulation_averaged_alike_is_what_the_waveforms_show(name):
     values = lively_values(name)
     time = clock(5000.0, 3.0)
-    change = Change(0.5037, 0.5 if name == "FIRST_ORDER" else 0.05)
-    simulator = Simulator(system_of(name), Course(0.0, 3.0, (change,)), time, 1e-3)
+    change = InputStep(0.5037, 0.5 if name == "FIRST_ORDER" else 0.05)
+    simulator = Simulator(system_of(name), Inputs(0.0, 3.0, (change,)), time, 1e-3)
     vt = simulator.samples(values, ("vt",))[0][:, 0] + (1.0 if name == "FIRST_ORDER" else 0.0)
     seen = waves(time, 49.2, vt, negative=0.01, harmonics=HARMONICS)
     course = positive_sequence(time, seen)
     everything = np.ones(len(course.time), dtype=bool)
-    alike = Conditioning(course.time, everything, averaged=MovingAverage(course.window))
+    alike = Filtering(course.time, everything, averaged=MovingAverage(course.window))
     # a moving voltage spreads the ripples' lines, and the window has zeros: some 1e-7 are left
     inner = slice(100, -100)  # half a window: beyond it the simulation goes on, here it ends
-    simulated = alike.shown(vt[course.kept])
+    simulated = alike.as_recorded(vt[course.kept])
     assert simulated[inner] == pytest.approx(course.voltage[inner], abs=1e-6)
 
 

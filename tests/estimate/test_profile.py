@@ -5,7 +5,7 @@ import pytest
 from known_minima import numbers
 from scipy.stats import t as student
 
-from exfit.estimate import End, least_squares, profile, profiles
+from exfit.estimate import ProfileEnd, least_squares, profile, profiles
 
 FREE = (-np.inf, np.inf)
 
@@ -50,7 +50,7 @@ def test_on_a_linear_problem_the_interval_is_that_of_linear_theory(seed):
     rise = 0.7
     half = np.sqrt(2.0 * rise * np.diag(np.linalg.inv(J.T @ J)))
     for k, one in enumerate(profiles(fun, jac, x, range(4), FREE, rise)):
-        assert one.ends == (End.RISE, End.RISE)
+        assert one.ends == (ProfileEnd.RISE, ProfileEnd.RISE)
         assert one.low == pytest.approx(x[k] - half[k], abs=1e-3 * half[k])
         assert one.high == pytest.approx(x[k] + half[k], abs=1e-3 * half[k])
 
@@ -149,7 +149,9 @@ def test_a_parameter_alone_needs_no_refit():
 WIDE = np.array([5.0, 20.0, 20.0])  # so that the others do not meet their bounds first
 
 
-@pytest.mark.parametrize(("bounds", "end"), [(FREE, End.FLAT), ((-WIDE, WIDE), End.BOUND)])
+@pytest.mark.parametrize(
+    ("bounds", "end"), [(FREE, ProfileEnd.FLAT), ((-WIDE, WIDE), ProfileEnd.BOUND)]
+)
 def test_a_parameter_that_the_others_make_up_for_has_no_interval(bounds, end):
     # only the sum of the first two is seen
     times = np.linspace(0.0, 1.0, 20)
@@ -169,7 +171,7 @@ def test_a_side_that_meets_a_bound_first_has_no_end():
     low, high = np.full(4, -10.0), np.full(4, 10.0)
     low[2], high[2] = x[2] - 0.5 * half, x[2]
     one = profile(fun, jac, x, 2, (low, high), 0.7)
-    assert one.ends == (End.BOUND, End.BOUND)
+    assert one.ends == (ProfileEnd.BOUND, ProfileEnd.BOUND)
     assert (one.low, one.high) == (None, None)
     assert one.at[0] == low[2]  # exactly
     assert one.at[-1] == x[2]
@@ -181,7 +183,7 @@ def test_residuals_that_are_not_finite_end_a_side():
         return np.append(x - 1.0, 0.1) if x[0] > 0.5 else np.full(2, np.nan)
 
     one = profile(fun, lambda x: np.array([[1.0], [0.0]]), [1.0], 0, FREE, 2.0)
-    assert one.ends == (End.FAILED, End.RISE)
+    assert one.ends == (ProfileEnd.FAILED, ProfileEnd.RISE)
     assert one.low is None
     assert one.at[0] == pytest.approx(0.5, abs=0.05)
 
@@ -221,7 +223,7 @@ def test_an_interruption_keeps_the_points_so_far(calls):
         return michaelis_menten(x)
 
     one = profile(fun, michaelis_menten_slopes, found.x, 1, BOUNDS, rise_of(found))
-    assert End.INTERRUPTED in one.ends
+    assert ProfileEnd.INTERRUPTED in one.ends
     assert 1 <= len(one.at) < len(whole.at)
     assert set(one.at) <= set(whole.at)
 
@@ -242,7 +244,7 @@ def test_watch_is_told_every_side_and_may_interrupt():
     told.clear()
     first, _ = profiles(*given, workers=1, watch=watch)
     assert len(told) == 3
-    assert first.ends == (End.RISE, End.RISE)
+    assert first.ends == (ProfileEnd.RISE, ProfileEnd.RISE)
 
 
 def test_what_cannot_be_profiled_is_refused():

@@ -12,7 +12,7 @@ from places import ROOT
 from exfit.analysis.profiles import profile
 from exfit.case.load import load_case
 from exfit.errors import SimulationError
-from exfit.fitting.build import fitted_trials, values_of
+from exfit.fitting.build import build_experiments, values_of
 from exfit.fitting.recordings import measured
 from exfit.plants import SATURATION, VT0
 from exfit.results.compare_with_record import compare_with_record
@@ -74,7 +74,7 @@ def test_the_cost_is_half_the_sum_of_the_weighted_errors_squared(load):
     rng = np.random.default_rng(1)
     signals = {"vt": rng.normal(1.0, 0.01, 61), "efd": rng.normal(1.1, 0.5, 61)}
     case = load(changed(MACHINE_CASE, "record", channels=channels), **signals)
-    compared = compare_with_record(fitted_trials(case)[0], "fit", values_of(case, {}))
+    compared = compare_with_record(build_experiments(case)[0], "fit", values_of(case, {}))
     assert compared.overlays.keys() == weights.keys()
     expected = sum(
         0.5 * np.sum((weights[name] * one.error) ** 2) for name, one in compared.overlays.items()
@@ -86,13 +86,13 @@ def test_the_cost_is_half_the_sum_of_the_weighted_errors_squared(load):
 def test_the_saturation_that_a_case_names_is_the_one_simulated(load, form):
     case = load({**MACHINE_CASE, "saturation": form}, vt=1.0 + 0.025 * TRUTH)
     got = simulate(case, {}).response.signals["vt"]
-    trial = fitted_trials(case)[0]
+    trial = build_experiments(case)[0]
     values = {**values_of(case, {}), VT0: 1.0}
 
     def response(name):
         system = oracle.system_of("AC1A", "GENROU", name)
-        simulator = Simulator(system, trial.experiment.simulator.course, TIME, case.simulation.step)
-        return simulator.secured(values).samples(values, ("vt",))[0][:, 0]
+        simulator = Simulator(system, trial.experiment.simulator.inputs, TIME, case.simulation.step)
+        return simulator.with_enough_substeps(values).samples(values, ("vt",))[0][:, 0]
 
     assert got == pytest.approx(response(form), abs=1e-12)
     for other in SATURATION.keys() - {form}:

@@ -9,10 +9,10 @@ from records import UNIT, case_of, found_in, one, synthetic
 
 from exfit import workflows
 from exfit.fitting import compression as module
-from exfit.fitting.build import fitted_trials, residuals_of
-from exfit.fitting.compression import condensed
+from exfit.fitting.build import build_experiments, residuals_of
+from exfit.fitting.compression import compressed
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.uncertainty import knowledge, linearisation
+from exfit.fitting.uncertainty import linearisation, uncertainty_at
 from exfit.inference import confidence
 from exfit.workflows import fit
 
@@ -35,7 +35,9 @@ def dense_case(folder, record=None, channels=None, sections=None, test=None):
 
 
 def residuals(case):
-    return residuals_of(case, [one.secured(case.values()) for one in fitted_trials(case)])
+    return residuals_of(
+        case, [one.with_enough_substeps(case.values()) for one in build_experiments(case)]
+    )
 
 
 def forms(found, theta):
@@ -67,7 +69,7 @@ OF_RECORD = {
 def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, record, test):
     """Where samples are left out, too, some steps of the grid whole; and the last parts of both."""
     every = residuals(dense_case(tmp_path, record, test=test))
-    few = condensed(every)
+    few = compressed(every)
     assert module.WORTH * few.count < every.count
     rng = np.random.default_rng(SEED)
     for _ in range(3):
@@ -79,8 +81,8 @@ def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, reco
 def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
     case = dense_case(tmp_path, sections={"estimate": {"strategy": "auto"}})
     ours = fit(case)
-    for user in ("study", "knowledge", "straightness"):
-        monkeypatch.setattr(f"exfit.{user}.condensed", lambda whole: whole)
+    for user in ("study", "fitting.uncertainty", "fitting.nonlinearity"):
+        monkeypatch.setattr(f"exfit.{user}.compressed", lambda whole: whole)
     every = fit(case)
     assert (ours.message, ours.nfev, ours.njev) == (every.message, every.nfev, every.njev)
     assert ours.cost == pytest.approx(every.cost, rel=AGREE)
@@ -92,7 +94,7 @@ def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
 def test_errors_and_intervals_are_those_of_all_samples(tmp_path, monkeypatch):
     whole = residuals(dense_case(tmp_path))
     ours = confidence(linearisation(whole, whole.start, ()))
-    monkeypatch.setattr("exfit.fitting.uncertainty.condensed", lambda whole: whole)
+    monkeypatch.setattr("exfit.fitting.uncertainty.compressed", lambda whole: whole)
     every = confidence(linearisation(whole, whole.start, ()))
     assert ours.dof == pytest.approx(every.dof, rel=1e-6)
     for name, one_ in every.parameters.items():
@@ -112,10 +114,10 @@ def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
 
     case = dense_case(tmp_path)
     every = residuals(case)
-    few = condensed(every)
+    few = compressed(every)
     monkeypatch.setattr("exfit.workflows.estimate.least_squares", stopped)
-    for search in (lambda whole: whole, condensed):
-        monkeypatch.setattr("exfit.workflows.condensed", search)
+    for search in (lambda whole: whole, compressed):
+        monkeypatch.setattr("exfit.fitting.search.compressed", search)
         with pytest.raises(KeyboardInterrupt):
             workflows.search(case, every, "auto", print, print)
     squares = [count * limit**2 for count, limit in asked.items()]
@@ -128,9 +130,9 @@ def test_what_moves_is_told_at_the_instants_of_the_record(tmp_path, monkeypatch)
     case = dense_case(tmp_path, {"delay": 0.2})
     found = residuals(case)
     theta = found.start
-    (ours, _) = knowledge(found, theta, ()).sensitivity
-    monkeypatch.setattr("exfit.fitting.uncertainty.condensed", lambda whole: whole)
-    (every, _) = knowledge(found, theta, ()).sensitivity
+    (ours, _) = uncertainty_at(found, theta, ()).sensitivity
+    monkeypatch.setattr("exfit.fitting.uncertainty.compressed", lambda whole: whole)
+    (every, _) = uncertainty_at(found, theta, ()).sensitivity
     assert len(ours.time) < len(every.time)
     later = ours.time <= every.time[-1]
     for k in range(len(theta)):
@@ -143,9 +145,9 @@ def test_what_moves_is_told_at_the_instants_of_the_record(tmp_path, monkeypatch)
 def test_a_record_is_condensed_once_whatever_comes_between_and_then_forgotten(tmp_path):
     first = residuals(dense_case(tmp_path))
     second = Residuals(first.experiments, first.free, first.fixed, first.ties)
-    few = condensed(first)
-    assert condensed(second) is not few
-    assert condensed(first) is few
+    few = compressed(first)
+    assert compressed(second) is not few
+    assert compressed(first) is few
     gone = weakref.ref(few)
     del first, few
     gc.collect()
@@ -176,11 +178,11 @@ def test_what_is_not_a_quadratic_form_of_the_grid_stays_as_it_is(tmp_path, recor
     given = {key: value for key, value in record.items() if key != "channels"}
     case = dense_case(tmp_path, given, record.get("channels"), sections, test)
     every = residuals(case)
-    assert condensed(every) is every
+    assert compressed(every) is every
 
 
 def test_a_record_with_few_samples_stays_as_it_is(tmp_path):
     synthetic(tmp_path, TEST, np.arange(0.0, 3.0, 0.01))
     every = residuals(case_of(one(TEST, free=("KA",)), tmp_path))
     assert isinstance(every, Residuals)
-    assert condensed(every) is every
+    assert compressed(every) is every

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from records import SAMPLES, UNIT, case_of, config, found_in, recording, several
 
-from exfit.dsp.filtering import Conditioning, LowPass, Median, MovingAverage
-from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage
+from exfit.fitting.build import build_experiments, residuals_of
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import noise_of
-from exfit.fitting.uncertainty import knowledge
+from exfit.fitting.uncertainty import uncertainty_at
 from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit
 
@@ -31,7 +31,9 @@ def open_case(folder, weight=1.0, loss="least-squares"):
     free["TE"]["prior"] = {"mean": UNIT["TE"], "std": "10 %"}
     content["parameters"]["free"] = free
     case = case_of(content, folder)
-    return residuals_of(case, [one.secured(case.values()) for one in fitted_trials(case)])
+    return residuals_of(
+        case, [one.with_enough_substeps(case.values()) for one in build_experiments(case)]
+    )
 
 
 @pytest.mark.parametrize("loss", LOSSES)
@@ -56,7 +58,7 @@ def test_how_far_a_signal_moves_in_per_unit_does_not_depend_on_its_weight(tmp_pa
     moved = []
     for weight in (1.0, WEIGHT):
         residuals = open_case(tmp_path, weight)
-        courses = knowledge(residuals, residuals.start, ()).sensitivity
+        courses = uncertainty_at(residuals, residuals.start, ()).sensitivity
         moved.append(np.concatenate([one.moved for one in courses]))
     assert np.ptp(moved[0]) > 0.1
     assert moved[1] == pytest.approx(moved[0], rel=1e-9, abs=1e-15)
@@ -69,7 +71,7 @@ def test_what_is_left_out_does_not_tell_the_noise(lost):
     kept[100:220] = False
     spoiled = np.where(kept, measured, lost)
     without = noise_of(Channel("vt", measured[kept]))
-    assert noise_of(Channel("vt", spoiled, conditioning=Conditioning(time, kept))) == without
+    assert noise_of(Channel("vt", spoiled, filtering=Filtering(time, kept))) == without
 
 
 WINDOW = 0.1  # s: so wide that what it does is far above rounding
@@ -79,8 +81,8 @@ def averaged(trial, filter=None, kept=None):
     """Return a trial whose record holds averages already."""
     time = trial.record.time
     kept = np.ones(len(time), dtype=bool) if kept is None else kept
-    alike = Conditioning(time, kept, filter, MovingAverage(WINDOW))
-    channels = tuple(replace(one, conditioning=alike) for one in trial.channels)
+    alike = Filtering(time, kept, filter, MovingAverage(WINDOW))
+    channels = tuple(replace(one, filtering=alike) for one in trial.channels)
     return replace(trial, experiment=replace(trial.experiment, channels=channels))
 
 
@@ -92,7 +94,7 @@ def averaged_case(folder, filter=None, lost=0):
     content["records"][0]["test"]["vt0"] = 1.0
     content["parameters"]["fixed"] |= {name: UNIT[name] for name in UNIT if name not in NEAR}
     case = case_of(content, folder)
-    trial = fitted_trials(case)[0].secured(case.values())
+    trial = build_experiments(case)[0].with_enough_substeps(case.values())
     kept = np.ones(len(trial.record.time), dtype=bool)
     kept[100 : 100 + lost] = False
     return case, averaged(trial, filter, kept)
@@ -106,11 +108,11 @@ def test_a_record_of_averages_is_held_against_the_averaged_simulation(tmp_path):
     values = case.values()
     vt = trial.response(values).signals["vt"]
     time = trial.record.time
-    average = Conditioning(time, np.ones(len(time), dtype=bool), averaged=MovingAverage(WINDOW))
-    recorded = [replace(trial.channels[0], measured=average.shown(vt))]
+    average = Filtering(time, np.ones(len(time), dtype=bool), averaged=MovingAverage(WINDOW))
+    recorded = [replace(trial.channels[0], measured=average.as_recorded(vt))]
     there = replace(trial, experiment=replace(trial.experiment, channels=tuple(recorded)))
     assert there.experiment.errors(values)[0] == pytest.approx(np.zeros(len(time)), abs=1e-12)
-    plain = replace(recorded[0], conditioning=None)
+    plain = replace(recorded[0], filtering=None)
     off = replace(trial.experiment, channels=(plain,)).errors(values)[0]
     assert np.abs(off).max() > 1e-4
 

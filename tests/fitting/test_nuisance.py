@@ -22,7 +22,7 @@ from records import (
 )
 
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.build import fitted_trials, residuals_of, trial_of
+from exfit.fitting.build import build_experiment, build_experiments, residuals_of
 from exfit.fitting.nuisance import names_of
 from exfit.plants import VT0
 from exfit.records.record import read_columns
@@ -78,8 +78,8 @@ def everything_open(tmp_path):
     content["parameters"]["fixed"] |= {"TE": "=0.9*TE0", "VAMIN": "=-VAMAX", "KF": 0.0444}
     content["parameters"]["fixed"] |= {"TF": 1.5754, "TA": 0.0545, "KC": 0.5111}
     case = case_of(content, tmp_path)
-    trials = fitted_trials(case)
-    return residuals_of(case, [trial.secured(case.values()) for trial in trials])
+    trials = build_experiments(case)
+    return residuals_of(case, [trial.with_enough_substeps(case.values()) for trial in trials])
 
 
 def test_the_exact_jacobian_is_that_of_differences_with_all_that_can_be_found(everything_open):
@@ -139,7 +139,7 @@ def test_auto_starts_where_the_record_shows_the_step(tmp_path, unit, direction):
     content = config(UNITS[unit])
     content["record"]["file"] = str(SAMPLES / f"{unit}_{direction}.csv")
     content["test"] = {"vref": [{"at": {"start": "auto"}, "step": {"start": "auto"}}]}
-    at, step = fitted_trials(case_of(content, tmp_path))[0].free
+    at, step = build_experiments(case_of(content, tmp_path))[0].free
     assert (at.name, step.name) == ("vref.at", "vref.step")
     assert at.low < at.start < at.high
     assert step.low < step.start < step.high
@@ -190,8 +190,8 @@ def test_a_late_recorder_is_found(tmp_path):
     # what the recorder shows at t happened 37 ms before: simulated there, not interpolated
     synthetic(tmp_path, TEST, TIME)
     case = case_of(one(TEST, delay=0.037), tmp_path)
-    trial = fitted_trials(case)[0]
-    late = trial.secured(case.values()).response(case.values()).signals["vt"]
+    trial = build_experiments(case)[0]
+    late = trial.with_enough_substeps(case.values()).response(case.values()).signals["vt"]
     assert np.interp(TIME - 0.037, TIME, shown) == pytest.approx(late, abs=6 * NOISE)
     rng = np.random.default_rng(1)
     write(tmp_path / "record.csv", t=TIME, vt=late + 2e-5 * rng.standard_normal(len(TIME)))
@@ -204,8 +204,8 @@ def test_a_late_recorder_is_found(tmp_path):
 def test_a_delay_moves_the_features_of_both_signals_alike(tmp_path):
     """They are read off where the record shows the step, not where it was made."""
     synthetic(tmp_path, TEST, TIME, noise=0.0)
-    prompt = fitted_trials(case_of(one(TEST), tmp_path))[0]
-    late = fitted_trials(case_of(one(TEST, delay=0.5), tmp_path))[0]
+    prompt = build_experiments(case_of(one(TEST), tmp_path))[0]
+    late = build_experiments(case_of(one(TEST, delay=0.5), tmp_path))[0]
     values = case_of(one(TEST), tmp_path).values()
     peak = compare_with_record(prompt, "prompt", values).simulated.peak_time
     assert compare_with_record(late, "late", values).simulated.peak_time == pytest.approx(
@@ -220,7 +220,7 @@ def test_an_early_recorder_sees_beyond_the_end_of_its_own_clock(tmp_path):
     whole = read_columns(tmp_path / "record.csv", ["t", "vt"])
     write(tmp_path / "record.csv", t=TIME[:151], vt=whole["vt"][:151])
     for delay in (-0.4, found_in(-0.4, -0.5, 0.1)):
-        trial = fitted_trials(case_of(one(TEST, delay=delay), tmp_path))[0]
+        trial = build_experiments(case_of(one(TEST, delay=delay), tmp_path))[0]
         early = trial.response(values).signals["vt"]
         # grids of 1 ms that end elsewhere, and a cubic between the samples
         assert early == pytest.approx(whole["vt"][40:191], abs=1e-6)
@@ -233,7 +233,7 @@ def test_an_early_recorder_leaves_less_to_tell_the_level(tmp_path):
     shown = read_columns(tmp_path / "record.csv", ["t", "vt"])
     write(tmp_path / "record.csv", t=TIME, vt=np.interp(TIME + 0.4, shown["t"], shown["vt"]))
     for delay in (-0.4, found_in(0.0, -0.4, 0.1)):
-        trial = fitted_trials(case_of(one(level, delay=delay), tmp_path))[0]
+        trial = build_experiments(case_of(one(level, delay=delay), tmp_path))[0]
         assert trial.experiment.own[VT0] == pytest.approx(1.0, abs=1e-9)
 
 
@@ -307,9 +307,9 @@ def test_each_name_moves_its_own_step(tmp_path, order):
             {"at": found_in(instants[name], 0.5, 5.0), "step": 0.01 * instants[name]}
             for name in names
         ]
-    trial = fitted_trials(case_of(one(test), tmp_path))[0]
-    moved = trial.experiment.moved({name: at + 0.25 for name, at in instants.items()})
-    assert {(step.at, round(step.step, 9)) for step in moved.course.steps} == {
+    trial = build_experiments(case_of(one(test), tmp_path))[0]
+    moved = trial.experiment.with_inputs({name: at + 0.25 for name, at in instants.items()})
+    assert {(step.at, round(step.step, 9)) for step in moved.inputs.steps} == {
         (at + 0.25, round(0.01 * at, 9)) for at in instants.values()
     }
 
@@ -318,7 +318,7 @@ def test_the_level_before_an_instant_that_is_found_is_that_before_its_lower_boun
     vt = np.where(TIME < 0.7, 1.0, 1.0 + 0.01 * (TIME - 0.7))
     write(tmp_path / "record.csv", t=TIME, vt=vt)
     test = {"vref": [{"at": found_in(1.0, 0.7, 1.2), "step": 0.05}]}
-    trial = fitted_trials(case_of(one(test), tmp_path))[0]
+    trial = build_experiments(case_of(one(test), tmp_path))[0]
     assert trial.experiment.own[VT0] == 1.0
     assert trial.test.steady == 0.7
 
@@ -329,29 +329,29 @@ def test_auto_finds_the_step_beside_gaps_and_masked_stretches(tmp_path):
     write(tmp_path / "record.csv", t=TIME, vt=shown)
     test = {"vref": [{"at": {"start": "auto"}, "step": {"start": "auto"}}]}
     case = case_of(one(test, gaps="skip", mask=[[2.0, 2.1]]), tmp_path)
-    at, _ = fitted_trials(case)[0].free
+    at, _ = build_experiments(case)[0].free
     assert at.start == pytest.approx(1.0, abs=0.1)
 
 
 def test_auto_keeps_the_bounds_that_are_given(tmp_path):
     synthetic(tmp_path, TEST, TIME)
     test = {"vref": [{"at": {"start": "auto", "min": 0.5, "max": 1.5}, "step": 0.05}]}
-    (at,) = fitted_trials(case_of(one(test), tmp_path))[0].free
+    (at,) = build_experiments(case_of(one(test), tmp_path))[0].free
     assert (at.low, at.high) == (0.5, 1.5)
     test["vref"][0]["at"] = {"start": "auto", "min": 3.0}
     with pytest.raises(CaseError, match=r"test\.vref\[0\]\.at: the record shows .* outside 3"):
-        fitted_trials(case_of(one(test), tmp_path))
+        build_experiments(case_of(one(test), tmp_path))
 
 
 def test_auto_refuses_a_record_without_a_step_and_one_whose_step_comes_after_the_next(tmp_path):
     write(tmp_path / "record.csv", t=TIME, vt=np.ones_like(TIME))
     auto = {"at": {"start": "auto"}, "step": {"start": "auto"}}
     with pytest.raises(RecordError, match=r"record\.csv: .*test\.vref\[0\] asks for start: auto"):
-        fitted_trials(case_of(one({"vref": [auto]}), tmp_path))
+        build_experiments(case_of(one({"vref": [auto]}), tmp_path))
     synthetic(tmp_path, {**TEST, "vref": [{"at": 3.0, "step": 0.05}]}, TIME)
     test = {"vref": [auto, {"at": 2.0, "step": 0.01}]}
     with pytest.raises(CaseError, match=r"test\.vref\[1\]\.at: 2 s is not after"):
-        fitted_trials(case_of(one(test), tmp_path))
+        build_experiments(case_of(one(test), tmp_path))
 
 
 def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
@@ -373,9 +373,9 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     assert found.values == plain.values
     (before,), (after,) = plain.validation, found.validation
     assert after.rmse == pytest.approx(before.rmse, rel=0.05)
-    trial = trial_of(case, case.validations[0], found.values)
+    trial = build_experiment(case, case.validations[0], found.values)
     assert tried_on(case, trial, found.values).rmse == after.rmse
-    unaligned = compare_with_record(trial.secured(found.values), "start", found.values)
+    unaligned = compare_with_record(trial.with_enough_substeps(found.values), "start", found.values)
     assert unaligned.rmse > 10 * after.rmse
 
 
@@ -435,9 +435,9 @@ def test_a_median_wider_than_a_tenth_of_the_record_is_refused(tmp_path):
 def test_a_step_that_may_be_earlier_asks_for_a_simulation_beyond_the_record(tmp_path):
     """Shifted to its lower bound, the response is read behind the end of the record."""
     content = several(recording("up", at=found_in(1.0, 0.8, 1.2)), recording("down"))
-    first, second = fitted_trials(case_of(content, tmp_path))
-    assert first.experiment.simulator.course.end == pytest.approx(first.record.time[-1] + 0.2)
-    assert second.experiment.simulator.course.end == second.record.time[-1]
+    first, second = build_experiments(case_of(content, tmp_path))
+    assert first.experiment.simulator.inputs.end == pytest.approx(first.record.time[-1] + 0.2)
+    assert second.experiment.simulator.inputs.end == second.record.time[-1]
 
 
 def test_the_file_of_parameters_names_every_record_with_its_error(tmp_path):

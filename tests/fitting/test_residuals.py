@@ -15,7 +15,7 @@ from exfit.dsp.noise import noise
 from exfit.dsp.robust_loss import LOSSES
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.parameters import Free, Known
+from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.fitting.residuals import (
     CENTRAL_STEP,
     FINEST,
@@ -26,11 +26,11 @@ from exfit.fitting.residuals import (
 )
 from exfit.models import MODELS
 from exfit.plants import VT0
-from exfit.simulation.inputs import Change, Course, each
+from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
-COURSE = Course(0.0, 2.0, (Change(0.5, 0.005),))
+COURSE = Inputs(0.0, 2.0, (InputStep(0.5, 0.005),))
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 
@@ -55,7 +55,7 @@ def problem(exciter, logarithmic=True, signals=("vt",), offset=0.01, **bounds):
         Channel(name, truth[:, k] + offset, WEIGHTS[name]) for k, name in enumerate(signals)
     ]
     free = [
-        Free(
+        FreeParameter(
             name,
             values[name],
             *bounds.get(name, (values[name] / 10, values[name] * 10)),
@@ -126,7 +126,7 @@ positive = st.floats(1e-6, 1e6)
 def test_scaling_and_back_is_the_identity_and_bounds_are_exact(low, ratio, share, logarithmic):
     high = low * ratio
     value = low + share * (high - low)
-    free = Free("X", value, low, high, logarithmic)
+    free = FreeParameter("X", value, low, high, logarithmic)
     assert free.value(free.scaled(value)) == pytest.approx(value, rel=1e-9)
     assert free.value(free.scaled(low)) == low
     assert free.value(free.scaled(high)) == high
@@ -136,7 +136,7 @@ def test_scaling_and_back_is_the_identity_and_bounds_are_exact(low, ratio, share
 
 @pytest.mark.parametrize("logarithmic", [True, False])
 def test_the_slope_of_the_scale_is_its_derivative(logarithmic):
-    free = Free("X", 3.0, 0.5, 20.0, logarithmic)
+    free = FreeParameter("X", 3.0, 0.5, 20.0, logarithmic)
     theta = free.scaled(3.0)
     expected = (free.value(theta + 1e-6) - free.value(theta - 1e-6)) / 2e-6
     assert free.slope(theta) == pytest.approx(expected, rel=1e-6)
@@ -151,7 +151,7 @@ def test_on_its_bounds_a_parameter_is_exactly_the_bound(exciter):
 
 
 def test_zero_may_be_a_bound_of_a_linear_parameter(exciter):
-    free = Free("TA", 0.01, 0.0, 0.1, False)
+    free = FreeParameter("TA", 0.01, 0.0, 0.1, False)
     assert free.value(free.scaled(0.0)) == 0.0
 
 
@@ -197,7 +197,7 @@ def with_extras(exciter, free, ties=None, robust=None):
 
 def test_a_prior_is_one_more_error_in_the_unit_of_the_noise():
     plain = problem("AC1A")
-    known = Known(plain.free[0].start * 1.1, plain.free[0].start * 0.05)
+    known = Prior(plain.free[0].start * 1.1, plain.free[0].start * 0.05)
     free = [replace(plain.free[0], prior=known), *plain.free[1:]]
     residuals = with_extras("AC1A", free)
     found, theta = residuals(residuals.start), residuals.start
@@ -213,7 +213,7 @@ def test_a_prior_is_one_more_error_in_the_unit_of_the_noise():
 @pytest.mark.parametrize("name", ["huber", "soft-l1"])
 def test_a_loss_applies_to_samples_and_not_to_priors(name):
     plain = problem("AC1A")
-    known = Known(plain.free[0].start * 1.1, plain.free[0].start * 1e-9)
+    known = Prior(plain.free[0].start * 1.1, plain.free[0].start * 1e-9)
     free = [replace(plain.free[0], prior=known), *plain.free[1:]]
     loss = LOSSES[name]
     residuals = with_extras("AC1A", free, robust=Robust(loss, 2.0))

@@ -21,7 +21,7 @@ from records import (
 
 from exfit.analysis.model_check import check
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.build import fitted_trials, residuals_of, values_of
+from exfit.fitting.build import build_experiments, residuals_of, values_of
 from exfit.fitting.overrides import changed_values, read_parameters
 from exfit.output.run_folder import write_fit
 from exfit.records.record import read_columns
@@ -158,8 +158,8 @@ def on_and_off_line(tmp_path):
     fixed = content["parameters"]["fixed"]
     case = case_of({**content, "parameters": {"fixed": {**fixed, **truth}}}, tmp_path)
     rng = np.random.default_rng(2)
-    for trial in fitted_trials(case):
-        response = trial.secured(case.values()).response(case.values())
+    for trial in build_experiments(case):
+        response = trial.with_enough_substeps(case.values()).response(case.values())
         shown = {
             signal: response.signals[signal] + 1e-5 * rng.standard_normal(len(TIME))
             for signal in trial.experiment.signals
@@ -196,12 +196,12 @@ def test_a_switching_starts_from_the_network_of_its_own_record(tmp_path):
     on = content["records"][1]
     on["plant"]["network"] = {**on["plant"]["network"], "X": 0.25}
     on["test"]["network"] = [{"at": 2.0, "X": 0.4}]
-    trial = fitted_trials(case_of(content, tmp_path))[1]
-    (switch,) = [step for step in trial.experiment.simulator.course.steps if step.signal == "X"]
+    trial = build_experiments(case_of(content, tmp_path))[1]
+    (switch,) = [step for step in trial.experiment.simulator.inputs.steps if step.signal == "X"]
     assert (switch.at, switch.step) == (2.0, pytest.approx(0.15))
     content["plant"] |= {"type": "infinite-bus", "network": {**on["plant"]["network"], "X": 0.1}}
-    trial = fitted_trials(case_of(content, tmp_path))[1]
-    (switch,) = [step for step in trial.experiment.simulator.course.steps if step.signal == "X"]
+    trial = build_experiments(case_of(content, tmp_path))[1]
+    (switch,) = [step for step in trial.experiment.simulator.inputs.steps if step.signal == "X"]
     assert switch.step == pytest.approx(0.15)
 
 
@@ -428,7 +428,7 @@ def test_a_gap_is_refused_or_skipped(tmp_path):
     with pytest.raises(RecordError, match=r"record\.csv"):
         fit(case_of(single(file="record.csv"), tmp_path))
     case = case_of(single(file="record.csv", gaps="skip"), tmp_path)
-    assert residuals_of(case, fitted_trials(case)).count == len(vt) - 3
+    assert residuals_of(case, build_experiments(case)).count == len(vt) - 3
     found, whole = fit(case), fit(case_of(single(), tmp_path))
     # three samples of a thousand
     assert unit(found) == pytest.approx(unit(whole), rel=5e-3)
@@ -459,7 +459,7 @@ def test_a_filter_that_does_not_go_with_the_record_is_refused(tmp_path, time, re
     write(tmp_path / "record.csv", t=time, vt=1.0 + 0.01 * time)
     case = case_of(one(TEST, {"vt": {"column": "vt", **record}}), tmp_path)
     with pytest.raises(RecordError) as caught:
-        fitted_trials(case)
+        build_experiments(case)
     for part in ("record.csv", *named):
         assert part in str(caught.value)
 
@@ -475,7 +475,7 @@ def test_a_mask_that_leaves_nothing_is_refused(tmp_path, mask, vt0, named):
     write(tmp_path / "record.csv", t=TIME, vt=1.0 + 0.01 * TIME)
     test = {"vref": TEST["vref"]} if vt0 is None else TEST
     with pytest.raises(RecordError, match=named):
-        fitted_trials(case_of(one(test, mask=mask), tmp_path))
+        build_experiments(case_of(one(test, mask=mask), tmp_path))
 
 
 def test_a_stretch_masked_from_the_beginning_is_no_fault_where_the_level_is_given(tmp_path):
@@ -493,7 +493,7 @@ def test_a_signal_that_drives_must_have_no_gap(tmp_path):
     write(tmp_path / "record.csv", **columns)
     content["record"] |= {"file": "record.csv", "gaps": "skip"}
     with pytest.raises(RecordError, match="it drives, and has a gap at"):
-        fitted_trials(case_of({**content, "validate": []}, tmp_path))
+        build_experiments(case_of({**content, "validate": []}, tmp_path))
 
 
 def test_a_check_covers_all_records_and_what_is_found_about_them(tmp_path):

@@ -13,10 +13,10 @@ from scipy.stats import t as student
 
 from exfit.case.load import load_case
 from exfit.estimate import least_squares
-from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.build import build_experiments, residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT
-from exfit.fitting.uncertainty import knowledge
+from exfit.fitting.uncertainty import uncertainty_at
 from exfit.inference import LEVEL
 from exfit.workflows import fit
 
@@ -67,7 +67,7 @@ def test_the_standard_errors_of_ac1a_are_the_known_ones(ac1a, name):
 
 def test_the_standard_errors_of_ac1a_are_those_of_scipy(ac1a):
     case = case_of("ac1a_typical")
-    residuals = residuals_of(case, fitted_trials(case))
+    residuals = residuals_of(case, build_experiments(case))
     start = np.log([one.value for one in ac1a.parameters.values()])
     covariance = curve_fit(
         lambda _, *theta: residuals(np.array(theta)),
@@ -171,7 +171,7 @@ def test_the_rise_is_the_quantile_of_one_parameter(ac1a):
 def first_order():
     """Return the residuals of a case, its samples the exact response to k = 4 and a = 2."""
     case = case_of("first_order")
-    (trial,) = fitted_trials(case)
+    (trial,) = build_experiments(case)
     whole = residuals_of(case, (trial,))
     (channel,) = trial.channels
     exact = 2.0 * (1.0 - np.exp(-2.0 * trial.record.time))
@@ -188,7 +188,7 @@ def known_with(exact, noise, given=None):
         residuals, exact.start, residuals.exact, residuals.bounds, "lm-then-dgn", x_scale=UNIT
     )
     assert found.success
-    return knowledge(residuals, found.x, ()).confidence
+    return uncertainty_at(residuals, found.x, ()).confidence
 
 
 RECORDS = 100
@@ -244,7 +244,7 @@ def test_intervals_of_a_fit_are_widened_for_noise_that_is_not_white():
 def test_a_response_that_is_not_linear_over_the_intervals_is_told(name, bent):
     """The check system is nearly linear; AC1A meets its limits within the interval of KA."""
     found = fit(case_of(name)).knowledge
-    assert ("KA" in found.bent) == bent
+    assert ("KA" in found.nonlinear) == bent
     assert any("not linear over the intervals" in text for text in found.sentences) == bent
 
 

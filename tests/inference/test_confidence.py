@@ -10,7 +10,7 @@ from scipy.optimize import curve_fit, least_squares
 from scipy.stats import chi2, kstest
 from scipy.stats import t as student
 
-from exfit.inference import Channel, Prior, confidence, rises
+from exfit.inference import PriorRow, ResidualBlock, confidence, rises
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 
 # NIST Statistical Reference Datasets: certified standard deviations of the estimates
@@ -92,7 +92,7 @@ def test_the_covariance_is_that_of_curve_fit(seed, absolute):
         ftol=1e-12,
     )
     response, slopes = decay(t, *found)
-    channel = Channel("vt", slice(0, len(t)), noise=1.0 if absolute else None)
+    channel = ResidualBlock("vt", slice(0, len(t)), noise=1.0 if absolute else None)
     lin = linearised(
         found, (response - measured) / sigma, slopes / sigma[:, None], channels=(channel,)
     )
@@ -163,7 +163,7 @@ def test_a_prior_that_is_right_narrows_the_interval_and_keeps_its_promise():
                 fitted,
                 LINE @ (fitted - TRUTH) - noise,
                 LINE,
-                priors=(Prior(1, mean, std, taken),),
+                priors=(PriorRow(1, mean, std, taken),),
             )
         )
         covered.append(is_covered(known))
@@ -180,7 +180,7 @@ def test_a_prior_that_is_right_narrows_the_interval_and_keeps_its_promise():
 def test_where_the_record_is_silent_the_prior_speaks():
     rows = np.column_stack([np.ones(50), np.zeros(50)])
     errors = np.random.default_rng(6).standard_normal(50)
-    known = confidence(linearised(TRUTH, errors, rows, priors=(Prior(1, 5.0, 0.3, 1.0),)))
+    known = confidence(linearised(TRUTH, errors, rows, priors=(PriorRow(1, 5.0, 0.3, 1.0),)))
     assert std_errors(known)[1] == pytest.approx(0.3)
 
 
@@ -188,7 +188,7 @@ def test_each_channel_brings_its_own_noise():
     rng = np.random.default_rng(7)
     levels = np.repeat([1.0, 0.05], 100)
     rows = np.column_stack([np.ones(200), np.concatenate([T[:100], 3.0 - T[:100]])])
-    channels = (Channel("vt", slice(0, 100)), Channel("efd", slice(100, 200)))
+    channels = (ResidualBlock("vt", slice(0, 100)), ResidualBlock("efd", slice(100, 200)))
     missed, told = [], []
     for noise in levels * rng.standard_normal((PROBLEMS, 200)):
         fitted = np.linalg.lstsq(rows, rows @ TRUTH + noise, rcond=None)[0]
@@ -282,7 +282,7 @@ def test_an_offset_that_no_parameter_takes_up_is_not_noise():
 def test_a_given_noise_counts_unless_the_residuals_speak_against_it(given, counts, times):
     errors = np.random.default_rng(14).standard_normal(2000)
     errors /= np.sqrt(np.mean(errors**2))
-    channel = Channel("vt", slice(0, 2000), noise=given)
+    channel = ResidualBlock("vt", slice(0, 2000), noise=given)
     known = confidence(linearised([5.0], errors, np.ones((2000, 1)), channels=(channel,)))
     assert known.noise[0].std == pytest.approx(counts, rel=1e-3)
     assert bool(known.sentences) == (times is not None)
@@ -413,7 +413,7 @@ def test_what_a_prior_determines_takes_no_sample():
     """A slope that its prior holds leaves the noise, and the degrees of freedom, of one fixed."""
     noise = 0.2 * np.random.default_rng(14).standard_normal(10)
     line = LINE[:: len(T) // 10]
-    held = linearised(TRUTH, noise, line, priors=(Prior(1, TRUTH[1], 1e-9, 0.2),))
+    held = linearised(TRUTH, noise, line, priors=(PriorRow(1, TRUTH[1], 1e-9, 0.2),))
     known = confidence(held)
     assert known.dof == pytest.approx(9.0)
     assert known.noise[0].estimated == pytest.approx(np.sqrt(noise @ noise / 9.0))
@@ -422,7 +422,7 @@ def test_what_a_prior_determines_takes_no_sample():
 def test_one_channel_without_a_given_noise_leaves_it_to_be_judged():
     noise = 0.1 * np.random.default_rng(15).standard_normal(len(T))
     half = len(T) // 2
-    both = (Channel("vt", slice(0, half), 0.1), Channel("efd", slice(half, len(T))))
+    both = (ResidualBlock("vt", slice(0, half), 0.1), ResidualBlock("efd", slice(half, len(T))))
     known = confidence(linearised(TRUTH, noise, LINE, channels=both))
     assert known.noise[0].accepted
     assert known.dof == pytest.approx(len(T) - 2)
@@ -439,7 +439,7 @@ def test_samples_that_repeat_each_other_ask_for_students_t():
 
 def test_a_given_noise_is_not_rejected_for_being_correlated():
     noise = autoregressive(np.random.default_rng(17), 0.9, (200, len(T)))
-    given = (Channel("vt", slice(0, len(T)), 1.0),)
+    given = (ResidualBlock("vt", slice(0, len(T)), 1.0),)
     lins = [linearised(TRUTH, one, LINE, channels=given) for one in noise]
     # as many samples, taken for independent, would reject 4 of 10
     assert np.mean([not confidence(one).noise[0].accepted for one in lins]) <= 0.03
@@ -448,7 +448,7 @@ def test_a_given_noise_is_not_rejected_for_being_correlated():
 def test_on_a_bound_the_cost_rises_by_the_mean_variance_of_all_samples():
     noise, cut = np.random.default_rng(18).standard_normal(len(T)), 50
     noise[:cut] *= 0.1
-    both = (Channel("vt", slice(0, cut), 0.1), Channel("efd", slice(cut, len(T)), 1.0))
+    both = (ResidualBlock("vt", slice(0, cut), 0.1), ResidualBlock("efd", slice(cut, len(T)), 1.0))
     lin = linearised(TRUTH, noise, LINE, channels=both, held=(None, "max"))
     mean = (cut * 0.1**2 + (len(T) - cut)) / len(T)
     assert rises(lin, confidence(lin))["b"] == pytest.approx(0.5 * chi2.ppf(0.95, 1) * mean)
@@ -488,6 +488,6 @@ def test_arrays_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match="jacobian: not finite"):
         linearised(TRUTH, np.zeros(200), LINE * np.nan)
     with pytest.raises(ValueError, match="channels: must cover the 200 errors"):
-        linearised(TRUTH, np.zeros(200), LINE, channels=(Channel("vt", slice(0, 100)),))
+        linearised(TRUTH, np.zeros(200), LINE, channels=(ResidualBlock("vt", slice(0, 100)),))
     with pytest.raises(ValueError, match="held: 1 for 2 parameters"):
         linearised(TRUTH, np.zeros(200), LINE, held=(None,))

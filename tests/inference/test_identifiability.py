@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from linearised import autoregressive, decay, linearised, std_errors
 
-from exfit.inference import WEAK, Channel, Prior, confidence, identifiability
+from exfit.inference import WEAK, PriorRow, ResidualBlock, confidence, identifiability
 from exfit.inference.wording import digits, listed, move
 
 SAMPLES = 300
@@ -89,7 +89,7 @@ def test_the_weight_of_a_channel_does_not_count_as_a_change_of_its_signal():
         errors=8.0 * lin.errors,
         influence=8.0 * lin.influence,
         jacobian=8.0 * lin.jacobian,
-        channels=(Channel("vt", slice(0, SAMPLES), weight=8.0),),
+        channels=(ResidualBlock("vt", slice(0, SAMPLES), weight=8.0),),
     )
     assert analysed(heavy)[1].unseen[0].sentence == analysed(lin)[1].unseen[0].sentence
 
@@ -244,7 +244,7 @@ def test_for_a_nuisance_that_is_hardly_known_nothing_is_fixed():
 def test_what_a_prior_says_is_seen():
     lin, right = with_directions(9, [900.0, 80.0, 2.0])
     k = int(np.argmax(np.abs(right[2])))
-    priors = (Prior(k, float(lin.values[k]), 0.001 * float(lin.values[k]), 1.0),)
+    priors = (PriorRow(k, float(lin.values[k]), 0.001 * float(lin.values[k]), 1.0),)
     _, found = analysed(replace(lin, priors=priors))
     assert found.unseen == ()
     assert len(found.singular_values) == 3
@@ -254,8 +254,8 @@ def test_each_signal_says_how_it_changes():
     lin, _ = with_directions(10, [900.0, 80.0, 2.0])
     half = SAMPLES // 2
     channels = (
-        Channel("up vt", slice(0, half)),
-        Channel("up efd", slice(half, SAMPLES), weight=0.1),
+        ResidualBlock("up vt", slice(0, half)),
+        ResidualBlock("up efd", slice(half, SAMPLES), weight=0.1),
     )
     known, found = analysed(replace(lin, channels=channels))
     (one,) = found.unseen

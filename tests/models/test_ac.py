@@ -13,7 +13,7 @@ from references import reference
 from exfit.models import MODELS, find
 from exfit.models.blocks import limited_lead_lag
 from exfit.models.sheet import typical
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 ALTERNATORS = ("AC2A", "AC3A", "AC4A", "AC5A", "AC6A", "EXAC4")
@@ -161,7 +161,7 @@ def test_the_clamp_of_exac4_winds_up_and_the_limit_of_ac4a_does_not():
     up_and_down = {}
     for name in ("AC4A", "EXAC4"):
         values = typical_values(name)
-        course = Course(0.0, 1.0, (Change(0.1, 0.5), Change(0.6, -0.5)))
+        course = Inputs(0.0, 1.0, (InputStep(0.1, 0.5), InputStep(0.6, -0.5)))
         simulator = Simulator(system_of(name), course, np.linspace(0.0, 1.0, 1001), 1e-3)
         up_and_down[name] = simulator.response(values, ("efd",)).signals["efd"]
     held = {name: efd[600:] >= 5.64 - 1e-9 for name, efd in up_and_down.items()}

@@ -14,7 +14,7 @@ from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.sheet import typical
 from exfit.plants import SATURATION, Names, exciter_inputs, exciter_parameters
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 FREQUENCIES = np.geomspace(0.01, 50.0, 41)  # Hz
@@ -236,7 +236,7 @@ def test_the_floor_of_AC7B_follows_the_field_current():
 
 
 def test_a_start_beyond_the_gate_of_EXAC2_is_refused():
-    simulator = Simulator(system_of("EXAC2"), Course(0.0, 1.0, ()), np.linspace(0.0, 1.0, 11), 1e-3)
+    simulator = Simulator(system_of("EXAC2"), Inputs(0.0, 1.0, ()), np.linspace(0.0, 1.0, 11), 1e-3)
     with pytest.raises(SimulationError, match="no state of rest"):
         simulator.samples(typical_values("EXAC2", VLR=1.0), ("vt",))
 
@@ -250,8 +250,8 @@ def test_a_start_beyond_the_gate_of_EXAC2_is_refused():
 def test_sample_data_give_a_stable_step_of_five_percent(name, changes):
     system, values = system_of(name), typical_values(name, **changes)
     times = np.linspace(0.0, 30.0, 601)
-    simulator = Simulator(system, Course(0.0, 30.0, (Change(0.5, 0.05),)), times, 1e-3)
-    vt = simulator.secured(values).samples(values, ("vt",))[0][:, 0]
+    simulator = Simulator(system, Inputs(0.0, 30.0, (InputStep(0.5, 0.05),)), times, 1e-3)
+    vt = simulator.with_enough_substeps(values).samples(values, ("vt",))[0][:, 0]
     assert rates_at_rest(system, values).real.max() < 0.0
     assert vt.max() < 1.0 + 1.3 * 0.05  # an overshoot of at most 30 %
     assert vt[-1] == pytest.approx(1.05, abs=1e-3)  # proportional regulators leave some

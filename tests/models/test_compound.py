@@ -14,7 +14,7 @@ from exfit.engine.trace import Graph, evaluate, in_order
 from exfit.models import MODELS
 from exfit.models.blocks import compound_source
 from exfit.plants import MACHINE, Names
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 J = 1j
@@ -172,7 +172,7 @@ def test_a_small_step_on_a_machine_without_saturation_is_that_of_the_diagram(
     transducer = lag(1.0, values.get("TR", 0.0))
     closed = machine.fed_back(-1.0 * Y + X * transducer) * X
     expected = size * closed.step(times)
-    course = Course(0.0, 3.0, (Change(0.0, size),))
+    course = Inputs(0.0, 3.0, (InputStep(0.0, size),))
     simulator = Simulator(system_of(name, "ONE_AXIS"), course, times, 5e-4)
     got = simulator.response(values, ("vt",)).signals["vt"] - 1.0
     assert np.abs(expected).max() > 0.3 * size
@@ -206,7 +206,7 @@ CEILINGS = [
 @pytest.mark.parametrize(("name", "changes", "ceiling"), CEILINGS)
 def test_a_large_step_drives_the_field_to_its_ceiling_and_back(name, changes, ceiling):
     values = typical_values(name) | changes
-    course = Course(0.0, 20.0, (Change(0.5, 0.4), Change(1.5, -0.4)))
+    course = Inputs(0.0, 20.0, (InputStep(0.5, 0.4), InputStep(1.5, -0.4)))
     times = np.linspace(0.0, 20.0, 2001)
     got = Simulator(system_of(name), course, times, 1e-3).response(values).signals
     expected = np.array(
@@ -223,7 +223,7 @@ def test_a_large_step_drives_the_field_to_its_ceiling_and_back(name, changes, ce
 
 def test_without_any_source_st2a_is_fed_by_one_per_unit():
     values = typical_values("ST2A") | {"KP": 0.0, "KI": 0.0, "VRMAX": 3.0, "EFDMAX": 9.0}
-    simulator = Simulator(system_of("ST2A"), Course(0.0, 5.0, ()), np.linspace(0, 5, 11), 1e-3)
+    simulator = Simulator(system_of("ST2A"), Inputs(0.0, 5.0, ()), np.linspace(0, 5, 11), 1e-3)
     got = simulator.response(values).signals
     assert got["VR"] == pytest.approx(got["efd"], abs=1e-9)
 

@@ -11,7 +11,7 @@ from exfit.engine.kernel import LinearKernel
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.plants import MACHINE, SATURATION, VT0, Names, exciter_inputs, exciter_parameters
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 CONTINUOUS = ("DC1A", "DC2A", "IEEET1", "IEEEX1", "EXDC2")
@@ -42,7 +42,7 @@ def vx(e):
 
 def respond(name, values, *changes, end=3.0, outputs=("vt", "efd")):
     """Return the outputs (M, ny) every 10 ms."""
-    course = Course(0.0, end, tuple(Change(*change) for change in changes))
+    course = Inputs(0.0, end, tuple(InputStep(*change) for change in changes))
     times = np.linspace(0.0, end, round(100 * end) + 1)
     system = system_of(name, "ONE_AXIS")
     return Simulator(system, course, times, 1e-3).samples(values, outputs)[0]

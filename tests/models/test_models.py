@@ -42,7 +42,7 @@ from exfit.plants import (
     exciter_parameters,
     open_circuit,
 )
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator, parameters_used
 
 SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}
@@ -197,7 +197,7 @@ def test_halving_the_step_cuts_the_error_sixteenfold(model):
 def responses(model, sets, saturation="quadratic", size=0.3):
     """Return vt and the last state after a large bump up and down, for each set."""
     system = system_of(model, saturation=saturation)
-    course = Course(0.0, 4.0, (Change(0.1, size), Change(2.0, -2 * size)))
+    course = Inputs(0.0, 4.0, (InputStep(0.1, size), InputStep(2.0, -2 * size)))
     simulator = Simulator(system, course, np.linspace(0.0, 4.0, 81), 1e-3)
     return [simulator.samples(values, ("vt",))[0] for values in sets]
 
@@ -433,7 +433,7 @@ def test_a_user_s_file_is_a_model_like_any_other(tmp_path):
     mine = find("mine.py", tmp_path)
     assert (mine.name, mine.title, mine.states) == ("MINE", "a lag", ("V",))
     simulator = Simulator(
-        alone(mine), Course(0.0, 2.0, (Change(0.0, 1.0),)), np.linspace(0.0, 2.0, 41), 1e-3
+        alone(mine), Inputs(0.0, 2.0, (InputStep(0.0, 1.0),)), np.linspace(0.0, 2.0, 41), 1e-3
     )
     samples, _ = simulator.samples({"K": 2.0, "T": 0.5, VT0: 0.0}, ("vt",))
     expected = 2.0 * (1.0 - np.exp(-simulator.times / 0.5))

@@ -10,7 +10,7 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from exfit import workflows
-from exfit.analysis.iteration_responses import Sketch
+from exfit.analysis.iteration_responses import LiveResponse
 from exfit.fitting.experiment import Experiment
 from exfit.output import terminal
 from exfit.output.terminal import progress
@@ -19,7 +19,7 @@ from exfit.results.model import Iteration
 
 TIME = np.linspace(0.0, 10.0, 1001)
 RISE = np.where(TIME < 1.0, 1.0, 1.05 - 0.05 * np.exp(1.0 - TIME))
-SKETCH = Sketch("vt", TIME, RISE, RISE + 0.002)
+SKETCH = LiveResponse("vt", TIME, RISE, RISE + 0.002)
 SIZES = [(30, 8), (60, 15), (80, 24), (100, 30), (120, 15), (120, 40), (250, 70)]
 # where Unicode puts the dots of a braille pattern, as (row, column)
 PLACES = {1: (0, 0), 2: (1, 0), 3: (2, 0), 4: (0, 1), 5: (1, 1), 6: (2, 1), 7: (3, 0), 8: (3, 1)}
@@ -86,7 +86,7 @@ def test_samples_that_are_no_numbers_are_left_out():
     seen = dots.any(axis=0)
     assert seen[:40].all()
     assert not seen[41:59].any()
-    assert drawing.sketched(Sketch("vt", TIME, gappy, gappy), 60, 12)
+    assert drawing.sketched(LiveResponse("vt", TIME, gappy, gappy), 60, 12)
 
 
 @pytest.mark.parametrize(("width", "height"), [(45, 9), (72, 14), (100, 20)])
@@ -99,7 +99,7 @@ def test_a_plot_is_as_large_as_asked(width, height):
 
 
 def test_a_flat_signal_has_different_levels_at_its_axis():
-    flat = Sketch("vt", TIME, np.ones(len(TIME)), np.ones(len(TIME)))
+    flat = LiveResponse("vt", TIME, np.ones(len(TIME)), np.ones(len(TIME)))
     labels = [text.plain.partition("┤")[0] for text in drawing.sketched(flat, 60, 12)]
     assert any(label.strip() for label in labels)
 

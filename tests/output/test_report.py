@@ -300,7 +300,7 @@ def test_the_iterations_begin_with_the_start_and_end_with_the_fit_as_they_are_co
     channel = {"column": "v", "averaged": 0.3, "filter": {"median": 3}}
     record = {"file": "up.csv", "time": "t", "channels": {"vt": channel}, "mask": [[1.0, 1.2]]}
     report = report_of(first_order(tmp_path / "case", record=record))
-    (found,), fitted = report.simulated.courses, report.fits[0].samples.overlays["vt"]
+    (found,), fitted = report.simulated.iteration_responses, report.fits[0].samples.overlays["vt"]
     assert np.isnan(fitted.measured).any()
     last = max(found.simulated)
     for ours, theirs in (

@@ -17,7 +17,7 @@ from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import MACHINE, NETWORK, STABILISER, VT0, Stabilised, infinite_bus, open_circuit
-from exfit.simulation.inputs import Change, Course, each
+from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator, parameters_used
 
 CLOCK = np.linspace(0.0, 4.0, 401)
@@ -66,7 +66,7 @@ def test_a_step_on_load_is_that_of_another_simulator(name, power):
     values |= {NETWORK + symbol: value for symbol, value in network.items()}
     simulator = Simulator(
         system(MACHINES["GENROU"], "E", inputs=("vref",)),
-        Course(0.0, columns["t"][-1], (Change(1.0, 0.02),)),
+        Inputs(0.0, columns["t"][-1], (InputStep(1.0, 0.02),)),
         columns["t"],
         1e-3,
     )
@@ -176,10 +176,10 @@ def test_a_line_trip_is_that_of_equations_typed_again(machine):
     if machine.name == "ONE_AXIS":
         pytest.skip("has no subtransient flux")
     changes = (
-        Change(0.3, 0.2, "X"),
-        Change(0.3, 0.01, "R"),
-        Change(1.0, -0.03, "E"),
-        Change(2.0, 0.02, "vref"),
+        InputStep(0.3, 0.2, "X"),
+        InputStep(0.3, 0.01, "R"),
+        InputStep(1.0, -0.03, "E"),
+        InputStep(2.0, 0.02, "vref"),
     )
     values = values_on_load(machine, exciter="SEXS", machine_D=1.5, network_Rc=0.0, network_Xc=0.0)
     values |= {"K": GAIN, "TE": LAG, "TATB": 1.0, "EMAX": 99.0, "EMIN": -99.0, NETWORK + "Q": 0.2}
@@ -223,7 +223,7 @@ def test_a_line_trip_is_that_of_equations_typed_again(machine):
         x = solved.y[:, -1]
     theirs = np.array(rows)
     simulator = Simulator(
-        system(machine, exciter="SEXS"), Course(0.0, CLOCK[-1], changes), CLOCK, 5e-4
+        system(machine, exciter="SEXS"), Inputs(0.0, CLOCK[-1], changes), CLOCK, 5e-4
     )
     got = simulator.response(values).signals
     for name, column, most in (("delta", 4, 1e-7), ("efd", 6, 1e-6), ("EQP", 0, 1e-7)):
@@ -257,7 +257,7 @@ def test_rest_is_rest_and_has_the_power_and_voltage_asked_for(machine, given):
 
 
 def test_a_flat_run_on_load_stays_flat_for_a_minute(machine):
-    simulator = Simulator(system(machine), Course(0.0, 60.0, ()), np.linspace(0.0, 60.0, 61), 1e-3)
+    simulator = Simulator(system(machine), Inputs(0.0, 60.0, ()), np.linspace(0.0, 60.0, 61), 1e-3)
     values = values_on_load(machine, network_X=0.2)
     vt = simulator.response(values, ("vt",)).signals["vt"]
     assert np.abs(vt - values[VT0]).max() < 1e-9
@@ -266,7 +266,7 @@ def test_a_flat_run_on_load_stays_flat_for_a_minute(machine):
 def test_far_from_the_source_without_power_it_is_open_circuit(machine):
     """Behind a million per unit nothing flows, and the voltage moves as with the breaker open."""
     values = values_on_load(machine, network_P=0.0, network_X=1e6, network_R=0.0) | {VT0: 1.0}
-    course = Course(0.0, 4.0, (Change(0.5, 0.05),))
+    course = Inputs(0.0, 4.0, (InputStep(0.5, 0.05),))
     apart = Simulator(system(machine), course, CLOCK, 1e-3).response(values, ("vt", "efd"))
     opened = open_circuit(MODELS["AC8B"], machine, QUADRATIC)
     alone = Simulator(opened, course, CLOCK, 1e-3).response(values, ("vt", "efd"))
@@ -319,13 +319,13 @@ def test_a_compound_source_rests_on_load(exciter):
 
 def test_short_times_of_a_stabiliser_ask_for_sub_steps():
     made, values = stabilised(STABILISERS["PSS1A"])
-    simulator = Simulator(made, Course(0.0, 1.0, ()), np.array([1.0]), 1e-3)
+    simulator = Simulator(made, Inputs(0.0, 1.0, ()), np.array([1.0]), 1e-3)
     assert simulator.substeps(values | {STABILISER + "T6": 2.5e-4}) >= 4
 
 
 def test_exact_derivatives_on_load_equal_central_differences(machine):
     """To every parameter of machine and network, over a step of the reference and a line trip."""
-    course = Course(0.0, 2.0, (Change(0.2, 0.01), Change(0.8, 0.05, "X")))
+    course = Inputs(0.0, 2.0, (InputStep(0.2, 0.01), InputStep(0.8, 0.05, "X")))
     simulator = Simulator(system(machine), course, np.linspace(0.0, 2.0, 41), 1e-3)
     values = values_on_load(machine, network_Q=0.2, machine_D=0.5)
     free = tuple(name for name in values if name.startswith((MACHINE, NETWORK)))
@@ -360,7 +360,7 @@ def stabilised(stabiliser, inputs=None, exciter="SEXS"):
 
 def test_a_stabiliser_waits_at_rest(stabiliser):
     made, values = stabilised(stabiliser)
-    simulator = Simulator(made, Course(0.0, 60.0, ()), np.linspace(0.0, 60.0, 61), 1e-3)
+    simulator = Simulator(made, Inputs(0.0, 60.0, ()), np.linspace(0.0, 60.0, 61), 1e-3)
     signals = simulator.response(values).signals
     assert np.abs(signals["vt"] - values[VT0]).max() < 1e-9
     assert np.ptp(signals["vref"]) == 0.0
@@ -394,7 +394,7 @@ def test_a_step_of_vs_is_one_of_the_reference(machine):
     made = system(machine)
     values = values_on_load(machine)
     one, other = (
-        Simulator(made, Course(0.0, 4.0, (Change(0.5, 0.01, signal),)), CLOCK, 1e-3)
+        Simulator(made, Inputs(0.0, 4.0, (InputStep(0.5, 0.01, signal),)), CLOCK, 1e-3)
         .response(values, ("vt",))
         .signals["vt"]
         for signal in ("vref", "vs")
@@ -406,7 +406,7 @@ def test_a_stabiliser_hears_what_it_is_told_to():
     """Of speed, power and voltage only what is named moves its states."""
     for heard in ("speed", "p", "vt"):
         made, values = stabilised(STABILISERS["PSS1A"], (heard,))
-        course = Course(0.0, 1.0, (Change(0.1, 0.1, "X"),))
+        course = Inputs(0.0, 1.0, (InputStep(0.1, 0.1, "X"),))
         response = Simulator(made, course, np.linspace(0.0, 1.0, 11), 1e-3).response(values)
         moved = [np.ptp(x) for name, x in response.signals.items() if STABILISER in name]
         assert max(moved) > 0.0, heard
@@ -418,7 +418,7 @@ def test_exact_derivatives_reach_through_a_stabiliser(stabiliser):
     gains = {STABILISER + name for name in ("KS", "KS1", "K_T")} & values.keys()
     values |= {name: 0.2 * values[name] for name in gains}
     assert damping_of_the_swing(made, values) > 0.0
-    course = Course(0.0, 2.0, (Change(0.2, 0.0005),))
+    course = Inputs(0.0, 2.0, (InputStep(0.2, 0.0005),))
     simulator = Simulator(made, course, np.linspace(0.0, 2.0, 41), 1e-3)
     free = tuple(
         STABILISER + row.symbol for row in stabiliser.sheet if row.unit == "s" and row.typical > 0.0

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import MACHINE, VT0
-from exfit.simulation.inputs import Change, Course, each
+from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
 
@@ -41,7 +41,7 @@ TIMES = np.arange(16) / 10.0
 
 
 def check_system(k=K, a=A, vt0=0.0):
-    course = Course(0.0, TIMES[-1], (Change(0.0, 1.0),))
+    course = Inputs(0.0, TIMES[-1], (InputStep(0.0, 1.0),))
     simulator = Simulator(system_of("FIRST_ORDER"), course, TIMES, 1e-3)
     return simulator, {"k": k, "a": a, VT0: vt0}
 
@@ -245,11 +245,11 @@ def test_another_integrator_of_other_words_agrees(unit, machine, changes_of_mach
         values[symbol] *= value / typical_values(name, machine)[symbol]
     limits = {"MAX": 9999.0, "MIN": -9999.0}
     values |= {symbol: limits[symbol[-3:]] for symbol in values if symbol[-3:] in limits}
-    changes = (Change(0.2, 0.02), Change(1.00037, -0.03), Change(1.5, 0.005))
+    changes = (InputStep(0.2, 0.02), InputStep(1.00037, -0.03), InputStep(1.5, 0.005))
     times = np.sort(np.random.default_rng(3).uniform(0.0, 2.5, 120))
     times = np.unique([0.0, 1.00037, 2.5, *times])
     vt, efd = integrated(unit(values, machine), 1.0, changes, times, method)
-    simulator = Simulator(system_of(name, machine), Course(0.0, 2.5, changes), times, 2.5e-4)
+    simulator = Simulator(system_of(name, machine), Inputs(0.0, 2.5, changes), times, 2.5e-4)
     samples, parts = simulator.samples(values, ("vt", "efd"))
     assert parts == 1
     # what is asked of the other integrator is 1e-10 per step; ours errs by (step/T)^4
@@ -261,7 +261,7 @@ def test_another_integrator_of_other_words_agrees(unit, machine, changes_of_mach
 
 
 def response(name, machine, values, size=0.05):
-    course = Course(0.0, 3.0, (Change(0.1, size),))
+    course = Inputs(0.0, 3.0, (InputStep(0.1, size),))
     simulator = Simulator(system_of(name, machine), course, np.linspace(0.0, 3.0, 301), 1e-3)
     return simulator.samples(values, ("vt", "efd", "ifd"))[0]
 
@@ -315,7 +315,7 @@ def test_a_damper_that_is_not_seen_may_have_any_time_constant():
     machine = MACHINES["GENROU"]
     unseen = {"Xppd": typical(machine.sheet)["Xpd"]}
     assert list(machine.faults(typical(machine.sheet) | unseen | {"Tppd0": 999.0})) == []
-    course = Course(0.0, 3.0, (Change(0.5, 0.01),))
+    course = Inputs(0.0, 3.0, (InputStep(0.5, 0.01),))
     simulator = Simulator(system_of("AC1A"), course, np.linspace(0.0, 3.0, 61), 1e-3)
     values = typical_values("AC1A", machine_Xppd=unseen["Xppd"])
     one, other = (

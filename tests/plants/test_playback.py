@@ -10,7 +10,7 @@ from places import REFERENCE as RECORDED
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError, RecordError, SimulationError
-from exfit.fitting.build import fitted_trials
+from exfit.fitting.build import build_experiments
 from exfit.simulation.simulator import Simulator
 from exfit.workflows import fit, simulate
 
@@ -157,9 +157,9 @@ def test_an_exciter_that_needs_the_field_current_says_so(tmp_path):
 
 
 def test_what_drives_is_not_compared(tmp_path):
-    trial = fitted_trials(case_of(exciter(), tmp_path))[0]
+    trial = build_experiments(case_of(exciter(), tmp_path))[0]
     assert [channel.signal for channel in trial.channels] == ["efd"]
-    assert set(trial.experiment.simulator.course.played.signals) == {"vt", "ifd"}
+    assert set(trial.experiment.simulator.inputs.recorded.signals) == {"vt", "ifd"}
 
 
 @pytest.mark.parametrize(
@@ -213,8 +213,8 @@ def test_a_known_reference_far_away_is_reached_too(tmp_path):
     for vref in (1.004, 1.012):
         text = exciter().replace("{type: playback}", f"{{type: playback, vref: {vref}}}")
         case = case_of(text.replace(steps, "steady_until: 1.0"), tmp_path)
-        trial = fitted_trials(case)[0]
-        still = replace(trial.experiment.simulator.course, played=None)
+        trial = build_experiments(case)[0]
+        still = replace(trial.experiment.simulator.inputs, recorded=None)
         simulator = Simulator(
             trial.experiment.simulator.system, still, np.linspace(0.0, 1.0, 11), 1e-3
         )
@@ -224,6 +224,6 @@ def test_a_known_reference_far_away_is_reached_too(tmp_path):
 
 def test_short_times_of_a_played_machine_ask_for_sub_steps(tmp_path):
     case = case_of(MACHINE, tmp_path)
-    trial = fitted_trials(case)[0]
+    trial = build_experiments(case)[0]
     values = {**case.values(), **trial.experiment.own, "machine.Tppd0": 5e-4}
     assert trial.experiment.simulator.substeps(values) >= 2

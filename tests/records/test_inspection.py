@@ -21,7 +21,7 @@ from exfit.records.channel_recognition import connection_of, guessed, three_phas
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 from exfit.records.record import read_columns
-from exfit.records.steps import Change, together
+from exfit.records.steps import LevelChange, together
 from exfit.records.units import unit_in
 
 FIELD = "field_record"
@@ -461,12 +461,12 @@ def test_the_figure_marks_steps_gaps_and_spikes():
 
 
 def test_one_step_in_several_channels_is_told_by_the_mean_of_least_variance():
-    shown = {"a": (Change(1.0, 0.001, 0.1, 0.0),), "b": (Change(1.002, 0.002, 0.2, 0.0),)}
+    shown = {"a": (LevelChange(1.0, 0.001, 0.1, 0.0),), "b": (LevelChange(1.002, 0.002, 0.2, 0.0),)}
     (step,) = together(shown)
     assert step.at == pytest.approx((4.0 * 1.0 + 1.002) / 5.0)
     assert step.error == pytest.approx(0.002 / 5.0**0.5)  # they scatter less than they err
-    (alone,) = together({**shown, "ref": (Change(1.01, 0.005, 0.1, 0.0, jumps=True),)})
+    (alone,) = together({**shown, "ref": (LevelChange(1.01, 0.005, 0.1, 0.0, jumps=True),)})
     assert (alone.at, alone.error) == (1.01, 0.005)
     assert alone.seen_in == ("a", "b", "ref")
-    far = {"a": (Change(1.0, 0.001, 0.1, 0.0), Change(1.1, 0.001, 0.1, 0.0))}
+    far = {"a": (LevelChange(1.0, 0.001, 0.1, 0.0), LevelChange(1.1, 0.001, 0.1, 0.0))}
     assert len(together(far)) == 2  # of one channel, two are two

@@ -7,7 +7,7 @@ from records import UNIT, case_of, one, synthetic, write
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.build import fitted_trials
+from exfit.fitting.build import build_experiments
 from exfit.workflows import fit
 
 TEST = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}]}
@@ -41,7 +41,7 @@ def case_with(folder, channels, columns=None, free=(), **record):
 
 
 def trial(case):
-    return fitted_trials(case)[0].secured(case.values())
+    return build_experiments(case)[0].with_enough_substeps(case.values())
 
 
 @pytest.mark.parametrize("kind", ["waveform", "rms"])
@@ -64,7 +64,7 @@ def test_waveforms_become_the_voltage_that_the_simulation_shows_averaged(tmp_pat
     columns = {"t": TIME, **dict(zip(PHASES["phases"], waves(vt).T, strict=True))}
     seen = trial(case_with(tmp_path, {"vt": PHASES}, columns))
     errors, _ = seen.experiment.errors(
-        seen.known(UNIT | load_case(tmp_path / "case.yaml").values())
+        seen.with_start_values(UNIT | load_case(tmp_path / "case.yaml").values())
     )
     assert seen.record.averaged["vt"] == pytest.approx(1.0 / FREQUENCY, rel=1e-6)
     assert np.max(np.abs(errors)) < NEAR
@@ -116,7 +116,7 @@ def test_a_recorder_that_averages_is_simulated_so(tmp_path):
         trial(case_with(tmp_path, {"vt": entry}, columns))
         for entry in ({"column": "vt", "averaged": window}, "vt")
     )
-    values = seen.known(load_case(tmp_path / "case.yaml").values())
+    values = seen.with_start_values(load_case(tmp_path / "case.yaml").values())
     inner = slice(half, -half)
     assert np.max(np.abs(seen.experiment.errors(values)[0][inner])) < NEAR
     assert np.max(np.abs(plain.experiment.errors(values)[0][inner])) > 100 * NEAR
@@ -185,7 +185,7 @@ def test_a_voltage_that_no_machine_has_is_refused_with_its_value_and_limits(tmp_
     with pytest.raises(
         RecordError, match=rf"vt rests at {rests} pu, outside 0\.1 \.\.\. 2: .*base"
     ):
-        fitted_trials(case_of(content, tmp_path))
+        build_experiments(case_of(content, tmp_path))
 
 
 @pytest.mark.parametrize("connection", ["phase-to-ground", "phase-to-phase"])

@@ -9,11 +9,11 @@ from places import CONFIGS
 from scipy.integrate import solve_ivp
 
 from exfit.case.load import load_case
-from exfit.fitting.build import fitted_trials, free_of
+from exfit.fitting.build import build_experiments, free_parameters
 from exfit.models import MODELS
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limit_hits import limits_hit, nearest
-from exfit.simulation.limits import limiters
+from exfit.simulation.limits import equation_limits
 from exfit.simulation.simulator import Simulator
 
 STEP = 1e-3  # s
@@ -25,7 +25,7 @@ BUMP = 0.02  # pu, as in a test
 
 @cache
 def simulator(name, size, step=STEP, delay=0.0):
-    course = Course(0.0, END, (Change(1.0, size),))
+    course = Inputs(0.0, END, (InputStep(1.0, size),))
     return Simulator(system_of(name), course, CLOCK, step, delay=delay)
 
 
@@ -84,7 +84,7 @@ def test_a_clamp_is_met_while_its_input_wants_to_be_beyond():
     size = 0.3
     hit = by_name(limits_hit(simulator("ST1A", size), values))["VIMAX", ""]
     fine = np.linspace(1.0, END, 30001)
-    course = simulator("ST1A", size).course
+    course = simulator("ST1A", size).inputs
     run = Simulator(system_of("ST1A"), course, fine, STEP).response(values, ("vt", "vref"))
     error = run.signals["vref"] - run.signals["vt"]
     error[0] = error[1]
@@ -114,7 +114,7 @@ def test_the_field_current_limit_is_met_where_vfe_stands_at_it():
 
 
 def test_a_model_without_limits_shows_none():
-    assert limiters(system_of("FIRST_ORDER")) == ()
+    assert equation_limits(system_of("FIRST_ORDER")) == ()
     assert limits_hit(simulator("FIRST_ORDER", 5.0), typical_values("FIRST_ORDER")) == ()
 
 
@@ -127,7 +127,9 @@ def test_a_large_step_meets_a_limit_and_passes_none(name, sign):
     assert hits
     told = simulator(name, sign * 20.0 * BUMP)
     held = {
-        (one.limit, one.signal) for one in limiters(system_of(name)) if one.stands and one.signal
+        (one.limit, one.signal)
+        for one in equation_limits(system_of(name))
+        if one.stands and one.signal
     }
     response = told.response(values).signals
     for hit in limits_hit(told, values):
@@ -159,7 +161,7 @@ def test_limits_far_away_change_the_response_as_little_as_no_hit_says(name):
         symbol: value + (50.0 if "MAX" in symbol else -50.0)
         for symbol, value in values.items()
         if ("MAX" in symbol or "MIN" in symbol)
-        and symbol in {one.limit for one in limiters(system_of(name))}
+        and symbol in {one.limit for one in equation_limits(system_of(name))}
     }
     if name in ("DC3A", "ST5B", "ST6B"):
         return  # their limits are gains too, or the floor of another limiter
@@ -173,16 +175,16 @@ def test_limits_far_away_change_the_response_as_little_as_no_hit_says(name):
 def test_every_limit_of_the_data_sheet_is_known(name):
     """But those that a model says it does not have in its own words."""
     rows = {row.symbol for row in MODELS[name].sheet if row.symbol.endswith(("MAX", "MIN"))}
-    assert rows <= {one.limit for one in limiters(system_of(name))}
+    assert rows <= {one.limit for one in equation_limits(system_of(name))}
 
 
 @pytest.mark.parametrize("case", ["first_order", "ac8b_unit1"])
 def test_sample_cases_off_their_limits_show_none(case):
     loaded = load_case(CONFIGS / f"{case}.yaml")
-    trials = fitted_trials(loaded)
-    values = {one.name: one.start for one in free_of(loaded, trials)} | loaded.values()
+    trials = build_experiments(loaded)
+    values = {one.name: one.start for one in free_parameters(loaded, trials)} | loaded.values()
     for one in (trial.experiment for trial in trials):
-        assert limits_hit(one.moved(values), one.parameters(values)) == ()
+        assert limits_hit(one.with_inputs(values), one.parameters(values)) == ()
 
 
 # --- what is told ---------------------------------------------------------------------------------

@@ -21,13 +21,20 @@ from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.plants import SATURATION, VT0, open_circuit
-from exfit.simulation.grid import Stretch
-from exfit.simulation.inputs import Change, Course, Direction, Played, each, stretches
-from exfit.simulation.interpolation import Sampling
+from exfit.simulation.grid import GridSegment
+from exfit.simulation.inputs import (
+    Direction,
+    Inputs,
+    InputStep,
+    RecordedInputs,
+    each,
+    grid_segments,
+)
+from exfit.simulation.interpolation import Interpolation
 from exfit.simulation.simulator import MOST_SUBSTEPS, Simulator, parameters_used
 
-UP = Course(0.0, 2.0, (Change(0.5, 3e-4),))  # off the limits
-AT_REST = Course(0.0, 2.0, ())
+UP = Inputs(0.0, 2.0, (InputStep(0.5, 3e-4),))  # off the limits
+AT_REST = Inputs(0.0, 2.0, ())
 CLOCK = np.linspace(0.0, 2.0, 201)
 laws = settings(deadline=None, derandomize=True, max_examples=25)
 
@@ -50,22 +57,22 @@ def short_step(model, values, share):
 @laws
 @given(st.lists(st.floats(0.0, 3.0), max_size=4, unique=True), st.floats(1e-3, 0.5))
 def test_the_grid_is_gapless_and_every_change_lies_on_it(instants, step):
-    changes = tuple(Change(at, 0.1) for at in sorted(instants))
-    grid = stretches(Course(0.0, 3.0, changes), step)
+    changes = tuple(InputStep(at, 0.1) for at in sorted(instants))
+    grid = grid_segments(Inputs(0.0, 3.0, changes), step)
     ends = [part.start + part.step * part.steps for part in grid]
     assert grid[0].start == 0.0
     assert ends == pytest.approx([part.start for part in grid[1:]] + [3.0], abs=1e-12)
     inside = [at for at in sorted(instants) if 0.0 < at < 3.0]
     assert [part.start for part in grid[1:]] == inside
     assert all(part.step <= step * (1.0 + 1e-5) for part in grid)
-    course = Course(0.0, 3.0, changes)
+    course = Inputs(0.0, 3.0, changes)
     level = course.level("vref", grid[-1].start)
     assert level == pytest.approx(0.1 * sum(at < 3.0 for at in instants))
 
 
 def test_at_the_instant_of_a_step_the_value_is_that_before_it(model):
     for at in (0.5, 0.50037):
-        course = Course(0.0, 1.0, (Change(at, 0.02),))
+        course = Inputs(0.0, 1.0, (InputStep(at, 0.02),))
         times = np.array([at - 1e-3, at, at + 1e-3])
         vref = samples(model, lively_values(model), course, times, outputs=("vref",))[:, 0]
         assert vref[1] == pytest.approx(vref[0], abs=1e-15)  # the rounding of a mean of both
@@ -75,14 +82,14 @@ def test_at_the_instant_of_a_step_the_value_is_that_before_it(model):
 def test_a_step_between_grid_points_is_the_same_step_later(model):
     """Two grids of one response: they differ by the method's error alone."""
     values, delay = lively_values(model), 0.00037
-    later = Course(0.0, 2.0, (Change(0.5 + delay, UP.steps[0].step),))
+    later = Inputs(0.0, 2.0, (InputStep(0.5 + delay, UP.steps[0].step),))
     got = samples(model, values, later, CLOCK[:-1] + delay)
     assert np.abs(got - samples(model, values)[:-1]).max() < 1e-9
 
 
 def test_steps_add_up(model):
     values = lively_values(model)
-    several = Course(0.0, 2.0, (Change(0.5, 0.03), Change(1.0, -0.02), Change(1.2, 0.01)))
+    several = Inputs(0.0, 2.0, (InputStep(0.5, 0.03), InputStep(1.0, -0.02), InputStep(1.2, 0.01)))
     vref = samples(model, values, several, outputs=("vref",))[:, 0]
     levels = vref - vref[0]
     assert levels[[49, 51, 99, 101, 119, 121, 200]] == pytest.approx(
@@ -92,7 +99,7 @@ def test_steps_add_up(model):
 
 def test_a_step_up_and_back_returns_to_rest():
     values = typical_values("AC1A")
-    course = Course(0.0, 60.0, (Change(1.0, 0.05), Change(20.0, -0.05)))
+    course = Inputs(0.0, 60.0, (InputStep(1.0, 0.05), InputStep(20.0, -0.05)))
     vt = samples("AC1A", values, course, np.array([0.0, 20.0, 60.0]))[:, 0]
     assert vt[2] == pytest.approx(vt[0], abs=1e-6)
     assert vt[1] - vt[0] > 0.04
@@ -102,7 +109,7 @@ def test_the_response_to_a_small_bump_scales_and_mirrors(model):
     values = lively_values(model)
 
     def moved(size):
-        vt = samples(model, values, Course(0.0, 2.0, (Change(0.5, size),)))
+        vt = samples(model, values, Inputs(0.0, 2.0, (InputStep(0.5, size),)))
         return (vt - vt[0]) / size
 
     assert moved(1e-5) == pytest.approx(moved(-1e-5), abs=1e-3)
@@ -113,7 +120,7 @@ def test_samples_at_uneven_times_err_as_little_as_the_method(model):
     """Halving the step divides the error of samples between grid points by sixteen."""
     values, rng = lively_values(model), np.random.default_rng(4)
     times = np.sort(rng.uniform(0.01, 2.0, 200))
-    course, step = Course(0.0, 2.0, (Change(0.0, 3e-4),)), short_step(model, values, 0.2)
+    course, step = Inputs(0.0, 2.0, (InputStep(0.0, 3e-4),)), short_step(model, values, 0.2)
     finest, *ends = (samples(model, values, course, times, h) for h in (step / 32, step, step / 2))
     errors = [np.abs(end - finest).max() for end in ends]
     assert errors[0] / errors[1] > 11.0 or errors[1] < ROUNDING
@@ -132,10 +139,10 @@ def test_a_sample_on_the_grid_is_the_computed_value(model):
 @pytest.mark.parametrize("steps", range(1, 9))
 def test_a_line_is_read_as_it_is_however_short_the_last_stretch(steps):
     """Between grid points, on them, and behind the end, where the last value holds."""
-    grid = [Stretch(0.0, 0.01, 20), Stretch(0.2, 0.01, steps)]
+    grid = [GridSegment(0.0, 0.01, 20), GridSegment(0.2, 0.01, steps)]
     end = grid[-1].end
     times = np.sort(np.append(np.linspace(0.003, end + 0.02, 50), [0.0, 0.2, end]))
-    read = Sampling(grid, times)([part.times[:, None] for part in grid])[:, 0]
+    read = Interpolation(grid, times)([part.times[:, None] for part in grid])[:, 0]
     np.testing.assert_allclose(read, np.minimum(times, end), rtol=0.0, atol=1e-14)
 
 
@@ -160,7 +167,7 @@ def test_many_sets_give_what_each_gives(model):
 
 # --- what a fit may move --------------------------------------------------------------------------
 
-SMOOTH = Change(0.50037, 3e-4, smooth=True)
+SMOOTH = InputStep(0.50037, 3e-4, smooth=True)
 BETWEEN = (np.arange(75) * 26 + 0.5) * 1e-3  # s, in the middle of steps of 1 ms
 FIVE_POINTS = {1: 8.0, -1: -8.0, 2: -1.0, -2: 1.0}  # the difference that is exact up to quartics
 MOVED = 1e-4  # of a direction; of an instant or a delay, in s, within its step
@@ -170,12 +177,12 @@ DIFFERENCE_ROUNDING = 2e-14
 
 def along(simulator, values, direction, far, outputs=("vt",)):
     """Return the samples when what a direction names has moved ``far`` along it."""
-    steps = list(simulator.course.steps)
+    steps = list(simulator.inputs.steps)
     for index, (at, step) in direction.steps.items():
         old = steps[index]
         steps[index] = old._replace(at=old.at + far * at, step=old.step + far * step)
     values = values | {name: values[name] + far * v for name, v in direction.parameters.items()}
-    moved = simulator.moved(tuple(steps), simulator.delay + far * direction.delay)
+    moved = simulator.with_inputs(tuple(steps), simulator.delay + far * direction.delay)
     return moved.samples(values, outputs)[0]
 
 
@@ -195,7 +202,7 @@ def assert_exact(simulator, values, directions, outputs=("vt",), h=MOVED):
 def test_tangents_are_the_slopes_of_the_samples(model):
     """Of parameters, a tie of two, instant and size of a smooth step, another's size, a delay."""
     system, values = system_of(model), lively_values(model)
-    course = Course(0.0, 2.0, (SMOOTH._replace(at=0.20037), Change(0.9, -3e-4)))
+    course = Inputs(0.0, 2.0, (SMOOTH._replace(at=0.20037), InputStep(0.9, -3e-4)))
     simulator = Simulator(system, course, BETWEEN, 1e-3)
     free = (system.parameters[-1], *sorted(parameters_used(system))[:4])
     rates = {name: max(values[name], 0.1) for name in free}
@@ -218,11 +225,11 @@ def test_tangents_are_exact_with_sub_steps_two_smooth_steps_and_two_inputs():
     values = lively_values("AC8B")
     steps = (
         SMOOTH,
-        Change(0.8, -2e-4, "vs"),
-        Change(0.80052, 1e-4, smooth=True),
-        Change(1.2, 1e-4, "vs", smooth=True),
+        InputStep(0.8, -2e-4, "vs"),
+        InputStep(0.80052, 1e-4, smooth=True),
+        InputStep(1.2, 1e-4, "vs", smooth=True),
     )
-    simulator = Simulator(system, Course(0.0, 2.0, steps), BETWEEN, 1e-3, least=3)
+    simulator = Simulator(system, Inputs(0.0, 2.0, steps), BETWEEN, 1e-3, least=3)
     assert simulator.substeps(values) == 3
     directions = (
         *(Direction(steps={k: (1.0, 0.0)}) for k in (0, 2, 3)),
@@ -231,7 +238,7 @@ def test_tangents_are_exact_with_sub_steps_two_smooth_steps_and_two_inputs():
         Direction(delay=1.0),
     )
     # the third one's instant lies on the grid, where only the first derivative is continuous
-    off_grid = simulator.moved((*steps[:3], steps[3]._replace(at=1.20037)), 0.00113)
+    off_grid = simulator.with_inputs((*steps[:3], steps[3]._replace(at=1.20037)), 0.00113)
     assert_exact(off_grid, values, directions, ("vt", "efd", "vref"))
 
 
@@ -246,11 +253,11 @@ def test_a_direction_that_moves_several_parameters_is_the_sum_of_theirs():
 
 def test_the_derivative_to_an_instant_adds_up_across_grid_points():
     """By Gauss's rule on each side: the derivative is continuous, and all but linear there."""
-    values, course = lively_values("AC1A"), Course(0.0, 2.0, (SMOOTH,))
+    values, course = lively_values("AC1A"), Inputs(0.0, 2.0, (SMOOTH,))
     simulator = Simulator(system_of("AC1A"), course, CLOCK, 1e-3)
 
     def at(instant):
-        return simulator.moved((SMOOTH._replace(at=instant),), 0.0)
+        return simulator.with_inputs((SMOOTH._replace(at=instant),), 0.0)
 
     total = 0.0
     nodes, weights = np.polynomial.legendre.leggauss(3)
@@ -267,8 +274,8 @@ def test_the_derivative_to_an_instant_adds_up_across_grid_points():
 @laws
 @given(st.floats(0.1, 2.9), st.floats(-0.1, 0.1), st.sampled_from([0.05, 0.01, 1e-3]))
 def test_the_area_under_a_smooth_step_is_that_of_the_exact_one(at, size, step):
-    course = Course(0.0, 3.0, (Change(at, size, smooth=True),))
-    (part,) = stretches(course, step)
+    course = Inputs(0.0, 3.0, (InputStep(at, size, smooth=True),))
+    (part,) = grid_segments(course, step)
     u = course.input("vref", part)
     area = part.step * (u.sum() - (u[0] + u[-1]) / 2.0)
     assert area == pytest.approx(size * (3.0 - at), abs=1e-13)
@@ -279,9 +286,9 @@ def test_the_area_under_a_smooth_step_is_that_of_the_exact_one(at, size, step):
 
 @pytest.mark.parametrize("at", [-5.0, -0.01, 3.01, 9.0])
 def test_a_smooth_step_outside_a_course_is_over_or_never_comes(at):
-    change = Change(at, 0.05, smooth=True)
-    course = Course(0.0, 3.0, (change,))
-    (part,) = stretches(course, 1e-3)
+    change = InputStep(at, 0.05, smooth=True)
+    course = Inputs(0.0, 3.0, (change,))
+    (part,) = grid_segments(course, 1e-3)
     assert (course.input("vref", part) == (0.05 if at < 0.0 else 0.0)).all()
     assert (change.share_slope(part) == 0.0).all()
     assert course.level("vref", 10.0) == 0.0
@@ -292,7 +299,7 @@ def test_a_smooth_step_nears_the_exact_one_with_the_square_of_the_step(model):
     errors = []
     for step in (2e-3, 1e-3):
         smooth, exact = (
-            samples(model, values, Course(0.0, 2.0, (change,)), clock, step)
+            samples(model, values, Inputs(0.0, 2.0, (change,)), clock, step)
             for change in (SMOOTH, SMOOTH._replace(smooth=False))
         )
         errors.append(np.abs(smooth - exact).max())
@@ -302,13 +309,13 @@ def test_a_smooth_step_nears_the_exact_one_with_the_square_of_the_step(model):
 
 def test_a_later_instant_is_a_later_recorder_for_a_plant_at_rest(model):
     """To rounding by whole steps; else by what the step's second moment moves within a step."""
-    values, course = lively_values(model), Course(0.0, 2.0, (SMOOTH,))
+    values, course = lively_values(model), Inputs(0.0, 2.0, (SMOOTH,))
     simulator = Simulator(system_of(model), course, CLOCK[CLOCK < 1.9], 1e-3)
     late, early = SMOOTH.at + 0.013, SMOOTH.at - 0.02
     for at, least in ((late, 1e-13), (early, 1e-13), (late + 0.0004, 2e-5 * SMOOTH.step)):
         delay = at - SMOOTH.at
-        moved = simulator.moved((SMOOTH._replace(at=at),), 0.0).samples(values, ("vt",))[0]
-        delayed = simulator.moved((SMOOTH,), delay).samples(values, ("vt",))[0]
+        moved = simulator.with_inputs((SMOOTH._replace(at=at),), 0.0).samples(values, ("vt",))[0]
+        delayed = simulator.with_inputs((SMOOTH,), delay).samples(values, ("vt",))[0]
         # around the bend at the step itself a cubic cannot follow
         away = np.abs(simulator.times - at) > 0.005
         assert np.abs(moved - delayed)[away].max() < least + 1e-11
@@ -317,14 +324,14 @@ def test_a_later_instant_is_a_later_recorder_for_a_plant_at_rest(model):
 def test_a_recorder_with_a_delay_shows_what_was(model):
     """Before the start it shows the start, after the end the end, and neither has a slope."""
     values = lively_values(model)
-    simulator = Simulator(system_of(model), Course(0.0, 2.0, (SMOOTH,)), CLOCK, 1e-3)
+    simulator = Simulator(system_of(model), Inputs(0.0, 2.0, (SMOOTH,)), CLOCK, 1e-3)
     undelayed = simulator.samples(values, ("vt",))[0]
     delay = Direction(delay=1.0)
-    late, slopes = simulator.moved((SMOOTH,), 0.25).tangents(values, ("vt",), (delay,))
+    late, slopes = simulator.with_inputs((SMOOTH,), 0.25).tangents(values, ("vt",), (delay,))
     assert np.abs(late[25:] - undelayed[:-25]).max() < 1e-13
     assert (late[:25] == undelayed[0]).all()
     assert (slopes[:25] == 0.0).all()
-    early, slopes = simulator.moved((SMOOTH,), -0.25).tangents(values, ("vt",), (delay,))
+    early, slopes = simulator.with_inputs((SMOOTH,), -0.25).tangents(values, ("vt",), (delay,))
     assert np.abs(early[:-25] - undelayed[25:]).max() < 1e-13
     assert early[-25:] == pytest.approx(np.full((25, 1), undelayed[-1, 0]), abs=1e-15)
     assert (slopes[-24:] == 0.0).all()
@@ -332,26 +339,26 @@ def test_a_recorder_with_a_delay_shows_what_was(model):
 
 
 def test_a_moved_simulator_is_the_one_built_so():
-    values, played = lively_values("AC1A"), Played(CLOCK, {"vref": 1e-3 * np.sin(CLOCK)})
-    steps = (SMOOTH, Change(0.7, 1e-4), Change(1.3, 2e-4, smooth=True))
-    course = Course(0.0, 2.0, steps, played)
+    values, played = lively_values("AC1A"), RecordedInputs(CLOCK, {"vref": 1e-3 * np.sin(CLOCK)})
+    steps = (SMOOTH, InputStep(0.7, 1e-4), InputStep(1.3, 2e-4, smooth=True))
+    course = Inputs(0.0, 2.0, steps, played)
     simulator = Simulator(system_of("AC1A"), course, BETWEEN, 1e-3)
     before = simulator.samples(values, ("vt",))[0]
-    others = (steps[0]._replace(at=0.9), Change(0.7, 0.0), steps[2])
-    moved = simulator.moved(others, 0.0123)
+    others = (steps[0]._replace(at=0.9), InputStep(0.7, 0.0), steps[2])
+    moved = simulator.with_inputs(others, 0.0123)
     new = Simulator(
-        system_of("AC1A"), Course(0.0, 2.0, others, played), BETWEEN, 1e-3, delay=0.0123
+        system_of("AC1A"), Inputs(0.0, 2.0, others, played), BETWEEN, 1e-3, delay=0.0123
     )
     expected = new.samples(values, ("vt",))[0]
     np.testing.assert_array_equal(moved.samples(values, ("vt",))[0], expected)
     np.testing.assert_array_equal(simulator.samples(values, ("vt",))[0], before)
-    back = moved.moved(steps, 0.0)
+    back = moved.with_inputs(steps, 0.0)
     np.testing.assert_array_equal(back.samples(values, ("vt",))[0], before)
 
 
 def test_only_what_is_smooth_may_change_its_instant():
     exact, smooth = UP.steps[0], SMOOTH
-    simulator = Simulator(system_of("AC1A"), Course(0.0, 2.0, (exact, smooth)), CLOCK, 1e-3)
+    simulator = Simulator(system_of("AC1A"), Inputs(0.0, 2.0, (exact, smooth)), CLOCK, 1e-3)
     wrong = (
         (exact._replace(at=0.6), smooth),
         (exact, smooth._replace(smooth=False)),
@@ -360,7 +367,7 @@ def test_only_what_is_smooth_may_change_its_instant():
     )
     for steps in wrong:
         with pytest.raises(ValueError, match="instants of smooth steps"):
-            simulator.moved(steps, 0.0)
+            simulator.with_inputs(steps, 0.0)
     values, moving = lively_values("AC1A"), Direction(steps={0: (1.0, 0.0)})
     with pytest.raises(ValueError, match=r"the step of vref at 0\.5 s is not smooth"):
         simulator.tangents(values, ("vt",), (moving,))
@@ -369,16 +376,16 @@ def test_only_what_is_smooth_may_change_its_instant():
 def test_a_simulator_made_from_another_keeps_its_steps_and_its_delay():
     """With finer steps a smooth step is sharper: the step error tells of it."""
     end = 33.0**0.5
-    course = Course(0.0, 1.0, (Change(0.3, end + end**3, smooth=True),))
+    course = Inputs(0.0, 1.0, (InputStep(0.3, end + end**3, smooth=True),))
     times, values = np.linspace(0.0, 1.0, 51), {VT0: 0.0}
     start = Simulator(STIFFENING, course, times, 0.02)
-    moved = start.moved((course.steps[0]._replace(at=0.1),), 0.11)
-    secured = moved.secured(values)
+    moved = start.with_inputs((course.steps[0]._replace(at=0.1),), 0.11)
+    secured = moved.with_enough_substeps(values)
     assert secured is not moved
-    assert (secured.delay, secured.course) == (0.11, moved.course)
+    assert (secured.delay, secured.inputs) == (0.11, moved.inputs)
     parts = moved.substeps(values)
     coarse, fine = (
-        Simulator(STIFFENING, moved.course, times, 0.02 / n, parts).samples(values, ("x",))[0]
+        Simulator(STIFFENING, moved.inputs, times, 0.02 / n, parts).samples(values, ("x",))[0]
         for n in (1, 2)
     )
     assert moved.step_error(values, ("x",)) == np.abs(coarse - fine).max() > 0.0
@@ -394,7 +401,7 @@ def test_a_lag_meets_and_leaves_its_limits_when_a_run_of_tiny_steps_does():
     """
     changes = {"KA": 40.0, "TA": 0.1, "VAMAX": 5.0, "VAMIN": -1.0, "KF": 0.0, "TE": 99.0}
     values = typical_values("AC1A", **changes, VRMAX=99.0, VRMIN=-99.0)
-    course = Course(0.0, 2.0, (Change(0.2, 0.5), Change(0.9, -1.0), Change(1.4, 0.52)))
+    course = Inputs(0.0, 2.0, (InputStep(0.2, 0.5), InputStep(0.9, -1.0), InputStep(1.4, 0.52)))
     got = samples("AC1A", values, course, outputs=("VA", "vref", "vt"))
     start, vt = got[0, 0], got[:, 2]
     vref = got[0, 1]
@@ -417,7 +424,7 @@ def test_a_lag_meets_and_leaves_its_limits_when_a_run_of_tiny_steps_does():
 
 def test_halving_the_step_hardly_moves_a_response_that_meets_limits(exciter):
     values = lively_values(exciter)
-    course = Course(0.0, 2.0, (Change(0.3, 0.3), Change(1.1, -0.4)))
+    course = Inputs(0.0, 2.0, (InputStep(0.3, 0.3), InputStep(1.1, -0.4)))
     step = min(1e-3, short_step(exciter, values, 0.05))
     fine, *ends = (samples(exciter, values, course, step=h) for h in (step / 32, step, step / 4))
     errors = [np.abs(end - fine).max() for end in ends]
@@ -513,7 +520,7 @@ def stiff_values(name, seed):
 def secured(name, values, course, times, step):
     """Return vt with sub-steps that are enough all along, as every run of a case has them."""
     simulator = Simulator(system_of(name), course, times, step)
-    return simulator.secured(values).samples(values, ("vt",))[0]
+    return simulator.with_enough_substeps(values).samples(values, ("vt",))[0]
 
 
 @pytest.mark.parametrize("step", [1e-3, 2e-2])
@@ -522,7 +529,7 @@ def test_no_response_is_unstable_without_a_word(model, step):
 
     But for a set that swings from limit to limit for good at any step: each turn moves the next.
     """
-    course = Course(0.0, 4.0, (Change(0.5, 0.05), Change(2.0, -0.05)))
+    course = Inputs(0.0, 4.0, (InputStep(0.5, 0.05), InputStep(2.0, -0.05)))
     times = np.linspace(0.0, 4.0, 201)
     simulated = 0
     for seed in range(40):
@@ -595,7 +602,7 @@ def test_a_parameter_that_matters_nowhere_costs_no_sub_steps():
 def test_a_fast_pole_without_a_time_constant_is_seen_too():
     """FIRST_ORDER has its rate as a parameter: the spectral radius finds it."""
     values = {"k": 900.0, "a": 900.0, VT0: 0.0}
-    course = Course(0.0, 0.1, (Change(0.0, 1.0),))
+    course = Inputs(0.0, 0.1, (InputStep(0.0, 1.0),))
     times = np.linspace(0.0, 0.1, 11)
     simulator = Simulator(system_of("FIRST_ORDER"), course, times, 1e-2)
     got, parts = simulator.samples(values, ("vt",))
@@ -625,10 +632,10 @@ STIFFENING = System(
 def test_a_response_that_gets_faster_on_its_way_is_secured_by_more_sub_steps():
     """dx/dt = vref - x - x^3 has the rate 1 at rest, and 1 + 3 x^2 = 100 where the step ends."""
     end = 33.0**0.5
-    course = Course(0.0, 1.0, (Change(0.1, end + end**3),))
+    course = Inputs(0.0, 1.0, (InputStep(0.1, end + end**3),))
     times, values = np.linspace(0.0, 1.0, 51), {VT0: 0.0}
     plain = Simulator(STIFFENING, course, times, 0.02)
-    secured = plain.secured(values)
+    secured = plain.with_enough_substeps(values)
     assert plain.substeps(values) == 1
     assert secured.substeps(values) >= 2  # 0.02 s at 100 1/s
     fine = Simulator(STIFFENING, course, times, 0.02 / 16.0).samples(values, ("x",))[0]
@@ -640,4 +647,4 @@ def test_a_response_that_gets_faster_on_its_way_is_secured_by_more_sub_steps():
 
 def test_a_response_that_stays_as_fast_as_at_rest_is_secured_as_it_is(model):
     simulator = Simulator(system_of(model), AT_REST, CLOCK, 1e-2)
-    assert simulator.secured(lively_values(model)) is simulator
+    assert simulator.with_enough_substeps(lively_values(model)) is simulator

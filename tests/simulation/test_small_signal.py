@@ -15,7 +15,7 @@ from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import MACHINE, MEASURED, SATURATION, playback
-from exfit.simulation.inputs import Change, Course, Played
+from exfit.simulation.inputs import Inputs, InputStep, RecordedInputs
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import StateSpace, linearised, margins, small_signal
 
@@ -246,7 +246,7 @@ def test_unstable_poles_are_those_of_a_run_that_grows(name):
         ),
         None,
     )
-    bump = Course(0.0, 12.0, (Change(0.5, TALL), Change(0.6, -TALL)))
+    bump = Inputs(0.0, 12.0, (InputStep(0.5, TALL), InputStep(0.6, -TALL)))
     times = np.linspace(0.0, 12.0, 2401)
     decided = 0
     for factor in (0.3, 1.0, 8.0, 60.0):
@@ -270,7 +270,7 @@ def test_unstable_poles_are_those_of_a_run_that_grows(name):
 @pytest.mark.parametrize("name", ["AC1A", "ST1A", "SEXS", "DC2A", "AC8B", "FIRST_ORDER"])
 def test_a_small_step_settles_to_the_response_at_rest(name):
     system, values = system_of(name), lively_values(name)
-    course = Course(0.0, 200.0, (Change(1.0, TALL),))
+    course = Inputs(0.0, 200.0, (InputStep(1.0, TALL),))
     vt = Simulator(system, course, np.array([0.0, 200.0]), 1e-3).samples(values, ("vt",))[0][:, 0]
     slow = small_signal(system, values, np.array([1e-6])).closed.response[0]
     # the rounding of vt, over the step
@@ -283,8 +283,8 @@ def test_a_small_sine_comes_back_as_the_closed_response_says(name, frequency):
     system, values = system_of(name), lively_values(name)
     times = np.linspace(0.0, 60.0, 60001)
     size = 1e-5
-    sine = Played(times, {"vref": size * np.sin(2.0 * np.pi * frequency * times)})
-    simulator = Simulator(system, Course(0.0, 60.0, (), sine), times, 1e-3)
+    sine = RecordedInputs(times, {"vref": size * np.sin(2.0 * np.pi * frequency * times)})
+    simulator = Simulator(system, Inputs(0.0, 60.0, (), sine), times, 1e-3)
     vt = simulator.samples(values, ("vt",))[0][30000:, 0]
     angle = 2.0 * np.pi * frequency * times[30000:]
     columns = np.stack([np.sin(angle), np.cos(angle), np.ones_like(angle)], axis=1)
@@ -316,7 +316,7 @@ def test_damping_and_frequency_are_those_of_the_decay():
     poles = small_signal(system, values).poles
     (swing,) = [pole for pole in poles if {"delta", "dw"} <= set(pole.states)]
     times = np.linspace(0.0, 10.0, 10001)
-    course = Course(0.0, 10.0, (Change(0.1, TALL, "E"), Change(0.2, -TALL, "E")))
+    course = Inputs(0.0, 10.0, (InputStep(0.1, TALL, "E"), InputStep(0.2, -TALL, "E")))
     dw = Simulator(system, course, times, 1e-3).samples(values, ("speed",))[0][:, 0]
     dw = dw - dw[0]
     turns = times[1:][np.diff(np.sign(dw)) != 0]
@@ -413,7 +413,7 @@ def test_the_input_that_breaks_the_loop_moves_what_the_exciter_measures():
     times = np.linspace(0.0, 2.0, 21)
 
     def moved(signal, step):
-        course = Course(0.0, 2.0, (Change(0.5, step, signal),))
+        course = Inputs(0.0, 2.0, (InputStep(0.5, step, signal),))
         return Simulator(several, course, times, 1e-3).samples(values, ("vt",))[0]
 
     np.testing.assert_allclose(moved(MEASURED, 0.01), moved("vref", -0.01), rtol=0.0, atol=1e-14)

@@ -31,10 +31,10 @@ from linearised import autoregressive
 
 from exfit.case.load import load_case
 from exfit.estimate import least_squares
-from exfit.fitting.build import fitted_trials, residuals_of
+from exfit.fitting.build import build_experiments, residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT
-from exfit.fitting.uncertainty import knowledge
+from exfit.fitting.uncertainty import uncertainty_at
 from exfit.inference import LEVEL
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
@@ -104,8 +104,8 @@ def problem(name):
     """Return the residuals of one of CASES, their samples the exact response to the truth."""
     case, fixed = load_case(CASE), CASES[name]
     values = {**case.values(), **TRUTH, **fixed}
-    (trial,) = fitted_trials(case)
-    trial = trial.secured(values)
+    (trial,) = build_experiments(case)
+    trial = trial.with_enough_substeps(values)
     whole = residuals_of(case, (trial,))
     exact = trial.experiment.samples(values)[0][:, 0]
     (channel,) = trial.channels
@@ -139,7 +139,7 @@ def outcome(residuals, aside, profiled):
     """Fit from a start that is aside (N,) of the truth, and return what it came to."""
     truth = np.log([TRUTH[one.name] for one in residuals.free])
     found = fitted(residuals, truth + aside)
-    told = knowledge(residuals, found.x, ())
+    told = uncertainty_at(residuals, found.x, ())
     known, missed, values = told.confidence, found.x - truth, np.exp(found.x)
     covariance = known.covariance / np.outer(values, values)
     distance = float(missed @ np.linalg.solve(covariance, missed))

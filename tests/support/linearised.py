@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from exfit.inference import Channel, Linearisation
+from exfit.inference import Linearisation, ResidualBlock
 
 
 def linearised(values, errors, jacobian, **changes):
@@ -20,7 +20,7 @@ def linearised(values, errors, jacobian, **changes):
         "jacobian": np.asarray(jacobian, dtype=float),
         "influence": errors,
         "curvature": np.ones(len(errors)),
-        "channels": (Channel("vt", slice(0, len(errors))),),
+        "channels": (ResidualBlock("vt", slice(0, len(errors))),),
     }
     return Linearisation(**{**plain, **changes})
 

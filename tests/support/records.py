@@ -5,7 +5,7 @@ import yaml
 from places import ROOT
 
 from exfit.case.load import load_case
-from exfit.fitting.build import fitted_trials
+from exfit.fitting.build import build_experiments
 
 SAMPLES = ROOT / "sample_data"
 STEP = {"up": 0.05, "down": -0.05}  # pu, at 1 s, of all sample records
@@ -93,7 +93,7 @@ def synthetic(folder, test, time, seed=0, noise=NOISE, signals=("vt",)):
     write(folder / "record.csv", t=time, vt=time)
     case = case_of(one(test), folder)
     values = case.values()
-    response = fitted_trials(case)[0].secured(values).response(values)
+    response = build_experiments(case)[0].with_enough_substeps(values).response(values)
     rng = np.random.default_rng(seed)
     shown = {
         name: response.signals[name] + noise * rng.standard_normal(len(time)) for name in signals

@@ -9,7 +9,7 @@ from places import REFERENCE
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import MACHINE, VT0
-from exfit.simulation.inputs import Change, Course
+from exfit.simulation.inputs import Inputs, InputStep
 
 MACHINE_NAMES = {
     "Td10": "Tpd0",
@@ -51,5 +51,5 @@ def reference(name):
         header, *rows = csv.reader(file)
     columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
     times = columns["t"]
-    steps = tuple(Change(*step) for step in told["steps"])
-    return model, values | {VT0: 1.0}, Course(times[0], times[-1], steps), columns, told
+    steps = tuple(InputStep(*step) for step in told["steps"])
+    return model, values | {VT0: 1.0}, Inputs(times[0], times[-1], steps), columns, told

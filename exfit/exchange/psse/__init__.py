@@ -1,6 +1,6 @@
 """PSS/E dynamics files (.dyr): their free format, their records, the units they describe."""
 
-from exfit.exchange.psse.fields import Fault, located, read_records, text_of
+from exfit.exchange.psse.fields import DynamicsFault, located, read_records, text_of
 from exfit.exchange.psse.records import (
     Definition,
     alternatives,
@@ -10,13 +10,13 @@ from exfit.exchange.psse.records import (
     read_values,
     record_text,
 )
-from exfit.exchange.psse.unit import Part, Unit, read_unit
+from exfit.exchange.psse.unit import Unit, UnitPart, read_unit
 
 __all__ = [
     "Definition",
-    "Fault",
-    "Part",
+    "DynamicsFault",
     "Unit",
+    "UnitPart",
     "alternatives",
     "contradictions",
     "definition_of",

@@ -28,7 +28,7 @@ BYTE_ORDER = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "ut
 END_OF_FILE = "\x1a"  # as DOS wrote it
 
 
-class Fault(NamedTuple):
+class DynamicsFault(NamedTuple):
     """What is wrong, or must be known, on a line of the file."""
 
     line: int
@@ -76,7 +76,7 @@ def read_records(text: str, file: str) -> list[Fields]:
     """Return the records of a text; raises DynamicsError where one has no end."""
     found: list[Fields] = []
     open_: tuple[Field, ...] = ()
-    faults: list[Fault] = []
+    faults: list[DynamicsFault] = []
     after_comma = True  # a comma here has nothing before it
     for number, line in enumerate(text.split("\n"), start=1):
         if line.lstrip().startswith(COMMENTS):
@@ -86,7 +86,7 @@ def read_records(text: str, file: str) -> list[Fields]:
             open_ = ()
         read = _line(line, number, after_comma)
         if read.unclosed:
-            faults.append(Fault(number, "a quote is opened and not closed on the line"))
+            faults.append(DynamicsFault(number, "a quote is opened and not closed on the line"))
         open_ += read.fields
         after_comma = read.after_comma
         if read.ended:
@@ -98,13 +98,13 @@ def read_records(text: str, file: str) -> list[Fields]:
     return found
 
 
-def refuse(faults: list[Fault], file: str) -> None:
+def refuse(faults: list[DynamicsFault], file: str) -> None:
     """Raise DynamicsError with all faults in the order of their lines, where there is any."""
     if faults:
         raise DynamicsError(located(faults, file))
 
 
-def located(faults: Iterable[Fault], file: str) -> list[str]:
+def located(faults: Iterable[DynamicsFault], file: str) -> list[str]:
     """Return faults as ``file:line: what``, in the order of their lines."""
     return [f"{file}:{line}: {text}" for line, text in sorted(faults, key=lambda one: one.line)]
 
@@ -145,5 +145,5 @@ def _line(line: str, number: int, after_comma: bool) -> _Line:
     return _Line(tuple(fields), after_comma)
 
 
-def _endless(record: tuple[Field, ...], where: str) -> Fault:
-    return Fault(record[0].line, f"the record that begins here has no '/' {where}")
+def _endless(record: tuple[Field, ...], where: str) -> DynamicsFault:
+    return DynamicsFault(record[0].line, f"the record that begins here has no '/' {where}")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from exfit.case.templates import commented, parameter_line
 from exfit.errors import DynamicsError
-from exfit.exchange.psse import Part, Unit, read_unit, text_of
+from exfit.exchange.psse import Unit, UnitPart, read_unit, text_of
 from exfit.models.sheet import Sheet
 from exfit.util.text import yaml_number
 
@@ -45,13 +45,13 @@ def _heading(unit: Unit, file: str) -> Iterator[str]:
         yield f"# Line {line}: {_plain(text)}."
 
 
-def _exciter_name(exciter: Part) -> Iterator[str]:
+def _exciter_name(exciter: UnitPart) -> Iterator[str]:
     yield commented(f"model: {exciter.definition.model.name}", _origin(exciter))
     if {"E1", "SE1", "E2", "SE2"} <= exciter.values.keys():
         yield commented("saturation: quadratic", "as PSS/E")
 
 
-def _plant(machine: Part) -> Iterator[str]:
+def _plant(machine: UnitPart) -> Iterator[str]:
     yield "plant:"
     yield "  type: open-circuit"
     yield commented(f"  machine: {machine.definition.model.name}", _origin(machine))
@@ -59,14 +59,14 @@ def _plant(machine: Part) -> Iterator[str]:
     yield from _values(machine, "    ")
 
 
-def _values(part: Part, indent: str) -> Iterator[str]:
+def _values(part: UnitPart, indent: str) -> Iterator[str]:
     rows: Sheet = part.definition.model.sheet
     for row in rows:
         remark = "" if row.symbol in part.definition.names else "; typical, not in the file"
         yield parameter_line(row, yaml_number(part.values[row.symbol]), indent, remark)
 
 
-def _origin(part: Part) -> str:
+def _origin(part: UnitPart) -> str:
     return f"{part.definition.record.name} on line {part.line}"
 
 

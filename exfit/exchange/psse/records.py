@@ -4,10 +4,10 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from exfit.exchange.psse.fields import Fault, Field, number, whole
+from exfit.exchange.psse.fields import DynamicsFault, Field, number, whole
 from exfit.models import MODELS, STABILISERS, sheet
 from exfit.models.machines import MACHINES, Machine
-from exfit.models.sheet import Model, Record, Sheet, typical
+from exfit.models.sheet import DynamicsRecord, Model, Sheet, typical
 from exfit.util.text import show
 
 WIDTH = 80  # columns of a file
@@ -21,7 +21,7 @@ class Definition:
 
     kind: str
     model: Model | Machine
-    record: Record
+    record: DynamicsRecord
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -34,8 +34,8 @@ class Reading:
     """What the fields of a record say: values by symbol, what is wrong, what must be known."""
 
     values: Mapping[str, float]
-    faults: list[Fault]
-    warnings: list[Fault]
+    faults: list[DynamicsFault]
+    warnings: list[DynamicsFault]
 
 
 def definitions() -> list[Definition]:
@@ -85,13 +85,14 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     """Return what the fields behind a record's id say; ``line`` is where the record begins."""
     record, names = definition.record, definition.names
     if len(fields) != len(names):
-        count = Fault(line, _wrong_count(definition, len(fields)))
+        count = DynamicsFault(line, _wrong_count(definition, len(fields)))
         return Reading({}, [count, *_no_numbers(record.name, fields)], [])
     lines = dict(zip(names, (field.line for field in fields), strict=True))
 
-    def placed(found: Iterable[tuple[str, str]]) -> list[Fault]:
+    def placed(found: Iterable[tuple[str, str]]) -> list[DynamicsFault]:
         return [
-            Fault(lines.get(name, line), f"{record.name}: {name}: {text}") for name, text in found
+            DynamicsFault(lines.get(name, line), f"{record.name}: {name}: {text}")
+            for name, text in found
         ]
 
     given, unreadable = _numbers(definition, fields)
@@ -101,7 +102,7 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     values = {**typical(definition.model.sheet), **known}
     wrong = [*unreadable, *_outside(definition.model.sheet, known)]
     wrong = wrong or [*contradictions(definition.model, values)]
-    doubt = [Fault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
+    doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
     lacking = [
         (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
         for row in definition.model.sheet
@@ -148,17 +149,17 @@ def _numbers(
     return values, faults
 
 
-def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[Fault]:
+def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[DynamicsFault]:
     """Yield what is no number, such as a repeat count: it may be why the count is wrong."""
     for field in fields:
         try:
             number(field)
         except ValueError as error:
-            yield Fault(field.line, f"{name}: {error}")
+            yield DynamicsFault(field.line, f"{name}: {error}")
 
 
 def _unmodelled(
-    record: Record, symbols: Iterable[str], given: Mapping[str, float]
+    record: DynamicsRecord, symbols: Iterable[str], given: Mapping[str, float]
 ) -> Iterable[tuple[str, str]]:
     """Yield (symbol, warning) for what the model, of these symbols, has in one way only."""
     for name, modelled in (*record.icons, *record.absent):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from exfit.errors import DynamicsError
-from exfit.exchange.psse.fields import Fault, Field, Fields, read_records, refuse
+from exfit.exchange.psse.fields import DynamicsFault, Field, Fields, read_records, refuse
 from exfit.exchange.psse.records import Definition, definition_of, definitions, read_values
 from exfit.util.text import near, show_value
 
@@ -40,7 +40,7 @@ class Head(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class UnitPart:
     """A model of the unit with the values of its record, which begins on ``line``."""
 
     definition: Definition
@@ -54,10 +54,10 @@ class Unit:
 
     bus: int
     id: str
-    machine: Part
-    exciter: Part
-    stabiliser: Part | None
-    warnings: tuple[Fault, ...]
+    machine: UnitPart
+    exciter: UnitPart
+    stabiliser: UnitPart | None
+    warnings: tuple[DynamicsFault, ...]
 
 
 def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | None = None) -> Unit:
@@ -67,12 +67,12 @@ def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | No
     where the unit is not in the file, is not the only one, or has no machine or exciter that exfit
     knows.
     """
-    faults: list[Fault] = []
+    faults: list[DynamicsFault] = []
     heads = [head for record in read_records(text, file) for head in _heads(record, faults)]
     refuse(faults, file)
     chosen = _chosen(heads, file, bus, machine_id)
     left_out = tuple(head for head in chosen if definition_of(head.name) is None)
-    warnings = [Fault(head.line, _left_out(head)) for head in left_out]
+    warnings = [DynamicsFault(head.line, _left_out(head)) for head in left_out]
     parts = _parts(chosen, faults, warnings)
     faults += _missing(parts, chosen, left_out)
     refuse(faults, file)
@@ -86,9 +86,11 @@ def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | No
     )
 
 
-def _parts(chosen: Iterable[Head], faults: list[Fault], warnings: list[Fault]) -> dict[str, Part]:
+def _parts(
+    chosen: Iterable[Head], faults: list[DynamicsFault], warnings: list[DynamicsFault]
+) -> dict[str, UnitPart]:
     """Return the models of a unit by their kind; add what is wrong and what must be known."""
-    parts: dict[str, Part] = {}
+    parts: dict[str, UnitPart] = {}
     for head in chosen:
         definition = definition_of(head.name)
         if definition is None:
@@ -97,22 +99,22 @@ def _parts(chosen: Iterable[Head], faults: list[Fault], warnings: list[Fault]) -
         if kind in parts:
             first = parts[kind]
             other = f"{first.definition.record.name} is on line {first.line}"
-            faults.append(Fault(head.line, f"{name}: a second {kind}; {other}"))
+            faults.append(DynamicsFault(head.line, f"{name}: a second {kind}; {other}"))
             continue
         reading = read_values(definition, head.line, head.fields)
         faults += reading.faults
         warnings += reading.warnings
-        parts[kind] = Part(definition, head.line, reading.values)
+        parts[kind] = UnitPart(definition, head.line, reading.values)
     return parts
 
 
-def _heads(record: Fields, faults: list[Fault]) -> Iterator[Head]:
+def _heads(record: Fields, faults: list[DynamicsFault]) -> Iterator[Head]:
     """Yield the head of a record that belongs to a unit; add a fault where it cannot be told."""
     line, fields = record
     if len(fields) < 3 or not fields[1].text[:1].isalpha():
         if any(definition_of(field.text) for field in fields[:2]) or len(fields) < 3:
             begin = " ".join(field.text for field in fields[:3])
-            faults.append(Fault(line, f"{show_value(begin)} is not bus, 'model' and id"))
+            faults.append(DynamicsFault(line, f"{show_value(begin)} is not bus, 'model' and id"))
         return  # of a line or a device: their records begin otherwise
     bus, name, machine_id = (field.text for field in fields[:3])
     label = f"{name} {fields[3].text}" if name.upper() == "USRMDL" and fields[3:] else name
@@ -125,7 +127,7 @@ def _heads(record: Fields, faults: list[Fault]) -> Iterator[Head]:
         label = "".join(letter if letter.isprintable() else "?" for letter in label)
         yield Head(int(bus), label.upper(), machine_id, line, fields[3:])
     elif definition_of(name) is not None:
-        faults += [Fault(line, f"{name.upper()}: {text}") for text in wrong]
+        faults += [DynamicsFault(line, f"{name.upper()}: {text}") for text in wrong]
 
 
 def _chosen(heads: list[Head], file: str, bus: int | None, machine_id: str | None) -> list[Head]:
@@ -164,8 +166,8 @@ def _list(units: Mapping[tuple[int, str], list[Head]]) -> Iterator[str]:
 
 
 def _missing(
-    parts: Mapping[str, Part], chosen: Sequence[Head], left_out: Iterable[Head]
-) -> Iterator[Fault]:
+    parts: Mapping[str, UnitPart], chosen: Sequence[Head], left_out: Iterable[Head]
+) -> Iterator[DynamicsFault]:
     """Yield a fault for each record that may be the machine or exciter that is missing."""
     known = [one for one in definitions() if definition_of(one.record.name) == one]
     missing = [kind for kind in NEEDED if kind not in parts]
@@ -175,10 +177,10 @@ def _missing(
         meant = [head for head in unknown if len(missing) == 1 or _looks_like(head) == kind]
         for head in meant:
             text = f"exfit has no {kind} of that name; {near(head.name, names)}"
-            yield Fault(head.line, f"{head.name}: {text}")
+            yield DynamicsFault(head.line, f"{head.name}: {text}")
         if not meant:
             unit = f"bus {chosen[0].bus}, id {chosen[0].id}"
-            yield Fault(chosen[0].line, f"{unit}: has no {kind}; known: {', '.join(names)}")
+            yield DynamicsFault(chosen[0].line, f"{unit}: has no {kind}; known: {', '.join(names)}")
 
 
 def _looks_like(head: Head) -> str:

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from exfit.engine.trace import Signal
-from exfit.models.sheet import Record, Row, Sheet
+from exfit.models.sheet import DynamicsRecord, Row, Sheet
 
 Faults = Iterable[tuple[str, str]]
 
@@ -56,7 +56,7 @@ class Machine:
     rest: Callable[..., None]
     quadrature: Callable[..., Signal]
     faults: Callable[[Mapping[str, float]], Faults]
-    records: tuple[Record, ...] = ()
+    records: tuple[DynamicsRecord, ...] = ()
 
     @property
     def states(self) -> tuple[str, ...]:

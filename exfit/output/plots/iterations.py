@@ -9,7 +9,7 @@ from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from exfit.output.plots.style import LABELS, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
-from exfit.results.model import Comparison, Courses, FitResult
+from exfit.results.model import Comparison, FitResult, IterationResponses
 
 FADING = LinearSegmentedColormap.from_list("fading", ["#b9d2ee", START, "#5b2a86", SIMULATED])
 MOST_TICKS = 12  # of the colour bar
@@ -22,7 +22,11 @@ def iterations(result: FitResult) -> Figure:
     Colour tells the iteration, from the start in pale blue to the fit in red. Of a fit without
     courses the figure is empty but for its title.
     """
-    shown = [(one, one.courses) for one in result.comparisons if one.courses is not None]
+    shown = [
+        (one, one.iteration_responses)
+        for one in result.comparisons
+        if one.iteration_responses is not None
+    ]
     count = len(shown)
     figure = Figure(figsize=(WIDTH, 1.0 + 4.4 * max(count, 1)), layout="constrained")
     figure.suptitle(f"{result.name}: the response after each iteration", fontsize=11)
@@ -50,7 +54,7 @@ def _colours(numbers: Sequence[int]) -> list[tuple[float, float, float, float]]:
     return [FADING(place) for place in places[: len(numbers)]]
 
 
-def _responses(axes: Axes, comparison: Comparison, courses: Courses) -> None:
+def _responses(axes: Axes, comparison: Comparison, courses: IterationResponses) -> None:
     time, measured = comparison.time, comparison.judged.measured
     axes.plot(time, measured, ".", color=MEASURED, markersize=3, label="measured")
     last = len(courses.numbers) - 1
@@ -65,7 +69,7 @@ def _responses(axes: Axes, comparison: Comparison, courses: Courses) -> None:
     tidy(axes)
 
 
-def _errors(axes: Axes, comparison: Comparison, courses: Courses) -> None:
+def _errors(axes: Axes, comparison: Comparison, courses: IterationResponses) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
     for samples, colour in zip(courses.samples, _colours(courses.numbers), strict=True):
         error = MILLI * (samples - comparison.judged.measured)

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from exfit.analysis.profiles import Profiles
 from exfit.dsp.decimation import envelope
-from exfit.fitting.uncertainty import Knowledge
+from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.output.plots.style import COLORS, LIMIT, MILLI, SIMULATED, START, STYLES, WIDTH, tidy
 
 Array = NDArray[np.float64]
 PERCENT = 1e-2
 
 
-def sensitivity(known: Knowledge, title: str) -> Figure:
+def sensitivity(known: UncertaintyAnalysis, title: str) -> Figure:
     """Return by how much 1 % more of each parameter moves each signal over time.
 
     What belongs to a record is left out.
@@ -41,7 +41,7 @@ def sensitivity(known: Knowledge, title: str) -> Figure:
     return figure
 
 
-def correlation(known: Knowledge, title: str) -> Figure:
+def correlation(known: UncertaintyAnalysis, title: str) -> Figure:
     """Return the correlations of the estimates as a map; what has none is left blank."""
     names, values = known.linear.names, known.confidence.correlation
     side = max(4.2, 1.6 + 0.62 * len(names))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from exfit.dsp.decimation import PIXELS, envelope
 from exfit.output.plots.style import LIMIT, SIMULATED, START, WIDTH, tidy
-from exfit.records.inspection import Channel, Inspection
-from exfit.records.steps import Step
+from exfit.records.inspection import InspectedChannel, Inspection
+from exfit.records.steps import RecordedStep
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def inspection(found: Inspection, title: str) -> Figure:
     return figure
 
 
-def _channel(axes: Axes, found: Inspection, one: Channel) -> None:
+def _channel(axes: Axes, found: Inspection, one: InspectedChannel) -> None:
     time, column = found.time, found.samples[one.name]
     for gap in found.sampling.gaps:
         axes.axvspan(gap.start, gap.end, color=SHADE, linewidth=0.0)
@@ -70,7 +70,7 @@ def _channel(axes: Axes, found: Inspection, one: Channel) -> None:
     tidy(axes)
 
 
-def _steps(axes: Axes, steps: Sequence[Step]) -> None:
+def _steps(axes: Axes, steps: Sequence[RecordedStep]) -> None:
     """Write the instants of the steps above the panels."""
     for step in steps:
         axes.annotate(

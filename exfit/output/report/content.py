@@ -9,11 +9,11 @@ from typing import Any
 from exfit import __version__
 from exfit.case.case import Case
 from exfit.case.parts import Part
-from exfit.case.schema import BumpTest, Channel, Phases, Recording, Unknown, known
+from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, Recording, Unknown, known
 from exfit.dsp.features import Features
 from exfit.errors import ExfitError
 from exfit.exchange.psse.export import export
-from exfit.fitting.build import Trial
+from exfit.fitting.build import ExperimentSetup
 from exfit.fitting.nuisance import unit_of
 from exfit.inference.wording import listed
 from exfit.output.report.simulated import Simulated, simulated
@@ -324,7 +324,7 @@ def _tests(found: Sources) -> Iterator[Tested]:
             yield _tested(case, recording, trial, role)
 
 
-def _tested(case: Case, recording: Recording, trial: Trial, role: str) -> Tested:
+def _tested(case: Case, recording: Recording, trial: ExperimentSetup, role: str) -> Tested:
     time = trial.record.time
     return Tested(
         name=recording.name,
@@ -354,7 +354,7 @@ def _done(test: BumpTest) -> Iterator[str]:
         yield f"network switched at {switch.at:g} s: {told}"
 
 
-def _channel(signal: str, entry: Channel | Phases) -> str:
+def _channel(signal: str, entry: ChannelSection | PhasesSection) -> str:
     """Return a signal with what 1 pu of it is."""
     return signal if entry.base is None else f"{signal}, 1 pu = {entry.base:g} {entry.unit}"
 

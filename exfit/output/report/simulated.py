@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.analysis.iteration_responses import course_of
+from exfit.analysis.iteration_responses import iteration_response
 from exfit.analysis.model_check import FLAT_DRIFT, flat_drift
 from exfit.errors import SimulationError
-from exfit.fitting.build import Trial, compared, residuals_of
+from exfit.fitting.build import ExperimentSetup, compared, residuals_of
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
@@ -97,9 +97,11 @@ def simulated(found: Sources) -> Simulated:
     fitted = found.saved.fitted()
     theta = np.array([one.scaled(fitted[one.name]) for one in residuals.free])
     values = residuals.values(theta)
-    trials = tuple(one.secured(values) for one in found.trials)
+    trials = tuple(one.with_enough_substeps(values) for one in found.trials)
     # what a validation leaves open about its own record is at its start: no limit depends on it
-    unseen = tuple(one.secured(one.known(values)) for one in found.validations)
+    unseen = tuple(
+        one.with_enough_substeps(one.with_start_values(values)) for one in found.validations
+    )
     experiments = [one.experiment for one in trials]
     known = found.saved.at("knowledge") is not None
     return Simulated(
@@ -113,11 +115,13 @@ def simulated(found: Sources) -> Simulated:
 
 def _flat(experiments: Sequence[Experiment], values: Values) -> Iterator[Flat]:
     for one in experiments:
-        simulator, at = one.moved(values), one.parameters(values)
+        simulator, at = one.with_inputs(values), one.parameters(values)
         yield Flat(one.name, flat_drift(simulator, at, one.signals))
 
 
-def _moved(residuals: Residuals, theta: Array, trials: Sequence[Trial]) -> Iterator[Moved]:
+def _moved(
+    residuals: Residuals, theta: Array, trials: Sequence[ExperimentSetup]
+) -> Iterator[Moved]:
     """Yield what 1 % more of each parameter does; what belongs to a record is left out."""
     try:
         linear = linearisation(residuals, theta, names_of_records(trials))
@@ -149,17 +153,17 @@ def _small(experiments: Sequence[Experiment], values: Values) -> Iterator[Small]
             yield Small(names, None, str(fault))
 
 
-def _limited(trials: Sequence[Trial], values: Values) -> Iterator[Limited]:
+def _limited(trials: Sequence[ExperimentSetup], values: Values) -> Iterator[Limited]:
     from exfit.simulation.limit_hits import limits_hit
 
     for one in trials:
-        at = one.known(values)
-        simulator, parameters = one.experiment.moved(at), one.experiment.parameters(at)
+        at = one.with_start_values(values)
+        simulator, parameters = one.experiment.with_inputs(at), one.experiment.parameters(at)
         yield Limited(one.name, limits_hit(simulator, parameters))
 
 
 def _courses(
-    found: Sources, trials: Sequence[Trial], residuals: Residuals, values: Values
+    found: Sources, trials: Sequence[ExperimentSetup], residuals: Residuals, values: Values
 ) -> Iterator[Courses]:
     """Yield how the response to each fitted test went from the start to the fit."""
     history = found.saved.entries("history")
@@ -172,7 +176,7 @@ def _courses(
         for row in rows[: len(history)]:
             number = int(found.saved.number("history", int(row), "number"))
             moved = found.saved.at("history", int(row), "values")
-            course = course_of(trial, residuals, signals[column], moved)
+            course = iteration_response(trial, residuals, signals[column], moved)
             if course is not None:
                 samples[number] = course
         measured = compared(channel, trial.experiment.measured(channel, values))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from exfit.case.case import SINGLE, Case
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
-from exfit.fitting.build import Trial, trial_of
+from exfit.fitting.build import ExperimentSetup, build_experiment
 from exfit.fitting.search import fitted
 from exfit.records.record import file_hash
 from exfit.results.io import Saved
@@ -37,8 +37,8 @@ class Sources:
 
     saved: Saved
     case: Case
-    trials: tuple[Trial, ...]
-    validations: tuple[Trial, ...]
+    trials: tuple[ExperimentSetup, ...]
+    validations: tuple[ExperimentSetup, ...]
 
     @property
     def folder(self) -> Path:
@@ -63,7 +63,7 @@ def sources(saved: Saved, case: Path | None = None) -> Sources:
     loaded = load_case(path)
     trials, _ = fitted(loaded)
     given = loaded.values()
-    validations = tuple(trial_of(loaded, one, given) for one in loaded.validations)
+    validations = tuple(build_experiment(loaded, one, given) for one in loaded.validations)
     files = {"case": path, "model": loaded.folder / str(loaded.model)}
     for label, trial in zip(_labels(loaded), (*trials, *validations), strict=True):
         files[label] = trial.record.source

@@ -10,7 +10,7 @@ from rich.live import Live
 from rich.progress import TaskID
 from rich.text import Text
 
-from exfit.analysis.iteration_responses import Sketch
+from exfit.analysis.iteration_responses import LiveResponse
 from exfit.case.case import Case
 from exfit.estimate import Progress
 from exfit.output.terminal.sketch import LEAST_HEIGHT, LEAST_WIDTH, sketched
@@ -38,7 +38,7 @@ class Watch:
     def __init__(self, console: Console, title: str, most: int | None = None) -> None:
         self.console, self.title, self.most = console, title, most
         self.lines: list[Iteration] = []
-        self._sketch: Sketch | None = None
+        self._sketch: LiveResponse | None = None
         self._live: Live | None = None
         self._next = 0.0  # when it may be drawn again
 
@@ -56,12 +56,12 @@ class Watch:
                     self._live.update(self.picture(), refresh=True)
 
     @property
-    def look(self) -> Callable[[Sketch], None] | None:
+    def look(self) -> Callable[[LiveResponse], None] | None:
         """What is to be told the responses; None where they would not be shown."""
         shows = self.console.is_terminal and not self.console.options.ascii_only
         return self._keep if shows else None
 
-    def _keep(self, sketch: Sketch) -> None:
+    def _keep(self, sketch: LiveResponse) -> None:
         self._sketch = sketch
 
     def __call__(self, line: Iteration) -> None:

@@ -7,7 +7,7 @@ from rich.text import Text
 
 from exfit.dsp.sampling import Sampling
 from exfit.output.terminal.terminal import notes, number, plain_table
-from exfit.records.inspection import Channel, Inspection
+from exfit.records.inspection import InspectedChannel, Inspection
 
 NAME = 22  # letters of a channel's name that leave room for its numbers
 
@@ -50,7 +50,7 @@ def in_words(sampling: Sampling) -> str:
     return text + (f"; {count} gap{'s' if count > 1 else ''}" if count else "; no gaps")
 
 
-def _channels(console: Console, channels: Sequence[Channel]) -> None:
+def _channels(console: Console, channels: Sequence[InspectedChannel]) -> None:
     heads = ("at rest", "smallest", "largest", "noise", "rounded to")
     table = plain_table("channel", "unit", "is", *heads, numbers=heads)
     for one in channels:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.text import Text
 
-from exfit.analysis.iteration_responses import Sketch
+from exfit.analysis.iteration_responses import LiveResponse
 
 Array = NDArray[np.float64]
 Dots = NDArray[np.bool_]
@@ -25,7 +25,7 @@ ROOM = 0.05  # of the range, above and below
 FLAT = 1e-6  # pu: a range that is smaller shows rounding errors alone
 
 
-def sketched(sketch: Sketch, width: int, height: int) -> list[Text]:
+def sketched(sketch: LiveResponse, width: int, height: int) -> list[Text]:
     """Return the lines of a plot of so many characters: what was measured and what is simulated.
 
     Where both lie in a character, it has the colour of the simulated one.
@@ -108,7 +108,7 @@ def _down(samples: Array, limits: tuple[float, float], rows: int) -> NDArray[np.
     return np.rint(place).astype(np.int64)
 
 
-def _range(sketch: Sketch) -> tuple[float, float]:
+def _range(sketch: LiveResponse) -> tuple[float, float]:
     """Return the levels at the bottom and the top."""
     both = np.concatenate([sketch.measured, sketch.simulated])
     finite = both[np.isfinite(both)]
@@ -122,7 +122,7 @@ def _label(level: float, span: float) -> str:
     return f"{level:.{min(max(0, math.ceil(2.0 - math.log10(span))), 6)}f}"
 
 
-def _heading(sketch: Sketch, margin: int) -> Text:
+def _heading(sketch: LiveResponse, margin: int) -> Text:
     dot = chr(BRAILLE + 0x36)
     line = Text(" " * (margin + 1), no_wrap=True)
     line.append(f"{sketch.signal} (pu)   ", style="bold")

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 from exfit.records.formats.columns import Columns
 from exfit.records.formats.comtrade.channels import analog_of, status_of, time_of
 from exfit.records.formats.comtrade.configuration import config_of
-from exfit.records.formats.comtrade.data import Samples, samples_of
-from exfit.records.formats.comtrade.files import Parts, of_file
+from exfit.records.formats.comtrade.data import ComtradeSamples, samples_of
+from exfit.records.formats.comtrade.files import ComtradeFiles, of_file
 from exfit.records.formats.heads import stated
 from exfit.records.formats.table import Array, Table
 from exfit.records.units import unit_in
@@ -39,7 +39,7 @@ def read_comtrade(path: Path) -> Table:
     return _table(parts, config, samples_of(parts, config))
 
 
-def _table(parts: Parts, config: "Cfg", samples: Samples) -> Columns:
+def _table(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples) -> Columns:
     time = time_of(parts, config, samples)
     analog, status = config.analog_channels, config.status_channels
 

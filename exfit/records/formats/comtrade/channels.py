@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.comtrade.data import BITS, MISSING_STAMP, Samples
-from exfit.records.formats.comtrade.files import Parts
+from exfit.records.formats.comtrade.data import BITS, MISSING_STAMP, ComtradeSamples
+from exfit.records.formats.comtrade.files import ComtradeFiles
 from exfit.records.formats.table import Array, column_error
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ MISSING_1991 = -1.0  # 0xFFFF
 NANOSECONDS = 1e-9
 
 
-def time_of(parts: Parts, config: "Cfg", samples: Samples) -> Array:
+def time_of(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples) -> Array:
     """Return the time (M,) in s since the first sample."""
     if config.timestamp_critical or any(rate == 0.0 for rate, _ in config.sample_rates):
         return _stamped(parts, config, samples.stamp)
@@ -36,7 +36,7 @@ def time_of(parts: Parts, config: "Cfg", samples: Samples) -> Array:
     return time
 
 
-def _stamped(parts: Parts, config: "Cfg", stamp: NDArray[Any]) -> Array:
+def _stamped(parts: ComtradeFiles, config: "Cfg", stamp: NDArray[Any]) -> Array:
     """Return the time in s since the first sample, by the time stamps of the samples."""
     lost = np.flatnonzero((stamp == MISSING_STAMP) | ~np.isfinite(stamp))
     if lost.size:
@@ -67,7 +67,7 @@ def analog_of(config: "Cfg", channel: "AnalogChannel", raw: NDArray[Any]) -> Arr
     return np.asarray(values, np.float64)
 
 
-def status_of(parts: Parts, config: "Cfg", samples: Samples, at: int) -> Array:
+def status_of(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples, at: int) -> Array:
     """Return a status channel (M,) as 0 and 1."""
     if config.ft.upper() != "ASCII":
         return np.asarray(samples.status[:, at // BITS] >> at % BITS & 1, np.float64)

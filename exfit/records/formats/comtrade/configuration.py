@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from exfit.errors import RecordError
 from exfit.records.formats.columns import needed
-from exfit.records.formats.comtrade.files import Parts
+from exfit.records.formats.comtrade.files import ComtradeFiles
 
 if TYPE_CHECKING:
     from comtrade import Cfg
@@ -23,7 +23,7 @@ _COUNTS = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*[Aa]\s*,\s*(\d{1,6})\s*[Dd
 _NO_FRACTION = re.compile(r"(\d:\d\d:\d\d)(?=[ \t]*$)", re.MULTILINE)
 
 
-def config_of(parts: Parts) -> "Cfg":
+def config_of(parts: ComtradeFiles) -> "Cfg":
     """Return the configuration as the package reads it, where its lines are as they should be.
 
     Raises RecordError for a line that cannot be, or the package comtrade missing.
@@ -46,7 +46,7 @@ def config_of(parts: Parts) -> "Cfg":
     return config
 
 
-def _check_lines(parts: Parts) -> None:
+def _check_lines(parts: ComtradeFiles) -> None:
     """Raise RecordError where a line has too many or too few cells, which the package fills."""
     lines = parts.text.rstrip().split("\n")
     if not lines[0].strip():
@@ -79,7 +79,7 @@ def _check_lines(parts: Parts) -> None:
             )
 
 
-def _check_config(parts: Parts, config: "Cfg") -> None:
+def _check_config(parts: ComtradeFiles, config: "Cfg") -> None:
     """Raise RecordError where a number of the configuration cannot be."""
     for at, channel in enumerate(config.analog_channels):
         if not (math.isfinite(channel.a) and math.isfinite(channel.b)):

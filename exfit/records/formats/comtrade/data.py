@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.formats.cells import is_number, why_not
-from exfit.records.formats.comtrade.files import Parts
+from exfit.records.formats.comtrade.files import ComtradeFiles
 from exfit.records.formats.table import Array
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ _BLANK_CELL = re.compile(rb"(?<=,)[ \t]*(?=,|\r|\n|\Z)")
 
 
 @dataclass(frozen=True)
-class Samples:
+class ComtradeSamples:
     """The data part as it stands: each (M,), (M, analog) or (M, words or channels)."""
 
     number: NDArray[Any]
@@ -33,7 +33,7 @@ class Samples:
     status: NDArray[Any]
 
 
-def samples_of(parts: Parts, config: "Cfg") -> Samples:
+def samples_of(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     """Return the samples; raises RecordError where they are not those of the configuration."""
     read = _ascii if config.ft.upper() == "ASCII" else _binary
     samples = read(parts, config)
@@ -51,7 +51,7 @@ def samples_of(parts: Parts, config: "Cfg") -> Samples:
     return samples
 
 
-def _binary(parts: Parts, config: "Cfg") -> Samples:
+def _binary(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     """Return the samples of binary data."""
     layout = np.dtype(
         [
@@ -68,10 +68,10 @@ def _binary(parts: Parts, config: "Cfg") -> Samples:
             f"and {left} bytes: it is cut off, or its channels are not those of {parts.cfg.name}"
         )
     data = np.frombuffer(parts.data, layout)
-    return Samples(data["number"], data["stamp"], data["analog"], data["status"])
+    return ComtradeSamples(data["number"], data["stamp"], data["analog"], data["status"])
 
 
-def _ascii(parts: Parts, config: "Cfg") -> Samples:
+def _ascii(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     """Return the samples of data in text, blank cells as nan."""
     width = 2 + config.analog_count + config.status_count
     data = parts.data.replace(b"\x1a", b"")
@@ -85,7 +85,7 @@ def _ascii(parts: Parts, config: "Cfg") -> Samples:
         _find_fault(parts, data, width)
     stamp = np.where(np.isnan(cells[:, 1]), MISSING_STAMP, cells[:, 1])
     analog = cells[:, 2 : 2 + config.analog_count]
-    return Samples(cells[:, 0], stamp, analog, cells[:, 2 + config.analog_count :])
+    return ComtradeSamples(cells[:, 0], stamp, analog, cells[:, 2 + config.analog_count :])
 
 
 def _loaded(data: bytes, width: int) -> Array:
@@ -95,7 +95,7 @@ def _loaded(data: bytes, width: int) -> Array:
     return np.loadtxt(text, delimiter=",", comments=None, ndmin=2)
 
 
-def _find_fault(parts: Parts, data: bytes, width: int) -> None:
+def _find_fault(parts: ComtradeFiles, data: bytes, width: int) -> None:
     """Raise RecordError for the first line of the data with a wrong cell, if any."""
     for at, line in enumerate(data.decode("latin-1").splitlines()):
         cells = line.split(",")

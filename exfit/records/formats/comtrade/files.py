@@ -16,7 +16,7 @@ _SECTION = re.compile(
 
 
 @dataclass(frozen=True)
-class Parts:
+class ComtradeFiles:
     """The two halves of a record, whether they are two files or one."""
 
     path: Path
@@ -36,7 +36,7 @@ class Parts:
         return f"{self.dat}: sample {row + 1}"
 
 
-def of_file(path: Path) -> Parts:
+def of_file(path: Path) -> ComtradeFiles:
     """Return the parts of a record, by its .cfg, its .dat or its .cff file.
 
     Raises RecordError for a file of another kind, and where one is missing or cut off.
@@ -47,7 +47,7 @@ def of_file(path: Path) -> Parts:
     return _of_one_file(path) if kind == ".cff" else _of_two_files(path)
 
 
-def _of_two_files(path: Path) -> Parts:
+def _of_two_files(path: Path) -> ComtradeFiles:
     found = read_bytes(path)
     if path.suffix.lower() == ".cfg":
         cfg, dat, text = path, _beside(path, ".dat"), found
@@ -56,7 +56,7 @@ def _of_two_files(path: Path) -> Parts:
         cfg, dat, data = _beside(path, ".cfg"), path, found
         text = read_bytes(cfg)
     sha256 = hashlib.sha256(text + data).hexdigest()
-    return Parts(path, cfg, _decoded(cfg, text), 1, dat, data, sha256)
+    return ComtradeFiles(path, cfg, _decoded(cfg, text), 1, dat, data, sha256)
 
 
 def _beside(path: Path, suffix: str) -> Path:
@@ -70,7 +70,7 @@ def _beside(path: Path, suffix: str) -> Path:
     return found[0]
 
 
-def _of_one_file(path: Path) -> Parts:
+def _of_one_file(path: Path) -> ComtradeFiles:
     """Return the parts of a .cff file (IEEE Std C37.111-2013, clause 9)."""
     whole = read_bytes(path)
     sections = {}
@@ -90,7 +90,9 @@ def _of_one_file(path: Path) -> Parts:
         data = _cut(path, data, int(dat[3]))
     text = _decoded(path, whole[cfg.end() : min(ends)])
     first_line = whole.count(b"\n", 0, cfg.end()) + 1
-    return Parts(path, path, text, first_line, path, data, hashlib.sha256(whole).hexdigest())
+    return ComtradeFiles(
+        path, path, text, first_line, path, data, hashlib.sha256(whole).hexdigest()
+    )
 
 
 def _cut(path: Path, data: bytes, size: int) -> bytes:
