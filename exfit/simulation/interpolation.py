@@ -1,7 +1,9 @@
 """A run read at given times: polynomials that never reach across a step."""
 
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from functools import cache, cached_property
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +24,19 @@ def lagrange(points: int) -> Array:
     below them those of their slopes: zero where there are fewer points than NEIGHBOURS,
     (2 NEIGHBOURS, NEIGHBOURS).
     """
-    places = np.arange(points) - 0.5 * (points - 1)  # about the middle powers stay small
+    # the polynomials are rational: worked out exactly, they are the same on every machine
+    places = [Fraction(2 * k - points + 1, 2) for k in range(points)]  # about the middle
     values = np.zeros((NEIGHBOURS, NEIGHBOURS))
-    values[:points, :points] = np.linalg.inv(np.vander(places, increasing=True)).T
-    slopes = np.roll(values * np.arange(NEIGHBOURS), -1, axis=1)
+    slopes = np.zeros((NEIGHBOURS, NEIGHBOURS))
+    for k, place in enumerate(places):
+        others = places[:k] + places[k + 1 :]
+        coefficients = [Fraction(1)]
+        for other in others:
+            raised, scaled = [Fraction(0), *coefficients], [*coefficients, Fraction(0)]
+            coefficients = [a - other * b for a, b in zip(raised, scaled, strict=True)]
+        size = prod((place - other for other in others), start=Fraction(1))
+        values[k, :points] = [float(c / size) for c in coefficients]
+        slopes[k, : points - 1] = [float(n * c / size) for n, c in enumerate(coefficients)][1:]
     return np.vstack([values, slopes])
 
 
