@@ -267,7 +267,7 @@ def _clock(table: Table, asked: str | None) -> tuple[str, ...]:
 def _check_clock(table: Table, clock: Sequence[str], time: Array) -> None:
     """Raise a RecordError where time is not finite or goes back; an instant may repeat."""
     named = Clock(tuple(clock))
-    check_finite(table, named, time)
+    check_finite(time, named.label, table.place)
     back = np.flatnonzero(np.diff(time) < 0.0)
     if len(back):
         before, now = time[back[0]], time[back[0] + 1]

@@ -158,7 +158,7 @@ def inspect(
     stamps = table.instants(columns, unit)
     if len(stamps) < FEWEST:
         raise RecordError(f"{table.path}: {len(stamps)} samples; at least {FEWEST} are needed")
-    check_finite(table, Clock(columns, unit), stamps)
+    check_finite(stamps, Clock(columns, unit).label, table.place)
     sampling = sampling_of(stamps)
     forward = increasing(stamps)
     time = stamps[forward]

@@ -1,14 +1,14 @@
 """Records: signals measured on one clock, read from a recorder's file and made per unit."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, NamedTuple, NoReturn, Protocol
+from typing import Literal, NamedTuple, NoReturn, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from exfit.dsp.resampling import resampled
 from exfit.dsp.three_phase import Connection, PhasorCourse, vt_of_rms, vt_of_waveforms
@@ -88,6 +88,43 @@ class Record:
     sha256: str
     averaged: Mapping[str, float] = field(default_factory=dict)
 
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        signals: Mapping[str, ArrayLike],
+        source: str | Path = "arrays",
+        missing: bool = False,
+    ) -> Self:
+        """Return the record of signals that are arrays already; it keeps copies of them.
+
+        Args:
+            time: (M,), s, increasing.
+            signals: signal name -> samples (M,), per unit.
+            source: what messages and results name in place of a file.
+            missing: whether a sample may be missing from a signal: nan.
+
+        Raises:
+            RecordError: fewer than two samples, no signal or one without any sample, arrays that
+                are not one-dimensional, real and equally long, a value that is no finite number,
+                or time that does not increase.
+        """
+        source = Path(source)
+        if not signals:
+            raise RecordError(f"{source}: no signals")
+        if "time" in signals:
+            raise RecordError(f"{source}: a signal cannot be named time")
+        instants = _real_array(source, "time", time)
+        samples = {name: _real_array(source, name, signal) for name, signal in signals.items()}
+        if len(instants) < FEWEST_SAMPLES:
+            raise RecordError(
+                f"{source}: {len(instants)} samples; at least {FEWEST_SAMPLES} are needed"
+            )
+        for name, values in {"time": instants, **samples}.items():
+            _check_samples(source, name, values, len(instants), missing and name in samples)
+        check_increasing(instants, "time", lambda row: f"{source}: sample {row}")
+        return cls(instants, MappingProxyType(samples), source, _content_hash(instants, samples))
+
 
 def read_record(
     path: Path,
@@ -123,7 +160,8 @@ def read_record(
     table = open_table(path, sheet)
     _check_units(table, channels, per_unit)
     time = table.instants(clock.columns, clock.unit)
-    _check_time(table, clock, time)
+    check_finite(time, clock.label, table.place)
+    check_increasing(time, clock.label, table.place)
     names = [name for channel in channels.values() for name in _columns(channel)]
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
     columns = table.numbers(dict.fromkeys(names), gappy)
@@ -220,21 +258,54 @@ def _how(unit: str) -> str:
     return f"unit: {unit} and base: what 1 pu is in {unit}"
 
 
-def _check_time(table: Table, clock: Clock, time: Array) -> None:
-    """Raise a RecordError where time is not finite or does not increase."""
-    check_finite(table, clock, time)
+def check_finite(time: Array, label: str, place: Callable[[int], str]) -> None:
+    """Raise a RecordError where time is not finite; ``place`` names a sample, counted from 0."""
+    lost = np.flatnonzero(~np.isfinite(time))
+    if lost.size:
+        raise RecordError(f"{place(int(lost[0]))}: {label}: {time[lost[0]]} is not a finite number")
+
+
+def check_increasing(time: Array, label: str, place: Callable[[int], str]) -> None:
+    """Raise a RecordError where time does not increase; ``place`` names a sample, from 0."""
     back = np.flatnonzero(time[1:] <= time[:-1])
     if back.size:
         before, now = time[back[0]], time[back[0] + 1]
         kind = "repeats" if now == before else "goes back behind"
-        _refuse(table, back[0] + 1, f"{clock.label}: time {now} s {kind} the {before} s before it")
+        what = f"{label}: time {now} s {kind} the {before} s before it"
+        raise RecordError(f"{place(int(back[0]) + 1)}: {what}")
 
 
-def check_finite(table: Table, clock: Clock, time: Array) -> None:
-    """Raise a RecordError where time is not finite."""
-    lost = np.flatnonzero(~np.isfinite(time))
+def _real_array(source: Path, name: str, values: ArrayLike) -> Array:
+    """Return a read-only copy (M,) of real numbers; raises RecordError for anything else."""
+    given = np.asarray(values)
+    if given.ndim != 1:
+        raise RecordError(f"{source}: {name}: {given.ndim} dimensions in place of 1")
+    if not np.can_cast(given.dtype, np.float64, "same_kind"):
+        raise RecordError(f"{source}: {name}: {given.dtype} in place of real numbers")
+    copy = np.array(given, np.float64)
+    copy.flags.writeable = False
+    return copy
+
+
+def _check_samples(source: Path, name: str, values: Array, count: int, missing: bool) -> None:
+    """Raise a RecordError where an array is of another length than the time or not finite."""
+    if len(values) != count:
+        raise RecordError(f"{source}: {name}: {len(values)} samples, but time has {count}")
+    gaps = np.isnan(values) & missing
+    if gaps.all():
+        raise RecordError(f"{source}: {name}: every sample is missing")
+    lost = np.flatnonzero(~np.isfinite(values) & ~gaps)
     if lost.size:
-        _refuse(table, lost[0], f"{clock.label}: {time[lost[0]]} is not a finite number")
+        row = lost[0]
+        raise RecordError(f"{source}: sample {row}: {name}: {values[row]} is not a finite number")
+
+
+def _content_hash(time: Array, signals: Mapping[str, Array]) -> str:
+    """Return the SHA-256 of a record without a file, whatever the order of its signals."""
+    digest = hashlib.sha256(time.astype("<f8").tobytes())
+    for name in sorted(signals):
+        digest.update(b"\0" + name.encode() + b"\0" + signals[name].astype("<f8").tobytes())
+    return digest.hexdigest()
 
 
 def _kept(path: Path, time: Array, window: tuple[float, float] | None) -> NDArray[np.intp]:

@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import FrozenInstanceError, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.io import savemat
 from tables import refused
 
 from exfit.errors import RecordError
-from exfit.records.record import Clock, file_hash, read_columns, read_record
+from exfit.records.record import Clock, Record, file_hash, read_columns, read_record
 
 
 @dataclass(frozen=True)
@@ -378,6 +379,81 @@ def test_a_scale_of_zero_makes_no_number_of_an_infinite_one(csv):
 def test_the_column_of_time_cannot_have_gaps_as_a_signal_either(csv):
     with pytest.raises(RecordError, match=r"bump\.csv:4: column 't': an empty cell"):
         read_record(csv(GOOD.replace("0.2,", ",")), T, {"x": Channel("t")}, missing=True)
+
+
+def test_arrays_make_the_record_that_their_file_makes(csv):
+    read = read_record(csv(GOOD), T, {"vt": Channel("vt"), "ifd": Channel("ifd")})
+    built = Record.from_arrays(read.time.tolist(), dict(read.signals), source="bench test")
+    assert np.array_equal(built.time, read.time)
+    assert built.signals.keys() == read.signals.keys()
+    assert all(np.array_equal(built.signals[name], read.signals[name]) for name in read.signals)
+    assert built.source == Path("bench test")
+
+
+def test_a_record_of_arrays_keeps_read_only_copies():
+    vt = np.array([1.0, 1.01])
+    record = Record.from_arrays([0, 1], {"vt": vt})
+    vt[0] = 0.0
+    assert record.signals["vt"].tolist() == [1.0, 1.01]
+    for array in (record.time, record.signals["vt"]):
+        assert array.dtype == np.float64
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+
+
+def test_the_hash_of_arrays_is_of_their_content():
+    def digest(**changes):
+        arrays = {"time": [0.0, 1.0], "vt": [1.0, 1.1], "efd": [2.0, 2.1], **changes}
+        return Record.from_arrays(arrays.pop("time"), arrays).sha256
+
+    same = digest(time=np.array([0, 1]), vt=np.array([1.0, 1.1]))
+    reordered = Record.from_arrays([0.0, 1.0], {"efd": [2.0, 2.1], "vt": [1.0, 1.1]}).sha256
+    assert digest() == same == reordered
+    others = [
+        digest(time=[0.0, 1.5]),
+        digest(vt=[1.0, 1.2]),
+        digest(vt=[2.0, 2.1], efd=[1.0, 1.1]),
+        Record.from_arrays([0.0, 1.0], {"vt": [1.0, 1.1]}).sha256,
+    ]
+    assert len({digest(), *others}) == 1 + len(others)
+
+
+# what is wrong -> time, vt, and what the message must name beside the source
+UNUSABLE_ARRAYS = {
+    "one sample": ([0.0], [1.0], "1 samples; at least 2"),
+    "none": ([], [], "0 samples; at least 2"),
+    "uneven": ([0.0, 1.0], [1.0], "vt: 1 samples, but time has 2"),
+    "a table": ([0.0, 1.0], [[1.0, 2.0]], "vt: 2 dimensions"),
+    "a number": ([0.0, 1.0], 1.0, "vt: 0 dimensions"),
+    "complex": ([0.0, 1.0], [1.0, 1j], "vt: complex128 in place of real"),
+    "text": ([0.0, 1.0], ["1", "2"], "vt: <U1 in place of real"),
+    "nothing": ([0.0, 1.0], [1.0, None], "vt: object in place of real"),
+    "timestamps": (np.array([0, 1], "datetime64[s]"), [1.0, 2.0], "time: datetime64[s] in place"),
+    "nan": ([0.0, 1.0], [1.0, np.nan], "sample 1: vt: nan is not a finite"),
+    "inf": ([0.0, 1.0], [np.inf, 1.0], "sample 0: vt: inf is not a finite"),
+    "nan in time": ([0.0, np.nan], [1.0, 1.0], "sample 1: time: nan is not a finite"),
+    "repeated time": ([0.0, 1.0, 1.0], [1.0, 1.0, 1.0], "sample 2: time: time 1.0 s repeats"),
+    "time going back": ([0.0, 2.0, 1.0], [1.0, 1.0, 1.0], "sample 2: time: time 1.0 s goes back"),
+}
+
+
+@pytest.mark.parametrize("fault", UNUSABLE_ARRAYS)
+def test_arrays_that_are_no_record_are_refused_by_name(fault):
+    time, vt, named = UNUSABLE_ARRAYS[fault]
+    refused(lambda: Record.from_arrays(time, {"vt": vt}, source="bench"), f"bench: {named}")
+
+
+def test_a_sample_of_an_array_may_be_missing_where_that_is_allowed():
+    gappy = Record.from_arrays([0.0, 1.0], {"vt": [1.0, np.nan]}, missing=True)
+    assert np.isnan(gappy.signals["vt"]).tolist() == [False, True]
+    for time, vt, named in (
+        ([0.0, 1.0], [np.nan, np.nan], "vt: every sample is missing"),
+        ([0.0, 1.0], [np.nan, np.inf], "sample 1: vt: inf"),
+        ([0.0, np.nan], [1.0, 1.0], "sample 1: time: nan"),
+    ):
+        refused(partial(Record.from_arrays, time, {"vt": vt}, missing=True), named)
+    refused(lambda: Record.from_arrays([0.0, 1.0], {}), "no signals")
+    refused(lambda: Record.from_arrays([0, 1], {"time": [0, 1]}), "named time")
 
 
 @settings(max_examples=200, deadline=None)
