@@ -87,7 +87,7 @@ def at_the_top(tree):
 
 
 def test_every_package_has_a_row_in_the_table():
-    assert {package(name) for name in MODULES} - {""} == {*MAY_IMPORT}
+    assert {package(name) for name in MODULES} - {""} <= {*MAY_IMPORT}
 
 
 def test_a_package_imports_only_what_its_row_allows():
