@@ -1,250 +1,157 @@
-"""The whole path of a study: from a case to a fit, a simulation, a validation."""
+"""What can be done with a case: the functions behind the commands and behind ``import exfit``."""
 
 import sys
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit import __version__, estimate
+from exfit.analysis import experiment_design, model_check, profiles
 from exfit.analysis.diagnostics import (
-    level_notes,
-    match_notes,
-    misfit_notes,
-    notes,
-    outlier_notes,
     typical_notes,
-    unsteady_notes,
-    validation_notes,
-    voltage_notes,
 )
+from exfit.analysis.experiment_design import Design
 from exfit.analysis.iteration_responses import (
     LiveResponse,
     live_response,
-    skipped_response_notes,
-    with_iteration_responses,
+)
+from exfit.analysis.model_check import Check
+from exfit.analysis.profiles import Profiles
+from exfit.analysis.solution import (
+    comparisons_of,
+    fit_notes,
+    fitted_parameters,
+    iteration_of,
+    minima_of,
+    record_notes,
+    uncertainty_of_solution,
+    validation_of,
 )
 from exfit.case.case import SINGLE, Case
-from exfit.case.schema import Unknown
-from exfit.errors import CaseError, SimulationError
+from exfit.case.load import load_case
+from exfit.case.schema import Recording
+from exfit.errors import CaseError
 from exfit.fitting.build import (
     ExperimentSetup,
     build_experiment,
     plain_simulator,
-    robust_of,
     values_of,
     with_enough_substeps,
 )
 from exfit.fitting.compression import compressed
-from exfit.fitting.nonlinearity import nonlinear_parameters
-from exfit.fitting.nuisance import unit_of
-from exfit.fitting.residuals import Residuals
-from exfit.fitting.search import UNIT, fitted, names_of_records, search
-from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
+from exfit.fitting.search import fitted, search
 from exfit.records.record import file_hash
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import (
     Comparison,
     FitResult,
-    FittedParameter,
     Iteration,
-    Minima,
-    Minimum,
     PartOf,
 )
 from exfit.simulation.simulator import Response
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+CaseOrPath = Case | str | PathLike[str]
+ValuesOrResult = Values | FitResult
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
 
 
-def fit(
-    case: Case,
-    strategy: estimate.Method | None = None,
-    watch: Callable[[Iteration], None] = lambda _: None,
-    progress: Callable[[estimate.Progress], None] = lambda _: None,
-    look: Callable[[LiveResponse], None] | None = None,
-) -> FitResult:
-    """Fit the free parameters of a case to its records, and try the result on its other records.
+def _ignore(_: object) -> None:
+    """Take a message that nobody asked for."""
 
-    ``watch`` is told every iteration, ``look`` before it the response that it led to, ``progress``
-    how far a search from many starts is. An interruption (KeyboardInterrupt) ends the search with
-    the best point so far. Raises ExfitError for input that cannot be used.
+
+def fit(
+    case: CaseOrPath,
+    strategy: estimate.Method | None = None,
+    progress: Callable[[Iteration], None] = _ignore,
+    search_progress: Callable[[estimate.Progress], None] = _ignore,
+    live: Callable[[LiveResponse], None] | None = None,
+) -> FitResult:
+    """Fit the free parameters of a case to its records, and validate the result on its others.
+
+    Args:
+        case: a case, or the path of its file.
+        strategy: of the estimator; None: the case's own.
+        progress: called with every iteration; after a search from many starts with those of the
+            best. A KeyboardInterrupt, raised in it too, ends the search with the best point so far.
+        search_progress: called with how far a search from many starts is.
+        live: called before ``progress`` with the response of that iteration.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> result = exfit.fit("case.yaml", progress=lambda iteration: print(iteration.cost))
+        >>> result.parameters["KA"].value
     """
     began = clock.perf_counter()
-    given = case.values()
-    trials, residuals = fitted(case)
-    validations = tuple(build_experiment(case, one, given) for one in case.validations)
-    fewer = compressed(residuals)
-    before = fewer.simulations
+    case = loaded(case)
+    start = case.values()
+    setups, residuals = fitted(case)
+    unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
+    problem = compressed(residuals)
+    simulations_before = problem.simulations
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
     def announce(line: estimate.SolverIteration) -> None:
-        history.append(_iteration(line, residuals))
-        seen = None if look is None else live_response(trials[0], residuals, line.x)
-        if look is not None and seen is not None:
-            look(seen)
-        watch(history[-1])
+        history.append(iteration_of(line, residuals))
+        response = None if live is None else live_response(setups[0], residuals, line.x)
+        if live is not None and response is not None:
+            live(response)
+        progress(history[-1])
 
-    found, minima = search(case, residuals, method, announce, progress)
-    simulations, substeps = fewer.simulations - before, fewer.substeps  # of the search alone
-    values, begin = residuals.values(found.x), residuals.values(residuals.start)
-    interrupted = found.stop is estimate.Stop.INTERRUPTED
-    known = None if interrupted else told(residuals, found.x, trials)
-    secure = [one.with_enough_substeps(values) for one in trials]
-    compared = tuple(
-        with_iteration_responses(
-            compare_with_record(one, one.name, values, begin), one, residuals, history
-        )
-        for one in secure
-    )
-    tried = tuple(tried_on(case, one, values) for one in validations)
+    best, search_result = search(case, residuals, method, announce, search_progress)
+    # of the search alone
+    simulations, substeps = problem.simulations - simulations_before, problem.substeps
+    values = residuals.values(best.x)
+    interrupted = best.stop is estimate.Stop.INTERRUPTED
+    uncertainty = None if interrupted else uncertainty_of_solution(residuals, best.x, setups)
+    comparisons = comparisons_of(setups, residuals, values, history)
+    validation = tuple(validation_of(case, setup, values) for setup in unseen)
+    free = case.free()
     return FitResult(
         case=case.path,
         name=case.path.stem,
         model=case.subject,
         strategy=method,
         saturation=case.saturation,
-        parameters=_parameters(case, residuals, values),
-        fixed={name: values[name] for name in given if name not in case.free()},
+        parameters=fitted_parameters(case, residuals, values),
+        fixed={name: values[name] for name in start if name not in free},
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
         typical=case.typical(),
         parts=tuple(PartOf(part.kind, part.name, part.prefix) for part in case.parts.all),
-        cost=found.cost,
-        comparisons=compared,
-        knowledge=known,
-        minima=None if minima is None else minima_of(residuals, minima),
-        status=found.status,
-        message=found.message,
-        success=found.success,
-        interrupted=interrupted or (minima is not None and minima.interrupted),
+        cost=best.cost,
+        comparisons=comparisons,
+        knowledge=uncertainty,
+        minima=minima_of(residuals, search_result),
+        status=best.status,
+        message=best.message,
+        success=best.success,
+        interrupted=interrupted or (search_result is not None and search_result.interrupted),
         history=tuple(history),
-        nfev=found.nfev,
-        njev=found.njev,
+        nfev=best.nfev,
+        njev=best.njev,
         simulations=simulations,
         substeps=substeps,
         seconds=clock.perf_counter() - began,
-        notes=(
-            *_notes(case, residuals, found, trials, compared, tried),
-            *(() if known is None else misfit_notes(residuals, known)),
-            *skipped_response_notes(compared),
-        ),
-        validation=tried,
+        notes=tuple(fit_notes(case, residuals, best, setups, comparisons, validation, uncertainty)),
+        validation=validation,
         versions=versions(),
-        inputs=inputs(case, *trials, *validations),
+        inputs=inputs(case, *setups, *unseen),
         about=case.about,
     )
 
 
-def told(
-    residuals: Residuals, theta: Array, trials: Iterable[ExperimentSetup]
-) -> UncertaintyAnalysis | None:
-    """Return what the records tell at the solution theta (N,), in scaled parameters.
-
-    None where the derivatives there are not finite.
-    """
-    try:
-        known = uncertainty_at(residuals, theta, names_of_records(trials))
-    except SimulationError:
-        return None
-    return replace(known, nonlinear=nonlinear_parameters(residuals, theta, known))
-
-
-def minima_of(residuals: Residuals, found: estimate.MultistartResult) -> Minima:
-    """Return the minima that were found, in the parameters' own values."""
-    names = [one.name for one in residuals.free]
-
-    def minimum(one: estimate.LocalMinimum) -> Minimum:
-        values = residuals.values(one.x)
-        return Minimum({name: values[name] for name in names}, one.cost, one.starts)
-
-    each = tuple(minimum(one) for one in found.minima)
-    return Minima(each, found.start_costs, found.end_costs)
-
-
-def _notes(
-    case: Case,
-    residuals: Residuals,
-    found: estimate.Result,
-    trials: Sequence[ExperimentSetup],
-    compared: Sequence[Comparison],
-    tried: Sequence[Comparison],
-) -> Iterator[str]:
-    """Yield what must be known beside the numbers of a fit."""
-    if not found.success:
-        yield "the search did not end at a minimum: errors and intervals would be those of one"
-    yield from notes(case, residuals, found, compared)
-    for trial, one in zip(trials, compared, strict=True):
-        before = trial.test.vt0 if trial.test.begin is None else None
-        # one that is found lies where the record begins, or on a bound, which is told
-        yield from match_notes(one, None if isinstance(before, Unknown) else before)
-        if case.plant.type != "none":
-            yield from voltage_notes(one)
-        yield from record_notes(trial, one)
-        yield from outlier_notes(trial.record.source.name, trial.channels)
-    yield from validation_notes(compared, tried)
-
-
-def tried_on(
-    case: Case, trial: ExperimentSetup, values: Values, name: str | None = None
-) -> Comparison:
-    """Return how fitted values do on a record that the fit never saw.
-
-    What that record leaves open about itself (its instants, its levels) is found on it, with the
-    parameters of the unit as they are.
-    """
-    limit = None if case.accept is None else case.accept.rmse
-    with_enough_substeps = trial.with_enough_substeps(values)
-    if trial.free:
-        robust = robust_of(case)
-        residuals = Residuals([with_enough_substeps.experiment], trial.free, values, robust=robust)
-        aligned = estimate.least_squares(
-            residuals,
-            residuals.start,
-            jac=residuals.exact,
-            bounds=residuals.bounds,
-            method="lm-then-dgn",
-            x_scale=UNIT,
-        )
-        values = residuals.values(aligned.x)
-    return compare_with_record(with_enough_substeps, name or trial.name, values, None, limit)
-
-
-def record_notes(trial: ExperimentSetup, compared: Comparison) -> Iterator[str]:
-    """Yield what the steady part of a record says against the case."""
-    test = trial.test
-    if test.steady is not None and test.begin is None:
-        yield from unsteady_notes(trial.record, test.steady, trial.channels)
-        yield from level_notes(compared, test.steady)
-
-
-def _parameters(case: Case, residuals: Residuals, values: Values) -> dict[str, FittedParameter]:
-    units, shared = case.units(), case.free()
-    return {
-        one.name: FittedParameter(
-            value=values[one.name],
-            start=one.start,
-            min=one.low,
-            max=one.high,
-            at_bound=one.bound(values[one.name]),
-            unit=units.get(one.name, unit_of(one.name)),
-            of_record=one.name not in shared,
-        )
-        for one in residuals.free
-    }
-
-
-def _iteration(line: estimate.SolverIteration, residuals: Residuals) -> Iteration:
-    """Return a line of the log with the parameters' own values for the scaled ones."""
-    values = residuals.values(line.x)
-    kept = {name: value for name, value in vars(line).items() if name != "x"}
-    return Iteration(**kept, values={one.name: values[one.name] for one in residuals.free})
+def loaded(case: CaseOrPath) -> Case:
+    """Return a case, read from its file where it is a path; raises CaseError."""
+    return case if isinstance(case, Case) else load_case(Path(case))
 
 
 def versions() -> dict[str, str]:
@@ -258,14 +165,14 @@ def versions() -> dict[str, str]:
     }
 
 
-def inputs(case: Case, *trials: ExperimentSetup) -> dict[str, str]:
+def inputs(case: Case, *setups: ExperimentSetup) -> dict[str, str]:
     """Return the SHA-256 of every file that went into a result."""
     files = {"case": file_hash(case.path)}
     if case.model is not None and case.model.endswith(".py"):
         files["model"] = file_hash(case.folder / case.model)
-    fitted = ["record"] if not case.records else [f"records.{one.name}" for one in case.records]
-    labels = [*fitted, *(f"validate.{one.name}" for one in case.validations)]
-    return files | {label: trial.record.sha256 for label, trial in zip(labels, trials, strict=True)}
+    fitted = [f"records.{recording.name}" for recording in case.records] or ["record"]
+    labels = [*fitted, *(f"validate.{recording.name}" for recording in case.validations)]
+    return files | {label: setup.record.sha256 for label, setup in zip(labels, setups, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -277,22 +184,36 @@ class SimulationResult:
     notes: tuple[str, ...]
 
 
-def simulate(case: Case, changes: Values) -> SimulationResult:
-    """Simulate a case at its start values, with changes upon them; of several records the first.
+def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> SimulationResult:
+    """Simulate a case, with the test of its first record where it has several.
+
+    Args:
+        case: a case, or the path of its file.
+        values: of parameters, by name, or those of a fit; None: the start values of the case, which
+            also stand for what is not among them.
 
     Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
     """
-    values = values_of(case, changes)
+    case = loaded(case)
+    values = values_of(case, _numbers(values))
     if case.recordings:
-        trial = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
-        response = trial.response(values)
-        compared = compare_with_record(trial, "record", values) if trial.channels else None
-        told = [] if compared is None else record_notes(trial, compared)
-        return SimulationResult(response, compared, (*simulation_notes(case, response), *told))
+        setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
+        response = setup.response(values)
+        comparison = compare_with_record(setup, "record", values) if setup.channels else None
+        said = [] if comparison is None else record_notes(setup, comparison)
+        return SimulationResult(response, comparison, (*simulation_notes(case, response), *said))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     response = with_enough_substeps(simulator, at, case.path).response(at)
     return SimulationResult(response, None, tuple(simulation_notes(case, response)))
+
+
+def _numbers(values: ValuesOrResult | None) -> Values:
+    """Return values by name; those of a fit are all that it knows."""
+    return values.values if isinstance(values, FitResult) else values or {}
 
 
 def simulation_notes(case: Case, response: Response) -> Iterator[str]:
@@ -304,26 +225,94 @@ def simulation_notes(case: Case, response: Response) -> Iterator[str]:
         yield f"the machine falls out of step at {at:.3g} s: delta passes half a turn"
 
 
-def validate(case: Case, changes: Values, record: Path | None = None) -> list[Comparison]:
+def validate(
+    case: CaseOrPath, values: ValuesOrResult, record: Path | str | None = None
+) -> list[Comparison]:
     """Compare a case with its records: the fitted ones first, then those that no fit saw.
 
-    ``record`` takes the place of the first of the latter (or of the fitted one if there is no
-    other), under the same test and columns. Raises ExfitError for input that cannot be used.
+    Args:
+        case: a case, or the path of its file.
+        values: of parameters, by name, or those of a fit.
+        record: a file in place of the first record that no fit saw (or of the fitted one if there
+            is no other), under the same test and columns.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> result = exfit.fit("case.yaml")
+        >>> [match.rmse for match in exfit.validate("case.yaml", result)]
     """
-    fitted, others = list(case.recordings), list(case.validations)
+    case = loaded(case)
+    fitted, unseen = list(case.recordings), list(case.validations)
     if record is not None:
-        if not fitted + others:
-            raise CaseError([f"{case.path}: record: missing; nothing says how to read {record}"])
-        like = (others + fitted)[0]
-        file = like.record.model_copy(update={"file": str(record.absolute())})
-        name = record.name if record.stem == SINGLE else record.stem
-        others = [like.model_copy(update={"name": name, "record": file})]
-    if not fitted + others:
+        unseen = [_in_place_of([*unseen, *fitted], case, Path(record))]
+    if not fitted + unseen:
         raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
-    values = values_of(case, changes)
-    seen = [build_experiment(case, one, values).with_enough_substeps(values) for one in fitted]
-    unseen = [build_experiment(case, one, values) for one in others]
-    return [
-        *(compare_with_record(one, one.name, values) for one in seen),
-        *(tried_on(case, one, values) for one in unseen),
+    values = values_of(case, _numbers(values))
+    setups = [
+        build_experiment(case, recording, values).with_enough_substeps(values)
+        for recording in fitted
     ]
+    others = [build_experiment(case, recording, values) for recording in unseen]
+    return [
+        *(compare_with_record(setup, setup.name, values) for setup in setups),
+        *(validation_of(case, setup, values) for setup in others),
+    ]
+
+
+def _in_place_of(recordings: Sequence[Recording], case: Case, file: Path) -> Recording:
+    """Return the first of the recordings with another file."""
+    if not recordings:
+        raise CaseError([f"{case.path}: record: missing; nothing says how to read {file}"])
+    section = recordings[0].record.model_copy(update={"file": str(file.absolute())})
+    name = file.name if file.stem == SINGLE else file.stem
+    return recordings[0].model_copy(update={"name": name, "record": section})
+
+
+def profile(
+    case: CaseOrPath,
+    names: Iterable[str] = (),
+    progress: Callable[[estimate.Progress], None] = _ignore,
+) -> Profiles:
+    """Fit a case and find the 95 % intervals of its parameters from their profile likelihood.
+
+    Args:
+        case: a case, or the path of its file.
+        names: of free parameters; none: all.
+        progress: called with how far the profiles are.
+
+    An interruption keeps what is done of the profiles; one of the fit before them is passed on.
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> for profile in exfit.profile("case.yaml", ["KA"]).profiles:
+        ...     print(profile.name, profile.low, profile.high)
+    """
+    return profiles.profile(loaded(case), names, progress)
+
+
+def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> Design:
+    """Return how well tests would determine the free parameters of a case, at its start values.
+
+    Args:
+        case: a case, or the path of its file; it needs no record.
+        noise: standard deviation of the noise by signal, per unit; what is missing: the case's
+            own, else that of its record, else a typical one.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
+    """
+    return experiment_design.identify(loaded(case), noise or {})
+
+
+def check(case: CaseOrPath) -> Check:
+    """Check a case before its fit: derivatives, bypasses, sub-steps, a run without a step.
+
+    Raises ExfitError for input that cannot be used.
+
+    Example:
+        >>> exfit.workflows.check("case.yaml").agrees
+    """
+    return model_check.check(loaded(case))

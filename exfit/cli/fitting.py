@@ -184,10 +184,10 @@ def validate(
 @case_argument
 def check(case: Path) -> None:
     """Check CASE before a fit: derivatives, bypasses, sub-steps, a flat run."""
-    from exfit.analysis.model_check import check as checked
+    from exfit import workflows
     from exfit.output import terminal
 
-    found = checked(load(case))
+    found = workflows.check(load(case))
     terminal.check(terminal.console(), found)
     if not (found.agrees and found.flat):
         raise SystemExit(NOT_CONVERGED)

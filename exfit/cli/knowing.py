@@ -45,7 +45,7 @@ def profile(
     Without PARAM all free parameters are profiled. Writes profile.json, profile.csv and profile.png
     to runs/CASE-profile, or to DIR. Ctrl-C keeps what is done.
     """
-    from exfit.analysis.profiles import profile as profiled
+    from exfit import workflows
     from exfit.output import run_folder
     from exfit.util.text import to_json
 
@@ -53,13 +53,13 @@ def profile(
     folder = output or folder_of(case, "profile")
     run_folder.refuse_unwritable(folder)
     if quiet or as_json:
-        found = profiled(loaded, parameters)
+        found = workflows.profile(loaded, parameters)
     else:
         from exfit.output import terminal
 
         console = terminal.console()
         with terminal.Bar(console).running() as watch:
-            found = profiled(loaded, parameters, watch)
+            found = workflows.profile(loaded, parameters, watch)
     run_folder.write_profiles(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
@@ -96,14 +96,14 @@ def identify(
     At the start values: the test of CASE, steps of 2, 5 and 10 %, a test twice as long, further
     channels. Writes identify.json and figures to runs/CASE-identify, or to DIR.
     """
-    from exfit.analysis.experiment_design import identify as identified
+    from exfit import workflows
     from exfit.output import run_folder
     from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "identify")
     run_folder.refuse_unwritable(folder)
-    found = identified(loaded, assignments(noise, "--noise"))
+    found = workflows.identify(loaded, assignments(noise, "--noise"))
     run_folder.write_design(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)

@@ -27,11 +27,11 @@ def fit_in_sight(
     console = terminal.console()
     if case.estimate.starts > 1:
         with terminal.Bar(console).running() as progress:
-            result = workflows.fit(case, strategy, progress=progress)
+            result = workflows.fit(case, strategy, search_progress=progress)
     else:
         title, most = terminal.task(case, strategy), case.estimate.iterations
         with terminal.Watch(console, title, most).running() as watch:
-            result = workflows.fit(case, strategy, watch, look=watch.look)
+            result = workflows.fit(case, strategy, watch, live=watch.look)
     run_folder.write_fit(result, folder, plots)
     terminal.fit(console, result, folder, before)
     return result

@@ -9,7 +9,7 @@ from places import ROOT
 from records import case_of, config, recording, several
 
 from exfit import workflows
-from exfit.analysis import iteration_responses
+from exfit.analysis import iteration_responses, solution
 from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
@@ -98,13 +98,13 @@ def test_an_iteration_without_a_response_is_left_out(fitted, monkeypatch, tmp_pa
             raise SimulationError("no state of rest")
         return whole(self, values)
 
-    result_of = workflows.with_iteration_responses
+    result_of = solution.with_iteration_responses
 
     def failing(*given):
         monkeypatch.setattr(Experiment, "samples", samples)
         return result_of(*given)
 
-    monkeypatch.setattr(workflows, "with_iteration_responses", failing)
+    monkeypatch.setattr(solution, "with_iteration_responses", failing)
     result = workflows.fit(load_case(CASE))
     assert 1 not in result.comparison.iteration_responses.numbers
     assert len(result.comparison.iteration_responses.numbers) == len(result.history) - 1
@@ -117,7 +117,7 @@ def test_an_interruption_keeps_the_iterations_until_then():
         if line.number == 2:
             raise KeyboardInterrupt
 
-    result = workflows.fit(load_case(CASE), watch=stop)
+    result = workflows.fit(load_case(CASE), progress=stop)
     assert result.interrupted
     assert result.comparison.iteration_responses.numbers == (0, 1, 2)
 

@@ -21,6 +21,7 @@ from records import (
     write,
 )
 
+from exfit.analysis.solution import validation_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment, build_experiments, residuals_of
 from exfit.fitting.nuisance import names_of
@@ -28,7 +29,7 @@ from exfit.plants import VT0
 from exfit.records.record import read_columns
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.tables import parameter_file
-from exfit.workflows import fit, simulate, tried_on, validate
+from exfit.workflows import fit, simulate, validate
 
 REFERENCE = SAMPLES.parent / "tests" / "reference"
 NAMES = {"kP": "KPR", "kI": "KIR", "kD": "KDR", "Td": "TDR"}  # as the reference calls them
@@ -374,7 +375,7 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     (before,), (after,) = plain.validation, found.validation
     assert after.rmse == pytest.approx(before.rmse, rel=0.05)
     trial = build_experiment(case, case.validations[0], found.values)
-    assert tried_on(case, trial, found.values).rmse == after.rmse
+    assert validation_of(case, trial, found.values).rmse == after.rmse
     unaligned = compare_with_record(trial.with_enough_substeps(found.values), "start", found.values)
     assert unaligned.rmse > 10 * after.rmse
 

@@ -186,7 +186,7 @@ def test_a_look_sees_what_each_iteration_led_to_and_costs_nothing(monkeypatch, t
     plain = workflows.fit(case)
     simulated = len(runs)
     seen, lines = [], []
-    looked = workflows.fit(case, watch=lines.append, look=seen.append)
+    looked = workflows.fit(case, progress=lines.append, live=seen.append)
     assert looked.simulations == plain.simulations
     # with differences an accepted trial may not be the last one that was simulated
     assert len(runs) - 2 * simulated <= (0 if jacobian == "exact" else len(lines))
@@ -198,7 +198,7 @@ def test_a_look_at_a_record_with_gaps_leaves_them_out(tmp_path):
     content = config("ac1a_typical")
     content["record"]["mask"] = [[3.0, 4.0]]
     seen = []
-    workflows.fit(case_of(content, tmp_path), look=seen.append)
+    workflows.fit(case_of(content, tmp_path), live=seen.append)
     assert not np.any((seen[0].time >= 3.0) & (seen[0].time <= 4.0))
     assert len(seen[0].time) == len(seen[0].measured) == len(seen[0].simulated)
 

@@ -1,0 +1,168 @@
+"""The solution of a search, and what follows from it: responses, uncertainty, notes."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit import estimate
+from exfit.analysis.diagnostics import (
+    level_notes,
+    match_notes,
+    misfit_notes,
+    notes,
+    outlier_notes,
+    unsteady_notes,
+    validation_notes,
+    voltage_notes,
+)
+from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
+from exfit.case.case import Case
+from exfit.case.schema import Unknown
+from exfit.errors import SimulationError
+from exfit.fitting.build import ExperimentSetup, robust_of
+from exfit.fitting.nonlinearity import nonlinear_parameters
+from exfit.fitting.nuisance import unit_of
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import UNIT, names_of_records
+from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.model import Comparison, FittedParameter, Iteration, Minima, Minimum
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+
+def fitted_parameters(
+    case: Case, residuals: Residuals, values: Values
+) -> dict[str, FittedParameter]:
+    """Return the free parameters with their fitted values, in the parameters' own units."""
+    units, shared = case.units(), case.free()
+    return {
+        parameter.name: FittedParameter(
+            value=values[parameter.name],
+            start=parameter.start,
+            min=parameter.low,
+            max=parameter.high,
+            at_bound=parameter.bound(values[parameter.name]),
+            unit=units.get(parameter.name, unit_of(parameter.name)),
+            of_record=parameter.name not in shared,
+        )
+        for parameter in residuals.free
+    }
+
+
+def iteration_of(line: estimate.SolverIteration, residuals: Residuals) -> Iteration:
+    """Return a line of the log with the parameters' own values for the scaled ones."""
+    values = residuals.values(line.x)
+    figures = {name: value for name, value in vars(line).items() if name != "x"}
+    free = {parameter.name: values[parameter.name] for parameter in residuals.free}
+    return Iteration(**figures, values=free)
+
+
+def uncertainty_of_solution(
+    residuals: Residuals, theta: Array, setups: Iterable[ExperimentSetup]
+) -> UncertaintyAnalysis | None:
+    """Return how well the records determine the solution theta (N,), in scaled parameters.
+
+    None where the derivatives there are not finite.
+    """
+    try:
+        uncertainty = uncertainty_at(residuals, theta, names_of_records(setups))
+    except SimulationError:
+        return None
+    return replace(uncertainty, nonlinear=nonlinear_parameters(residuals, theta, uncertainty))
+
+
+def comparisons_of(
+    setups: Iterable[ExperimentSetup],
+    residuals: Residuals,
+    values: Values,
+    history: Sequence[Iteration],
+) -> tuple[Comparison, ...]:
+    """Return the fitted response beside each record, with the iterations that led to it."""
+    start = residuals.values(residuals.start)
+    fine = [setup.with_enough_substeps(values) for setup in setups]
+    return tuple(
+        with_iteration_responses(
+            compare_with_record(setup, setup.name, values, start), setup, residuals, history
+        )
+        for setup in fine
+    )
+
+
+def minima_of(
+    residuals: Residuals, search_result: estimate.MultistartResult | None
+) -> Minima | None:
+    """Return the minima of a search from many starts, in the parameters' own values."""
+    if search_result is None:
+        return None
+    names = [parameter.name for parameter in residuals.free]
+
+    def minimum(local: estimate.LocalMinimum) -> Minimum:
+        values = residuals.values(local.x)
+        return Minimum({name: values[name] for name in names}, local.cost, local.starts)
+
+    minima = tuple(minimum(local) for local in search_result.minima)
+    return Minima(minima, search_result.start_costs, search_result.end_costs)
+
+
+def fit_notes(
+    case: Case,
+    residuals: Residuals,
+    best: estimate.Result,
+    setups: Sequence[ExperimentSetup],
+    comparisons: Sequence[Comparison],
+    validation: Sequence[Comparison],
+    uncertainty: UncertaintyAnalysis | None,
+) -> Iterator[str]:
+    """Yield what must be known beside the numbers of a fit."""
+    if not best.success:
+        yield "the search did not end at a minimum: errors and intervals would be those of one"
+    yield from notes(case, residuals, best, comparisons)
+    for setup, comparison in zip(setups, comparisons, strict=True):
+        vt0 = setup.test.vt0 if setup.test.begin is None else None
+        # a fitted vt0 lies where the record begins, or on a bound, which is reported
+        yield from match_notes(comparison, None if isinstance(vt0, Unknown) else vt0)
+        if case.plant.type != "none":
+            yield from voltage_notes(comparison)
+        yield from record_notes(setup, comparison)
+        yield from outlier_notes(setup.record.source.name, setup.channels)
+    yield from validation_notes(comparisons, validation)
+    if uncertainty is not None:
+        yield from misfit_notes(residuals, uncertainty)
+    yield from skipped_response_notes(comparisons)
+
+
+def validation_of(
+    case: Case, setup: ExperimentSetup, values: Values, name: str | None = None
+) -> Comparison:
+    """Return how fitted values do on a record that the fit never saw.
+
+    What that record leaves open about itself (its instants, its levels) is fitted to it, with the
+    parameters of the unit as they are.
+    """
+    limit = None if case.accept is None else case.accept.rmse
+    fine = setup.with_enough_substeps(values)
+    if setup.free:
+        robust = robust_of(case)
+        residuals = Residuals([fine.experiment], setup.free, values, robust=robust)
+        aligned = estimate.least_squares(
+            residuals,
+            residuals.start,
+            jac=residuals.exact,
+            bounds=residuals.bounds,
+            method="lm-then-dgn",
+            x_scale=UNIT,
+        )
+        values = residuals.values(aligned.x)
+    return compare_with_record(fine, name or setup.name, values, None, limit)
+
+
+def record_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
+    """Yield where the steady part of a record contradicts the case."""
+    test = setup.test
+    if test.steady is not None and test.begin is None:
+        yield from unsteady_notes(setup.record, test.steady, setup.channels)
+        yield from level_notes(comparison, test.steady)
