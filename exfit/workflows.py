@@ -167,7 +167,7 @@ def versions() -> dict[str, str]:
 
 def inputs(case: Case, *setups: ExperimentSetup) -> dict[str, str]:
     """Return the SHA-256 of every file that went into a result."""
-    files = {"case": file_hash(case.path)}
+    files = {"case": file_hash(case.path)} if case.from_file else {}
     if case.model is not None and case.model.endswith(".py"):
         files["model"] = file_hash(case.folder / case.model)
     fitted = [f"records.{recording.name}" for recording in case.records] or ["record"]

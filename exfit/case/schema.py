@@ -210,6 +210,10 @@ class NoPlant(Section):
     type: Literal["none"] = Field(description="What surrounds the model: nothing.")
 
 
+Plant = OpenCircuit | InfiniteBus | Playback | MachinePlayback | NoPlant
+SaturationName = Literal["quadratic", "exponential", "exponential-se"]
+
+
 class Stabiliser(Section):
     """A power system stabiliser, which acts on load."""
 
@@ -560,3 +564,49 @@ class Recording(Section):
     )
     test: BumpTest = Field(description="What was done to the unit.")
     record: RecordFile = Field(description="What was measured.")
+
+
+class CaseDocument(Section):
+    """A study of exfit: a model, its plant, a test, its record, and what is to be found."""
+
+    about: Frozen[Fact] = ABOUT
+    model: Text | None = Field(
+        default=None,
+        description="Model of the catalogue, in upper or lower case, or path of a .py file; none "
+        "with plant machine-playback.",
+    )
+    saturation: SaturationName = Field(
+        default="quadratic", description="Form of the exciter's saturation curve."
+    )
+    plant: Annotated[Plant, Field(discriminator="type")] = Field(
+        description="What surrounds the exciter."
+    )
+    stabiliser: Stabiliser | None = Field(
+        default=None, description="A power system stabiliser; on open circuit it does not act."
+    )
+    test: BumpTest | None = Field(
+        default=None, description="What was done to the unit; each of the records has its own."
+    )
+    record: RecordFile | None = Field(
+        default=None, description="What was measured; a simulation does without."
+    )
+    records: tuple[Recording, ...] = Field(
+        default=(),
+        min_length=1,
+        description="In place of test and record: several tests with their records, fitted as one.",
+    )
+    parameters: Parameters = Field(
+        default_factory=Parameters, description="What is known and what is to be found."
+    )
+    estimate: Estimate = Field(
+        default_factory=Estimate, description="How the free parameters are found."
+    )
+    simulation: SimulationSection = Field(
+        default_factory=SimulationSection, description="The grid of the simulation."
+    )
+    validations: tuple[Recording, ...] = Field(
+        default=(), alias="validate", description="Records on which the result is tried."
+    )
+    accept: Limit | None = Field(
+        default=None, description="What a validation must keep to; beyond it the exit code is 3."
+    )

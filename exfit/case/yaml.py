@@ -37,6 +37,11 @@ class Fault(NamedTuple):
     line: int | None = None
 
 
+def dotted(place: Place) -> str:
+    """Return a place as ``test.vref[0].at``."""
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place)[1:]
+
+
 @dataclass(frozen=True)
 class YamlNode:
     """A value, the line on which it starts, and the nodes of its entries by key or index."""

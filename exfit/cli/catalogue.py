@@ -44,7 +44,7 @@ def models(name: str | None, folder: Path | None) -> None:
 @click.command(short_help="Print the JSON Schema of a case file.")
 def schema() -> None:
     """Print the JSON Schema of a case file, for editors that complete and check."""
-    from exfit.case.load import json_schema
+    from exfit.case.json_schema import json_schema
     from exfit.util.text import to_json
 
     click.echo(to_json(json_schema()), nl=False)

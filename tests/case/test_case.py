@@ -1,6 +1,8 @@
 """Cases: what a sound file says is what the case holds; every fault is told with its line."""
 
+from dataclasses import FrozenInstanceError, fields, replace
 from math import exp
+from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -11,8 +13,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from exfit.case.case import Case
-from exfit.case.load import dotted, json_schema, load_case, parse_case
-from exfit.case.yaml import scalar
+from exfit.case.json_schema import json_schema
+from exfit.case.load import load_case, parse_case
+from exfit.case.schema import CaseDocument
+from exfit.case.yaml import dotted, scalar
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.recordings import initial_voltage, measured
 from exfit.models import MODELS
@@ -238,8 +242,10 @@ record:
 
 def test_a_case_cannot_be_changed(case_file):
     case = load_case(case_file(EXAMPLE))
-    with pytest.raises(ValidationError):
+    with pytest.raises(FrozenInstanceError):
         case.saturation = "exponential"
+    with pytest.raises(FrozenInstanceError):
+        case.path = Path("other.yaml")
     with pytest.raises(ValidationError):
         case.parameters.free["KA"].start = 1.0
     for mapping in (
@@ -253,10 +259,45 @@ def test_a_case_cannot_be_changed(case_file):
             mapping["KA"] = 1.0
 
 
-def test_a_case_can_be_written_out_again(case_file):
-    case = load_case(case_file(EXAMPLE))
-    again = Case.model_validate(case.model_dump(by_alias=True, exclude_defaults=True))
-    assert again.model_dump() == case.model_dump()
+def test_a_case_can_be_written_out_again():
+    document = CaseDocument.model_validate(yaml.safe_load(EXAMPLE))
+    again = CaseDocument.model_validate(document.model_dump(by_alias=True, exclude_defaults=True))
+    assert again.model_dump() == document.model_dump()
+
+
+def test_a_case_has_every_section_of_the_document():
+    own = {"path", "from_file", "parts", "ties"}
+    assert {field.name for field in fields(Case)} - own == {*CaseDocument.model_fields}
+
+
+def test_a_case_made_in_python_is_that_of_the_file(case_file):
+    path = case_file(EXAMPLE)
+    made = Case.from_dict(yaml.safe_load(EXAMPLE), path.parent, path.name)
+    assert replace(made, from_file=True) == load_case(path)
+
+
+def test_a_case_may_be_made_of_tuples_and_numbers_of_numpy():
+    content = yaml.safe_load(EXAMPLE)
+    content["record"]["window"] = (np.float32(0.5), np.int64(9))
+    content["test"]["vref"] = tuple(content["test"]["vref"])
+    content["record"]["file"] = Path(content["record"]["file"])
+    case = Case.from_dict(content)
+    assert case.record.window == (0.5, 9.0)
+    assert case.test == Case.from_dict(yaml.safe_load(EXAMPLE)).test
+    assert case.folder == Path()
+
+
+def test_all_faults_of_a_case_made_in_python_are_told_with_their_places():
+    content = yaml.safe_load(EXAMPLE)
+    content["parameters"]["free"]["KA"]["start"] = None
+    content["modle"] = content.pop("model")
+    content["record"]["window"] = (9.0, 0.5)
+    with pytest.raises(CaseError) as refused:
+        Case.from_dict(content, name="unit 1")
+    faults = refused.value.faults
+    assert any(fault.startswith("unit 1: parameters.free.KA.start: has no v") for fault in faults)
+    assert "unit 1: modle: unknown key; did you mean model?" in faults
+    assert any(fault.startswith("unit 1: record.window: start 9 is") for fault in faults)
 
 
 # what is wrong -> old text, new text, where the message must point, what else it must say

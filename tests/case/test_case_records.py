@@ -11,7 +11,8 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from exfit.case.load import json_schema, parse_case
+from exfit.case.json_schema import json_schema
+from exfit.case.load import parse_case
 from exfit.cli import main
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiments, residuals_of

@@ -1,0 +1,75 @@
+"""What a case file says, checked as a whole: its sections, the models it names, its ties."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from exfit.case.checks.model import contradictions
+from exfit.case.json_schema import json_schema
+from exfit.case.messages import form_faults
+from exfit.case.parts import Parts, parts_of, ties_of
+from exfit.case.schema import CaseDocument
+from exfit.case.ties import Ties
+from exfit.case.yaml import Fault, Place
+
+
+@dataclass(frozen=True)
+class CheckedContent:
+    """The content of a case file without a fault."""
+
+    document: CaseDocument
+    parts: Parts
+    ties: Ties
+
+
+def check_content(
+    content: dict[str, Any], folder: Path, faults: list[Fault]
+) -> CheckedContent | None:
+    """Return the checked content of a case file; None, and faults added, where it has any.
+
+    The files that it names are relative to ``folder``; ``faults`` holds those found before.
+    """
+    parts = parts_of(content, folder, faults)
+    ties = ties_of(content, parts, faults)
+    document = _validated(content, faults)
+    places = {fault.place for fault in faults}
+    faults += [fault for fault in contradictions(content, parts, ties) if fault.place not in places]
+    if faults or document is None:
+        return None
+    return CheckedContent(document, parts, ties)
+
+
+def _validated(content: dict[str, Any], faults: list[Fault]) -> CaseDocument | None:
+    """Return the sections if all have the right form; add a fault for each that has not."""
+    try:
+        return CaseDocument.model_validate(content)
+    except ValidationError as error:
+        places = {fault.place for fault in faults}
+        wrong_forms = form_faults(error.errors(include_url=False), json_schema())
+        faults += [fault for fault in wrong_forms if fault.place not in places]
+        return None
+
+
+def plain_content(value: Any, faults: list[Fault], place: Place = ()) -> Any:
+    """Return Python data as a case file holds it: mappings, lists, numbers and text.
+
+    Tuples become lists, NumPy's numbers floats and integers, paths text; a None is a fault.
+    """
+    if value is None:
+        faults.append(Fault(place, "has no value"))
+    if isinstance(value, Mapping):
+        return {
+            str(key): plain_content(entry, faults, (*place, str(key)))
+            for key, entry in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [plain_content(entry, faults, (*place, k)) for k, entry in enumerate(value)]
+    if isinstance(value, Path):
+        return value.as_posix()
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return value
+    return int(value) if isinstance(value, Integral) else float(value)

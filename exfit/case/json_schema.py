@@ -1,0 +1,29 @@
+"""The JSON Schema of the case file, for editors and for messages about unknown keys."""
+
+from typing import Any
+
+from exfit.case.schema import CaseDocument
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the case file."""
+    from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+
+    class NoNulls(GenerateJsonSchema):
+        """A key that may be missing may not be null."""
+
+        def nullable_schema(self, schema: Any) -> JsonSchemaValue:
+            return self.generate_inner(schema["schema"])
+
+        def default_schema(self, schema: Any) -> JsonSchemaValue:
+            inner = super().default_schema(schema)
+            return _without(inner, "default") if inner.get("default", 0) is None else inner
+
+    schema = CaseDocument.model_json_schema(by_alias=True, schema_generator=NoNulls)
+    return {"$schema": DIALECT, **schema, "title": "exfit case"}
+
+
+def _without(mapping: dict[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in mapping.items() if name != key}
