@@ -16,10 +16,10 @@ from exfit.records.formats.table import listed, refuse_uneven
 from exfit.records.record import Clock, check_finite
 from exfit.records.units import needs_base
 from exfit.results.model import judged_of
+from exfit.signals import COMPARED
 
 Array = NDArray[np.float64]
 
-SIGNALS = ("vt", "efd", "ifd", "p", "q")
 SIMULATED, MEASURED = "_simulated", "_measured"  # behind a signal in the table of a fit
 FEWEST = 2  # instants in common
 SAME = 1e-9  # s: instants that near are one, whatever the digits of a file
@@ -210,7 +210,7 @@ def _curve(name: str, source: Path, asked: Asked, ending: str, shift: float = 0.
     table = open_table(path)
     header, clock = table.names, _clock(table, asked.time)
     places = {signal: column for signal, column in asked.columns.items() if column in header}
-    for signal in SIGNALS:
+    for signal in COMPARED:
         convention = [column for column in (signal, signal + ending) if column in header]
         if convention:
             places.setdefault(signal, convention[0])
@@ -288,7 +288,7 @@ def _refuse_unknown(asked: Asked, curves: Sequence[Curve]) -> None:
 
 
 def _listed(curve: Curve) -> str:
-    return ", ".join(curve.signals) or f"none of {', '.join(SIGNALS)}"
+    return ", ".join(curve.signals) or f"none of {', '.join(COMPARED)}"
 
 
 def _difference(signal: str, first: Curve, second: Curve) -> Difference:

@@ -22,6 +22,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis, linearisation, uncertainty_of
 from exfit.inference import Confidence
+from exfit.signals import NOISE
 from exfit.simulation.simulator import Simulator
 from exfit.util.text import near
 
@@ -29,8 +30,7 @@ Array = NDArray[np.float64]
 
 STEPS = (0.02, 0.05, 0.10)  # pu, of the reference
 LONGER = 2.0  # times as long
-NOISE: Mapping[str, float] = {"vt": 1e-4, "efd": 5e-3, "ifd": 5e-3, "p": 1e-3, "q": 1e-3}  # pu
-EXTRA = {"open-circuit": ("efd", "ifd"), "infinite-bus": ("efd", "ifd", "p", "q")}
+EXTRA = {"open-circuit": ("efd", "ifd"), "infinite-bus": ("efd", "ifd", "p", "q", "it")}
 
 
 @dataclass(frozen=True, eq=False)

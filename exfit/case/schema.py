@@ -5,7 +5,7 @@ The descriptions reach editors through the JSON Schema.
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -21,9 +21,13 @@ from pydantic import (
 
 from exfit.case.messages import FILE_NAME, PERCENT
 from exfit.case.ties import is_tie
+from exfit.signals import RECORDED
 
 Value = TypeVar("Value")
-Signal = Literal["vt", "efd", "ifd", "p", "q", "vref"]
+if TYPE_CHECKING:
+    RecordedSignal = str
+else:
+    RecordedSignal = Literal[RECORDED]
 Heard = Literal["speed", "p", "vt"]
 
 
@@ -440,7 +444,7 @@ class RecordFile(Section):
     )
     channels: Annotated[
         Mapping[
-            Signal,
+            RecordedSignal,
             Annotated[Entry, BeforeValidator(_channel, json_schema_input_type=Text | Entry)],
         ],
         Field(min_length=1),

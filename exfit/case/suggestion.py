@@ -12,6 +12,7 @@ from exfit.records.channel_recognition import connection_of
 from exfit.records.inspection import AT_REST_PU, InspectedChannel, InspectedPhases, Inspection
 from exfit.records.steps import RecordedStep
 from exfit.records.units import quantity_of
+from exfit.signals import COMPARED, RECORDED, SIGNALS
 from exfit.util.text import yaml_number
 
 FILL_IN = '"?"'  # no number: a case that holds it is refused by place
@@ -19,16 +20,6 @@ AROUND = 0.25  # s: how far the instant of a step may be from where the record s
 LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower
 DIGITS = 4
 OUTLIERS = "6"  # times the noise, as `exfit inspect` counts spikes
-HINTS = {
-    "vt": "rated, line to line",
-    "vref": "rated, line to line",
-    "efd": "air-gap line",
-    "ifd": "air-gap line",
-    "p": "rated MVA",
-    "q": "rated MVA",
-}
-ORDER = ("vt", "vref", "efd", "ifd", "p", "q")
-COMPARED = ("vt", "efd", "ifd", "p", "q")
 NAMED = 6  # columns among which the voltage may be
 
 
@@ -39,7 +30,7 @@ def record_section(found: Inspection, file: str, only: tuple[str, ...] = COMPARE
     with it is refused.
     """
     lines = ["record:", f"  file: {_text(file)}", f"  time: {_clock(found)}", "  channels:"]
-    channels = [one for signal in ORDER if (one := found.channel_of(signal))]
+    channels = [one for signal in RECORDED if (one := found.channel_of(signal))]
     noisy = bool(channels) and all(in_per_unit(one) and one.noise > 0.0 for one in channels)
     for group in _voltage(found, channels):
         lines += [f"    # {line}" for line in _about_phases(found, group)]
@@ -150,7 +141,8 @@ def _about(one: InspectedChannel) -> str:
         return f"{why}; {'pu' if one.unit else 'taken for pu'}, {one.level:.5g} at rest"
     if one.unit == "%":
         return f"{why}; {one.level:.5g} % at rest"
-    return f"{why}; {one.level:.5g} {one.unit or '?'} at rest; base: {HINTS[str(one.signal)]}"
+    base = SIGNALS[str(one.signal)].base
+    return f"{why}; {one.level:.5g} {one.unit or '?'} at rest; base: {base}"
 
 
 def _channel(one: InspectedChannel, noisy: bool) -> str:

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import click
 
-SIGNALS = ("vt", "efd", "ifd", "p", "q")
-
 
 def models(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
     """Return the names of exciters, machines and stabilisers, in upper or lower case."""
@@ -51,7 +49,9 @@ def assigned_parameters(ctx: click.Context, _: click.Parameter, incomplete: str)
 
 def noises(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
     """Return the signals, each ready for its noise."""
-    return _beginning((f"{signal}=" for signal in SIGNALS), incomplete)
+    from exfit.signals import COMPARED
+
+    return _beginning((f"{signal}=" for signal in COMPARED), incomplete)
 
 
 def _case(ctx: click.Context) -> Path | None:

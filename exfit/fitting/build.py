@@ -21,7 +21,6 @@ from exfit.case.schema import (
     Playback,
     RecordFile,
     Recording,
-    Signal,
     StepSection,
     Switch,
     Unknown,
@@ -314,7 +313,7 @@ def _without_masked(record: Record, file: RecordFile, driving: Sequence[str]) ->
     return replace(record, signals=signals)
 
 
-def channel_of(case: Case, file: RecordFile, record: Record, signal: Signal) -> Channel:
+def channel_of(case: Case, file: RecordFile, record: Record, signal: str) -> Channel:
     """Return a channel of a record, with what is done to it before it is compared."""
     entry, samples = file.channels[signal], record.signals[signal]
     kept = np.isfinite(samples)

@@ -15,9 +15,8 @@ from exfit.errors import CaseError, RecordError
 from exfit.fitting.experiment import Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.records.record import Record
+from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
-
-JUMPS = ("efd",)  # signals that follow a step at once
 
 AROUND = 0.25  # s: how far the instant may be from where a record shows the step
 SHARE = 0.5  # of the size that a record shows: how far the size may be from it
@@ -103,7 +102,8 @@ def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> boo
     step that moves over the grid meets them now a step earlier, now later, and so gives the cost a
     kink for each. It needs an only step from rest, and signals that do not jump with it.
     """
-    return len(steps) == 1 and test.begin is None and not set(JUMPS) & set(file.channels)
+    jumps = any(SIGNALS[signal].jumps for signal in file.channels)
+    return len(steps) == 1 and test.begin is None and not jumps
 
 
 def prefix_of(recording: Recording) -> str:

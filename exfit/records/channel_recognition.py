@@ -1,40 +1,15 @@
-"""What the names and units of a recorder's columns say of the signals behind them."""
+"""Which signals a recorder's columns hold, by their names and units."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from exfit.records.units import bare, quantity_of
+from exfit.signals import ROWS, SignalRow
 
-# signal -> the quantity of its unit, and the words that stand for it, the surest first
-WORDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "vref": (
-        "voltage",
-        ("vref", "uref", "usoll", "vset", "uset", "reference", "setpoint", "sollwert", "ref"),
-    ),
-    "efd": (
-        "voltage",
-        ("efd", "vfd", "ufd", "vf", "uf", "field voltage", "ufield", "vfield", "erregerspannung",
-         "feldspannung"),
-    ),
-    "ifd": (
-        "current",
-        ("ifd", "if", "field current", "ifield", "erregerstrom", "feldstrom", "lad ifd"),
-    ),
-    "q": ("reactive", ("q", "qe", "qg", "qgen", "reactive power", "reactive", "blindleistung")),
-    "p": (
-        "power",
-        ("p", "pe", "pg", "pgen", "active power", "real power", "wirkleistung", "power"),
-    ),
-    "vt": (
-        "voltage",
-        ("vt", "ut", "ug", "vg", "ugen", "vgen", "uterm", "vterm", "ugenerator", "terminal voltage",
-         "generator voltage", "stator voltage", "generatorspannung", "klemmenspannung",
-         "ustator", "vstator", "voltage", "volt", "spannung", "u", "v"),
-    ),
-}  # fmt: skip
+IN_TURN = sorted((row for row in ROWS if row.words), key=lambda row: row.turn)
 OF_EXCITER = {"exciter", "erregermaschine", "pilot", "ve", "ife", "ief", "efe", "vfe"}
-BY_UNIT: Mapping[str, str] = {"power": "p", "reactive": "q"}
+BY_UNIT: Mapping[str, str] = {row.quantity: row.symbol for row in ROWS if row.unit_suffices}
 TRIPLES = (
     ("l1", "l2", "l3"), ("12", "23", "31"), ("ab", "bc", "ca"), ("rs", "st", "tr"),
     ("a", "b", "c"), ("r", "s", "t"), ("1", "2", "3"),
@@ -54,72 +29,70 @@ class Guess:
 def guessed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Guess]:
     """Return the signals that columns seem to be, by column: each signal once, by the surest word.
 
-    The unit must go with the signal; where the name says nothing, MW and Mvar still do.
+    The unit must be one of the signal; where the name shows nothing, MW and Mvar still do.
     """
-    found: dict[str, Guess] = {}
-    for signal, (_, words) in WORDS.items():
+    guesses: dict[str, Guess] = {}
+    for row in IN_TURN:
         ranked = [
             (rank, name)
             for name in names
-            if name not in found and (rank := _rank(name, units.get(name), signal)) is not None
+            if name not in guesses and (rank := _rank(name, units.get(name), row)) is not None
         ]
         if ranked:
-            rank, name = min(ranked, key=lambda one: one[0])
-            found[name] = Guess(signal, f"its name: {words[rank]}")
+            rank, name = min(ranked, key=lambda pair: pair[0])
+            guesses[name] = Guess(row.symbol, f"its name: {row.words[rank]}")
     for name in names:
         signal = BY_UNIT.get(quantity_of(units.get(name)) or "", "")
-        if signal and name not in found and signal not in {one.signal for one in found.values()}:
-            found[name] = Guess(signal, f"its unit: {units[name]}")
-    return found
+        recognised = {guess.signal for guess in guesses.values()}
+        if signal and name not in guesses and signal not in recognised:
+            guesses[name] = Guess(signal, f"its unit: {units[name]}")
+    return guesses
 
 
 def three_phases(names: Sequence[str], units: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
     """Return the columns that are the three phases of a voltage: Ua Ub Uc, UL1 UL2 UL3, U12 ..."""
-    found: list[tuple[str, ...]] = []
-    taken: set[str] = set()
+    groups: list[tuple[str, ...]] = []
     for name in names:
         for triple in _triples(name, names):
-            quantities = {quantity_of(units.get(one)) for one in triple}
+            quantities = {quantity_of(units.get(column)) for column in triple}
             voltage = quantities == {"voltage"} or (
                 quantities == {None} and OF_VOLTAGE.match(bare(name).lower())
             )
-            if voltage and not taken & {*triple}:
-                found.append(triple)
-                taken |= {*triple}
-    return tuple(found)
+            if voltage and not any({*triple} & {*group} for group in groups):
+                groups.append(triple)
+    return tuple(groups)
 
 
 def connection_of(columns: Sequence[str]) -> str:
     """Return between what three voltages seem to be recorded, by their names: U12, Uab, URS ..."""
-    low = [one.lower() for one in columns]
+    lowered = [column.lower() for column in columns]
     for marks in LINE_TO_LINE:
-        if all(mark in name for mark, name in zip(marks, low, strict=True)):
+        if all(mark in name for mark, name in zip(marks, lowered, strict=True)):
             return "phase-to-phase"
     return "phase-to-ground"
 
 
 def _triples(name: str, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """Yield the columns that differ from one in the mark of the phase alone."""
-    known = {one.lower(): one for one in names}
-    low = name.lower()
+    by_lower_case = {column.lower(): column for column in names}
+    text = name.lower()
     for marks in TRIPLES:
-        for at in (match.start() for match in re.finditer(re.escape(marks[0]), low)):
-            others = [low[:at] + mark + low[at + len(marks[0]) :] for mark in marks]
-            if at > 0 and all(other in known for other in others):
-                yield tuple(known[other] for other in others)
+        for at in (match.start() for match in re.finditer(re.escape(marks[0]), text)):
+            phases = [text[:at] + mark + text[at + len(marks[0]) :] for mark in marks]
+            if at > 0 and all(phase in by_lower_case for phase in phases):
+                yield tuple(by_lower_case[phase] for phase in phases)
 
 
-def _rank(name: str, unit: str | None, signal: str) -> int | None:
+def _rank(name: str, unit: str | None, row: SignalRow) -> int | None:
     """Return how surely a column is a signal, the surest 0; None where it is not."""
-    quantity, words = WORDS[signal]
-    if unit not in (None, "pu", "%") and quantity_of(unit) != quantity:
+    if unit not in (None, "pu", "%") and quantity_of(unit) != row.quantity:
         return None
-    tokens = [one for one in re.split(r"[^a-zäöüß0-9]+", bare(name).lower()) if one]
+    tokens = [token for token in re.split(r"[^a-zäöüß0-9]+", bare(name).lower()) if token]
     if OF_EXCITER & {*tokens}:
         return None
     text = " ".join(tokens)
     joined = "".join(tokens)
-    for rank, word in enumerate(words):
+    for rank, word in enumerate(row.words):
         if word in (text, joined) or re.search(rf"(^| ){re.escape(word)}( |$)", text):
             return rank
     return None

@@ -32,7 +32,7 @@ EVENTS: Mapping[str, tuple[str, ...]] = {
 }
 SIGNALS: Mapping[str, tuple[str, ...]] = {
     "open-circuit": ("vt", "efd", "ifd"),
-    "infinite-bus": ("vt", "efd", "ifd", "p", "q"),
+    "infinite-bus": ("vt", "efd", "ifd", "p", "q", "it"),
     "playback": ("vref", *DRIVING, "efd"),
     "machine-playback": ("efd", "vt", "ifd"),
     "none": ("vt",),

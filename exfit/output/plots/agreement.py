@@ -5,7 +5,8 @@ from matplotlib.figure import Figure
 
 from exfit.analysis.comparison import Agreement, Curve, Difference
 from exfit.dsp.decimation import envelope
-from exfit.output.plots.style import LABELS, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.signals import label_of
 
 LINES = {"A": (START, "-"), "B": (SIMULATED, "--")}
 
@@ -44,7 +45,7 @@ def _curves(axes: Axes, curves: tuple[Curve, ...], signal: str, between: Differe
             axes.plot(*envelope(time, samples), style, color=color, linewidth=1.4, label=one.name)
         else:
             axes.plot(*envelope(time, samples), ".", color=MEASURED, markersize=3, label=one.name)
-    axes.set_ylabel(LABELS.get(signal, f"{signal} (pu)"))
+    axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
     value, at = between.largest
     text = f"B - A: rms {between.rms:.3g} pu, largest {value:.3g} pu at {at:.4g} s"

@@ -8,8 +8,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from exfit.output.plots.style import LABELS, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
 from exfit.results.model import Comparison, FitResult, IterationResponses
+from exfit.signals import label_of
 
 FADING = LinearSegmentedColormap.from_list("fading", ["#b9d2ee", START, "#5b2a86", SIMULATED])
 MOST_TICKS = 12  # of the colour bar
@@ -64,7 +65,7 @@ def _responses(axes: Axes, comparison: Comparison, courses: IterationResponses) 
     for k, (samples, colour) in enumerate(zip(courses.samples, colours, strict=True)):
         width = 1.6 if k in labels else 1.0
         axes.plot(time, samples, "-", color=colour, linewidth=width, label=labels.get(k))
-    axes.set_ylabel(LABELS[courses.signal])
+    axes.set_ylabel(label_of(courses.signal))
     axes.legend(loc="best", frameon=False)
     tidy(axes)
 

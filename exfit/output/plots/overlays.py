@@ -4,8 +4,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.decimation import envelope
-from exfit.output.plots.style import LABELS, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
 from exfit.results.model import Comparison, Overlay
+from exfit.signals import label_of
 
 
 def overlay(comparison: Comparison, title: str) -> Figure:
@@ -33,7 +34,7 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> No
         )
     label = "fitted" if one.start is not None else "simulated"
     axes.plot(*envelope(time, one.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
-    axes.set_ylabel(LABELS[signal])
+    axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
     text = f"rmse {one.rmse:.3g} pu, fit {one.fit_percent:.2f} %"
     axes.set_title(text, fontsize=9, loc="right")

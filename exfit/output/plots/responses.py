@@ -1,16 +1,14 @@
 """Simulated responses without a record."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from matplotlib.figure import Figure
 
-from exfit.output.plots.style import LABELS, MEASURED, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import MEASURED, SIMULATED, START, WIDTH, tidy
+from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.simulator import Response
 
 WANTED_STATES = 12  # panels of states that are still readable
 SHOWN_OTHERWISE = ("dw",)  # as speed
-UNITS: Mapping[str, str] = {"delta": "rad"}  # of signals that are not per unit
 
 
 def response(simulated: Response, title: str) -> Figure:
@@ -34,7 +32,7 @@ def response(simulated: Response, title: str) -> Figure:
     for k, name in enumerate(names):
         ax = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
         ax.plot(time, simulated.signals[name], color=START, linewidth=1.1)
-        ax.set_ylabel(f"{name} ({UNITS.get(name, 'pu')})")
+        ax.set_ylabel(f"{name} ({unit_of_signal(name)})")
         ax.tick_params(labelbottom=k + columns >= len(names))
         tidy(ax)
     # one column lies on the same axis as the panels below it, two do not
@@ -62,7 +60,7 @@ def overview(title: str, drawing: str, simulated: Response) -> Figure:
         axes.sharex(panels[-1])
         axes.tick_params(labelbottom=axes is panels[-1])
         axes.plot(simulated.time, simulated.signals[name], color=SIMULATED, linewidth=1.4)
-        axes.set_ylabel(LABELS[name])
+        axes.set_ylabel(label_of(name))
         tidy(axes)
     panels[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=12)

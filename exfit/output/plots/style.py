@@ -1,7 +1,6 @@
 """How all figures look, and how one becomes a file."""
 
 import io
-from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,14 +13,6 @@ DPI = 120
 MILLI = 1e3
 COLORS = ("#1f4e9c", "#c1272d", "#2f855a", "#b7791f", "#6b46c1", "#0e7490", "#4a5568")
 STYLES = ("-", "--", ":")
-LABELS: Mapping[str, str] = {
-    "vt": "terminal voltage vt (pu)",
-    "vref": "reference vref (pu)",
-    "efd": "field voltage efd (pu)",
-    "ifd": "field current ifd (pu)",
-    "p": "active power p (pu)",
-    "q": "reactive power q (pu)",
-}
 
 
 def png(figure: Figure) -> bytes:

@@ -12,6 +12,7 @@ from exfit.output.report.charts import SMALL, Chart, Panel, Rule, Series
 from exfit.output.report.content import Fitted, Iteration, Match, Report, Signal
 from exfit.output.report.simulated import Courses, Moved, Small
 from exfit.results.tables import clock_digits
+from exfit.signals import label_of
 from exfit.util.text import show
 
 if TYPE_CHECKING:
@@ -29,14 +30,6 @@ MOST_POINTS = 40_000  # drawn in all overlays: 400 KB
 MOST_SENT = 16_000  # samples for the interactive overlays: 600 KB
 DIGITS = 7  # of a sample: beyond what a recorder resolves
 COLOURS, DASHES = 7, 3  # of lines in the style sheet
-LABELS: Mapping[str, str] = {
-    "vt": "terminal voltage vt (pu)",
-    "efd": "field voltage efd (pu)",
-    "ifd": "field current ifd (pu)",
-    "p": "active power p (pu)",
-    "q": "reactive power q (pu)",
-    "vref": "reference vref (pu)",
-}
 PHASES: Mapping[str, str] = {
     "lm": "Levenberg-Marquardt",
     "dgn": "damped Gauss-Newton",
@@ -123,12 +116,12 @@ def overlay(key: str, match: Match, signal: Signal, bins: int = BINS) -> Chart:
     error = Series("", *envelope(time, MILLI * one.error, bins), "simulated thin")
     return Chart(
         key=key,
-        title=f"{match.name}: {LABELS.get(signal.name, signal.name)}, {match.record}",
+        title=f"{match.name}: {label_of(signal.name)}, {match.record}",
         text=f"Measured and {fit} {signal.name} from {show(time[0])} to {show(time[-1])} s, the "
         f"difference below: rmse {signal.rmse:.3g} pu, at most {signal.max_error:.3g} pu.",
         x_title=TIME,
         panels=(
-            Panel(LABELS.get(signal.name, signal.name), tuple(lines), TALL),
+            Panel(label_of(signal.name), tuple(lines), TALL),
             Panel("simulated - measured (1e-3 pu)", (error,), LOW, rules=(ZERO,)),
         ),
         x_range=(float(time[0]), float(time[-1])),
@@ -191,7 +184,7 @@ def iterations(key: str, one: Courses) -> Chart:
         text=f"Measured {one.signal}, and simulated with the values after iterations "
         f"{', '.join(map(str, numbers))}; 0 is the start.",
         x_title=TIME,
-        panels=(Panel(LABELS.get(one.signal, one.signal), tuple(lines), TALL),),
+        panels=(Panel(label_of(one.signal), tuple(lines), TALL),),
         x_range=(float(one.time[0]), float(one.time[-1])),
     )
 

@@ -1,0 +1,107 @@
+"""The table of signals: all that a plant puts out or takes, and what a record may hold of it.
+
+A new signal is a row here and an output of a plant: figures, reports, comparisons, completion, the
+recognition of columns and the case file take it from this table.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+
+class SignalRow(NamedTuple):
+    """A signal: its symbol, what it is called, and its unit in a simulation.
+
+    ``noise`` is the standard deviation that a recorder's channel typically has, in that unit; a
+    signal without one is never compared with a record. ``jumps`` says that it follows a step of
+    the reference at once. The rest serves the recognition of a recorder's columns: the
+    ``quantity`` of the column's unit, the ``words`` that recorders use, the surest first, whether
+    the unit alone is enough, and the ``turn``, as a signal with common words must not take the
+    columns of others. ``base`` says what 1 pu is. A signal without words is in no record.
+    """
+
+    symbol: str
+    name: str
+    unit: str = "pu"
+    noise: float | None = None
+    jumps: bool = False
+    quantity: str = ""
+    words: tuple[str, ...] = ()
+    unit_suffices: bool = False
+    turn: int = 0
+    base: str = ""
+
+    @property
+    def label(self) -> str:
+        """The label of an axis."""
+        return f"{self.name} {self.symbol} ({self.unit})"
+
+
+RATED_VOLTAGE, AIR_GAP_LINE, RATED_POWER = "rated, line to line", "air-gap line", "rated MVA"
+
+ROWS = (
+    SignalRow(
+        "vt", "terminal voltage", noise=1e-4, quantity="voltage", turn=7, base=RATED_VOLTAGE,
+        words=(
+            "vt", "ut", "ug", "vg", "ugen", "vgen", "uterm", "vterm", "ugenerator",
+            "terminal voltage", "generator voltage", "stator voltage", "generatorspannung",
+            "klemmenspannung", "ustator", "vstator", "voltage", "volt", "spannung", "u", "v",
+        ),
+    ),
+    SignalRow(
+        "vref", "reference", quantity="voltage", turn=1, base=RATED_VOLTAGE,
+        words=(
+            "vref", "uref", "usoll", "vset", "uset", "reference", "setpoint", "sollwert", "ref",
+        ),
+    ),
+    SignalRow(
+        "efd", "field voltage", noise=5e-3, jumps=True, quantity="voltage", turn=2,
+        base=AIR_GAP_LINE,
+        words=(
+            "efd", "vfd", "ufd", "vf", "uf", "field voltage", "ufield", "vfield",
+            "erregerspannung", "feldspannung",
+        ),
+    ),
+    SignalRow(
+        "ifd", "field current", noise=5e-3, quantity="current", turn=3, base=AIR_GAP_LINE,
+        words=("ifd", "if", "field current", "ifield", "erregerstrom", "feldstrom", "lad ifd"),
+    ),
+    SignalRow(
+        "p", "active power", noise=1e-3, quantity="power", turn=5, base=RATED_POWER,
+        words=("p", "pe", "pg", "pgen", "active power", "real power", "wirkleistung", "power"),
+        unit_suffices=True,
+    ),
+    SignalRow(
+        "q", "reactive power", noise=1e-3, quantity="reactive", turn=4, base=RATED_POWER,
+        words=("q", "qe", "qg", "qgen", "reactive power", "reactive", "blindleistung"),
+        unit_suffices=True,
+    ),
+    SignalRow(
+        "it", "stator current", noise=1e-3, quantity="current", turn=6, base="rated current",
+        words=(
+            "it", "ig", "igen", "istator", "stator current", "armature current",
+            "generator current", "statorstrom", "generatorstrom",
+        ),
+    ),
+    SignalRow("delta", "rotor angle", "rad"),
+    SignalRow("speed", "speed"),
+    SignalRow("vs", "stabiliser signal"),
+    SignalRow("vc1", "measured voltage"),
+    SignalRow("E", "source voltage"),
+    SignalRow("R", "resistance to the source"),
+    SignalRow("X", "reactance to the source"),
+)  # fmt: skip
+
+SIGNALS: Mapping[str, SignalRow] = {row.symbol: row for row in ROWS}
+RECORDED = tuple(row.symbol for row in ROWS if row.words)
+COMPARED = tuple(row.symbol for row in ROWS if row.noise is not None)
+NOISE: Mapping[str, float] = {row.symbol: row.noise for row in ROWS if row.noise is not None}
+
+
+def label_of(symbol: str) -> str:
+    """Return the label of an axis: of a signal, or of a state of a model, which is in pu."""
+    return SIGNALS[symbol].label if symbol in SIGNALS else f"{symbol} (pu)"
+
+
+def unit_of_signal(symbol: str) -> str:
+    """Return the unit of a signal, or of a state of a model, which is in pu."""
+    return SIGNALS[symbol].unit if symbol in SIGNALS else "pu"

@@ -1,0 +1,78 @@
+"""The table of signals, and that whoever uses it covers every row."""
+
+import pytest
+from on_load import ALL_INPUTS, system
+
+from exfit.case.schema import RecordFile
+from exfit.cli.completion import noises
+from exfit.models import MODELS
+from exfit.models.machines import MACHINES
+from exfit.plants import DRIVING, SATURATION, alone, machine_playback, open_circuit, playback
+from exfit.records.channel_recognition import guessed
+from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
+
+MACHINE, EXCITER, QUADRATIC = MACHINES["GENROU"], MODELS["AC8B"], SATURATION["quadratic"]
+SYSTEMS = {
+    "infinite-bus": system(MACHINE, inputs=ALL_INPUTS),
+    "open-circuit": open_circuit(EXCITER, MACHINE, QUADRATIC, ("vref", "vs")),
+    "playback": playback(EXCITER, QUADRATIC, DRIVING),
+    "machine-playback": machine_playback(MACHINE),
+    "none": alone(MODELS["FIRST_ORDER"]),
+}
+
+
+@pytest.mark.parametrize("plant", SYSTEMS)
+def test_all_that_a_plant_puts_out_or_takes_has_a_row(plant):
+    system = SYSTEMS[plant]
+    signals = {*system.inputs, *system.outputs} - {*system.states}
+    assert signals <= SIGNALS.keys()
+
+
+def test_every_row_is_a_signal_of_some_plant():
+    signals = {name for one in SYSTEMS.values() for name in (*one.inputs, *one.outputs)}
+    assert SIGNALS.keys() - {"vc1"} <= signals  # vc1 is added where the loop is opened
+
+
+def test_a_signal_stands_once():
+    assert len(SIGNALS) == len(ROWS)
+    assert len({row.label for row in ROWS}) == len(ROWS)
+
+
+def test_what_is_compared_can_be_recorded():
+    assert {*COMPARED} <= {*RECORDED}
+    assert NOISE.keys() == {*COMPARED}
+    assert all(noise > 0.0 for noise in NOISE.values())
+
+
+@pytest.mark.parametrize("signal", RECORDED)
+def test_each_word_of_a_signal_identifies_it(signal):
+    for word in SIGNALS[signal].words:
+        guess = guessed((word,), {})
+        assert guess[word].signal == signal, word
+
+
+def test_no_signal_takes_the_column_of_another():
+    """All signals side by side, each under the word that identifies it best."""
+    columns = {SIGNALS[one].words[0]: one for one in RECORDED}
+    guesses = guessed(tuple(columns), {})
+    assert {name: guess.signal for name, guess in guesses.items()} == columns
+
+
+def test_no_two_signals_are_recognised_in_the_same_turn():
+    turns = [row.turn for row in ROWS if row.words]
+    assert len({*turns}) == len(turns)
+
+
+def test_a_case_may_name_each_signal_that_can_be_recorded():
+    schema = RecordFile.model_json_schema()
+    assert {*schema["properties"]["channels"]["propertyNames"]["enum"]} == {*RECORDED}
+
+
+def test_the_shell_completes_each_signal_that_is_compared():
+    assert noises(None, None, "") == [f"{signal}=" for signal in COMPARED]
+
+
+def test_a_label_names_symbol_and_unit():
+    assert label_of("vt") == "terminal voltage vt (pu)"
+    assert label_of("delta") == "rotor angle delta (rad)"
+    assert label_of("VA") == "VA (pu)"  # a state of a model
