@@ -2,6 +2,7 @@
 
 import ctypes
 import hashlib
+import os
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
@@ -52,23 +53,45 @@ class Span(NamedTuple):
     du: Array | None = None
 
 
-@cache
-def _machine(long_vectors: bool) -> tuple[Any, str]:
-    """Return LLVM's idea of this machine, and what distinguishes it from others.
+class Target(NamedTuple):
+    """What machine code is made for: a processor by LLVM's name, and its features."""
 
-    Without long vectors it does not know AVX-512: single numbers that are chosen by comparison, as
-    limits do, take a tenth less time where the choice need not pass through a mask register.
+    cpu: str
+    features: str
+
+
+def target(long_vectors: bool) -> Target:
+    """Return the processor that code is made for: this one, or the one that EXFIT_CPU names.
+
+    ``EXFIT_CPU=x86-64`` gives the code that every processor of 64 bits runs, as a check that no
+    result depends on the machine; any name that LLVM knows will do. Without long vectors this
+    processor's AVX-512 is left out: single numbers that are chosen by comparison, as limits do,
+    take a tenth less time where the choice need not pass through a mask register.
     """
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    cpu, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    chosen = os.environ.get("EXFIT_CPU")
+    if chosen:
+        return Target(chosen, "")
+    features: str = llvm.get_host_cpu_features().flatten()
     if not long_vectors:
         features = features.replace("+avx512", "-avx512")
-    target = llvm.Target.from_default_triple()
-    machine = target.create_target_machine(
-        cpu=cpu, features=features, opt=3, reloc="pic", codemodel="jitdefault", jit=True
+    return Target(llvm.get_host_cpu_name(), features)
+
+
+@cache
+def _machine(made_for: Target) -> tuple[Any, str]:
+    """Return LLVM's idea of a processor, and what distinguishes it from others."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    platform = llvm.Target.from_default_triple()
+    machine = platform.create_target_machine(
+        cpu=made_for.cpu,
+        features=made_for.features,
+        opt=3,
+        reloc="pic",
+        codemodel="jitdefault",
+        jit=True,
     )
-    return machine, f"{llvm.llvm_version_info} {target.triple} {cpu} {features}"
+    return machine, " ".join((str(llvm.llvm_version_info), platform.triple, *made_for))
 
 
 def _build(ir: str, machine: Any) -> bytes:
@@ -100,7 +123,7 @@ def _keep(path: Path, code: bytes) -> None:
 def compiled(ir: str, *, long_vectors: bool) -> Any:
     """Return LLVM's engine holding the functions of an IR, built or from the cache."""
     with _lock:
-        machine, name = _machine(long_vectors)
+        machine, name = _machine(target(long_vectors))
         key = hashlib.sha256(f"{name}\n{ir}".encode()).hexdigest()[:32]
         path = cache_folder() / f"{key}.code"
         code = _cached(path)

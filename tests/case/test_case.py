@@ -825,7 +825,7 @@ FOUND = "{start: 1.0, min: 0.05, max: 1.5}"
 
 
 @pytest.mark.parametrize(
-    ("model", "vt", "refused"),
+    ("started", "vt", "refused"),
     [
         (OPEN_CIRCUIT, "'Ut [kV]'", True),
         (OPEN_CIRCUIT, "{column: 'Ut [kV]', weight: 2.0}", True),
@@ -835,9 +835,9 @@ FOUND = "{start: 1.0, min: 0.05, max: 1.5}"
         (("FIRST_ORDER", "type: none"), "'Ut [kV]'", False),
     ],
 )
-def test_numbers_in_kv_are_not_taken_for_per_unit(case_file, tmp_path, model, vt, refused):
+def test_numbers_in_kv_are_not_taken_for_per_unit(case_file, tmp_path, started, vt, refused):
     (tmp_path / "up.csv").write_text("t,Ut [kV]\n0,15.75\n0.5,15.75\n2,16.5\n")
-    case = load_case(case_file(IN_KV.format(model=model[0], plant=model[1], vt=vt)))
+    case = load_case(case_file(IN_KV.format(model=started[0], plant=started[1], vt=vt)))
     if refused:
         with pytest.raises(RecordError, match=r"up\.csv: column 'Ut \[kV\]': in kV .* unit: kV"):
             measured(case, case.test, case.record)

@@ -60,14 +60,13 @@ def started(name, table, folder, machine="GENROU", step=STEP):
     return path
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_every_model_becomes_a_case_that_loads_as_it_stands(name, record, tmp_path):
-    path = started(name, record(name), tmp_path)
+def test_every_model_becomes_a_case_that_loads_as_it_stands(model, record, tmp_path):
+    path = started(model, record(model), tmp_path)
     assert [line for line in path.read_text().splitlines() if len(line) > WIDTH] == []
     case = load_case(path)
-    assert case.parts.exciter.name == name
+    assert case.parts.exciter.name == model
     values = case.values()
-    for row in MODELS[name].sheet:
+    for row in MODELS[model].sheet:
         assert values[row.symbol] == pytest.approx(row.typical, rel=1e-6)
     (step,) = case.test.vref
     assert step.at.start == pytest.approx(AT, abs=0.05)
@@ -75,9 +74,8 @@ def test_every_model_becomes_a_case_that_loads_as_it_stands(name, record, tmp_pa
     assert case.record.channels["vt"].noise == pytest.approx(NOISE, rel=0.2)
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_what_is_free_is_a_gain_or_a_time_and_starts_between_its_bounds(name):
-    free = free_of(MODELS[name])
+def test_what_is_free_is_a_gain_or_a_time_and_starts_between_its_bounds(model):
+    free = free_of(MODELS[model])
     assert free
     for row in free:
         low, high = bounds_of(row)

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracle import SURROUNDINGS, WITHOUT_PLANT, drawn_values, float_run, levels, system_of, vector
+from oracle import drawn_values, float_run, levels, system_of, vector
 
 from exfit.engine import kernel as engine
 from exfit.engine.emit import simulation_with_tangents
 from exfit.engine.kernel import Kernel, LinearKernel, Span, TangentKernel
 from exfit.engine.system import Motion, Rest, System, differentiate, trace
 from exfit.engine.trace import clip, cos, exp, larger, log, sin, smaller, sqrt, where
-from exfit.models import MODELS
-from exfit.plants import SATURATION, VT0
+from exfit.plants import VT0
 
 STEP = 1e-3
 LANES = engine.SIDE_BY_SIDE
@@ -66,8 +65,8 @@ def test_machine_code_gives_what_the_float_run_gives(model, seed, size):
         assert (np.abs(one - other) / size_of(expected)).max() < AS_FLOATS
 
 
-@pytest.mark.parametrize(("machine", "saturation"), SURROUNDINGS)
-def test_so_it_does_for_every_machine_and_saturation(exciter, machine, saturation):
+def test_so_it_does_for_every_machine_and_saturation(surrounded):
+    exciter, machine, saturation = surrounded
     system, values = system_of(exciter, machine, saturation), drawn_values(exciter, 7, machine)
     spans = [Span(levels(60, (0, 0.1)), STEP, 2)]
     expected = float_run(system, values, system.outputs, spans)
@@ -297,11 +296,8 @@ def smooth_bump(system, values):
     return small_bump(linear[0])
 
 
-FORMS = [(name, form) for name in MODELS for form in SATURATION if name not in WITHOUT_PLANT]
-
-
-@pytest.mark.parametrize(("name", "saturation"), [*FORMS, ("FIRST_ORDER", "quadratic")])
-def test_tangents_equal_central_differences_for_every_parameter(name, saturation):
+def test_tangents_equal_central_differences_for_every_parameter(saturated):
+    name, saturation = saturated
     system, outputs = system_of(name, saturation=saturation), ("vt", system_of(name).outputs[-1])
     values = drawn_values(name, 21)
     free = system.parameters  # more than fit into one block of directions
@@ -512,6 +508,14 @@ def test_other_equations_are_other_code(cache, builds):
     assert apply(lambda x: x * x + 1.0, np.array([3.0]), lanes=1)[0] == 10.0
     assert apply(square, np.array([3.0]), lanes=LANES)[0] == 9.0
     assert len(builds) == len(list(cache.iterdir())) == 3
+
+
+def test_code_for_another_processor_is_other_code_that_gives_the_same(cache, builds, monkeypatch):
+    own = nine()
+    monkeypatch.setenv("EXFIT_CPU", "x86-64")
+    assert engine.target(long_vectors=True) == ("x86-64", "")
+    assert nine() == own
+    assert len(builds) == len(list(cache.iterdir())) == 2
 
 
 @pytest.mark.parametrize(

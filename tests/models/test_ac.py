@@ -211,14 +211,14 @@ def test_a_limited_lead_lag_without_lead_is_a_limited_lag():
 
 
 @pytest.mark.parametrize(
-    ("name", "model", "vt", "efd"),
+    ("name", "ours", "vt", "efd"),
     [
         ("exac4", "EXAC4", 1e-6, 2e-4),
         ("exac4", "AC4A", 1e-6, 2e-4),  # KC = 0, and no limit is met: the same model here
         ("esac5a", "AC5A", 5e-6, 2e-4),
     ],
 )
-def test_a_step_is_that_of_another_simulator(name, model, vt, efd):
+def test_a_step_is_that_of_another_simulator(name, ours, vt, efd):
     """What is left is the other one's step of 1 ms (trapezoidal rule), squared.
 
     vt differs by 2.6e-7 (EXAC4) and 1.1e-6 pu (AC5A, which is at VRMAX from 1.008 to 1.135 s),
@@ -228,7 +228,7 @@ def test_a_step_is_that_of_another_simulator(name, model, vt, efd):
     quadratic in both.
     """
     _, values, course, columns, told = reference(f"andes_{name}_up5")
-    simulator = Simulator(system_of(model), course, columns["t"], 1e-3)
+    simulator = Simulator(system_of(ours), course, columns["t"], 1e-3)
     assert values.keys() == set(simulator.system.parameters)
     got = simulator.response(values).signals
     assert got["vref"][0] == pytest.approx(told["vref_initial"], abs=1e-9)

@@ -304,12 +304,12 @@ def test_the_resistance_of_the_compensation_acts_on_active_power():
         assert rest.x[made.states.index("VC")] == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("exciter", ["ST2A", "ST3A", "ST4B"])
-def test_a_compound_source_rests_on_load(exciter):
+@pytest.mark.parametrize("name", ["ST2A", "ST3A", "ST4B"])
+def test_a_compound_source_rests_on_load(name):
     """It sees active and reactive power: what it rests at is what it sees on its way."""
-    made = system(MACHINES["GENROU"], exciter=exciter)
-    values = values_on_load(MACHINES["GENROU"], exciter=exciter, network_Q=0.3, network_P=0.6)
-    values |= {name: 9.0 for name in ("EFDMAX", "VMMAX", "VBMAX") if name in values}
+    made = system(MACHINES["GENROU"], exciter=name)
+    values = values_on_load(MACHINES["GENROU"], exciter=name, network_Q=0.3, network_P=0.6)
+    values |= {limit: 9.0 for limit in ("EFDMAX", "VMMAX", "VBMAX") if limit in values}
     values |= {VT0: 1.05, "KI": 1.0}
     p = vector(made, values)
     rest = LinearKernel(made).rest(p)

@@ -222,9 +222,8 @@ def assert_same_poles(found, expected):
         assert np.abs(ours - pole).min() < 1e-4 * max(1.0, abs(pole))
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_poles_are_those_of_differences_of_the_equations(name):
-    system, values = system_of(name), drawn_values(name, 6)
+def test_poles_are_those_of_differences_of_the_equations(model):
+    system, values = system_of(model), drawn_values(model, 6)
     assert_same_poles(small_signal(system, values).poles, differences(system, values))
 
 
@@ -235,14 +234,13 @@ def test_closed_is_that_of_the_equations_around_every_machine(machine, saturatio
     assert_same_poles(small_signal(system, values).poles, differences(system, values))
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_unstable_poles_are_those_of_a_run_that_grows(name):
+def test_unstable_poles_are_those_of_a_run_that_grows(model):
     """Some seconds after a small bump it has grown, up to the limits, or died out."""
     gain = next(
         (
             symbol
             for symbol in ("KA", "K", "KPR", "KPA", "KV", "KR", "k")
-            if symbol in typical_values(name)
+            if symbol in typical_values(model)
         ),
         None,
     )
@@ -250,18 +248,18 @@ def test_unstable_poles_are_those_of_a_run_that_grows(name):
     times = np.linspace(0.0, 12.0, 2401)
     decided = 0
     for factor in (0.3, 1.0, 8.0, 60.0):
-        values = lively_values(name)
+        values = lively_values(model)
         values[gain] *= factor
-        fastest = max(pole.value.real for pole in small_signal(system_of(name), values).poles)
+        fastest = max(pole.value.real for pole in small_signal(system_of(model), values).poles)
         if not 0.2 < abs(fastest) < 20.0:
             continue  # too slow to be seen, or soon beyond every limit
-        vt = Simulator(system_of(name), bump, times, 1e-3).samples(values, ("vt",))[0][:, 0]
+        vt = Simulator(system_of(model), bump, times, 1e-3).samples(values, ("vt",))[0][:, 0]
         moved = np.abs(vt - vt[0])
         early, late = moved[120:400].max(), moved[2000:].max()
         grown = late > min(early, 10.0 * TALL)
         assert grown == (fastest > 0.0), (factor, fastest)
         decided += 1
-    assert decided or name in ("DC3A", "AC8B", "AC7B", "DC4B", "ESAC8B")
+    assert decided or model in ("DC3A", "AC8B", "AC7B", "DC4B", "ESAC8B")
 
 
 # --- simulated runs -------------------------------------------------------------------------------
@@ -385,9 +383,8 @@ def test_frequencies_that_are_asked_for_are_told_and_change_no_figure():
     )
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_the_peak_and_the_bandwidth_are_those_of_a_denser_grid(name):
-    system, values = system_of(name), drawn_values(name, 7)
+def test_the_peak_and_the_bandwidth_are_those_of_a_denser_grid(model):
+    system, values = system_of(model), drawn_values(model, 7)
     found = small_signal(system, values)
     frequency = found.closed.frequency
     dense = np.geomspace(frequency[0], frequency[-1], 20001)

@@ -17,10 +17,22 @@ from exfit.plants import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.simulation.simulator import parameters_used
 
 WITHOUT_PLANT = ("FIRST_ORDER",)
+EXCITERS = tuple(name for name in MODELS if name not in WITHOUT_PLANT)
 # every machine, and every form of the exciter's saturation: neither knows of the other
 SURROUNDINGS = (
     *((machine, "quadratic") for machine in MACHINES),
     *(("GENROU", form) for form in SATURATION if form != "quadratic"),
+)
+# a machine and a form of saturation have equations of their own, the same behind every exciter:
+# each exciter stands in the first of the surroundings; one with a rotating rectifier and one with
+# a commutator stand in all of them
+SURROUNDED = (
+    *((name, *SURROUNDINGS[0]) for name in EXCITERS),
+    *((name, *around) for around in SURROUNDINGS[1:] for name in ("AC1A", "DC1A")),
+)
+SATURATED = (
+    *((name, "quadratic") for name in MODELS),
+    *((name, form) for name, machine, form in SURROUNDED if form != "quadratic"),
 )
 MACHINE_SATURATION = {"S10": 0.12, "S12": 0.4}
 
