@@ -45,7 +45,7 @@ from exfit.fitting.build import (
 )
 from exfit.fitting.compression import compressed
 from exfit.fitting.search import fitted, search
-from exfit.records.record import file_hash
+from exfit.records.reading import file_hash
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import (
     Comparison,

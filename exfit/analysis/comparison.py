@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from exfit.dsp.features import TAIL, Features, features
 from exfit.dsp.step_detection import DetectedStep, find_step
 from exfit.errors import RecordError
+from exfit.records.clock import Clock, check_finite, check_increasing
 from exfit.records.formats import Table, open_table
 from exfit.records.formats.table import listed, refuse_uneven
-from exfit.records.record import Clock, check_finite
 from exfit.records.units import needs_base
 from exfit.results.model import judged_of
 from exfit.signals import COMPARED
@@ -266,15 +266,9 @@ def _clock(table: Table, asked: str | None) -> tuple[str, ...]:
 
 def _check_clock(table: Table, clock: Sequence[str], time: Array) -> None:
     """Raise a RecordError where time is not finite or goes back; an instant may repeat."""
-    named = Clock(tuple(clock))
-    check_finite(time, named.label, table.place)
-    back = np.flatnonzero(np.diff(time) < 0.0)
-    if len(back):
-        before, now = time[back[0]], time[back[0] + 1]
-        raise RecordError(
-            f"{table.place(int(back[0]) + 1)}: {named.label}: time {now:g} s goes back behind the "
-            f"{before:g} s before it"
-        )
+    label = Clock(tuple(clock)).label
+    check_finite(time, label, table.place)
+    check_increasing(time, label, table.place, may_repeat=True)
 
 
 def _refuse_unknown(asked: Asked, curves: Sequence[Curve]) -> None:

@@ -8,7 +8,9 @@ import numpy as np
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, RecordFile, TimeColumn, known
 from exfit.errors import RecordError
-from exfit.records.record import Clock, Record, ThreePhases, read_record
+from exfit.records.clock import Clock
+from exfit.records.reading import ThreePhases, read_record
+from exfit.records.record import Record
 from exfit.util.text import show
 
 

@@ -13,8 +13,8 @@ from exfit.dsp.quality import mains_frequency, noise_of, quantum, spikes, stuck
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
 from exfit.records.channel_recognition import Guess, guessed, three_phases
+from exfit.records.clock import Clock, check_finite
 from exfit.records.formats.table import Table, listed, refuse_uneven
-from exfit.records.record import Clock, check_finite
 from exfit.records.steps import (
     ROUNDING,
     SAME_STEP,

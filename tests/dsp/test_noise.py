@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from places import SAMPLES
+from tables import read_columns
 
 from exfit.dsp.noise import noise, spread
-from exfit.records.record import read_columns
 
 TIME = np.arange(0.0, 10.0, 0.01)
 RESPONSE = np.where(TIME < 1.0, 1.0, 1.05 - 0.05 * np.exp(-3.0 * (TIME - 1.0)))

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from places import REFERENCE, SAMPLES
+from tables import read_columns
 
 from exfit.dsp.step_detection import find_step, find_steps
-from exfit.records.record import read_columns
 
 STEP_AT = 1.0  # s, in every record and reference
 STEP = 0.05  # pu, of the reference

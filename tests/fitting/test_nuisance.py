@@ -20,13 +20,13 @@ from records import (
     synthetic,
     write,
 )
+from tables import read_columns
 
 from exfit.analysis.solution import validation_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment, build_experiments, residuals_of
 from exfit.fitting.nuisance import names_of
 from exfit.plants import VT0
-from exfit.records.record import read_columns
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.tables import parameter_file
 from exfit.workflows import fit, simulate, validate

@@ -18,13 +18,13 @@ from records import (
     synthetic,
     write,
 )
+from tables import read_columns
 
 from exfit.analysis.model_check import check
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiments, residuals_of, values_of
 from exfit.fitting.overrides import changed_values, read_parameters
 from exfit.output.run_folder import write_fit
-from exfit.records.record import read_columns
 from exfit.workflows import fit, simulate, validate
 
 NEAR = 1.56  # s: TF where the records do not speak against it

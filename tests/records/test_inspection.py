@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from places import REFERENCE, SAMPLES
+from tables import read_columns
 
 from exfit.case.suggestion import bump_section, record_section
 from exfit.dsp.quality import quantum, spikes, stuck
@@ -20,7 +21,6 @@ from exfit.output import plots
 from exfit.records.channel_recognition import connection_of, guessed, three_phases
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
-from exfit.records.record import read_columns
 from exfit.records.steps import LevelChange, together
 from exfit.records.units import unit_in
 

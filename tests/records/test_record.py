@@ -13,7 +13,9 @@ from scipy.io import savemat
 from tables import refused
 
 from exfit.errors import RecordError
-from exfit.records.record import Clock, Record, file_hash, read_columns, read_record
+from exfit.records.clock import Clock
+from exfit.records.reading import file_hash, read_record
+from exfit.records.record import Record
 
 
 @dataclass(frozen=True)
@@ -185,12 +187,6 @@ def test_timestamps_that_repeat_or_go_back_are_refused(csv):
     path = csv("Date;Time;vt\n2020-01-02;10:00;1\n2020-01-01;10:00;2\n")
     with pytest.raises(RecordError, match=r"csv:3: columns 'Date' and 'Time': .* goes back"):
         read_record(path, Clock(("Date", "Time")), VT)
-
-
-def test_columns_can_be_read_by_name(csv):
-    columns = read_columns(csv(GOOD), ["ifd", "t"])
-    assert list(columns) == ["ifd", "t"]
-    assert columns["ifd"].tolist() == [1.1, 1.2, 1.3, 1.4]
 
 
 # what is wrong -> content, then all that the message must name

@@ -6,6 +6,12 @@ import pytest
 from hypothesis import strategies as st
 
 from exfit.errors import RecordError
+from exfit.records.formats import open_table
+
+
+def read_columns(path, names):
+    """Return columns of a file by name, as they stand."""
+    return open_table(path).numbers(names)
 
 
 def everything(table):

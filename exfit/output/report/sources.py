@@ -13,7 +13,7 @@ from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.fitting.build import ExperimentSetup, build_experiment
 from exfit.fitting.search import fitted
-from exfit.records.record import file_hash
+from exfit.records.reading import file_hash
 from exfit.results.io import Saved
 from exfit.results.model import Overlay
 from exfit.workflows import inputs

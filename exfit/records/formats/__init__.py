@@ -4,7 +4,6 @@ from pathlib import Path
 
 from exfit.errors import RecordError
 from exfit.records.formats.table import Table
-from exfit.records.formats.text import read_text_table
 from exfit.util.files import siblings
 
 __all__ = ["Table", "open_table"]
@@ -38,4 +37,6 @@ def open_table(path: Path, sheet: str | None = None) -> Table:
         from exfit.records.formats.parquet import read_parquet
 
         return read_parquet(path)
+    from exfit.records.formats.text import read_text_table
+
     return read_text_table(path)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.clock import clock_of, in_seconds
+from exfit.records.clock import find_clock, in_seconds
 from exfit.records.formats.table import (
     NONE,
     Array,
@@ -47,7 +47,7 @@ class Columns:
     @cached_property
     def clock(self) -> tuple[str, ...]:
         """The column that holds the time, or those of date and time; empty where none seems to."""
-        return self.said or clock_of(self.names, self.stamps, partial(increases, self))
+        return self.said or find_clock(self.names, self.stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
+from exfit.records.clock import find_clock, in_seconds
 from exfit.records.formats.cells import is_missing, is_number, shown, why_not
-from exfit.records.formats.clock import clock_of, in_seconds
 from exfit.records.formats.decoding import Text, decoded
 from exfit.records.formats.dialect import (
     HEAD,
@@ -60,7 +60,7 @@ class TextTable:
         """The column that holds the time, or those of date and time; empty where none seems to."""
         _, first = next(self.rows())
         stamps = [name for name, cell in zip(self.names, first, strict=False) if is_timestamp(cell)]
-        return clock_of(self.names, stamps, partial(increases, self))
+        return find_clock(self.names, stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from exfit.records.formats.clock import clock_of
+from exfit.records.clock import find_clock
 
 CLOCKS = {
     ("t", "vt"): ("t",),
@@ -31,7 +31,7 @@ CLOCKS = {
 
 @pytest.mark.parametrize("names", CLOCKS, ids=str)
 def test_the_time_is_known_by_its_name(names):
-    assert clock_of(names, (), lambda columns: False) == CLOCKS[names]
+    assert find_clock(names, (), lambda columns: False) == CLOCKS[names]
 
 
 @pytest.mark.parametrize(
@@ -46,4 +46,4 @@ def test_the_time_is_known_by_its_name(names):
     ],
 )
 def test_where_no_name_says_so_the_time_is_what_increases(names, stamps, increasing, clock):
-    assert clock_of(names, stamps, increasing.__contains__) == clock
+    assert find_clock(names, stamps, increasing.__contains__) == clock

@@ -1,0 +1,101 @@
+"""The clock of a record: which columns seem to hold the time, its unit, and what a time must be."""
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from exfit.errors import RecordError
+from exfit.records.formats.table import Array, column_error
+from exfit.records.units import SECONDS, alike, bare, usual
+
+TIMESTAMP_NAMES = frozenset(  # date and time of day in one column
+    ("timestamp", "zeitstempel", "zeitpunkt", "datetime", "date_time", "date_&_time",
+     "date_+_time", "date+time", "time_stamp", "time_date")
+)  # fmt: skip
+DATE_NAMES = frozenset(("date", "datum", "fecha"))
+TIME_NAME = re.compile(
+    r"t|time|tout|zeit|uhrzeit|tiempo|hora|temps|tempo|tijd|tid|utc|x_value|time_of_day"
+    r"|(?:rel|abs|elapsed)[a-z]*_?(?:time|zeit)"
+)
+WORD_SEPARATOR = re.compile(r"[\s\-/.]+")
+
+
+class Clock(NamedTuple):
+    """The column with the time, or those of date and time of day; the unit where it is numbers."""
+
+    columns: tuple[str, ...]
+    unit: str | None = None
+
+    @property
+    def label(self) -> str:
+        """The columns as messages name them."""
+        kind = "column" if len(self.columns) == 1 else "columns"
+        return f"{kind} {' and '.join(map(repr, self.columns))}"
+
+
+def find_clock(
+    names: Sequence[str], stamps: Sequence[str], increases: Callable[[Sequence[str]], bool]
+) -> tuple[str, ...]:
+    """Return the column that seems to hold the time, or those of date and time of day, or none.
+
+    The names decide, else what follows the last dot in them, as in s.time; else it is what
+    ``increases`` throughout, of the columns that hold ``stamps`` or of all the first.
+    """
+    for endings in (names, [name.rpartition(".")[2] for name in names]):
+        words = [WORD_SEPARATOR.sub("_", bare(ending).casefold()) for ending in endings]
+        named = _by_name(dict(zip(names, words, strict=True)))
+        if named:
+            return named
+    candidates = (tuple(columns) for columns in (stamps[:2], stamps[:1], names[:1]))
+    return next((columns for columns in candidates if columns and increases(columns)), ())
+
+
+def _by_name(words: dict[str, str]) -> tuple[str, ...]:
+    """Return the columns of the time, given the plain words of each name."""
+    stamps = [name for name, word in words.items() if word in TIMESTAMP_NAMES]
+    dates = [name for name, word in words.items() if word in DATE_NAMES]
+    times = [name for name, word in words.items() if TIME_NAME.fullmatch(word)]
+    return tuple(stamps[:1] or dates[:1] + times[:1])
+
+
+def in_seconds(
+    path: Path, column: str, numbers: Array, stated: str | None, requested: str | None
+) -> Array:
+    """Return the numbers (M,) of a time column in s.
+
+    ``stated`` is the unit that the file itself gives, ``requested`` the one that the caller gives;
+    without either it is s. Raises RecordError for a unit that is none of time, and where the two
+    contradict each other.
+    """
+    units = [unit for unit in (stated, requested) if unit is not None]
+    for unit in units:
+        if usual(unit) not in SECONDS:
+            raise column_error(path, column, f"{unit} is no unit of time: {', '.join(SECONDS)}")
+    if stated is not None and requested is not None and not alike(stated, requested):
+        raise column_error(path, column, f"in {stated} as the file says, not in {requested}")
+    factor = SECONDS[usual(units[0])] if units else 1.0
+    # the reciprocal is a whole number: no digit of 5 ms is lost
+    return numbers / round(1.0 / factor) if factor < 1.0 else numbers * factor
+
+
+def check_finite(time: Array, label: str, place: Callable[[int], str]) -> None:
+    """Raise a RecordError where time is not finite; ``place`` names a sample, counted from 0."""
+    lost = np.flatnonzero(~np.isfinite(time))
+    if lost.size:
+        raise RecordError(f"{place(int(lost[0]))}: {label}: {time[lost[0]]} is not a finite number")
+
+
+def check_increasing(
+    time: Array, label: str, place: Callable[[int], str], may_repeat: bool = False
+) -> None:
+    """Raise a RecordError where time does not increase; ``place`` names a sample, from 0."""
+    steps = np.diff(time)
+    back = np.flatnonzero(steps < 0.0 if may_repeat else steps <= 0.0)
+    if back.size:
+        before, now = time[back[0]], time[back[0] + 1]
+        kind = "repeats" if now == before else "goes back behind"
+        what = f"{label}: time {now} s {kind} the {before} s before it"
+        raise RecordError(f"{place(int(back[0]) + 1)}: {what}")

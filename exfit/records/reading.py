@@ -1,0 +1,241 @@
+"""Read a record: the columns of a recorder's file become signals per unit."""
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.resampling import resampled
+from exfit.dsp.three_phase import Connection, vt_of_rms, vt_of_waveforms
+from exfit.errors import RecordError
+from exfit.records.clock import Clock, check_finite, check_increasing
+from exfit.records.formats import open_table
+from exfit.records.formats.table import NONE, Table, column_error, read_bytes, refuse_uneven
+from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
+from exfit.records.units import alike, needs_base, unit_of, usual
+
+Rows = NDArray[np.intp]
+
+PERCENT = "%"
+
+
+class ChannelLike(Protocol):
+    """Where a signal stands in a file and how it becomes per unit."""
+
+    @property
+    def column(self) -> str:
+        """Name of the column."""
+
+    @property
+    def scale(self) -> float:
+        """Factor on the column's numbers."""
+
+    @property
+    def offset(self) -> float:
+        """What is added after scaling."""
+
+    @property
+    def unit(self) -> str | None:
+        """Unit of the column's numbers, where it is known."""
+
+    @property
+    def base(self) -> float | None:
+        """What 1 pu is in that unit; None: the numbers are taken as they stand."""
+
+
+class ThreePhases(NamedTuple):
+    """Where the three phases of the terminal voltage stand, and how they become one, per unit.
+
+    ``base`` is the rated line-to-line RMS voltage in ``unit``, ``cycles`` the window of waveforms.
+    """
+
+    columns: tuple[str, str, str]
+    kind: Literal["waveform", "rms"]
+    unit: str
+    base: float
+    connection: Connection
+    cycles: int
+
+
+class _PhaseVoltage(NamedTuple):
+    """The voltage (M,) per unit of three phases, nan where it was not looked at.
+
+    ``window`` (s) is what it is averaged over, None where it is not.
+    """
+
+    samples: Array
+    window: float | None
+
+
+def read_record(
+    path: Path,
+    clock: Clock,
+    channels: Mapping[str, ChannelLike | ThreePhases],
+    window: tuple[float, float] | None = None,
+    missing: bool = False,
+    sheet: str | None = None,
+    rate: float | None = None,
+    per_unit: frozenset[str] = NONE,
+) -> Record:
+    """Return the record of a file: each signal is ``column / base * scale + offset``.
+
+    Args:
+        path: a recorder's file of any kind that ``open_table`` knows.
+        clock: where the time stands; timestamps become s since the first of them.
+        channels: signal name -> column, its unit and base, scale and offset, or three phases. The
+            base of a field current is that of the air-gap line: what gives 1 pu voltage without
+            saturation.
+        window: first and last instant kept, s, both included; what lies outside may hold gaps, and
+            no waveform is looked at there.
+        missing: whether a sample may be missing from a signal: an empty cell or nan becomes nan.
+        sheet: of a workbook.
+        rate: Hz, of a slower, even clock; None: the record's own.
+        per_unit: signals whose columns are taken for per unit: the file must not say otherwise.
+
+    Raises:
+        RecordError: a file that cannot be read, a column that is missing, in another unit or of
+            another length than the time, a cell that is no finite number, time that does not
+            increase, fewer than two samples, a signal without any, waveforms that are none, or a
+            record that cannot be resampled.
+    """
+    table = open_table(path, sheet)
+    _check_units(table, channels, per_unit)
+    time = table.instants(clock.columns, clock.unit)
+    check_finite(time, clock.label, table.place)
+    check_increasing(time, clock.label, table.place)
+    columns = _columns(table, clock, channels, missing)
+    refuse_uneven(path, {clock.columns[0]: time} | columns)
+    rows = _rows_in_window(path, time, window)
+    voltages = {
+        name: _of_phases(path, time, columns, channel, rows)
+        for name, channel in channels.items()
+        if isinstance(channel, ThreePhases)
+    }
+    for voltage in voltages.values():
+        if voltage.window is not None:
+            rows = rows[np.isfinite(voltage.samples[rows])]
+    signals = {
+        name: voltages[name].samples[rows]
+        if isinstance(channel, ThreePhases)
+        else _signal(table, channel, columns[channel.column], rows, missing)
+        for name, channel in channels.items()
+    }
+    time = time[rows]
+    if rate is not None:
+        time, signals = _resampled(path, time, signals, rate)
+    return Record(
+        read_only(time),
+        MappingProxyType({name: read_only(signal) for name, signal in signals.items()}),
+        path,
+        table.sha256,
+        {name: voltage.window for name, voltage in voltages.items() if voltage.window is not None},
+    )
+
+
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes; raises RecordError where it cannot be read."""
+    return hashlib.sha256(read_bytes(path)).hexdigest()
+
+
+def _column_names(channel: ChannelLike | ThreePhases) -> tuple[str, ...]:
+    """Return the columns that a channel is read from."""
+    return channel.columns if isinstance(channel, ThreePhases) else (channel.column,)
+
+
+def _columns(
+    table: Table, clock: Clock, channels: Mapping[str, ChannelLike | ThreePhases], missing: bool
+) -> dict[str, Array]:
+    """Return the columns (M,) of all channels, nan where a sample may be missing and is."""
+    names = [name for channel in channels.values() for name in _column_names(channel)]
+    gappy = frozenset(names) - {*clock.columns} if missing else NONE
+    return table.numbers(dict.fromkeys(names), gappy)
+
+
+def _of_phases(
+    path: Path, time: Array, columns: Mapping[str, Array], channel: ThreePhases, rows: Rows
+) -> _PhaseVoltage:
+    """Return the voltage of three phases at the given rows.
+
+    Raises RecordError where the columns are not the three phases of one voltage.
+    """
+    phases = np.stack([columns[name][rows] for name in channel.columns], axis=1)
+    samples, rating = np.full(len(time), np.nan), (channel.base, channel.connection)
+    try:
+        if channel.kind == "rms":
+            samples[rows] = vt_of_rms(phases, *rating)
+            return _PhaseVoltage(samples, None)
+        phasor = vt_of_waveforms(time[rows], phases, *rating, channel.cycles)
+    except ValueError as fault:
+        names = ", ".join(map(repr, channel.columns))
+        raise RecordError(f"{path}: columns {names}: {fault}") from None
+    samples[rows[phasor.kept]] = phasor.voltage
+    return _PhaseVoltage(samples, phasor.window)
+
+
+def _resampled(
+    path: Path, time: Array, signals: Mapping[str, Array], rate: float
+) -> tuple[Array, dict[str, Array]]:
+    """Return a record on a slower, even clock; raises RecordError where that cannot be."""
+    try:
+        return resampled(time, signals, rate)
+    except ValueError as fault:
+        raise RecordError(f"{path}: resample: {fault}") from None
+
+
+def _check_units(
+    table: Table, channels: Mapping[str, ChannelLike | ThreePhases], per_unit: frozenset[str]
+) -> None:
+    """Raise a RecordError for a column that the file says to be in another unit."""
+    for signal, channel in channels.items():
+        for column in _column_names(channel):
+            unit = table.units.get(column)
+            if unit is None:
+                continue
+            if channel.unit is not None and not alike(unit, channel.unit):
+                what = f"in {unit} as the file says, not in {channel.unit}"
+                raise column_error(table.path, column, what)
+            if signal in per_unit and unit_of(unit) and needs_base(unit):
+                scaling = f"give {signal} {_how_to_scale(unit)}"
+                what = f"in {unit} as the file says, and not per unit: {scaling}"
+                raise column_error(table.path, column, what)
+
+
+def _how_to_scale(unit: str) -> str:
+    """Return what makes numbers of a unit per unit, as a case has it."""
+    if usual(unit) == PERCENT:
+        return f"scale: 0.01, or unit: {PERCENT!r} and base: 100"
+    return f"unit: {unit} and base: what 1 pu is in {unit}"
+
+
+def _rows_in_window(path: Path, time: Array, window: tuple[float, float] | None) -> Rows:
+    """Return the rows in the window."""
+    start, end = window or (time[0], time[-1])
+    rows = np.flatnonzero((time >= start) & (time <= end))
+    if rows.size < FEWEST_SAMPLES:
+        place = f" in the window {start:g} ... {end:g} s" if window else ""
+        raise RecordError(
+            f"{path}: {rows.size} of {time.size} samples ({time[0]:g} ... {time[-1]:g} s)"
+            f"{place}; at least {FEWEST_SAMPLES} are needed"
+        )
+    return rows
+
+
+def _signal(table: Table, channel: ChannelLike, column: Array, rows: Rows, missing: bool) -> Array:
+    """Return a channel in per unit; raises RecordError where it is not finite, nor missing."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        per_unit = column[rows] if channel.base is None else column[rows] / channel.base
+        signal = per_unit * channel.scale + channel.offset
+    gaps = np.isnan(column[rows]) & missing
+    if gaps.all():
+        raise RecordError(f"{table.path}: column {channel.column!r}: every sample is missing")
+    lost = np.flatnonzero(~np.isfinite(signal) & ~gaps)
+    if lost.size:
+        row = int(rows[lost[0]])
+        scaled = "" if not np.isfinite(column[row]) else f" * {channel.scale:g}"
+        what = f"{column[row]}{scaled} is not a finite number"
+        raise column_error(table.place(row), channel.column, what)
+    return np.asarray(signal, np.float64)
