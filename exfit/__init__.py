@@ -1,3 +1,75 @@
-"""exfit: the parameters of a generator's excitation system from a recorded bump test."""
+"""exfit: the parameters of a generator's excitation system from a recorded bump test.
+
+    >>> import exfit
+    >>> result = exfit.fit("case.yaml")
+    >>> result.parameters["KA"].value
+
+Everything here is imported when it is first used: ``import exfit`` alone loads nothing heavy.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from exfit.errors import (
+    CaseError,
+    DynamicsError,
+    ExfitError,
+    FileError,
+    ModelError,
+    RecordError,
+    SimulationError,
+)
+
+if TYPE_CHECKING:
+    from exfit.case.case import Case
+    from exfit.records.record import Record
+    from exfit.results.model import FitResult
+    from exfit.workflows import check, fit, identify, load_case, profile, simulate, validate
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Case",
+    "CaseError",
+    "DynamicsError",
+    "ExfitError",
+    "FileError",
+    "FitResult",
+    "ModelError",
+    "Record",
+    "RecordError",
+    "SimulationError",
+    "__version__",
+    "check",
+    "fit",
+    "identify",
+    "load_case",
+    "profile",
+    "simulate",
+    "validate",
+]
+
+_MODULES = {
+    "Case": "exfit.case.case",
+    "FitResult": "exfit.results.model",
+    "Record": "exfit.records.record",
+    "check": "exfit.workflows",
+    "fit": "exfit.workflows",
+    "identify": "exfit.workflows",
+    "load_case": "exfit.workflows",
+    "profile": "exfit.workflows",
+    "simulate": "exfit.workflows",
+    "validate": "exfit.workflows",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name from the module that defines it."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Return the names of the module, those not yet imported too."""
+    return sorted({*globals(), *__all__})

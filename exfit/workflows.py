@@ -32,8 +32,8 @@ from exfit.analysis.solution import (
     uncertainty_of_solution,
     validation_of,
 )
+from exfit.case import load
 from exfit.case.case import SINGLE, Case
-from exfit.case.load import load_case
 from exfit.case.schema import Recording
 from exfit.errors import CaseError
 from exfit.fitting.build import (
@@ -149,9 +149,17 @@ def fit(
     )
 
 
+def load_case(path: str | PathLike[str]) -> Case:
+    """Return the case of a YAML file.
+
+    Raises CaseError with all faults of the file, each as ``file:line: place: what is wrong``.
+    """
+    return load.load_case(Path(path))
+
+
 def loaded(case: CaseOrPath) -> Case:
     """Return a case, read from its file where it is a path; raises CaseError."""
-    return case if isinstance(case, Case) else load_case(Path(case))
+    return case if isinstance(case, Case) else load_case(case)
 
 
 def versions() -> dict[str, str]:

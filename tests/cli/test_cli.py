@@ -568,7 +568,7 @@ import signal
 import time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
-from exfit.residuals import Residuals
+from exfit.fitting.residuals import Residuals
 quick = Residuals.__call__
 def slow(self, theta):
     time.sleep(0.2)
