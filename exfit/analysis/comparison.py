@@ -21,9 +21,9 @@ from exfit.signals import COMPARED
 Array = NDArray[np.float64]
 
 SIMULATED, MEASURED = "_simulated", "_measured"  # behind a signal in the table of a fit
-FEWEST = 2  # instants in common
-SAME = 1e-9  # s: instants that near are one, whatever the digits of a file
-APART = 0.05  # s: steps found closer than this may differ by the shape of the rise alone
+FEWEST_IN_COMMON = 2  # instants
+SAME_INSTANT = 1e-9  # s: whatever the digits of a file
+STEPS_APART = 0.05  # s: steps found closer than this may differ by the shape of the rise alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Curve:
     repeated: int = 0
 
 
-class Asked(NamedTuple):
+class ColumnChoice(NamedTuple):
     """Which columns are read: of signals, by their names, and of the time; else by convention."""
 
     columns: Mapping[str, str]
@@ -88,8 +88,8 @@ class Difference:
         kept = np.isfinite(self.error)
         time = self.time[kept]
         tail = time >= time[-1] - TAIL * (time[-1] - time[0])
-        found = np.mean(self.values[:, kept][:, tail], axis=1)
-        return float(found[0]), float(found[1])
+        means = np.mean(self.values[:, kept][:, tail], axis=1)
+        return float(means[0]), float(means[1])
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures, without the samples."""
@@ -129,21 +129,29 @@ class Agreement:
     @property
     def between(self) -> tuple[Difference, ...]:
         """The differences of the two responses, without those from the record."""
-        return tuple(one for one in self.differences if (one.first, one.second) == ("A", "B"))
+        return tuple(
+            difference
+            for difference in self.differences
+            if (difference.first, difference.second) == ("A", "B")
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures, without the samples."""
         return {
             "curves": {
-                one.name: {"file": str(one.path), "sha256": one.sha256, "samples": len(one.time)}
-                for one in self.curves
+                entry.name: {
+                    "file": str(entry.path),
+                    "sha256": entry.sha256,
+                    "samples": len(entry.time),
+                }
+                for entry in self.curves
             },
             "shift": self.shift,
-            "differences": [one.as_json() for one in self.differences],
+            "differences": [entry.as_json() for entry in self.differences],
             "step_at": self.step_at,
             "features": {
                 "signal": self.judged,
-                **{name: asdict(one) for name, one in self.features.items()},
+                **{name: asdict(entry) for name, entry in self.features.items()},
             },
             "notes": list(self.notes),
         }
@@ -153,7 +161,7 @@ def compare(
     a: Path,
     b: Path,
     record: Path | None,
-    asked: Asked,
+    choice: ColumnChoice,
     shift: float = 0.0,
     step_at: float | None = None,
 ) -> Agreement:
@@ -166,36 +174,27 @@ def compare(
 
     Args:
         a, b, record: where the curves are.
-        asked: the columns of signals and time, in the files that have them.
+        choice: the columns of signals and time, in the files that have them.
         shift: s, added to the time of ``b``.
-        step_at: s, the instant of the step on the clock of ``a``; else it is looked for.
+        step_at: s, the instant of the step on the clock of ``a``; by default it is detected.
 
     Raises RecordError where a file cannot be used, or they have no signal or time in common.
     """
-    curves = [_curve("A", a, asked, SIMULATED), _curve("B", b, asked, SIMULATED, shift)]
+    curves = [_curve("A", a, choice, SIMULATED), _curve("B", b, choice, SIMULATED, shift)]
     if record is not None:
-        curves.append(_curve("record", record, asked, MEASURED))
-    _refuse_unknown(asked, curves)
-    shared = [name for name in curves[0].signals if name in curves[1].signals]
-    if not shared:
-        raise RecordError(
-            f"{a} and {b}: no signal in common: A has {_listed(curves[0])}, B has "
-            f"{_listed(curves[1])}; name columns with --columns vt=COLUMN"
-        )
-    found = [_difference(name, curves[0], curves[1]) for name in shared]
+        curves.append(_curve("record", record, choice, MEASURED))
+    _refuse_unknown(choice, curves)
+    shared = _shared_signals(curves[0], curves[1])
+    differences = [_difference(signal, curves[0], curves[1]) for signal in shared]
     for measured in curves[2:]:
-        known = [name for name in shared if name in measured.signals]
-        if not known:
-            text = f"{record}: none of the signals {', '.join(shared)}; it has {_listed(measured)}"
-            raise RecordError(f"{text}; name columns with --columns vt=COLUMN")
-        found += [_difference(name, measured, one) for one in curves[:2] for name in known]
+        differences += _from_record(measured, curves[:2], shared)
     judged = judged_of(shared)
-    steps = {one.name: _step_of(one, judged) for one in curves if judged in one.signals}
-    onset = steps.get("record") or steps.get("A") or steps.get("B")
-    at = step_at if step_at is not None or onset is None else onset.at
+    steps = {curve.name: _step_of(curve, judged) for curve in curves if judged in curve.signals}
+    step = steps.get("record") or steps.get("A") or steps.get("B")
+    at = step_at if step_at is not None or step is None else step.at
     return Agreement(
         tuple(curves),
-        tuple(found),
+        tuple(differences),
         shift,
         at,
         judged,
@@ -204,12 +203,37 @@ def compare(
     )
 
 
-def _curve(name: str, source: Path, asked: Asked, ending: str, shift: float = 0.0) -> Curve:
+def _shared_signals(a: Curve, b: Curve) -> list[str]:
+    """Return the signals that two curves share; raises RecordError where there is none."""
+    shared = [signal for signal in a.signals if signal in b.signals]
+    if not shared:
+        raise RecordError(
+            f"{a.path} and {b.path}: no signal in common: A has {_listed(a)}, B has {_listed(b)}; "
+            "name columns with --columns vt=COLUMN"
+        )
+    return shared
+
+
+def _from_record(record: Curve, curves: Sequence[Curve], shared: Sequence[str]) -> list[Difference]:
+    """Return how curves differ from a record; raises RecordError where it has none of the signals.
+
+    A record need not have all of them.
+    """
+    measured = [signal for signal in shared if signal in record.signals]
+    if not measured:
+        raise RecordError(
+            f"{record.path}: none of the signals {', '.join(shared)}; it has {_listed(record)}; "
+            "name columns with --columns vt=COLUMN"
+        )
+    return [_difference(signal, record, curve) for curve in curves for signal in measured]
+
+
+def _curve(name: str, source: Path, choice: ColumnChoice, ending: str, shift: float = 0.0) -> Curve:
     """Return a curve of a run's folder, its result.json, or a file of another program."""
     path = _table_of(source)
     table = open_table(path)
-    header, clock = table.names, _clock(table, asked.time)
-    places = {signal: column for signal, column in asked.columns.items() if column in header}
+    header, clock = table.names, _clock(table, choice.time)
+    places = {signal: column for signal, column in choice.columns.items() if column in header}
     for signal in COMPARED:
         convention = [column for column in (signal, signal + ending) if column in header]
         if convention:
@@ -253,10 +277,10 @@ def _holds_response(path: Path) -> bool:
         return False
 
 
-def _clock(table: Table, asked: str | None) -> tuple[str, ...]:
-    """Return the columns with the time: the one asked for, else those that seem to hold it."""
-    if asked is not None and asked in table.names:
-        return (asked,)
+def _clock(table: Table, name: str | None) -> tuple[str, ...]:
+    """Return the columns with the time: the one that is named, else those that seem to hold it."""
+    if name is not None and name in table.names:
+        return (name,)
     if not table.clock:
         raise RecordError(
             f"{table.path}: no column seems to be the time; --time names one: {listed(table.names)}"
@@ -271,13 +295,13 @@ def _check_clock(table: Table, clock: Sequence[str], time: Array) -> None:
     check_increasing(time, label, table.place, may_repeat=True)
 
 
-def _refuse_unknown(asked: Asked, curves: Sequence[Curve]) -> None:
-    """Raise a RecordError for what is asked for by name and is in no file."""
-    headers = {name for one in curves for name in one.columns}
-    wanted = [*asked.columns.values(), *(() if asked.time is None else (asked.time,))]
+def _refuse_unknown(choice: ColumnChoice, curves: Sequence[Curve]) -> None:
+    """Raise a RecordError for a column that is named and in no file."""
+    headers = {name for curve in curves for name in curve.columns}
+    wanted = [*choice.columns.values(), *(() if choice.time is None else (choice.time,))]
     for column in wanted:
         if column not in headers:
-            held = "; ".join(f"{one.path} has {listed(one.columns)}" for one in curves)
+            held = "; ".join(f"{curve.path} has {listed(curve.columns)}" for curve in curves)
             raise RecordError(f"no file has a column {column!r}; {held}")
 
 
@@ -287,20 +311,22 @@ def _listed(curve: Curve) -> str:
 
 def _difference(signal: str, first: Curve, second: Curve) -> Difference:
     """Return the difference of a signal over the time that two curves share."""
-    begin = max(first.time[0], second.time[0]) - SAME
-    end = min(first.time[-1], second.time[-1]) + SAME
-    inside = [one.time[(one.time >= begin) & (one.time <= end)] for one in (first, second)]
+    begin = max(first.time[0], second.time[0]) - SAME_INSTANT
+    end = min(first.time[-1], second.time[-1]) + SAME_INSTANT
+    inside = [curve.time[(curve.time >= begin) & (curve.time <= end)] for curve in (first, second)]
     finer = 0 if first.name == "record" or len(inside[0]) >= len(inside[1]) else 1
     time = inside[finer]
-    if len(time) < FEWEST:
-        spans = (f"{one.path}: {one.time[0]:g} ... {one.time[-1]:g} s" for one in (first, second))
+    if len(time) < FEWEST_IN_COMMON:
+        spans = (
+            f"{curve.path}: {curve.time[0]:g} ... {curve.time[-1]:g} s" for curve in (first, second)
+        )
         raise RecordError(f"no time in common: {', '.join(spans)}; --shift moves the time of B")
-    read = [_at(time, one.time, one.signals[signal]) for one in (first, second)]
+    read = [_at(time, curve.time, curve.signals[signal]) for curve in (first, second)]
     values = np.stack([samples for samples, _ in read])
     if not np.isfinite(values).all(axis=0).any():
         both = f"{first.path} and {second.path}"
-        raise RecordError(f"{both}: {signal}: at no instant there are samples of both")
-    return Difference(signal, first.name, second.name, time, values, max(own for _, own in read))
+        raise RecordError(f"{both}: {signal}: no instant has samples of both")
+    return Difference(signal, first.name, second.name, time, values, max(bend for _, bend in read))
 
 
 def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:
@@ -308,8 +334,8 @@ def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:
 
     Nothing is read across a sample that is left out.
     """
-    nearest = np.clip(np.searchsorted(clock, time - SAME), 0, len(clock) - 1)
-    exact = np.abs(clock[nearest] - time) <= SAME
+    nearest = np.clip(np.searchsorted(clock, time - SAME_INSTANT), 0, len(clock) - 1)
+    exact = np.abs(clock[nearest] - time) <= SAME_INSTANT
     read = np.where(exact, samples[nearest], np.nan)
     if exact.all():
         return read, 0.0
@@ -317,7 +343,7 @@ def _at(time: Array, clock: Array, samples: Array) -> tuple[Array, float]:
 
     straight = np.interp(time, clock, samples)
     kept = np.isfinite(samples)
-    if np.count_nonzero(kept) <= FEWEST:
+    if np.count_nonzero(kept) <= FEWEST_IN_COMMON:
         return np.where(exact, read, straight), 0.0
     cubic = Akima1DInterpolator(clock[kept], samples[kept], method="makima")(
         np.clip(time, clock[kept][0], clock[kept][-1])
@@ -343,28 +369,25 @@ def _step_of(curve: Curve, signal: str) -> DetectedStep | None:
 
 def _features_of(curves: Sequence[Curve], signal: str, at: float) -> Iterator[tuple[str, Features]]:
     """Yield the features of each curve, until the first of them ends."""
-    until = min(float(one.time[-1]) for one in curves)
-    for one in curves:
-        if signal in one.signals:
-            kept = np.isfinite(one.signals[signal])
-            found = features(one.time[kept], one.signals[signal][kept], at, until)
-            if found is not None:
-                yield one.name, found
+    until = min(float(curve.time[-1]) for curve in curves)
+    for curve in curves:
+        if signal in curve.signals:
+            kept = np.isfinite(curve.signals[signal])
+            of_curve = features(curve.time[kept], curve.signals[signal][kept], at, until)
+            if of_curve is not None:
+                yield curve.name, of_curve
 
 
 def _notes(
     curves: Sequence[Curve], steps: Mapping[str, DetectedStep | None], shift: float
 ) -> Iterator[str]:
-    for one in curves:
-        if one.repeated:
-            yield (
-                f"{one.path}: {one.repeated} instants repeat: of each the last row is taken, which "
-                "holds from then on"
-            )
+    for curve in curves:
+        if curve.repeated:
+            yield (f"{curve.path}: {curve.repeated} instants repeat: the last row of each is used")
     first, second = steps.get("A"), steps.get("B")
-    if first is not None and second is not None and abs(first.at - second.at) > APART:
+    if first is not None and second is not None and abs(first.at - second.at) > STEPS_APART:
         wanted = shift + first.at - second.at
         yield (
-            f"the step of A shows at {first.at:.3f} s, that of B at {second.at:.3f} s: "
+            f"the step of A is at {first.at:.3f} s, that of B at {second.at:.3f} s: "
             f"--shift {wanted:.3f} puts them together"
         )

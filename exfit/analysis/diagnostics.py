@@ -28,26 +28,26 @@ MISFIT = 2.0  # times the noise: three quarters of the squared error are not noi
 
 
 def notes(
-    case: Case, residuals: Residuals, found: estimate.Result, compared: Sequence[Comparison]
+    case: Case, residuals: Residuals, solution: estimate.Result, compared: Sequence[Comparison]
 ) -> Iterator[str]:
     """Yield the notes on what a fit found; ``compared`` has sub-steps enough for its response."""
-    values = residuals.values(found.x)
+    values = residuals.values(solution.x)
     yield from typical_notes(case)
-    for one, match in zip(residuals.experiments, compared, strict=True):
-        simulator, at = one.with_inputs(values), one.parameters(values)
-        for signal, moved in simulator.step_errors(at, one.signals).items():
-            error = match.overlays[signal].error
+    for experiment, comparison in zip(residuals.experiments, compared, strict=True):
+        simulator, at = experiment.with_inputs(values), experiment.parameters(values)
+        for signal, change in simulator.step_errors(at, experiment.signals).items():
+            error = comparison.overlays[signal].error
             rmse = float(np.sqrt(np.nanmean(error**2)))
-            if moved > max(COARSE * rmse, INVISIBLE):
+            if change > max(COARSE * rmse, INVISIBLE):
                 yield (
                     f"halving the step of {case.simulation.step:g} s moves {signal} by "
-                    f"{moved:.1e} pu, its error is {rmse:.1e} pu: give a smaller simulation.step"
+                    f"{change:.1e} pu, its error is {rmse:.1e} pu: give a smaller simulation.step"
                 )
-        taken = simulator.substeps(at)
-        if match.substeps > 2 * taken:
-            step = case.simulation.step * taken / match.substeps
+        used = simulator.substeps(at)
+        if comparison.substeps > 2 * used:
+            step = case.simulation.step * used / comparison.substeps
             yield (
-                f"the response asks for {match.substeps} sub-steps on its way, {taken} were "
+                f"the response needs {comparison.substeps} sub-steps along its way, {used} were "
                 f"taken: give simulation.step = {step:.2g}"
             )
 
@@ -68,16 +68,16 @@ def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:
             yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
 
 
-def misfit_notes(residuals: Residuals, known: UncertaintyAnalysis) -> Iterator[str]:
+def misfit_notes(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> Iterator[str]:
     """Yield the channels that the fit misses by more than their noise, which none gave.
 
     A given noise is compared with the residuals where the intervals are made.
     """
-    for channel, seen in zip(residuals.channels, known.confidence.noise, strict=True):
-        times = seen.estimated / (channel.weight * noise_of(channel))
+    for channel, noise in zip(residuals.channels, uncertainty.confidence.noise, strict=True):
+        times = noise.estimated / (channel.weight * noise_of(channel))
         if channel.noise is None and times > MISFIT:
             yield (
-                f"the error of {seen.label} is {times:.2g} times what its record scatters from "
+                f"the error of {noise.label} is {times:.2g} times what its record scatters from "
                 "sample to sample: the step, the model or the record is not as the case says, and "
                 "the intervals do not hold that error"
             )
@@ -86,23 +86,27 @@ def misfit_notes(residuals: Residuals, known: UncertaintyAnalysis) -> Iterator[s
 def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:
     """Yield how many samples of each channel of a record were taken for outliers."""
     for channel in channels:
-        seen = np.isfinite(channel.measured)
-        beyond = int(np.count_nonzero(seen & ~channel.kept))
+        measured = np.isfinite(channel.measured)
+        beyond = int(np.count_nonzero(measured & ~channel.kept))
         if beyond:
+            samples = np.count_nonzero(measured)
             yield (
-                f"{beyond} of {np.count_nonzero(seen)} samples of {channel.signal} of {name} are "
-                "left out as outliers"
+                f"{beyond} of {samples} samples of {channel.signal} of {name} are left out as "
+                "outliers"
             )
 
 
-def validation_notes(fitted: Sequence[Comparison], tried: Sequence[Comparison]) -> Iterator[str]:
+def validation_notes(
+    fitted: Sequence[Comparison], validations: Sequence[Comparison]
+) -> Iterator[str]:
     """Yield on which records the response does not hold."""
-    worst = max(one.rmse for one in fitted)
-    for one in tried:
-        if one.rmse > MUCH_WORSE * worst:
+    worst = max(comparison.rmse for comparison in fitted)
+    for comparison in validations:
+        if comparison.rmse > MUCH_WORSE * worst:
+            times = comparison.rmse / worst
             yield (
-                f"on {one.name} the error is {one.rmse / worst:.1f} times that of the fit: "
-                "the fitted record leaves open what matters there"
+                f"on {comparison.name} the error is {times:.1f} times that of the fit: "
+                "the fitted record does not determine what matters there"
             )
 
 
@@ -135,37 +139,41 @@ def unsteady_notes(
     record: Record, steady: float, channels: Sequence[Channel] = ()
 ) -> Iterator[str]:
     """Yield the signals that drift while the case calls the unit steady."""
-    smooth = {one.signal: one.filtering.smooth_over for one in channels if one.filtering}
+    smooth = {
+        channel.signal: channel.filtering.smooth_over for channel in channels if channel.filtering
+    }
     before = record.time < steady
     for signal, samples in record.signals.items():
-        still = samples[before & np.isfinite(samples)]
+        at_rest = samples[before & np.isfinite(samples)]
         # averages over a window scatter little from each to the next: one of each window counts
-        still = still[:: smooth.get(signal, 1)]
-        half = len(still) // 2
+        at_rest = at_rest[:: smooth.get(signal, 1)]
+        half = len(at_rest) // 2
         if half < 4:
             continue
         # noise from neighbours: a drift does not pass for it
-        noise = float(np.std(np.diff(still))) / np.sqrt(2.0)
-        apart = abs(float(still[:half].mean() - still[half:].mean()))
-        if apart > max(UNSTEADY * noise * np.sqrt(2.0 / half), INVISIBLE):
+        noise = float(np.std(np.diff(at_rest))) / np.sqrt(2.0)
+        drift = abs(float(at_rest[:half].mean() - at_rest[half:].mean()))
+        if drift > max(UNSTEADY * noise * np.sqrt(2.0 / half), INVISIBLE):
             yield (
-                f"{signal} moves by {apart:.2g} pu before {steady:g} s, where the record should be "
-                "at rest: what the fit starts from is not sure"
+                f"{signal} moves by {drift:.2g} pu before {steady:g} s, where the record should be "
+                "at rest: the values that the fit starts from are uncertain"
             )
 
 
 def typical_notes(case: Case) -> Iterator[str]:
     """Yield which values were taken from the data sheet, because the case does not give them."""
-    views = (case, *(case.seen_from(one) for one in case.recordings))
+    views = (case, *(case.seen_from(recording) for recording in case.recordings))
     used = {name for view in views for name in parameters_used(system_of(view))}
-    values, typical = case.values(), case.typical()
-    for part in [part for part in case.parts.all if part.kind != "network"]:
-        names = [part.prefix + row.symbol for row in part.sheet]
-        taken = [name for name in names if name in typical and name in used]
-        if taken:
-            listed = ", ".join(
-                f"{name.removeprefix(part.prefix)} {values[name]:g}" for name in taken
-            )
+    values = case.values()
+    typical = {name: values[name] for name in case.typical() if name in used}
+    for part in case.parts.all:
+        if part.kind == "network":
+            continue
+        names = {part.prefix + symbol: symbol for symbol in part.symbols}
+        listed = ", ".join(
+            f"{names[name]} {value:g}" for name, value in typical.items() if name in names
+        )
+        if listed:
             yield f"typical values taken for {part.name}: {listed}"
     if case.parts.stabiliser is not None and not case.on_load:
         yield f"{case.parts.stabiliser.name} does not act: the breaker is open"

@@ -75,14 +75,18 @@ def with_iteration_responses(
         return comparison
     signal = comparison.judged_by
     lines = [history[k] for k in chosen(len(history))]
-    found = list(
+    responses = list(
         in_threads(lambda line: iteration_response(trial, residuals, signal, line.values), lines)
     )
-    kept = [(line.number, one) for line, one in zip(lines, found, strict=True) if one is not None]
-    if not kept:
+    numbered = [
+        (line.number, response)
+        for line, response in zip(lines, responses, strict=True)
+        if response is not None
+    ]
+    if not numbered:
         return comparison
-    numbers = tuple(number for number, _ in kept)
-    samples = np.stack([one for _, one in kept])
+    numbers = tuple(number for number, _ in numbered)
+    samples = np.stack([response for _, response in numbered])
     return replace(comparison, iteration_responses=IterationResponses(signal, numbers, samples))
 
 
@@ -96,15 +100,15 @@ def iteration_response(
         samples, _ = trial.experiment.samples(residuals.completed(values))
     except UNREACHABLE:
         return None
-    found = compared(channel, channel.as_recorded(samples[:, place]))
-    return found if np.isfinite(found[channel.kept]).all() else None
+    response = compared(channel, channel.as_recorded(samples[:, place]))
+    return response if np.isfinite(response[channel.kept]).all() else None
 
 
 def skipped_response_notes(comparisons: Sequence[Comparison]) -> list[str]:
     """Say of which records the iterations are not kept for their size."""
     return [
-        f"{one.record.name}: {len(one.time)} samples: the response after each iteration is kept of "
-        f"records up to {MOST_SAMPLES}"
-        for one in comparisons
-        if len(one.time) > MOST_SAMPLES
+        f"{comparison.record.name}: {len(comparison.time)} samples: the response after each "
+        f"iteration is kept of records up to {MOST_SAMPLES}"
+        for comparison in comparisons
+        if len(comparison.time) > MOST_SAMPLES
     ]

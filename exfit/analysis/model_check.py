@@ -19,8 +19,8 @@ Values = Mapping[str, float]
 
 STEPS = tuple(10.0**-k for k in range(1, 9))  # of the scaled parameters
 AGREEMENT = 1e-5  # relative to a column's largest element: what central differences can show
-ROUNDING = 1e-12  # of the largest column
-TINY = float(np.finfo(float).tiny)
+COLUMN_ROUNDING = 1e-12  # of the largest column
+SMALLEST_COLUMN = float(np.finfo(float).tiny)
 FLAT_SECONDS = 60.0
 FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
 FLAT_DRIFT = 1e-9  # pu
@@ -46,7 +46,7 @@ class Check:
     @property
     def agrees(self) -> bool:
         """Whether every column agrees with its best central difference."""
-        return all(min(found) <= AGREEMENT for found in self.deviations.values())
+        return all(min(quotients) <= AGREEMENT for quotients in self.deviations.values())
 
     @property
     def flat(self) -> bool:
@@ -65,20 +65,23 @@ def check(case: Case) -> Check:
     else:
         trials, experiments = (), [planned(case)]
     free = free_parameters(case, trials)
-    names = {one.name for one in free}
-    values = {**{one.name: one.start for one in free}, **case.values()}
+    names = {parameter.name for parameter in free}
+    values = {**{parameter.name: parameter.start for parameter in free}, **case.values()}
     fixed = {name: value for name, value in values.items() if name not in names}
     drift, error = 0.0, 0.0
-    for one in experiments:
-        simulator, at = one.with_inputs(values), one.parameters(values)
-        drift = max(drift, flat_drift(simulator, at, one.signals))
-        error = max(error, simulator.step_error(at, one.signals))
+    for experiment in experiments:
+        simulator, at = experiment.with_inputs(values), experiment.parameters(values)
+        drift = max(drift, flat_drift(simulator, at, experiment.signals))
+        error = max(error, simulator.step_error(at, experiment.signals))
     first = experiments[0].simulator
     at = experiments[0].parameters(values)
     return Check(
         deviations=deviations(Residuals(experiments, free, fixed, case.ties)),
         bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
-        substeps=max(one.simulator.substeps(one.parameters(values)) for one in experiments),
+        substeps=max(
+            experiment.simulator.substeps(experiment.parameters(values))
+            for experiment in experiments
+        ),
         step=first.step,
         step_error=error,
         drift=drift,
@@ -105,8 +108,11 @@ def deviations(residuals: Residuals) -> dict[str, tuple[float, ...]]:
     exact = residuals.exact(start)
     sizes = np.max(np.abs(exact), axis=0)
     # a column of rounding errors belongs to a parameter without effect
-    sizes = np.maximum(sizes, ROUNDING * max(float(np.max(sizes)), TINY))
+    sizes = np.maximum(sizes, COLUMN_ROUNDING * max(float(np.max(sizes)), SMALLEST_COLUMN))
     rows = [
         np.max(np.abs(residuals.differences(start, -h, h) - exact), axis=0) / sizes for h in STEPS
     ]
-    return {one.name: tuple(float(row[k]) for row in rows) for k, one in enumerate(residuals.free)}
+    return {
+        parameter.name: tuple(float(row[k]) for row in rows)
+        for k, parameter in enumerate(residuals.free)
+    }

@@ -36,7 +36,7 @@ WORDS: Mapping[str, Callable[[str, Data], str]] = {
     "model_attributes_type": lambda value, _: f"{value} is not a mapping (key: value)",
     "model_type": lambda value, limits: (
         f"{value} is not a mapping (key: value)"
-        + (" or, as text, a column" if limits["class_name"] == "Channel" else "")
+        + (" or, as text, a column" if limits["class_name"] == "ChannelSection" else "")
     ),
     "dict_type": lambda value, _: f"{value} is not a mapping (key: value)",
     "tuple_type": lambda value, _: f"{value} is not a list",

@@ -534,7 +534,7 @@ class Estimate(Section):
 class SimulationSection(Section):
     """The grid of the simulation."""
 
-    step: Positive = Field(default=0.001, description="StepSection of the integration, s.")
+    step: Positive = Field(default=0.001, description="Step of the integration, s.")
     output_step: Positive = Field(
         default=0.005, description="Spacing of the output where there is no record, s."
     )

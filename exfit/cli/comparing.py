@@ -47,14 +47,14 @@ def compare(
     the finer of their clocks. Writes compare.json, compare.csv and compare.png to runs/compare, or
     to DIR.
     """
-    from exfit.analysis.comparison import Asked
+    from exfit.analysis.comparison import ColumnChoice
     from exfit.analysis.comparison import compare as compared
     from exfit.output import run_folder
     from exfit.util.text import to_json
 
     folder = output or Path("runs") / "compare"
     run_folder.refuse_unwritable(folder)
-    found = compared(a, b, record, Asked(_columns(columns), time), shift, step_at)
+    found = compared(a, b, record, ColumnChoice(_columns(columns), time), shift, step_at)
     run_folder.write_agreement(found, folder, plots)
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)

@@ -138,13 +138,9 @@ def _read(w: Writer, part: TracePart, array: str, nodes: Sequence[Node | None]) 
 
 
 def _run(parts: Sequence[TracePart]) -> Writer:
+    """Write the loop over the steps of a run, and within it that over their sub-steps."""
     w = _writer(parts)
-    fixed: Values = {}
-    for part in parts:
-        fixed.update(_read(w, part, "p", part.p))
-        fixed.update(_read(w, part, "r", part.r))
-    every = [node for part in parts for node in (*part.slopes, *part.outputs, *part.clamped)]
-    w.prepare([n for n in in_order(every) if not n.varies and n.op != "symbol"], fixed)
+    fixed = _fixed_values(w, parts)
     fractions = {
         name: _fraction(w, parts, divisor)
         for name, divisor in (("h", 1), ("2", 2), ("3", 3), ("6", 6))
@@ -161,18 +157,7 @@ def _run(parts: Sequence[TracePart]) -> Writer:
 
     w.label("inner")
     w.put("%j = phi i64 [0, %outer], [%j.next, %inner]")
-    at = w.let("sitofp i64 %j to double")
-    later = w.let("icmp sgt i64 %j, 0")
-    # what a later sub-step writes, the next step writes over: no branch is needed
-    row = w.let(f"add i64 %k, {w.let(f'zext i1 {later} to i64')}")
-    driving = [_levels(w, part, *read, at) for part, read in zip(parts, inputs, strict=True)]
-    levels = [_merged(at_once) for at_once in zip(*driving, strict=True)]
-    x = _states(w, parts, slots)
-    moved = _runge_kutta(w, parts, fixed, levels, x, fractions, row)
-    clamped = {**fixed, **levels[2], **moved}
-    for part in parts:
-        for node, result in zip(part.x, w.compute(part.clamped, clamped, part.shape), strict=True):
-            w.put(f"store {part.shape.type} {result}, ptr {slots[node]}, align 64")
+    _write_substep(w, parts, fixed, inputs, slots, fractions)
     w.put("%j.next = add i64 %j, 1")
     w.put(f"br i1 {w.let('icmp slt i64 %j.next, %m')}, label %inner, label %next")
 
@@ -181,15 +166,56 @@ def _run(parts: Sequence[TracePart]) -> Writer:
     w.put(f"br i1 {w.let('icmp slt i64 %k.next, %n')}, label %outer, label %done")
 
     w.label("done")
+    _write_end(w, parts, fixed, slots)
+    return w
+
+
+def _fixed_values(w: Writer, parts: Sequence[TracePart]) -> Values:
+    """Write what stays during a run: parameters, setpoints, and what follows from them alone."""
+    fixed: Values = {}
+    for part in parts:
+        fixed.update(_read(w, part, "p", part.p))
+        fixed.update(_read(w, part, "r", part.r))
+    nodes = [node for part in parts for node in (*part.slopes, *part.outputs, *part.clamped)]
+    w.prepare([n for n in in_order(nodes) if not n.varies and n.op != "symbol"], fixed)
+    return fixed
+
+
+def _write_substep(
+    w: Writer,
+    parts: Sequence[TracePart],
+    fixed: Values,
+    inputs: Sequence[tuple[list[str], list[str]]],
+    slots: Mapping[Node, str],
+    fractions: Mapping[str, Mapping[Shape, str]],
+) -> None:
+    """Write one sub-step: the outputs before it, and the states after it, within their limits."""
+    at = w.let("sitofp i64 %j to double")
+    later = w.let("icmp sgt i64 %j, 0")
+    # what a later sub-step writes, the next step writes over: no branch is needed
+    row = w.let(f"add i64 %k, {w.let(f'zext i1 {later} to i64')}")
+    driving = [_levels(w, part, *read, at) for part, read in zip(parts, inputs, strict=True)]
+    levels = [_merged(at_once) for at_once in zip(*driving, strict=True)]
+    x = _states(w, parts, slots)
+    stepped = _runge_kutta(w, parts, fixed, levels, x, fractions, row)
+    values = {**fixed, **levels[2], **stepped}
+    for part in parts:
+        for node, result in zip(part.x, w.compute(part.clamped, values, part.shape), strict=True):
+            w.put(f"store {part.shape.type} {result}, ptr {slots[node]}, align 64")
+
+
+def _write_end(
+    w: Writer, parts: Sequence[TracePart], fixed: Values, slots: Mapping[Node, str]
+) -> None:
+    """Write the outputs at the last point of the grid, and the states there."""
     last = [_inputs(w, part, "%n", None)[0] for part in parts]
     final = _states(w, parts, slots)
     levels = [_in_every_lane(w, part, u) for part, u in zip(parts, last, strict=True)]
     values = {**fixed, **_merged(levels), **final}
     for part in parts:
         _write_outputs(w, part, values, "%n")
-        for row_, node in enumerate(part.x):
-            w.store(final[node], f"%{part.mark}x", row_, part.shape)
-    return w
+        for row, node in enumerate(part.x):
+            w.store(final[node], f"%{part.mark}x", row, part.shape)
 
 
 def _fraction(w: Writer, parts: Sequence[TracePart], divisor: int) -> Mapping[Shape, str]:

@@ -301,14 +301,14 @@ def in_order(targets: Iterable[Node]) -> Iterator[Node]:
 def tangents(targets: Iterable[Node], seeds: Mapping[Node, Node]) -> list[Node]:
     """Return the exact derivative of each target, given the tangents of the symbols."""
     targets = list(targets)
-    known: dict[Node, Node] = dict(seeds)
+    derivatives: dict[Node, Node] = dict(seeds)
     for node in list(in_order(targets)):
-        if node not in known and any(operand in known for operand in node.operands):
+        if node not in derivatives and any(operand in derivatives for operand in node.operands):
             zero = node.graph.constant(0.0)
-            inner = [known.get(operand, zero) for operand in node.operands]
+            inner = [derivatives.get(operand, zero) for operand in node.operands]
             if node.op not in TRUTHS:
-                known[node] = _tangent(node, inner)
-    return [known.get(node, node.graph.constant(0.0)) for node in targets]
+                derivatives[node] = _tangent(node, inner)
+    return [derivatives.get(node, node.graph.constant(0.0)) for node in targets]
 
 
 def _tangent(node: Node, t: list[Node]) -> Node:
@@ -349,11 +349,11 @@ def evaluate(targets: Iterable[Node], values: Mapping[Node, Any]) -> dict[Node, 
 
     They may be arrays, which broadcast: the instants of a run, or the directions of a tangent.
     """
-    known: dict[Node, Any] = dict(values)
+    computed: dict[Node, Any] = dict(values)
     for node in in_order(targets):
-        if node not in known:
-            known[node] = _value(node, [known[operand] for operand in node.operands])
-    return known
+        if node not in computed:
+            computed[node] = _value(node, [computed[operand] for operand in node.operands])
+    return computed
 
 
 def _value(node: Node, args: list[Any]) -> Any:

@@ -83,9 +83,9 @@ class Writer:
         """Write a scalar into every lane."""
         if shape.lanes == 1:
             return scalar
-        one = self.let(f"insertelement {shape.type} poison, double {scalar}, i64 0")
+        first = self.let(f"insertelement {shape.type} poison, double {scalar}, i64 0")
         mask = f"<{shape.lanes} x i32> zeroinitializer"
-        return self.let(f"shufflevector {shape.type} {one}, {shape.type} poison, {mask}")
+        return self.let(f"shufflevector {shape.type} {first}, {shape.type} poison, {mask}")
 
     def address(self, base: str, row: int | str, lanes: int = 1) -> str:
         """Write the address of a row of an array."""

@@ -107,7 +107,7 @@ class Valley:
         if len(guess) == 1 or half_square(residuals_at(self.fun, guess)) == inf:
             cost = half_square(residuals_at(self.fun, guess))
             return self.spot(guess, cost) if isfinite(cost) else None
-        found = least_squares(
+        result = least_squares(
             lambda z: self.fun(whole(z)),
             guess[rest],
             lambda z: np.asarray(self.jac(whole(z)))[:, rest],
@@ -117,9 +117,9 @@ class Valley:
             ftol=FINE * self.rise / max(self.bottom.cost, self.rise),
             x_scale=self.box.unit[rest] if self.scaled else None,
         )
-        if found.stop is Stop.INTERRUPTED:
+        if result.stop is Stop.INTERRUPTED:
             raise KeyboardInterrupt
-        return self.spot(whole(found.x), found.cost)
+        return self.spot(whole(result.x), result.cost)
 
     def tangent(self, index: int) -> tuple[Array, float]:
         """Return how all move with one parameter (N,), and by how much it moves up to the rise.
@@ -131,9 +131,9 @@ class Valley:
         if not np.isfinite(self.slopes).all():
             return direction, inf
         direction[direction == 0.0] = -np.linalg.lstsq(others, column, rcond=UNSEEN)[0]
-        seen = float(np.linalg.norm(self.slopes @ direction))
-        flat = seen <= UNSEEN * float(np.linalg.norm(column))
-        return direction, inf if flat else sqrt(2.0 * self.rise) / seen
+        effect = float(np.linalg.norm(self.slopes @ direction))
+        flat = effect <= UNSEEN * float(np.linalg.norm(column))
+        return direction, inf if flat else sqrt(2.0 * self.rise) / effect
 
 
 @dataclass
@@ -200,23 +200,23 @@ def profiles(
     start, box = checked(x, bounds, x_scale)
     if not rise > 0.0:
         raise ValueError(f"rise: {rise} is not above 0")
-    stop, moved = Event(), False
-    asked = until(stop, fun), until(stop, jac)
+    stop, lower_found = Event(), False
+    counted = until(stop, fun), until(stop, jac)
     for restarts in range(MOST_MINIMA + 1):
         cost = half_square(residuals_at(fun, start))
         if cost == inf:
             raise ValueError("the residuals at x are not finite")
         bottom = Spot(start, cost, 0.0)
         slopes = exact(jac, start)
-        valley = Valley(*asked, box, x_scale is not None, bottom, slopes, rise, points)
+        valley = Valley(*counted, box, x_scale is not None, bottom, slopes, rise, points)
         limit = cost - LOWER * rise if restarts < MOST_MINIMA else -inf
         sides = [Side(index, sign, [bottom]) for index in indices for sign in (-1, 1)]
         lowest = walk_all(valley, sides, limit, workers, watch, stop)
         if stop.is_set() or lowest.cost >= limit:
             break
-        start, moved = bottom_near(valley, lowest.x), True
+        start, lower_found = bottom_near(valley, lowest.x), True
     pairs = zip(sides[::2], sides[1::2], strict=True)
-    return tuple(joined(below, above, bottom, moved) for below, above in pairs)
+    return tuple(joined(below, above, bottom, lower_found) for below, above in pairs)
 
 
 def bottom_near(valley: Valley, x: Array) -> Array:
@@ -226,7 +226,7 @@ def bottom_near(valley: Valley, x: Array) -> Array:
     return least_squares(valley.fun, x, valley.jac, bounds, "lm-then-dgn", x_scale=unit).x
 
 
-def joined(below: Side, above: Side, bottom: Spot, moved: bool) -> CostProfile:
+def joined(below: Side, above: Side, bottom: Spot, lower_found: bool) -> CostProfile:
     """Return the profile of two sides."""
     spots = [*below.spots[:0:-1], *above.spots]
     return CostProfile(
@@ -239,7 +239,7 @@ def joined(below: Side, above: Side, bottom: Spot, moved: bool) -> CostProfile:
         ends=(below.end, above.end),
         x=bottom.x,
         cost=bottom.cost,
-        moved=moved,
+        moved=lower_found,
     )
 
 

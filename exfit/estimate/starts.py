@@ -105,7 +105,7 @@ def multistart(
     nothing = gtol**2 * float(np.median(costs[chosen])) if chosen else 0.0
 
     def descend(k: int) -> None:
-        found = least_squares(
+        result = least_squares(
             until(stop, fun),
             points[k],
             until(stop, jac),
@@ -118,9 +118,9 @@ def multistart(
             x_scale=x_scale,
             good_enough=good_enough,
         )
-        if found.stop is Stop.INTERRUPTED:
+        if result.stop is Stop.INTERRUPTED:
             raise KeyboardInterrupt
-        ends[k] = end_of(found, nothing)
+        ends[k] = end_of(result, nothing)
 
     def tell(_: None) -> None:
         lowest = min(end.result.cost for end in tuple(ends.values()))
@@ -201,13 +201,13 @@ class StartOutcome:
     step: float
 
 
-def end_of(found: Result, nothing: float) -> StartOutcome:
+def end_of(result: Result, nothing: float) -> StartOutcome:
     """Return the end that a refinement came to; ``nothing`` is what a perfect match may cost."""
-    freedom = max(1, len(found.fun) - len(found.x))
-    step = UNTOLD**2 * found.cost / freedom + nothing
-    triangle = np.asarray(np.linalg.qr(found.jac, mode="r"), dtype=np.float64)
+    freedom = max(1, len(result.fun) - len(result.x))
+    step = UNTOLD**2 * result.cost / freedom + nothing
+    triangle = np.asarray(np.linalg.qr(result.jac, mode="r"), dtype=np.float64)
     return StartOutcome(
-        replace(found, fun=np.zeros(0), jac=np.zeros((0, len(found.x)))), triangle, step
+        replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x)))), triangle, step
     )
 
 

@@ -22,12 +22,12 @@ def side_by_side(
     task: Callable[[Item], Done],
     items: Sequence[Item],
     workers: int | None,
-    told: Callable[[Done], object],
+    receive: Callable[[Done], object],
     stop: Event,
 ) -> None:
     """Do a task for every item in ``workers`` threads.
 
-    ``told`` is called with every result, in the thread that waits here. KeyboardInterrupt, there
+    ``receive`` is called with every result, in the thread that waits here. KeyboardInterrupt, there
     or in a task, sets ``stop``, which tasks obey by ``until``, and drops what has not begun. Any
     other exception does so too and is raised. None takes as many threads as there are processors.
     """
@@ -37,7 +37,7 @@ def side_by_side(
         for item in items:
             pool.submit(task, item).add_done_callback(finished.put)
         for _ in items:
-            told(next_of(finished).result())
+            receive(next_of(finished).result())
     except KeyboardInterrupt:
         stop.set()
     except BaseException:

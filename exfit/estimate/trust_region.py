@@ -117,5 +117,5 @@ def free_part(linear: LinearModel) -> tuple[Array, Array]:
         return linear.singular[:k], linear.amounts[:k]
     A = linear.singular[:k, None] * linear.directions[:k, free]
     left, s, _ = np.linalg.svd(A, full_matrices=False)
-    seen = s > linear.unseen * max(np.max(s, initial=0.0), TINY)
-    return s[seen], (left.T @ linear.amounts[:k])[seen]
+    determined = s > linear.unseen * max(np.max(s, initial=0.0), TINY)
+    return s[determined], (left.T @ linear.amounts[:k])[determined]

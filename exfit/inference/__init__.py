@@ -4,7 +4,7 @@ Arrays in, results out: a `Linearisation` of the fit at its minimum gives `confi
 errors, intervals) and `identifiability` (what can move together unseen, and what to fix).
 """
 
-from exfit.inference.combinations import WEAK, Combination, ParameterShift
+from exfit.inference.combinations import WEAK, Combination, SignalChange
 from exfit.inference.confidence import (
     LEVEL,
     UNDETERMINED,
@@ -28,9 +28,9 @@ __all__ = [
     "Identifiability",
     "Linearisation",
     "Noise",
-    "ParameterShift",
     "PriorRow",
     "ResidualBlock",
+    "SignalChange",
     "Uncertainty",
     "confidence",
     "identifiability",

@@ -22,7 +22,7 @@ TIED = 6  # digits: components that differ less are equal but for rounding
 
 
 @dataclass(frozen=True)
-class ParameterShift:
+class SignalChange:
     """By how much a signal moves: root mean square, in pu and in standard deviations of noise."""
 
     signal: str
@@ -40,7 +40,7 @@ class Combination:
     """
 
     moves: tuple[tuple[str, float], ...]
-    changes: tuple[ParameterShift, ...]
+    changes: tuple[SignalChange, ...]
     error: float | None
     exact: bool
     sentence: str
@@ -50,7 +50,8 @@ class Combination:
         return {
             "moves": dict(self.moves),
             "changes": [
-                {name: finite(value) for name, value in asdict(one).items()} for one in self.changes
+                {name: finite(value) for name, value in asdict(change).items()}
+                for change in self.changes
             ],
             "error": self.error,
             "exact": self.exact,
@@ -63,10 +64,10 @@ def seen_directions(factors: Factors, noise: Sequence[Noise]) -> tuple[Array, Ar
 
     Those without any effect come last, with singular value 0.
     """
-    lin, seen, count = factors.lin, factors.seen, len(factors.null)
+    lin, has_effect, count = factors.lin, factors.has_effect, len(factors.null)
     rounding = np.finfo(float).eps * np.max(np.abs(lin.relative), initial=0.0)
-    spread = lin.by_row([np.fmax(one.spread, rounding) for one in noise])
-    rows = np.vstack([lin.relative / spread[:, None], lin.prior_rows])[:, seen]
+    spread = lin.by_row([np.fmax(channel_noise.spread, rounding) for channel_noise in noise])
+    rows = np.vstack([lin.relative / spread[:, None], lin.prior_rows])[:, has_effect]
     _, singular, directions = tall_svd(rows)
     if count:
         singular[-count:], directions[-count:] = 0.0, np.linalg.qr(factors.null.T)[0].T
@@ -74,19 +75,19 @@ def seen_directions(factors: Factors, noise: Sequence[Noise]) -> tuple[Array, Ar
 
 
 def exact_combinations(lin: Linearisation, noise: Sequence[Noise]) -> Iterator[Combination]:
-    """Yield what nothing tells apart, those on a bound too: it may be why they are there."""
+    """Yield what changes no signal; parameters on a bound too: this may be why they are there."""
     factors = factored(lin, np.ones(len(lin.names), dtype=bool))
-    signals = listed([one.label for one in lin.channels])
-    still = tuple(ParameterShift(one.label, 0.0, 0.0) for one in lin.channels)
-    for k in np.flatnonzero(~factors.seen):
+    signals = listed([block.label for block in lin.channels])
+    still = tuple(SignalChange(block.label, 0.0, 0.0) for block in lin.channels)
+    for k in np.flatnonzero(~factors.has_effect):
         name = lin.names[k]
         text = f"{name} has no effect on {signals}: fix it"
         yield Combination(((name, EXACT_MOVE),), still, None, True, text)
-    kept = np.flatnonzero(factors.seen)
+    with_effect = np.flatnonzero(factors.has_effect)
     for direction, joined in zip(factors.null, factors.joined, strict=True):
-        moves = ordered(kept[joined], EXACT_MOVE * direction[joined])
-        told = f"{together(lin, moves)} without any change of {signals}: fix one of them"
-        yield Combination(named(lin, moves), still, None, True, told)
+        moves = ordered(with_effect[joined], EXACT_MOVE * direction[joined])
+        sentence = f"{together(lin, moves)} without any change of {signals}: fix one of them"
+        yield Combination(named(lin, moves), still, None, True, sentence)
 
 
 def weak_combinations(
@@ -97,30 +98,38 @@ def weak_combinations(
         if value == 0.0 or value * WEAK >= 1.0:
             continue
         step = direction / value
-        shown = np.abs(step) > SHOWN * np.max(np.abs(step))
-        moves = ordered(kept[shown], step[shown])
+        large = np.abs(step) > SHOWN * np.max(np.abs(step))
+        moves = ordered(kept[large], step[large])
         changes = tuple(changes_of(lin, noise, lin.relative[:, kept] @ step))
-        told = f"{together(lin, moves)}: {effects(changes)}"
-        yield Combination(named(lin, moves), changes, 1.0 / float(value), False, told)
+        sentence = f"{together(lin, moves)}: {effects(changes)}"
+        yield Combination(named(lin, moves), changes, 1.0 / float(value), False, sentence)
 
 
-def changes_of(
-    lin: Linearisation, noise: Sequence[Noise], moved: Array
-) -> Iterator[ParameterShift]:
-    """Yield what each channel does when the weighted errors move (M,)."""
-    for channel, one in zip(lin.channels, noise, strict=True):
-        rms = float(np.linalg.norm(moved[channel.rows])) / sqrt(one.samples)
-        yield ParameterShift(channel.label, rms / channel.weight, rms / one.std if one.std else inf)
+def changes_of(lin: Linearisation, noise: Sequence[Noise], errors: Array) -> Iterator[SignalChange]:
+    """Yield by how much each channel changes with the weighted errors (M,)."""
+    for channel, channel_noise in zip(lin.channels, noise, strict=True):
+        rms = float(np.linalg.norm(errors[channel.rows])) / sqrt(channel_noise.samples)
+        yield SignalChange(
+            channel.label,
+            rms / channel.weight,
+            rms / channel_noise.std if channel_noise.std else inf,
+        )
 
 
-def effects(changes: Sequence[ParameterShift]) -> str:
+def effects(changes: Sequence[SignalChange]) -> str:
     """Return "vt changes by 3e-6 pu rms, 0.03 of its noise; efd by 5e-4 pu, 0.02"."""
     first, *others = changes
-    told = (
+    of_first = (
         f"{first.signal} changes by {digits(first.rms)} pu rms, {digits(first.noises)} of its noise"
     )
     return "; ".join(
-        [told, *(f"{one.signal} by {digits(one.rms)} pu, {digits(one.noises)}" for one in others)]
+        [
+            of_first,
+            *(
+                f"{change.signal} by {digits(change.rms)} pu, {digits(change.noises)}"
+                for change in others
+            ),
+        ]
     )
 
 

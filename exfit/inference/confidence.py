@@ -55,13 +55,14 @@ class Confidence:
         return {
             "level": self.level,
             "dof": finite(self.dof),
-            "parameters": {name: asdict(one) for name, one in self.parameters.items()},
+            "parameters": {name: asdict(entry) for name, entry in self.parameters.items()},
             "correlation": {
                 "names": list(self.names),
                 "matrix": [[finite(x) for x in row] for row in self.correlation.tolist()],
             },
             "noise": [
-                {name: finite(value) for name, value in asdict(one).items()} for one in self.noise
+                {name: finite(value) for name, value in asdict(entry).items()}
+                for entry in self.noise
             ],
             "sentences": list(self.sentences),
         }
@@ -82,7 +83,7 @@ def confidence(lin: Linearisation) -> Confidence:
     """
     factors = factored(lin, lin.free)
     noise = noise_of(factors)
-    relative = factors.covariance(tuple(one.spread for one in noise))
+    relative = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
     errors = np.sqrt(np.diag(relative))
     dof = degrees_of_freedom(factors, noise)
     with np.errstate(invalid="ignore"):
@@ -95,12 +96,14 @@ def confidence(lin: Linearisation) -> Confidence:
         covariance=relative * np.outer(lin.size, lin.size),
         correlation=correlation,
         noise=noise,
-        sentences=tuple(text for one in noise for text in one.sentences(len(noise) == 1)),
+        sentences=tuple(
+            text for channel_noise in noise for text in channel_noise.sentences(len(noise) == 1)
+        ),
         dof=dof,
     )
 
 
-def rises(lin: Linearisation, known: Confidence) -> dict[str, float]:
+def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
     """Return by how much the cost rises from its minimum to the ends of each profile's interval.
 
     Half the squared quantile of Student's t, times the variance of the parameter over that by the
@@ -111,20 +114,22 @@ def rises(lin: Linearisation, known: Confidence) -> dict[str, float]:
     """
     from scipy.special import stdtrit
 
-    half = 0.5 * float(stdtrit(known.dof, 0.5 * (1.0 + LEVEL))) ** 2
-    squares = [one.spread**2 for one in known.noise]
-    mean = float(np.average(squares, weights=[one.samples for one in known.noise]))
+    half = 0.5 * float(stdtrit(intervals.dof, 0.5 * (1.0 + LEVEL))) ** 2
+    squares = [channel_noise.spread**2 for channel_noise in intervals.noise]
+    mean = float(
+        np.average(squares, weights=[channel_noise.samples for channel_noise in intervals.noise])
+    )
     plain = np.diag(factored(lin, lin.free).inverse) * lin.size**2
-    ratios = np.diag(known.covariance) / plain
+    ratios = np.diag(intervals.covariance) / plain
     ratios = np.where(np.isfinite(ratios), ratios, mean)
     return dict(zip(lin.names, (half * ratios).tolist(), strict=True))
 
 
 def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
     """Return the effective samples less the parameters that they determine, at least 1."""
-    if all(one.accepted and one.inflation == 1.0 for one in noise):
+    if all(channel_noise.accepted and channel_noise.inflation == 1.0 for channel_noise in noise):
         return inf
-    return max(sum(one.effective for one in noise) - factors.leverage, 1.0)
+    return max(sum(channel_noise.effective for channel_noise in noise) - factors.leverage, 1.0)
 
 
 def uncertainty(factors: Factors, k: int, share: float, dof: float) -> Uncertainty:
@@ -151,15 +156,15 @@ def reason(factors: Factors, k: int, share: float) -> str | None:
     """Return why a parameter has no interval."""
     lin = factors.lin
     if lin.held[k] is not None:
-        told = "the bound decides, not the record; the others hold for it there"
-        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: {told}"
-    if not factors.seen[k]:
+        words = "the bound decides, not the record; the others hold for it there"
+        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: {words}"
+    if not factors.has_effect[k]:
         return "has no effect on the record"
     if not factors.determined[k]:
-        return f"cannot be told apart from {listed(factors.others(k))}"
+        return f"cannot be distinguished from {listed(factors.others(k))}"
     if not isfinite(share):
         return "the record has no more samples than the fit has parameters"
     if share > UNDETERMINED:
-        told = error(lin, k, share)
-        return f"is not determined by the record: standard error {told}; see `exfit profile`"
+        words = error(lin, k, share)
+        return f"is not determined by the record: standard error {words}; see `exfit profile`"
     return None

@@ -16,14 +16,14 @@ TAKES_PART = 0.01  # of the largest component of a direction
 class Factors:
     """The rows of a fit, errors and priors, over relative changes of k parameters: rank r.
 
-    seen    (N,) which parameters these are: those asked for that have an effect
+    has_effect (N,) which parameters these are: those asked for that have an effect
     left    (R, r) and spread (k, r): the pseudo-inverse of the rows is spread left'
     null    (d, k) relative changes without any effect, largest component 1, sparse
     joined  (d, k) which parameters take part in them
     """
 
     lin: Linearisation
-    seen: Mask
+    has_effect: Mask
     left: Array
     spread: Array
     null: Array
@@ -37,9 +37,9 @@ class Factors:
     @cached_property
     def determined(self) -> Mask:
         """Which of all parameters (N,) are determined at all."""
-        found = np.zeros(len(self.seen), dtype=np.bool_)
-        found[self.seen] = ~self.joined.any(axis=0)
-        return found
+        determined = np.zeros(len(self.has_effect), dtype=np.bool_)
+        determined[self.has_effect] = ~self.joined.any(axis=0)
+        return determined
 
     def covariance(self, noise: tuple[float, ...]) -> Array:
         """Return the covariance of relative changes (N, N), nan where nothing is determined.
@@ -63,16 +63,16 @@ class Factors:
         """Return root root' (k, k) for all parameters (N, N), nan where nothing is determined."""
         count = len(self.lin.names)
         whole = np.full((count, count), np.nan)
-        whole[np.ix_(self.seen, self.seen)] = root @ root.T
+        whole[np.ix_(self.has_effect, self.has_effect)] = root @ root.T
         whole[~self.determined, :] = whole[:, ~self.determined] = np.nan
         return whole
 
     def others(self, index: int) -> list[str]:
-        """Return the names of the parameters that one cannot be told apart from."""
-        at = int(np.count_nonzero(self.seen[:index]))
+        """Return the names of the parameters that one cannot be distinguished from."""
+        at = int(np.count_nonzero(self.has_effect[:index]))
         together = np.asarray(self.joined[self.joined[:, at]].any(axis=0))
         together[at] = False
-        return [self.lin.names[k] for k in np.flatnonzero(self.seen)[together]]
+        return [self.lin.names[k] for k in np.flatnonzero(self.has_effect)[together]]
 
 
 def factored(lin: Linearisation, kept: Mask) -> Factors:
@@ -84,13 +84,13 @@ def factored(lin: Linearisation, kept: Mask) -> Factors:
     weight = lin.by_row([np.sqrt(lin.mean_curvature(channel)) for channel in lin.channels])
     rows = np.vstack([lin.relative * weight[:, None], lin.prior_rows * lin.prior_noise[:, None]])
     lengths = np.linalg.norm(rows, axis=0)
-    seen = kept & (lengths > NO_EFFECT * np.max(lengths, initial=0.0))
-    left, singular, directions = tall_svd(rows[:, seen] / lengths[seen])
+    has_effect = kept & (lengths > NO_EFFECT * np.max(lengths, initial=0.0))
+    left, singular, directions = tall_svd(rows[:, has_effect] / lengths[has_effect])
     some = singular > EXACTLY_REDUNDANT * np.max(singular, initial=0.0)
-    null = sparse(directions[~some] / lengths[seen])
-    joined = takes_part(null) | takes_part(null * lengths[seen])
-    spread = directions[some].T / singular[some] / lengths[seen][:, None]
-    return Factors(lin, seen, left[:, some], spread, null, joined)
+    null = sparse(directions[~some] / lengths[has_effect])
+    joined = takes_part(null) | takes_part(null * lengths[has_effect])
+    spread = directions[some].T / singular[some] / lengths[has_effect][:, None]
+    return Factors(lin, has_effect, left[:, some], spread, null, joined)
 
 
 def tall_svd(rows: Array) -> tuple[Array, Array, Array]:

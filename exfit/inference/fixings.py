@@ -49,13 +49,15 @@ def fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
     model = ~np.array(lin.nuisances, dtype=bool)
     before = now = errors_of(factors, noise)
     fixed: list[int] = []
-    while np.count_nonzero(factors.seen & model) > 1 and np.any(now[factors.seen & model] > WEAK):
+    while np.count_nonzero(factors.has_effect & model) > 1 and np.any(
+        now[factors.has_effect & model] > WEAK
+    ):
         fixed.append(next_to_fix(factors, noise, model))
-        kept = factors.seen.copy()
+        kept = factors.has_effect.copy()
         kept[fixed] = False
         factors = factored(lin, kept)
         now = errors_of(factors, noise)
-        others = np.flatnonzero(factors.seen & model)
+        others = np.flatnonzero(factors.has_effect & model)
         yield Fixing(
             tuple(lin.names[k] for k in fixed),
             {lin.names[k]: (float(before[k]), float(now[k])) for k in others},
@@ -65,7 +67,7 @@ def fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
 
 def errors_of(factors: Factors, noise: Sequence[Noise]) -> Array:
     """Return the relative standard errors of the parameters (N,), infinite if not determined."""
-    covariance = factors.covariance(tuple(one.spread for one in noise))
+    covariance = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
     return np.where(factors.determined, np.sqrt(np.diag(covariance)), inf)
 
 
@@ -74,12 +76,12 @@ def next_to_fix(factors: Factors, noise: Sequence[Noise], model: Mask) -> int:
     from scipy.linalg import qr
 
     singular, directions = seen_directions(factors, noise)
-    own = np.flatnonzero(model[factors.seen])
+    own = np.flatnonzero(model[factors.has_effect])
     parts = np.round(directions[:, own], TIED)
     # the last one at least: a fit may know less than its record, if it weights signals badly
     limit = 0.0 if singular[-1] == 0.0 else max(1.0 / WEAK, singular[-1])
     pick = qr(parts[singular <= limit], mode="r", pivoting=True)[1][0]
-    return int(np.flatnonzero(factors.seen)[own[pick]])
+    return int(np.flatnonzero(factors.has_effect)[own[pick]])
 
 
 def fixing_sentence(

@@ -53,12 +53,12 @@ class Identifiability:
             "directions": self.directions.tolist(),
             "condition": finite(self.condition),
             "correlation": [[finite(x) for x in row] for row in self.correlation.tolist()],
-            "unseen": [one.as_json() for one in self.unseen],
-            "suggestion": [one.as_json() for one in self.suggestion],
+            "unseen": [entry.as_json() for entry in self.unseen],
+            "suggestion": [entry.as_json() for entry in self.suggestion],
         }
 
 
-def identifiability(lin: Linearisation, known: Confidence) -> Identifiability:
+def identifiability(lin: Linearisation, intervals: Confidence) -> Identifiability:
     """Return which combinations of parameters the record does not see, and what would help.
 
     Singular values and right directions of the Jacobian to relative changes
@@ -66,18 +66,18 @@ def identifiability(lin: Linearisation, known: Confidence) -> Identifiability:
     along a direction. Priors are rows too.
     """
     factors = factored(lin, lin.free)
-    singular, directions = seen_directions(factors, known.noise)
-    kept = np.flatnonzero(factors.seen)
+    singular, directions = seen_directions(factors, intervals.noise)
+    kept = np.flatnonzero(factors.has_effect)
     smallest = float(np.min(singular, initial=inf))
     return Identifiability(
         names=tuple(lin.names[k] for k in kept),
         singular_values=singular,
         directions=directions,
         condition=float(singular[0]) / smallest if smallest > 0.0 and len(kept) else inf,
-        correlation=known.correlation[np.ix_(kept, kept)],
+        correlation=intervals.correlation[np.ix_(kept, kept)],
         unseen=(
-            *exact_combinations(lin, known.noise),
-            *weak_combinations(lin, known.noise, kept, singular, directions),
+            *exact_combinations(lin, intervals.noise),
+            *weak_combinations(lin, intervals.noise, kept, singular, directions),
         ),
-        suggestion=tuple(fixings(factors, known.noise)),
+        suggestion=tuple(fixings(factors, intervals.noise)),
     )

@@ -98,9 +98,9 @@ class Linearisation:
                 raise ValueError(f"{name}: shape {getattr(self, name).shape}, not {shape}")
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"{name}: not finite")
-        if sum(len(self.errors[one.samples]) for one in self.channels) != samples:
+        if sum(len(self.errors[block.samples]) for block in self.channels) != samples:
             raise ValueError(f"channels: must cover the {samples} errors")
-        if sum(len(self.jacobian[one.rows]) for one in self.channels) != rows:
+        if sum(len(self.jacobian[block.rows]) for block in self.channels) != rows:
             raise ValueError(f"channels: must cover the {rows} rows")
 
     @cached_property

@@ -20,7 +20,7 @@ class Catalogue(Mapping[str, Model]):
 
     def __init__(self, package: ModuleType) -> None:
         self.package = package.__name__
-        self.names = tuple(sorted(one.name.upper() for one in iter_modules(package.__path__)))
+        self.names = tuple(sorted(file.name.upper() for file in iter_modules(package.__path__)))
 
     def __getitem__(self, name: str) -> Model:
         if name not in self.names:
@@ -59,12 +59,12 @@ def find(name: str, folder: Path) -> Model:
     if wanted in MODELS:
         return MODELS[wanted]
     # an alias mostly ends with the name, as ESAC1A does: the fewest files are loaded
-    for known in sorted(MODELS, key=lambda known: not wanted.endswith(known)):
-        if wanted in MODELS[known].aliases:
-            return MODELS[known]
+    for listed in sorted(MODELS, key=lambda listed: not wanted.endswith(listed)):
+        if wanted in MODELS[listed].aliases:
+            return MODELS[listed]
     import difflib
 
-    names = [known for found in MODELS.values() for known in (found.name, *found.aliases)]
+    names = [listed for entry in MODELS.values() for listed in (entry.name, *entry.aliases)]
     near = difflib.get_close_matches(wanted, names, n=1)
     hint = f"; did you mean {near[0]}?" if near else ""
     raise ModelError(f"{name} is not in the catalogue ({', '.join(names)}){hint}")

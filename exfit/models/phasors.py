@@ -15,7 +15,7 @@ def modulus(a: Signal, b: Signal) -> Signal:
 def angle(x: Signal, y: Signal) -> Signal:
     """Return the angle of the point (x, y), in radians between -pi and pi; not for x = y = 0."""
     size = sqrt(x * x + y * y)
-    found = where(y < 0.0, -pi / 2.0, pi / 2.0) * (1.0 - x / size)
+    radians = where(y < 0.0, -pi / 2.0, pi / 2.0) * (1.0 - x / size)
     for _ in range(NEWTON_STEPS):
-        found = found + (y * cos(found) - x * sin(found)) / size
-    return found
+        radians = radians + (y * cos(radians) - x * sin(radians)) / size
+    return radians

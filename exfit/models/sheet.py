@@ -1,6 +1,6 @@
 """A model as data: its data sheet, its states and its functions."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -98,29 +98,10 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
     Raises ModelError where one is missing: a docstring ``NAME: title``, then the drawing, and
     SHEET, STATES, equations and rest.
     """
-    missing = [
-        part for part in ("__doc__", "SHEET", "STATES", "equations", "rest") if not parts.get(part)
-    ]
-    if missing:
-        raise ModelError(f"model {name}: its file lacks {', '.join(missing)}")
-    if not all(isinstance(row, Parameter) for row in parts["SHEET"]):
-        raise ModelError(f"model {name}: its SHEET is not what sheet(...) returns")
-    states, setpoints = parts["STATES"], parts.get("SETPOINTS", "")
-    functions = parts["equations"], parts["rest"]
-    if not (
-        isinstance(states, str) and isinstance(setpoints, str) and all(map(callable, functions))
-    ):
-        raise ModelError(
-            f"model {name}: STATES (and SETPOINTS) is a text of names, equations and rest are "
-            "functions"
-        )
-    for part, names in (
-        ("STATES", [*states.split(), *setpoints.split()]),
-        ("SHEET", [row.symbol for row in parts["SHEET"]]),
-    ):
-        twice = sorted({one for one in names if names.count(one) > 1})
-        if twice:
-            raise ModelError(f"model {name}: {part}: {', '.join(twice)} stands there twice")
+    _refuse_incomplete(name, parts)
+    states, setpoints = parts["STATES"].split(), parts.get("SETPOINTS", "").split()
+    _refuse_repeated(name, "STATES", [*states, *setpoints])
+    _refuse_repeated(name, "SHEET", [row.symbol for row in parts["SHEET"]])
     title, _, drawing = str(parts["__doc__"]).partition("\n")
     return Model(
         name=name,
@@ -128,13 +109,38 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         drawing=drawing.strip("\n"),
         aliases=tuple(parts.get("ALIASES", ())),
         sheet=tuple(parts["SHEET"]),
-        states=tuple(states.split()),
-        setpoints=tuple(setpoints.split()),
+        states=tuple(states),
+        setpoints=tuple(setpoints),
         records=tuple(parts.get("RECORDS", ())),
         inputs=tuple(parts.get("INPUTS", ())),
         equations=parts["equations"],
         rest=parts["rest"],
     )
+
+
+def _refuse_incomplete(name: str, parts: Mapping[str, Any]) -> None:
+    """Raise ModelError where a file lacks a part of a model, or one is of another kind."""
+    missing = [
+        part for part in ("__doc__", "SHEET", "STATES", "equations", "rest") if not parts.get(part)
+    ]
+    if missing:
+        raise ModelError(f"model {name}: its file lacks {', '.join(missing)}")
+    if not all(isinstance(row, Parameter) for row in parts["SHEET"]):
+        raise ModelError(f"model {name}: its SHEET is not what sheet(...) returns")
+    texts = parts["STATES"], parts.get("SETPOINTS", "")
+    functions = parts["equations"], parts["rest"]
+    if not (all(isinstance(text, str) for text in texts) and all(map(callable, functions))):
+        raise ModelError(
+            f"model {name}: STATES (and SETPOINTS) must be a text of names, equations and "
+            "rest must be functions"
+        )
+
+
+def _refuse_repeated(name: str, part: str, names: Sequence[str]) -> None:
+    """Raise ModelError where a name occurs twice."""
+    repeated = sorted({symbol for symbol in names if names.count(symbol) > 1})
+    if repeated:
+        raise ModelError(f"model {name}: {part}: duplicate name: {', '.join(repeated)}")
 
 
 def typical(rows: Sheet) -> dict[str, float]:

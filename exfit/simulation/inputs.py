@@ -32,12 +32,12 @@ class InputStep(NamedTuple):
     smooth: bool = False
 
     def share(self, part: GridSegment) -> Array:
-        """Return how much of the step the grid points (n + 1,) of a stretch have seen."""
+        """Return how much of the step the grid points (n + 1,) of a segment have seen."""
         if not self.smooth:
             return np.full(part.steps + 1, 1.0 if self.at <= part.start else 0.0)
-        seen, (near, x) = np.zeros(part.steps + 1), self._near(part)
-        seen[near], seen[near.stop :] = 0.5 + x - 0.5 * x * np.abs(x), 1.0
-        return seen
+        share, (near, x) = np.zeros(part.steps + 1), self._near(part)
+        share[near], share[near.stop :] = 0.5 + x - 0.5 * x * np.abs(x), 1.0
+        return share
 
     def share_slope(self, part: GridSegment) -> Array:
         """Return the derivative of ``share`` to the instant, 1/s; only a smooth step has it."""
@@ -77,7 +77,7 @@ class Inputs:
         return sum(made, start=0.0)
 
     def input(self, signal: str, part: GridSegment) -> Array:
-        """Return an input at the grid points (n + 1,) of a stretch."""
+        """Return an input at the grid points (n + 1,) of a segment."""
         u = np.full(part.steps + 1, self.level(signal, part.start))
         if self.recorded is not None and signal in self.recorded.signals:
             u += np.interp(part.times, self.recorded.time, self.recorded.signals[signal])

@@ -41,7 +41,7 @@ def lagrange(points: int) -> Array:
 
 
 class Interpolation:
-    """Reads a run, whose stretches lie one behind the other, at given times less a delay (s).
+    """Reads a run, whose segments lie one behind the other, at given times less a delay (s).
 
     Between grid points it interpolates with a polynomial that never reaches across an exact step of
     the inputs; at the instant of such a step it gives the values before the step. Before the start
@@ -80,10 +80,10 @@ class Interpolation:
         return [slice(first, min(first + BLOCK, count)) for first in range(0, count, BLOCK)]
 
     def __call__(self, run: Sequence[Array]) -> Array:
-        """Return samples (M, ...) of a run given as one array (n + 1, ...) per stretch."""
+        """Return samples (M, ...) of a run given as one array (n + 1, ...) per segment."""
         if self._exact is None:
             return self._read(run, self.weights)
-        # each stretch by itself: a copy of the whole run costs more than a simulation's tenth
+        # each segment by itself: a copy of the whole run costs more than a simulation's tenth
         return np.concatenate([part[k] for part, k in zip(run, self._exact, strict=True)])
 
     def slope(self, run: Sequence[Array]) -> Array:
@@ -135,21 +135,21 @@ class Interpolation:
             powers[k] = powers[k - 1] * away
         if len(self._kinds) == 1:
             return np.asarray(lagrange(*self._kinds)[rows] @ powers)
-        found = np.zeros((NEIGHBOURS, len(away)))
+        weights = np.zeros((NEIGHBOURS, len(away)))
         for n in self._kinds:
-            found += lagrange(n)[rows] @ (powers * (points == n))
-        return found
+            weights += lagrange(n)[rows] @ (powers * (points == n))
+        return weights
 
     def _read(self, run: Sequence[Array], weights: Callable[[slice], Array]) -> Array:
         whole = joined(run)
-        found = np.empty((len(self.first), *whole.shape[1:]))
+        samples = np.empty((len(self.first), *whole.shape[1:]))
         for block in self.blocks:
-            np.einsum("km,km...->m...", weights(block), whole[self.rows(block)], out=found[block])
-        return found
+            np.einsum("km,km...->m...", weights(block), whole[self.rows(block)], out=samples[block])
+        return samples
 
 
 class WholeRun:
-    """Reads a run at all points of its grid, one stretch behind the other."""
+    """Reads a run at all points of its grid, one segment behind the other."""
 
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return all points (G, ...) of a run."""
@@ -161,5 +161,5 @@ class WholeRun:
 
 
 def joined(run: Sequence[Array]) -> Array:
-    """Return a run (G, ...) of one array (n + 1, ...) per stretch, these one behind the other."""
+    """Return a run (G, ...) of one array (n + 1, ...) per segment, these one behind the other."""
     return np.concatenate(run) if len(run) > 1 else run[0]

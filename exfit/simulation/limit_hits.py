@@ -13,7 +13,9 @@ from exfit.simulation.simulator import Run, Simulator
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-ROUNDING = 1e-9  # of a limit: a state put back on it stands that near, one that passes by does not
+LIMIT_ROUNDING = (
+    1e-9  # of a limit: a state put back on it stands that near, one that passes by does not
+)
 POINTS_AT_ONCE = 16384  # of a run: the values of a whole graph along them take 50 MB
 FAR = 100.0  # times what a signal moves: a limit beyond that is a number that stands for none
 
@@ -68,8 +70,11 @@ def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
     Raises SimulationError where the start is no rest.
     """
     run = simulator.run(values)
-    found = [_hit(same, run, simulator.delay) for same in _alike(_followed(simulator, values, run))]
-    return tuple(sorted((hit for hit in found if hit is not None), key=lambda hit: hit.first))
+    hits = [
+        _hit(limiters, run, simulator.delay)
+        for limiters in _alike(_followed(simulator, values, run))
+    ]
+    return tuple(sorted((hit for hit in hits if hit is not None), key=lambda hit: hit.first))
 
 
 def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
@@ -81,41 +86,48 @@ def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
     """
     run = simulator.run(values)
     followed = _followed(simulator, values, run)
-    met = {_key(one.limiter) for one in followed if np.any(one.held)}
-    found: dict[tuple[str, str, float], Nearest] = {}
-    for one, other in _ranges(followed):
-        distance = one.limiter.sign * (one.bound - one.value)
+    met = {_key(limit_side.limiter) for limit_side in followed if np.any(limit_side.held)}
+    by_key: dict[tuple[str, str, float], Nearest] = {}
+    for limit_side, other_side in _ranges(followed):
+        distance = limit_side.limiter.sign * (limit_side.bound - limit_side.value)
         at = int(np.argmin(distance))
-        width = abs(one.bound[at] - other.bound[at])
-        moved = float(np.ptp(one.value))
-        if _key(one.limiter) not in met and 0.0 < distance[at] <= FAR * moved and width > 0.0:
-            limit, signal = one.limiter.limit, one.limiter.signal
+        width = abs(limit_side.bound[at] - other_side.bound[at])
+        span = float(np.ptp(limit_side.value))
+        if _key(limit_side.limiter) not in met and 0.0 < distance[at] <= FAR * span and width > 0.0:
+            limit, signal = limit_side.limiter.limit, limit_side.limiter.signal
             share = 100.0 * float(distance[at]) / float(width)
             near = Nearest(
-                limit, signal, float(one.bound[at]), share, float(run.time[at] + simulator.delay)
+                limit,
+                signal,
+                float(limit_side.bound[at]),
+                share,
+                float(run.time[at] + simulator.delay),
             )
-            found.setdefault(_key(one.limiter), near)
-    return tuple(sorted(found.values(), key=lambda near: near.percent))
+            by_key.setdefault(_key(limit_side.limiter), near)
+    return tuple(sorted(by_key.values(), key=lambda near: near.percent))
 
 
 def _followed(simulator: Simulator, values: Values, run: Run) -> list[Followed]:
     """Return every limiter of the system along a run."""
     system = simulator.system
-    of, every = traced(system), equation_limits(system)
-    fixed = at_rest(of, values)
+    trace_, limiters = traced(system), equation_limits(system)
+    fixed = at_rest(trace_, values)
     blocks: list[list[tuple[Array, Array]]] = []
     for first in range(0, len(run.time), POINTS_AT_ONCE):
         now = slice(first, first + POINTS_AT_ONCE)
-        courses = [run.outputs[name] for name in system.states]
-        courses += [run.inputs[name] for name in system.inputs]
-        pairs = zip((*of.x, *of.u), courses, strict=True)
-        targets = [node for one in every for node in (one.value, one.bound)]
-        known = evaluate(targets, {**fixed, **{node: course[now] for node, course in pairs}})
+        signals = [run.outputs[name] for name in system.states]
+        signals += [run.inputs[name] for name in system.inputs]
+        pairs = zip((*trace_.x, *trace_.u), signals, strict=True)
+        targets = [node for limiter in limiters for node in (limiter.value, limiter.bound)]
+        evaluated = evaluate(targets, {**fixed, **{node: samples[now] for node, samples in pairs}})
         count = len(run.time[now])
         blocks.append(
-            [(_along(known[one.value], count), _along(known[one.bound], count)) for one in every]
+            [
+                (_along(evaluated[limiter.value], count), _along(evaluated[limiter.bound], count))
+                for limiter in limiters
+            ]
         )
-    return [_follow(one, [block[k] for block in blocks]) for k, one in enumerate(every)]
+    return [_follow(limiter, [block[k] for block in blocks]) for k, limiter in enumerate(limiters)]
 
 
 def _along(value: Array | float, count: int) -> Array:
@@ -125,9 +137,9 @@ def _along(value: Array | float, count: int) -> Array:
 def _follow(limiter: EquationLimit, parts: Sequence[tuple[Array, Array]]) -> Followed:
     value, bound = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     beyond = limiter.sign * (value - bound)
-    near = ROUNDING * np.maximum(np.abs(bound), np.abs(value))
+    near = LIMIT_ROUNDING * np.maximum(np.abs(bound), np.abs(value))
     # a limit of zero has no size of its own
-    near = np.maximum(near, ROUNDING * np.max(np.abs(value), initial=0.0))
+    near = np.maximum(near, LIMIT_ROUNDING * np.max(np.abs(value), initial=0.0))
     held = beyond >= -near if limiter.stands else beyond > near
     return Followed(limiter, value, bound, held & np.isfinite(bound))
 
@@ -139,22 +151,22 @@ def _key(limiter: EquationLimit) -> tuple[str, str, float]:
 def _alike(followed: Iterable[Followed]) -> Iterable[list[Followed]]:
     """Return the limiters together that hold one signal at one limit: a drawing has it once."""
     together: dict[tuple[str, str, float], list[Followed]] = {}
-    for one in followed:
-        together.setdefault(_key(one.limiter), []).append(one)
+    for limit in followed:
+        together.setdefault(_key(limit.limiter), []).append(limit)
     return together.values()
 
 
-def _hit(same: Sequence[Followed], run: Run, delay: float) -> LimitHit | None:
-    held = np.any([one.held for one in same], axis=0)
+def _hit(limits: Sequence[Followed], run: Run, delay: float) -> LimitHit | None:
+    held = np.any([reached.held for reached in limits], axis=0)
     if not np.any(held):
         return None
     first = int(np.argmax(held))
-    one = next(one for one in same if one.held[first])
+    reached = next(reached for reached in limits if reached.held[first])
     seconds = float(np.trapezoid(held.astype(np.float64), run.time))
     return LimitHit(
-        limit=one.limiter.limit,
-        signal=one.limiter.signal,
-        value=float(one.bound[first]),
+        limit=reached.limiter.limit,
+        signal=reached.limiter.signal,
+        value=float(reached.bound[first]),
         seconds=seconds,
         first=float(run.time[first]) + delay,
         share=seconds / float(run.time[-1] - run.time[0]),
@@ -163,8 +175,8 @@ def _hit(same: Sequence[Followed], run: Run, delay: float) -> LimitHit | None:
 
 def _ranges(followed: Sequence[Followed]) -> Iterator[tuple[Followed, Followed]]:
     """Yield each limiter with the one on the other side of the same value."""
-    sides = {(one.limiter.value, one.limiter.sign): one for one in followed}
-    for (value, sign), one in sides.items():
-        other = sides.get((value, -sign))
-        if other is not None:
-            yield one, other
+    sides = {(side.limiter.value, side.limiter.sign): side for side in followed}
+    for (value, sign), side in sides.items():
+        opposite = sides.get((value, -sign))
+        if opposite is not None:
+            yield side, opposite

@@ -35,8 +35,8 @@ def traced(system: System) -> Trace:
 def at_rest(of: Trace, values: Values) -> dict[Node, Any]:
     """Return what the symbols of a graph are at rest."""
     p = {node: values[_name(node)] for node in of.p}
-    found = evaluate(of.rest, p)
-    starts = zip((*of.x, *of.r), (found[node] for node in of.rest), strict=True)
+    start = evaluate(of.rest, p)
+    starts = zip((*of.x, *of.r), (start[node] for node in of.rest), strict=True)
     return {**p, **dict(starts), **dict.fromkeys(of.u, 0.0)}
 
 
@@ -44,16 +44,16 @@ def limits_passed(system: System, values: Values) -> str:
     """Name the limits that the start would have to pass, with both values."""
     of = traced(system)
     everything = evaluate([*of.slopes, *of.outputs, *of.clamped], at_rest(of, values))
-    found = []
+    faults = []
     for node in [node for node in everything if node.op == "clip"]:
         x, low, high = (everything[operand] for operand in node.operands)
         for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
             name = limit_name(node.operands[limit])
             if passed and name:
-                found.append(
+                faults.append(
                     f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
                 )
-    return "; ".join(dict.fromkeys(found))
+    return "; ".join(dict.fromkeys(faults))
 
 
 def limit_name(node: Node) -> str:
@@ -73,16 +73,18 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     of = traced(system)
     states = {node: node for node in of.x}
     clamps = [(node, held) for node, held in zip(of.x, of.clamped, strict=True) if node is not held]
-    found = []
+    limits = []
     for state, held in clamps:
         _, low, high = held.operands
-        found += [_limiter(state, bound, sign, state) for bound, sign in ((low, -1.0), (high, 1.0))]
+        limits += [
+            _limiter(state, bound, sign, state) for bound, sign in ((low, -1.0), (high, 1.0))
+        ]
     ours = {held for _, held in clamps}
     for node in in_order([*of.slopes, *of.outputs, *of.clamped]):
         if node not in ours:
-            found += list(_clamp(node, states))
-    known = (one for one in found if one is not None)
-    return tuple(sorted(dict.fromkeys(known), key=lambda one: one.value.index))
+            limits += list(_clamp(node, states))
+    finite = (limit for limit in limits if limit is not None)
+    return tuple(sorted(dict.fromkeys(finite), key=lambda limit: limit.value.index))
 
 
 def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[EquationLimit | None]:
@@ -90,7 +92,7 @@ def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[EquationLimit | 
     if node.op == "clip":
         x, low, high = node.operands
         for bound, sign in ((low, -1.0), (high, 1.0)):
-            clamped_there = x.op == "clip" and any(bound is one for one in x.operands)
+            clamped_there = x.op == "clip" and any(bound is operand for operand in x.operands)
             if limit_name(bound) and not clamped_there:
                 yield _limiter(x, bound, sign, _state_in(x, states))
     elif node.op == "select" and node.operands[0].varies:
@@ -133,8 +135,8 @@ def _given(bound: Node) -> str:
 def _state_in(node: Node, states: Mapping[Node, Node]) -> Node | None:
     """Return the state that a node is, or is unless its lag is bypassed."""
     if node.op == "select":
-        found = (_state_in(branch, states) for branch in node.operands[1:])
-        return next((one for one in found if one is not None), None)
+        branch_states = (_state_in(branch, states) for branch in node.operands[1:])
+        return next((state for state in branch_states if state is not None), None)
     return states.get(node)
 
 

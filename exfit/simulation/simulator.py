@@ -26,7 +26,7 @@ Values = Mapping[str, float]
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
 REST_TOLERANCE = 1e-6  # pu/s: below any real motion
-ROUNDING = 1e-13  # of a state
+STATE_ROUNDING = 1e-13  # of a state, relative
 REMEMBERED = 64  # sets of values: several threads ask for a few of theirs again
 
 
@@ -82,7 +82,7 @@ def parameters_used(system: System) -> frozenset[str]:
 
 
 class Simulator:
-    """Simulates one system through one course, sampled at ``times`` (M,) in s.
+    """Simulates one system through a test's inputs, sampled at ``times`` (M,) in s.
 
     ``step`` (s) is the largest step; where the system is faster, every step is divided, into no
     fewer than ``least`` parts. A recorder's ``delay`` (s) makes it show at ``times`` the response
@@ -92,34 +92,36 @@ class Simulator:
     def __init__(
         self,
         system: System,
-        course: Inputs,
+        inputs: Inputs,
         times: Array,
         step: float,
         least: int = 1,
         delay: float = 0.0,
     ) -> None:
-        self.system, self.inputs, self.times = system, course, times
+        self.system, self.inputs, self.times = system, inputs, times
         self.step, self.least, self.delay = step, least, delay
-        self._grid = grid_segments(course, step)
-        self._inputs = [self._inputs_of(part) for part in self._grid]
+        self._grid = grid_segments(inputs, step)
+        self._input_samples = [self._inputs_of(segment) for segment in self._grid]
         self._sampling: Interpolation | WholeRun = Interpolation(self._grid, times, delay)
-        self._known: dict[bytes, int] = {}  # the sub-steps of values asked for lately
+        self._substeps_of: dict[bytes, int] = {}  # of the parameters of late
 
     def with_inputs(self, steps: tuple[InputStep, ...], delay: float) -> "Simulator":
-        """Return the simulator of the same course, whose steps and delay (s) are others.
+        """Return the simulator of the same test with other steps and another delay (s).
 
         The instant of a smooth step may be another, and the size of any. It costs little: the grid
-        and what is known of the sub-steps are shared. Raises ValueError where a step is another.
+        and the sub-steps found so far are shared. Raises ValueError where a step is another.
         """
         if [_fixed(change) for change in steps] != [_fixed(change) for change in self.inputs.steps]:
-            raise ValueError("only sizes, and the instants of smooth steps, can be moved")
+            raise ValueError("only the sizes of steps and the instants of smooth ones may change")
         pairs = zip(steps, self.inputs.steps, strict=True)
-        others = {new.signal for new, old in pairs if new != old}
+        changed = {new.signal for new, old in pairs if new != old}
         result = copy(self)
         result.inputs, result.delay = replace(self.inputs, steps=steps), delay
-        if others:
-            known = zip(self._inputs, self._grid, strict=True)
-            result._inputs = [result._inputs_with(others, u, part) for u, part in known]
+        if changed:
+            before = zip(self._input_samples, self._grid, strict=True)
+            result._input_samples = [
+                result._inputs_with(changed, u, segment) for u, segment in before
+            ]
         if delay != self.delay:
             result._sampling = Interpolation(self._grid, self.times, delay)
         return result
@@ -130,17 +132,17 @@ class Simulator:
         An instant of an exact step is there twice: before and after it.
         """
         result = copy(self)
-        result.times, result._sampling = np.concatenate([p.times for p in self._grid]), WholeRun()
+        result.times, result._sampling = (
+            np.concatenate([segment.times for segment in self._grid]),
+            WholeRun(),
+        )
         return result
 
     def sampling(self) -> Interpolation:
         """Return what reads the response at the sample times from the points of its grid."""
-        known = self._sampling
-        return (
-            known
-            if isinstance(known, Interpolation)
-            else Interpolation(self._grid, self.times, self.delay)
-        )
+        if isinstance(self._sampling, Interpolation):
+            return self._sampling
+        return Interpolation(self._grid, self.times, self.delay)
 
     @cached_property
     def time_constants(self) -> tuple[str, ...]:
@@ -155,25 +157,25 @@ class Simulator:
         of the slopes' Jacobian at rest and 1/T of every time constant that is not bypassed:
         Runge-Kutta of order four is unstable beyond 2.785, and a limit would hide it. It depends
         on the values alone, and a change of one sub-step moves a response by less than the
-        method's own error. What is faster away from rest is for ``secured``.
+        method's own error. What is faster away from rest is for ``with_enough_substeps``.
 
         Raises SimulationError where the start is no rest, or beyond ``MOST_SUBSTEPS``.
         """
         p = self._vector(values)
         key = p.tobytes()
-        parts = self._known.get(key)
+        parts = self._substeps_of.get(key)
         if parts is None:
             parts = max(self.least, self._parts(values, self._rate_at_rest(values, p)))
-            if len(self._known) >= REMEMBERED:
-                self._known.clear()
-            self._known[key] = parts
+            if len(self._substeps_of) >= REMEMBERED:
+                self._substeps_of.clear()
+            self._substeps_of[key] = parts
         return parts
 
     def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
         """Return the sub-steps that the rule asks for along a response with all its states."""
         p = self._vector(values)
         rest = linear_kernel(self.system).rest(p)
-        inputs = self._sampling(self._inputs)
+        inputs = self._sampling(self._input_samples)
         rows = np.linspace(0, len(response.time) - 1, points).astype(int)
         states = np.stack([response.signals[name][rows] for name in self.system.states], axis=1)
         code, r = linear_kernel(self.system), rest.r
@@ -205,7 +207,7 @@ class Simulator:
 
         At the points of the grid: a record with many more samples shows no more.
         """
-        times = np.unique(np.concatenate([part.times for part in self._grid]))
+        times = np.unique(np.concatenate([segment.times for segment in self._grid]))
         coarse = Simulator(self.system, self.inputs, times, self.step, self.least)
         samples, parts = coarse.samples(values, outputs)
         finer = Simulator(self.system, self.inputs, times, self.step / 2.0, parts)
@@ -232,9 +234,9 @@ class Simulator:
         p = self._vector(values)[:, None]
         run = code.run(p, code.start(p), self._spans(self.substeps(values)))
         return Run(
-            np.concatenate([part.times for part in self._grid]),
+            np.concatenate([segment.times for segment in self._grid]),
             dict(zip(self.system.outputs, joined(run)[:, :, 0].T, strict=True)),
-            dict(zip(self.system.inputs, joined(self._inputs).T, strict=True)),
+            dict(zip(self.system.inputs, joined(self._input_samples).T, strict=True)),
         )
 
     def samples_of_many(self, sets: Sequence[Values], outputs: tuple[str, ...]) -> Array:
@@ -260,29 +262,37 @@ class Simulator:
         A direction costs the same whatever moves in it; one of the delay alone costs nothing.
         Raises ValueError where one moves the instant of a step that is not smooth.
         """
-        columns = [k for k, one in enumerate(directions) if one.parameters or one.steps]
+        columns = [k for k, d in enumerate(directions) if d.parameters or d.steps]
         driving = [directions[k] for k in columns]
-        free = {name for one in driving for name in one.parameters}
-        inputs = {self.inputs.steps[k].signal for one in driving for k in one.steps}
-        code = tangent_kernel(
-            self.system,
-            outputs,
-            tuple(name for name in self.system.parameters if name in free),
-            tuple(name for name in self.system.inputs if name in inputs),
-        )
+        code = self._tangent_code(outputs, driving)
         spans = self._spans(self.substeps(values))
         if code.moving:
             spans = [
-                span._replace(du=self._moving(part, code.moving, driving))
-                for span, part in zip(spans, self._grid, strict=True)
+                span._replace(du=self._moving(segment, code.moving, driving))
+                for span, segment in zip(spans, self._grid, strict=True)
             ]
         run, derived = code.run(self._vector(values), self._seeds(driving), spans)
         slopes = np.zeros((len(self.times), len(outputs), len(directions)))
         slopes[:, :, columns] = self._sampling(derived)
-        delays = np.array([one.delay for one in directions])
+        delays = np.array([direction.delay for direction in directions])
         if np.any(delays):
             slopes -= self._sampling.slope(run)[:, :, None] * delays
         return self._sampling(run), slopes
+
+    def _tangent_code(
+        self, outputs: tuple[str, ...], directions: Sequence[Direction]
+    ) -> TangentKernel:
+        """Return the machine code whose derivatives cover what these directions move."""
+        free = {name for direction in directions for name in direction.parameters}
+        moving = {
+            self.inputs.steps[index].signal for direction in directions for index in direction.steps
+        }
+        return tangent_kernel(
+            self.system,
+            outputs,
+            tuple(name for name in self.system.parameters if name in free),
+            tuple(name for name in self.system.inputs if name in moving),
+        )
 
     def _seeds(self, directions: Sequence[Direction]) -> Array:
         """Return how each parameter moves in each direction, (np, N)."""
@@ -293,49 +303,52 @@ class Simulator:
         return seeds
 
     def _moving(
-        self, part: GridSegment, inputs: Sequence[str], directions: Sequence[Direction]
+        self, segment: GridSegment, inputs: Sequence[str], directions: Sequence[Direction]
     ) -> Array:
-        """Return how inputs move in each direction at a stretch's grid points, (n + 1, nu, N)."""
-        du = np.zeros((part.steps + 1, len(inputs), len(directions)))
+        """Return how inputs move in each direction at a segment's grid points, (n + 1, nu, N)."""
+        du = np.zeros((segment.steps + 1, len(inputs), len(directions)))
         for column, direction in enumerate(directions):
             for index, (at, step) in direction.steps.items():
                 change = self.inputs.steps[index]
                 if change.signal in inputs:
                     row = du[:, inputs.index(change.signal), column]
                     if at:
-                        row += at * change.step * change.share_slope(part)
+                        row += at * change.step * change.share_slope(segment)
                     if step:
-                        row += step * change.share(part)
+                        row += step * change.share(segment)
         return du
 
     def _with(self, step: float, least: int) -> "Simulator":
         return Simulator(self.system, self.inputs, self.times, step, least, self.delay)
 
-    def _inputs_of(self, part: GridSegment) -> Array:
-        """Return the inputs at the grid points of a stretch, (n + 1, nu)."""
-        inputs = [self.inputs.input(name, part) for name in self.system.inputs]
+    def _inputs_of(self, segment: GridSegment) -> Array:
+        """Return the inputs at the grid points of a segment, (n + 1, nu)."""
+        inputs = [self.inputs.input(name, segment) for name in self.system.inputs]
         return np.ascontiguousarray(np.stack(inputs, axis=1))
 
-    def _inputs_with(self, others: Container[str], known: Array, part: GridSegment) -> Array:
-        """Return known inputs with the others of them computed anew."""
-        u = known.copy()
+    def _inputs_with(self, changed: Container[str], before: Array, segment: GridSegment) -> Array:
+        """Return the inputs of before with the changed ones of them computed anew."""
+        u = before.copy()
         for column, name in enumerate(self.system.inputs):
-            if name in others:
-                u[:, column] = self.inputs.input(name, part)
+            if name in changed:
+                u[:, column] = self.inputs.input(name, segment)
         return u
 
     def _vector(self, values: Values) -> Array:
         return np.array([values[name] for name in self.system.parameters], dtype=np.float64)
 
     def _spans(self, parts: int) -> list[Span]:
-        return [Span(u, part.step, parts) for u, part in zip(self._inputs, self._grid, strict=True)]
+        return [
+            Span(u, segment.step, parts)
+            for u, segment in zip(self._input_samples, self._grid, strict=True)
+        ]
 
     def _rate_at_rest(self, values: Values, p: Array) -> float:
         """Return the fastest rate (1/s) at the start; raises SimulationError if that is no rest."""
         rest = linear_kernel(self.system).rest(p)
         slopes, rate = self._motion(p, rest, rest.x, np.zeros(len(self.system.inputs)))
         # what the rounding of a state leaves of its slope, at the fastest rate
-        rounding = ROUNDING * float(np.max(np.abs(rest.x))) * rate
+        rounding = STATE_ROUNDING * float(np.max(np.abs(rest.x))) * rate
         moving = ~(np.abs(slopes) <= REST_TOLERANCE + rounding)
         if np.any(moving) or not math.isfinite(rounding):
             why = self._why_moving(values, slopes, moving)

@@ -18,7 +18,7 @@ from exfit.engine.trace import Node, evaluate
 from exfit.errors import SimulationError
 from exfit.plants import MEASURED
 from exfit.simulation.limits import at_rest, limits_passed
-from exfit.simulation.simulator import REST_TOLERANCE, ROUNDING, fastest
+from exfit.simulation.simulator import REST_TOLERANCE, STATE_ROUNDING, fastest
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -109,8 +109,8 @@ class StateSpace:
         states = len(self.A)
         shifted = s[:, None, None] * np.eye(states) - self.A
         given = np.broadcast_to(self.b.astype(np.complex128)[:, None], (len(s), states, 1))
-        found = np.linalg.solve(shifted, given)[:, :, 0] @ self.c + self.d
-        return np.asarray(found, dtype=np.complex128)
+        response = np.linalg.solve(shifted, given)[:, :, 0] @ self.c + self.d
+        return np.asarray(response, dtype=np.complex128)
 
     def at(self, frequency: Array) -> ComplexArray:
         """Return the frequency response at frequencies (M,) in Hz."""
@@ -141,10 +141,10 @@ class LinearSystem(NamedTuple):
 def small_signal(system: System, values: Values, frequency: Array | None = None) -> SmallSignal:
     """Return poles, frequency responses and margins of a system at the state of rest of ``values``.
 
-    ``frequency`` (M,) in Hz is where the responses are told; by default about 400 points that span
+    ``frequency`` (M,) in Hz is where the responses are given; by default about 400 points that span
     the poles, dense around the peaks. The margins are those of Astrom and Murray, Feedback Systems
-    (2008), 9.3, at crossovers found to rounding; which states take part in a pole is told by the
-    participation factors of Perez-Arriaga, Verghese and Schweppe (1982).
+    (2008), 9.3, at crossovers refined to rounding; which states take part in a pole follows from
+    the participation factors of Perez-Arriaga, Verghese and Schweppe (1982).
 
     Raises SimulationError where the values have no state of rest.
     """
@@ -158,16 +158,16 @@ def small_signal(system: System, values: Values, frequency: Array | None = None)
     if loop is not None:
         rates += list(np.linalg.eigvals(loop.A))
     dense = spanning(rates)
-    told = dense if frequency is None else np.asarray(frequency, dtype=np.float64)
-    closed = _bode(forward, told)
-    own = closed if told is dense else _bode(forward, dense)
+    frequencies = dense if frequency is None else np.asarray(frequency, dtype=np.float64)
+    closed = _bode(forward, frequencies)
+    around_peaks = closed if frequencies is dense else _bode(forward, dense)
     return SmallSignal(
         poles=poles,
         closed=closed,
-        open=None if loop is None else _bode(loop, told),
+        open=None if loop is None else _bode(loop, frequencies),
         margins=None if loop is None else margins(loop, dense),
-        bandwidth=bandwidth(forward, own),
-        peak=_decibels(float(np.max(np.abs(own.response)))),
+        bandwidth=bandwidth(forward, around_peaks),
+        peak=_decibels(float(np.max(np.abs(around_peaks.response)))),
         path=(source, output),
     )
 
@@ -192,22 +192,22 @@ def linearised(system: System, values: Values) -> LinearSystem:
     start = at_rest(traced, values)
     seeds = np.eye(len(traced.x) + len(traced.u))
     moving: list[Node] = [node for node in (*derived.x, *derived.u) if node is not None]
-    known = {
+    symbols = {
         **start,
         **dict.fromkeys(derived.r, np.zeros(len(seeds))),
         **dict(zip(moving, seeds, strict=True)),
     }
-    found = evaluate([*traced.slopes, *derived.slopes, *derived.outputs], known)
+    derivatives = evaluate([*traced.slopes, *derived.slopes, *derived.outputs], symbols)
 
     def rows(nodes: Sequence[Node]) -> Array:
-        return np.stack([np.broadcast_to(found[node], (len(seeds),)) for node in nodes])
+        return np.stack([np.broadcast_to(derivatives[node], (len(seeds),)) for node in nodes])
 
     slopes, count = rows(derived.slopes), len(traced.x)
     _refuse_motion(
         system,
         values,
         x=np.array([float(start[node]) for node in traced.x]),
-        moving=np.array([float(found[node]) for node in traced.slopes]),
+        moving=np.array([float(derivatives[node]) for node in traced.slopes]),
         jacobian=slopes[:, :count],
     )
     # the state of a bypassed block, and one held at its limit, stays put
@@ -215,12 +215,12 @@ def linearised(system: System, values: Values) -> LinearSystem:
     outputs = (*system.outputs, MEASURED)[: len(traced.outputs)]
     out = dict(zip(outputs, rows(derived.outputs), strict=True))
     columns = {name: count + k for k, name in enumerate(system.inputs)}
-    kept = np.flatnonzero(moves)
+    moving_states = np.flatnonzero(moves)
     return LinearSystem(
-        states=tuple(system.states[k] for k in kept),
-        A=slopes[np.ix_(kept, kept)],
-        B={name: slopes[kept, column] for name, column in columns.items()},
-        C={name: row[kept] for name, row in out.items()},
+        states=tuple(system.states[k] for k in moving_states),
+        A=slopes[np.ix_(moving_states, moving_states)],
+        B={name: slopes[moving_states, column] for name, column in columns.items()},
+        C={name: row[moving_states] for name, row in out.items()},
         D={(y, u): float(out[y][column]) for y in out for u, column in columns.items()},
     )
 
@@ -229,7 +229,7 @@ def _refuse_motion(
     system: System, values: Values, x: Array, moving: Array, jacobian: Array
 ) -> None:
     """Raise SimulationError where slopes at rest are not zero, but for rounding."""
-    rounding = ROUNDING * float(np.max(np.abs(x), initial=0.0)) * fastest(jacobian)
+    rounding = STATE_ROUNDING * float(np.max(np.abs(x), initial=0.0)) * fastest(jacobian)
     if not (np.isfinite(rounding) and np.all(np.abs(moving) <= REST_TOLERANCE + rounding)):
         why = limits_passed(system, values) or "the values do not define one"
         raise SimulationError(f"no state of rest: {why}")
@@ -240,13 +240,13 @@ def poles_of(linear: LinearSystem) -> tuple[Pole, ...]:
     from scipy.linalg import eig
 
     modes: Any = eig(linear.A, left=True, right=True)
-    found, left, right = modes
-    size = np.max(np.abs(found), initial=0.0)
-    found = np.where(np.abs(found.imag) > SPLIT * np.abs(found), found, found.real + 0j)
+    values, left, right = modes
+    size = np.max(np.abs(values), initial=0.0)
+    values = np.where(np.abs(values.imag) > SPLIT * np.abs(values), values, values.real + 0j)
     taking_part = np.abs(left.conj() * right)
     poles = [
         _pole(complex(value), taking_part[:, k], linear.states, size)
-        for k, value in enumerate(found)
+        for k, value in enumerate(values)
         if value.imag >= 0.0
     ]
     return tuple(sorted(poles, key=lambda pole: abs(pole.value)))
@@ -294,8 +294,8 @@ def margins(loop: StateSpace, frequency: Array) -> Margins:
     return Margins(gain, phase, gain_at, phase_at)
 
 
-def _smallest(found: Sequence[tuple[float, float]]) -> tuple[float | None, float | None]:
-    return min(found, key=lambda one: abs(one[0]), default=(None, None))
+def _smallest(margins_at: Sequence[tuple[float, float]]) -> tuple[float | None, float | None]:
+    return min(margins_at, key=lambda margin_at: abs(margin_at[0]), default=(None, None))
 
 
 def _at(of: StateSpace, frequency: float) -> complex:
@@ -310,7 +310,7 @@ def _crossings(
 ) -> list[float]:
     """Return the frequencies (Hz) where a measure of the response changes its sign."""
     positive = measure(response) > 0.0
-    found = []
+    crossings = []
     for k in np.flatnonzero(positive[1:] != positive[:-1]):
         low, high = frequency[k], frequency[k + 1]
         for _ in range(ROUNDS):
@@ -320,8 +320,8 @@ def _crossings(
             if first == 0:  # within rounding of its end
                 break
             low, high = inside[first - 1], inside[first]
-        found.append(float(0.5 * (low + high)))
-    return found
+        crossings.append(float(0.5 * (low + high)))
+    return crossings
 
 
 def bandwidth(of: StateSpace, at: Bode) -> float | None:
@@ -331,8 +331,8 @@ def bandwidth(of: StateSpace, at: Bode) -> float | None:
     """
     still = _gain_at_rest(of)
     level = HALF_POWER * still
-    found = _crossings(lambda z: level - np.abs(z), of, at.frequency, at.response)
-    return found[0] if found and 0.0 < still < inf else None
+    crossings = _crossings(lambda z: level - np.abs(z), of, at.frequency, at.response)
+    return crossings[0] if crossings and 0.0 < still < inf else None
 
 
 def _gain_at_rest(of: StateSpace) -> float:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from exfit import cli
-from exfit.analysis.comparison import Asked, compare
+from exfit.analysis.comparison import ColumnChoice, compare
 from exfit.errors import RecordError
 from exfit.output import plots
 
-BY_NAME = Asked({})
+BY_NAME = ColumnChoice({})
 LAG = 0.25  # s
 AT, SIZE = 1.0, 0.05
 
@@ -203,7 +203,7 @@ def test_all_signals_in_common_are_compared_and_no_others():
     found = compare(a, b, None, BY_NAME)
     assert [one.signal for one in found.between] == ["vt", "efd"]
     assert of(found, "efd").rms == pytest.approx(0.1)
-    asked = compare(a, b, None, Asked({"VA": "VA"}))
+    asked = compare(a, b, None, ColumnChoice({"VA": "VA"}))
     assert "VA" in [one.signal for one in asked.between]
 
 
@@ -213,7 +213,7 @@ def test_a_fit_is_compared_with_an_export_of_another_program():
     Path("fit/result.json").write_text("{}")
     export = {"Time(s)": time, "VOLT 1 [GEN]": rise(time), "EFD": time}
     b = write("psse.csv", **export)
-    asked = Asked({"vt": "VOLT 1 [GEN]"})
+    asked = ColumnChoice({"vt": "VOLT 1 [GEN]"})
     for fit in (Path("fit"), Path("fit/result.json"), Path("fit/response.csv")):
         found = compare(fit, b, Path("fit/response.csv"), asked)
         assert of(found).rms == 0.0
@@ -226,7 +226,7 @@ def test_a_column_of_time_is_named_where_it_has_a_name_of_its_own():
     b = write("b.csv", vt=rise(time), sec=time)
     with pytest.raises(RecordError, match=r"b\.csv: no column seems .*--time .*'vt', 'sec'"):
         compare(a, b, None, BY_NAME)
-    assert of(compare(a, b, None, Asked({}, "sec"))).rms == 0.0
+    assert of(compare(a, b, None, ColumnChoice({}, "sec"))).rms == 0.0
 
 
 def test_of_instants_that_repeat_the_last_row_is_taken():
@@ -259,7 +259,7 @@ NOWHERE = {"t": clock(0.01), "vt": np.full(1001, np.nan)}
 REFUSED = {
     "no signal": ({"t": [0, 1], "x": [1, 1]}, ["no signal in common", "--columns"]),
     "no time": ({"t": [20, 21], "vt": [1, 1]}, ["no time in common", "--shift"]),
-    "back": ({"t": [0, 2, 1], "vt": [1, 1, 1]}, ["b.csv", "'t'", "goes back"]),
+    "back": ({"t": [0, 2, 1], "vt": [1, 1, 1]}, ["b.csv", "'t'", "is before"]),
     "lost time": ({"t": [0, np.nan], "vt": [1, 1]}, ["b.csv", "'t'", "not a finite"]),
     "no sample": (NOWHERE, ["vt", "samples of both"]),
 }

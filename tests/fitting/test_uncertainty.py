@@ -138,7 +138,7 @@ def test_none_of_the_gains_of_ac8b_has_an_interval_and_the_others_have(ac8b):
     assert known.keys() == gains | bound | others
     for name in gains:
         assert known[name].std_error is None
-        assert known[name].why.startswith("cannot be told apart from")
+        assert known[name].why.startswith("cannot be distinguished from")
         assert all(other in known[name].why for other in gains - {name})
     assert all(known[name].interval is not None for name in others)
 

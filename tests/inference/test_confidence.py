@@ -303,8 +303,8 @@ def test_what_is_exactly_redundant_has_no_standard_error_and_spoils_no_other():
     known = confidence(linearised([2.0, 3.0, 0.8], errors, rows))
     held = confidence(linearised([2.0, 3.0, 0.8], errors, rows, held=("min", None, None)))
     assert known.parameters["a"].std_error is None
-    assert known.parameters["a"].why == "cannot be told apart from b"
-    assert known.parameters["b"].why == "cannot be told apart from a"
+    assert known.parameters["a"].why == "cannot be distinguished from b"
+    assert known.parameters["b"].why == "cannot be distinguished from a"
     assert known.parameters["c"].interval == pytest.approx(held.parameters["c"].interval)
     assert known.dof == len(T) - 2 == pytest.approx(held.dof)
     assert np.isnan(known.correlation[0]).all()
@@ -320,7 +320,7 @@ def test_who_moves_little_in_a_redundancy_takes_part_in_it_too():
     ):
         known = confidence(linearised(np.ones(rows.shape[1]), 1e-3 * third[:, 0], rows))
         *joined, last = known.parameters.values()
-        assert all(one.why.startswith("cannot be told apart from") for one in joined)
+        assert all(one.why.startswith("cannot be distinguished from") for one in joined)
         assert last.std_error is not None
 
 
@@ -330,7 +330,7 @@ def test_redundancies_that_have_nothing_to_do_with_each_other_are_told_apart():
     rows = np.hstack([first, second, 3.0 * first, -second, rng.standard_normal((50, 1))])
     known = confidence(linearised(np.ones(5), rng.standard_normal(50), rows))
     why = [one.why for one in known.parameters.values()]
-    assert why[:2] == ["cannot be told apart from c", "cannot be told apart from d"]
+    assert why[:2] == ["cannot be distinguished from c", "cannot be distinguished from d"]
     assert known.parameters["e"].std_error is not None
 
 
@@ -459,8 +459,8 @@ def test_the_partners_of_a_redundancy_are_named_beside_what_has_no_effect():
     noise = np.random.default_rng(19).standard_normal(len(T))
     known = confidence(linearised(np.full(4, 2.0), noise, columns)).parameters
     assert known["a"].why == "has no effect on the record"
-    assert known["b"].why == "cannot be told apart from d"
-    assert known["d"].why == "cannot be told apart from b"
+    assert known["b"].why == "cannot be distinguished from d"
+    assert known["d"].why == "cannot be distinguished from b"
 
 
 @pytest.mark.parametrize("seed", range(3))

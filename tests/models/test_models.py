@@ -446,7 +446,7 @@ def test_a_user_s_file_is_a_model_like_any_other(tmp_path):
         (('STATES = "V"', ""), "lacks STATES"),
         (("import sheet", "import sheets"), "ImportError"),
         (("return v /", "return v //)"), "SyntaxError"),
-        (('STATES = "V"', 'STATES = "V V"'), "STATES: V stands there twice"),
+        (('STATES = "V"', 'STATES = "V V"'), "STATES: duplicate name: V"),
         (('STATES = "V"', "raise SystemExit(0)"), "SystemExit"),
     ],
 )
