@@ -259,7 +259,7 @@ NOWHERE = {"t": clock(0.01), "vt": np.full(1001, np.nan)}
 REFUSED = {
     "no signal": ({"t": [0, 1], "x": [1, 1]}, ["no signal in common", "--columns"]),
     "no time": ({"t": [20, 21], "vt": [1, 1]}, ["no time in common", "--shift"]),
-    "back": ({"t": [0, 2, 1], "vt": [1, 1, 1]}, ["b.csv", "'t'", "is before"]),
+    "back": ({"t": [0, 2, 1], "vt": [1, 1, 1]}, ["b.csv", "'t'", "goes back"]),
     "lost time": ({"t": [0, np.nan], "vt": [1, 1]}, ["b.csv", "'t'", "not a finite"]),
     "no sample": (NOWHERE, ["vt", "samples of both"]),
 }
