@@ -234,6 +234,7 @@ class TextTable:
             cells = self._loaded(self._lines(), places, f"S{width}")
         except ValueError as error:
             for line, row in self.rows():
+                self._check_width(line, row)  # quoted cells may hold separators
                 for name, place in zip(columns, places, strict=True):
                     if not is_timestamp(row[place]):
                         what = f"{shown(row[place])} is no timestamp"
@@ -257,6 +258,8 @@ def read_text_table(path: Path) -> TextTable:
         raise RecordError(f"{path}: the file is empty: a row of column names belongs there")
     dialect = find_dialect(path, [*islice(text.lines(), HEAD)])
     table = TextTable(path, hashlib.sha256(data).hexdigest(), text, dialect)
+    if next(table.rows(), None) is None:
+        raise RecordError(f"{path}: no samples below the column names")
     if dialect.comma is None and b"," in text.data:
         comma = has_comma(cells for _, cells in table.rows())
         return replace(table, dialect=replace(dialect, comma=comma))

@@ -781,6 +781,8 @@ LETTERS = st.text(alphabet="0123456789.,;:-/ \t\n\r\"'#%eEnaTZ+[]kVst", max_size
 
 
 @settings(max_examples=400, deadline=None)
+@example(data=b'",.0\n276.875387363.\n",6...-3;77')  # separators within a quoted cell
+@example(data=b'--"\n4"Ee569\n76776E6;,315e23e;-0;-.-;"463e2E93862.e,\n\n')  # comments alone
 @given(data=st.one_of(st.binary(max_size=80), LETTERS.map(str.encode)))
 def test_random_bytes_are_read_or_refused(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "random.csv"
