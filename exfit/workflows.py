@@ -33,8 +33,8 @@ from exfit.analysis.solution import (
     validation_of,
 )
 from exfit.case import load
-from exfit.case.case import SINGLE, Case
-from exfit.case.schema import Recording
+from exfit.case.case import Case
+from exfit.case.schema import SINGLE, Recording
 from exfit.errors import CaseError
 from exfit.fitting.build import (
     ExperimentSetup,

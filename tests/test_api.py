@@ -5,13 +5,24 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from places import ROOT
 
 import exfit
+from exfit.fitting.recordings import record_of
 
 CASE = ROOT / "configs" / "first_order.yaml"
 HEAVY = {"numpy", "scipy", "pydantic", "yaml", "matplotlib", "rich", "click", "llvmlite"}
+
+NOISE = 1e-4  # pu
+TRUE_K = 200.0
+SEXS = {
+    "model": "SEXS",
+    "plant": {"type": "open-circuit", "machine": "GENROU"},
+    "test": {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.02}]},
+    "parameters": {"free": {"K": {"start": 100.0, "min": 10.0, "max": 1000.0}}},
+}
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +113,71 @@ def test_more_noise_leaves_larger_errors():
 
 def test_a_check_takes_a_path():
     assert exfit.check(str(CASE)).agrees
+
+
+@pytest.fixture(scope="module")
+def arrays():
+    """Return the record of a simulation with a known parameter, with noise."""
+    plan = {**SEXS, "test": {**SEXS["test"], "duration": 10.0}}
+    truth = exfit.simulate(exfit.Case.from_dict(plan), {"K": TRUE_K}).response
+    noise = np.random.default_rng(1).normal(scale=NOISE, size=truth.time.size)
+    signals = {name: truth.signals[name] for name in ("vt", "efd")}
+    return exfit.Record.from_arrays(truth.time, {**signals, "vt": signals["vt"] + noise})
+
+
+def test_a_case_of_a_dict_is_fitted_to_a_record_of_arrays(arrays):
+    case = exfit.Case.from_dict({**SEXS, "record": {"channels": {"vt": {"noise": NOISE}}}}, arrays)
+    result = exfit.fit(case)
+    fitted = result.parameters["K"].value
+    error = result.knowledge.confidence.parameters["K"].std_error
+    assert result.success
+    # four standard errors: of this seed it is well below one
+    assert abs(fitted - TRUE_K) < 4.0 * error < 0.01 * TRUE_K
+    assert result.inputs == {"record": arrays.sha256}
+    assert list(result.comparison.overlays) == ["vt"]
+
+
+def test_a_case_without_a_record_section_takes_all_signals_of_the_arrays(arrays):
+    case = exfit.Case.from_dict(SEXS, arrays)
+    assert {*case.record.channels} == {"vt", "efd"}
+
+
+def test_a_record_that_is_given_is_fitted_like_its_file(result):
+    case = exfit.load_case(CASE)
+    read = record_of(case, case.recordings[0])
+    copy = exfit.Record.from_arrays(read.time, read.signals)
+    assert exfit.fit(case.with_record(copy)).values == result.values
+
+
+def test_several_records_are_given_by_name(arrays):
+    test = SEXS["test"]
+    content = {
+        **{key: SEXS[key] for key in ("model", "plant", "parameters")},
+        "records": [{"name": "up", "test": test}, {"name": "again", "test": test}],
+        "validate": [{"name": "later", "test": test}],
+    }
+    case = exfit.Case.from_dict(content, dict.fromkeys(("up", "again", "later"), arrays))
+    together, alone = exfit.fit(case), exfit.fit(exfit.Case.from_dict(SEXS, arrays))
+    assert [match.name for match in together.comparisons] == ["up", "again"]
+    assert [match.name for match in together.validation] == ["later"]
+    # the same record twice has the same minimum; both searches end within their tolerances
+    assert together.values["K"] == pytest.approx(alone.values["K"], rel=1e-6)
+
+
+def test_a_record_under_a_name_that_the_case_lacks_is_refused(arrays):
+    with pytest.raises(exfit.CaseError, match=r"case: records: up is given, but .* known: fit"):
+        exfit.Case.from_dict(SEXS, {"up": arrays})
+    with pytest.raises(exfit.CaseError, match="up: not a record of the case; known: fit"):
+        exfit.Case.from_dict(SEXS, arrays).with_record(arrays, "up")
+
+
+def test_a_record_without_a_signal_that_is_compared_is_refused(arrays):
+    content = {**SEXS, "record": {"channels": {"vt": {}, "ifd": {}}}}
+    with pytest.raises(exfit.CaseError, match="case: record fit: ifd: missing in arrays"):
+        exfit.Case.from_dict(content, arrays)
+
+
+def test_a_record_that_does_not_hold_the_step_is_refused(arrays):
+    late = exfit.Record.from_arrays(arrays.time + 5.0, arrays.signals)
+    with pytest.raises(exfit.RecordError, match=r"arrays: holds 5 ... 15 s, but case has a step"):
+        exfit.fit(exfit.Case.from_dict(SEXS, late))

@@ -1,13 +1,15 @@
 """Case: one study, checked, with the models it names. It is data: nothing of it ever changes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from exfit.case.assembly import CheckedContent, check_content, plain_content
+from exfit.case.given_records import with_record_sections
 from exfit.case.parts import Part, Parts, with_network
 from exfit.case.schema import (
+    SINGLE,
     BumpTest,
     Estimate,
     FreeSection,
@@ -27,8 +29,8 @@ from exfit.case.schema import (
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault, Place, dotted
 from exfit.errors import CaseError
-
-SINGLE = "fit"  # name of a record that stands alone
+from exfit.records.record import Record
+from exfit.util.text import near
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +39,7 @@ class Case:
 
     The sections are those of the case file. ``path`` is that file; of a case made in Python
     (``from_file`` is false) it is what messages call the case, in the folder of its files.
+    ``given_records`` are those, by name, that were given as arrays and are read from no file.
     """
 
     path: Path
@@ -56,6 +59,7 @@ class Case:
     accept: Limit | None
     parts: Parts
     ties: Ties
+    given_records: Mapping[str, Record] = field(default_factory=dict)
 
     @classmethod
     def of(cls, checked: CheckedContent, path: Path, from_file: bool = True) -> "Case":
@@ -67,18 +71,60 @@ class Case:
 
     @classmethod
     def from_dict(
-        cls, content: Mapping[str, Any], folder: str | Path = ".", name: str = "case"
+        cls,
+        content: Mapping[str, Any],
+        record: Record | Mapping[str, Record] | None = None,
+        folder: str | Path = ".",
+        name: str = "case",
     ) -> "Case":
         """Return the case that a mapping with the keys of a case file describes.
 
-        The files that it names are relative to ``folder``; ``name`` is what messages call it.
+        Args:
+            content: the sections of the case.
+            record: the measurements, in place of a file; of several records a mapping by name. The
+                section ``record`` may then be missing, or say only how they are compared.
+            folder: to which the files that the case names are relative.
+            name: what messages call the case.
+
         Raises CaseError with all faults, each as ``name: place: what is wrong``.
+
+        Example:
+            >>> record = exfit.Record.from_arrays(time, {"vt": vt})
+            >>> case = exfit.Case.from_dict({"model": "SEXS", ...}, record)
         """
         path, faults = Path(folder) / name, list[Fault]()
-        checked = check_content(plain_content(content, faults), path.parent, faults)
+        records = {SINGLE: record} if isinstance(record, Record) else record or {}
+        plain = with_record_sections(plain_content(content, faults), records, faults)
+        checked = check_content(plain, path.parent, faults)
         if checked is None:
             raise CaseError(f"{path}: {dotted(fault.place)}: {fault.text}" for fault in faults)
-        return cls.of(checked, path, from_file=False)
+        case = cls.of(checked, path, from_file=False)
+        for recording, measurements in records.items():
+            case = case.with_record(measurements, recording)
+        return case
+
+    def with_record(self, record: Record, name: str = SINGLE) -> "Case":
+        """Return the case with other measurements for one of its records, in place of its file.
+
+        ``name`` is that of the record in the case, "fit" where there is one alone. The signals are
+        per unit and stand as they are: of the section of the record holds what says how it is
+        compared (weight, noise, filter, outliers, mask, delay), not how it is read (columns, units,
+        window, resample). Raises CaseError where the case has no such record, or where a signal is
+        missing.
+        """
+        sections = {
+            recording.name: recording.record for recording in (*self.recordings, *self.validations)
+        }
+        if name not in sections:
+            hint = near(name, sections) if sections else "it has none: give it to Case.from_dict"
+            raise CaseError([f"{self.path}: {name}: not a record of the case; {hint}"])
+        missing = [signal for signal in sections[name].channels if signal not in record.signals]
+        if missing:
+            raise CaseError(
+                f"{self.path}: record {name}: {signal}: missing in {record.source}"
+                for signal in missing
+            )
+        return replace(self, given_records={**self.given_records, name: record})
 
     @property
     def folder(self) -> Path:

@@ -47,6 +47,7 @@ Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
+SINGLE = "fit"  # name of a record that stands alone
 MOST_STARTS = 1_000_000  # a day of simulations; their points alone fill 100 MB
 Text = Annotated[str, Strict(), Field(min_length=1)]
 Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSerializer(_thawed)]

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case import schema
-from exfit.case.case import SINGLE, Case
+from exfit.case.case import Case
 from exfit.case.schema import (
+    SINGLE,
     BumpTest,
     Filter,
     InfiniteBus,
@@ -34,7 +35,7 @@ from exfit.errors import CaseError, ModelError, RecordError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisance import nuisance_parameters, prefix_of, with_detected_steps
 from exfit.fitting.parameters import FreeParameter, Prior
-from exfit.fitting.recordings import column_of, initial_level, initial_voltage, measured
+from exfit.fitting.recordings import column_of, initial_level, initial_voltage, record_of
 from exfit.fitting.residuals import Residuals, Robust
 from exfit.models.sheet import Model
 from exfit.plants import (
@@ -256,7 +257,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     view, file = case.seen_from(recording), recording.record
     system = system_of(view)
     driving = [signal for signal in file.channels if signal in system.inputs]
-    record = _without_masked(measured(case, recording.test, file), file, driving)
+    record = _without_masked(record_of(case, recording), file, driving)
     test = with_detected_steps(case, recording, record)
     if view is not case:
         own = {name: v for name, v in view.values().items() if name.startswith(NETWORK)}

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from exfit.case.case import SINGLE, Case
-from exfit.case.schema import BumpTest, FindableStep, RecordFile, Recording, Unknown, known
+from exfit.case.case import Case
+from exfit.case.schema import SINGLE, BumpTest, FindableStep, RecordFile, Recording, Unknown, known
 from exfit.dsp.filtering import outliers
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError

@@ -1,17 +1,31 @@
 """The records of a case: read, and checked against its tests."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, RecordFile, TimeColumn, known
+from exfit.case.schema import (
+    BumpTest,
+    ChannelSection,
+    PhasesSection,
+    RecordFile,
+    Recording,
+    TimeColumn,
+    Unknown,
+    known,
+)
 from exfit.errors import RecordError
 from exfit.records.clock import Clock
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
 from exfit.util.text import show
+
+Array = NDArray[np.float64]
 
 
 class Column(NamedTuple):
@@ -22,6 +36,32 @@ class Column(NamedTuple):
     offset: float
     unit: str | None
     base: float | None
+
+
+def record_of(case: Case, recording: Recording) -> Record:
+    """Return the record of a recording: as it was given, else read from its file.
+
+    Raises RecordError where it cannot be read, or where the steps of the test lie outside it.
+    """
+    given, section = case.given_records.get(recording.name), recording.record
+    if given is None:
+        return measured(case, recording.test, section)
+    signals = {
+        signal: _with_start_of_scale(given.signals[signal], channel)
+        for signal, channel in section.channels.items()
+    }
+    record = replace(given, signals=MappingProxyType(signals))
+    _refuse_steps_outside(case, recording.test, record, given.source)
+    return record
+
+
+def _with_start_of_scale(samples: Array, channel: ChannelSection | PhasesSection) -> Array:
+    """Return samples with the start of a scale and an offset that the fit finds."""
+    if not isinstance(channel, ChannelSection):
+        return samples
+    scale = known(channel.scale) if isinstance(channel.scale, Unknown) else None
+    offset = known(channel.offset) if isinstance(channel.offset, Unknown) else None
+    return samples * (1.0 if scale is None else scale) + (offset or 0.0)
 
 
 def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from exfit.analysis.comparison import Agreement
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
-from exfit.case.case import SINGLE
+from exfit.case.schema import SINGLE
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.records.inspection import Inspection

@@ -266,13 +266,13 @@ def test_a_case_can_be_written_out_again():
 
 
 def test_a_case_has_every_section_of_the_document():
-    own = {"path", "from_file", "parts", "ties"}
+    own = {"path", "from_file", "parts", "ties", "given_records"}
     assert {field.name for field in fields(Case)} - own == {*CaseDocument.model_fields}
 
 
 def test_a_case_made_in_python_is_that_of_the_file(case_file):
     path = case_file(EXAMPLE)
-    made = Case.from_dict(yaml.safe_load(EXAMPLE), path.parent, path.name)
+    made = Case.from_dict(yaml.safe_load(EXAMPLE), folder=path.parent, name=path.name)
     assert replace(made, from_file=True) == load_case(path)
 
 

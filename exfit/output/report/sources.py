@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.case import SINGLE, Case
+from exfit.case.case import Case
 from exfit.case.load import load_case
+from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
 from exfit.fitting.build import ExperimentSetup, build_experiment
 from exfit.fitting.search import fitted
