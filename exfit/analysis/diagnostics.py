@@ -162,18 +162,19 @@ def unsteady_notes(
 
 def typical_notes(case: Case) -> Iterator[str]:
     """Yield which values were taken from the data sheet, because the case does not give them."""
-    views = (case, *(case.seen_from(recording) for recording in case.recordings))
-    used = {name for view in views for name in parameters_used(system_of(view))}
-    values = case.values()
-    typical = {name: values[name] for name in case.typical() if name in used}
+    typical = _typical_values(case)
     for part in case.parts.all:
-        if part.kind == "network":
-            continue
-        names = {part.prefix + symbol: symbol for symbol in part.symbols}
-        listed = ", ".join(
-            f"{names[name]} {value:g}" for name, value in typical.items() if name in names
-        )
-        if listed:
+        names = [symbol for symbol in part.symbols if part.prefix + symbol in typical]
+        if names and part.kind != "network":
+            listed = ", ".join(f"{symbol} {typical[part.prefix + symbol]:g}" for symbol in names)
             yield f"typical values taken for {part.name}: {listed}"
     if case.parts.stabiliser is not None and not case.on_load:
         yield f"{case.parts.stabiliser.name} does not act: the breaker is open"
+
+
+def _typical_values(case: Case) -> dict[str, float]:
+    """Return the typical values that a response of any of the records depends on."""
+    views = (case, *(case.seen_from(recording) for recording in case.recordings))
+    used = {name for view in views for name in parameters_used(system_of(view))}
+    values = case.values()
+    return {name: values[name] for name in case.typical() if name in used}
