@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from exfit.cli.options import json_option, output_option, plots_option, quiet_option
+from exfit.cli.options import json_option, output_option, plots_option, quiet_option, warn
 from exfit.errors import ExfitError
 
 
@@ -55,7 +55,7 @@ def compare(
     folder = output or Path("runs") / "compare"
     run_folder.refuse_unwritable(folder)
     found = compared(a, b, record, ColumnChoice(_columns(columns), time), shift, step_at)
-    run_folder.write_agreement(found, folder, plots)
+    warn(run_folder.write_agreement(found, folder, plots))
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:

@@ -17,6 +17,7 @@ from exfit.cli.options import (
     parameters_option,
     plots_option,
     quiet_option,
+    warn,
 )
 from exfit.cli.watched import fit_again_and_again, fit_in_sight
 
@@ -68,9 +69,11 @@ def fit(
     run_folder.refuse_unwritable(folder)
     if quiet or as_json:
         result = workflows.fit(loaded, strategy)
-        run_folder.write_fit(result, folder, plots)
-        if as_json:
-            click.echo(to_json(result.as_json()), nl=False)
+        try:
+            warn(run_folder.write_fit(result, folder, plots))
+        finally:  # whatever becomes of the files
+            if as_json:
+                click.echo(to_json(result.as_json()), nl=False)
     else:
         result = fit_in_sight(loaded, folder, strategy, plots)
     done = result.success and not result.interrupted
@@ -116,7 +119,7 @@ def simulate(
     values = read_parameters(loaded, parameters) if parameters else {}
     values |= changed_values(loaded, assignments(changes, "--set"), "--set")
     simulation = workflows.simulate(loaded, values)
-    run_folder.write_simulation(simulation, case.stem, folder, plots)
+    warn(run_folder.write_simulation(simulation, case.stem, folder, plots))
     if not quiet:
         from exfit.output import terminal
 
@@ -165,7 +168,7 @@ def validate(
     run_folder.refuse_unwritable(folder)
     source = parameters or run_folder.last_fit(case)
     found = workflows.validate(loaded, read_parameters(loaded, source), record)
-    run_folder.write_validation(found, folder, plots)
+    warn(run_folder.write_validation(found, folder, plots))
     if as_json:
         click.echo(to_json({"validation": [one.as_json() for one in found]}), nl=False)
     elif not quiet:

@@ -15,6 +15,7 @@ from exfit.cli.options import (
     output_option,
     plots_option,
     quiet_option,
+    warn,
 )
 
 
@@ -60,7 +61,7 @@ def profile(
         console = terminal.console()
         with terminal.Bar(console).running() as watch:
             found = workflows.profile(loaded, parameters, watch)
-    run_folder.write_profiles(found, folder, plots)
+    warn(run_folder.write_profiles(found, folder, plots))
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:
@@ -104,7 +105,7 @@ def identify(
     folder = output or folder_of(case, "identify")
     run_folder.refuse_unwritable(folder)
     found = workflows.identify(loaded, assignments(noise, "--noise"))
-    run_folder.write_design(found, folder, plots)
+    warn(run_folder.write_design(found, folder, plots))
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:

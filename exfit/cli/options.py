@@ -70,8 +70,13 @@ def write_text(text: str, output: Path | None, warnings: Iterable[str]) -> None:
         click.echo(text, nl=False)
     else:
         write(output, text)
-    for warning in warnings:
-        click.echo(f"Warning: {warning}", err=True)
+    warn(warnings)
+
+
+def warn(texts: Iterable[str]) -> None:
+    """Write what went wrong beside a result to standard error."""
+    for text in texts:
+        click.echo(f"Warning: {text}", err=True)
 
 
 def folder_of(case: Path, command: str) -> Path:

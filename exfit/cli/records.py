@@ -14,6 +14,7 @@ from exfit.cli.options import (
     plots_option,
     quiet_option,
     refuse_existing,
+    warn,
     write_text,
 )
 
@@ -68,7 +69,7 @@ def inspect_(
     folder = output or Path("runs") / f"{file.name}-inspect"
     run_folder.refuse_unwritable(folder)
     found = _inspected(file, clock, unit, sheet)
-    run_folder.write_inspection(found, folder, plots)
+    warn(run_folder.write_inspection(found, folder, plots))
     if as_json:
         click.echo(to_json(found.as_json()), nl=False)
     elif not quiet:

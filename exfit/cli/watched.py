@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exfit.cli.options import Refusal, load
+from exfit.cli.options import Refusal, load, warn
 from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
@@ -32,8 +32,13 @@ def fit_in_sight(
         title, most = terminal.task(case, strategy), case.estimate.iterations
         with terminal.Watch(console, title, most).running() as watch:
             result = workflows.fit(case, strategy, watch, live=watch.look)
-    run_folder.write_fit(result, folder, plots)
-    terminal.fit(console, result, folder, before)
+    try:
+        missing = run_folder.write_fit(result, folder, plots)
+    finally:  # whatever becomes of the files
+        terminal.fit(console, result, before)
+    console.print()
+    terminal.written(console, folder)
+    warn(missing)
     return result
 
 

@@ -1,10 +1,12 @@
-"""The files that a run leaves behind, each written whole or not at all."""
+"""The files that a run leaves behind: its numbers together, then its figures."""
 
 import hashlib
+import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +17,9 @@ from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
 from exfit.errors import CaseError, ExfitError
-from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.output import run_figures
 from exfit.records.inspection import Inspection
+from exfit.results.io import WHOLE_FIT
 from exfit.results.model import Comparison, FitResult
 from exfit.results.tables import (
     DIGITS,
@@ -27,7 +30,8 @@ from exfit.results.tables import (
     table,
 )
 from exfit.util.cache import cache_folder
-from exfit.util.files import write
+from exfit.util.files import write, write_together
+from exfit.util.interrupts import deferred_interrupts
 from exfit.util.text import to_json
 from exfit.workflows import SimulationResult
 
@@ -35,7 +39,13 @@ Array = NDArray[np.float64]
 
 PARAMETERS = "parameters.yaml"
 ITERATIONS = "iterations.csv"
-FIGURES = (
+VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
+INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
+MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT)
+# what a fit may write, beside the files that are named after records
+FILES_OF_FIT = (
+    ITERATIONS,
+    RESPONSE,
     "overlay.png",
     "iterations.png",
     "convergence.png",
@@ -47,133 +57,176 @@ FIGURES = (
 
 
 def refuse_unwritable(folder: Path) -> None:
-    """Raise ExfitError where a folder cannot be written, before a run is spent on it."""
-    place = next(one for one in (folder, *folder.parents) if one.exists())
+    """Raise ExfitError where a folder cannot take a run, before that is spent on it."""
+    place = next(path for path in (folder, *folder.parents) if path.exists())
     if not place.is_dir():
         raise ExfitError(f"{folder}: cannot be written: {place} is not a folder")
     if not os.access(place, os.W_OK | os.X_OK):
         raise ExfitError(f"{folder}: cannot be written: no permission in {place}")
+    for name in MAIN_FILES:
+        if (folder / name).is_dir():
+            raise ExfitError(f"{folder / name}: cannot be written: it is a folder")
 
 
-def write_fit(result: FitResult, folder: Path, figures: bool) -> None:
-    """Write a fit's numbers, tables and figures, and remember where they are.
+def write_fit(result: FitResult, folder: Path, figures: bool) -> tuple[str, ...]:
+    """Write a fit's numbers, and remember where they are, then its figures.
 
-    Raises ExfitError where the folder cannot be written.
+    Return which figures are missing, and why. Raises ExfitError where the folder cannot be
+    written, and KeyboardInterrupt at an interruption: the numbers are whole then.
     """
-    for old in ("result.json", *FIGURES):
-        (folder / old).unlink(missing_ok=True)  # of a former fit: it would stand beside new numbers
-    history = [asdict(line) for line in result.history]
-    write(folder / PARAMETERS, parameter_file(result))
-    write(folder / "history.csv", history_table(result))
+    with deferred_interrupts():
+        numbers = dict(_numbers_of_fit(result))
+        write_together(folder, numbers, {*FILES_OF_FIT, *_of_records(folder / WHOLE_FIT)})
+        with suppress(ExfitError):  # a cache that cannot be written keeps nothing
+            write(_kept(result.case), numbers[PARAMETERS])
+    return _draw(folder / WHOLE_FIT, partial(run_figures.of_fit, result)) if figures else ()
+
+
+def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
+    """Yield the names and contents of a fit's tables, and last of its result."""
+    yield PARAMETERS, parameter_file(result)
+    yield "history.csv", history_table(result)
     if result.comparison.name == SINGLE:
-        write(folder / "response.csv", comparison_table(result.comparison))
+        yield RESPONSE, comparison_table(result.comparison)
     else:
-        write_comparisons(result.comparisons, folder, figures)
-    write_comparisons(result.validation, folder, figures)
-    for one in result.comparisons:
-        name = ITERATIONS if one.name == SINGLE else f"{one.name}-{ITERATIONS}"
-        (folder / name).unlink(missing_ok=True)
-        if one.iteration_responses is not None:
-            write(folder / name, iteration_responses_table(one.time, one.iteration_responses))
-    if figures:
-        from exfit.output import plots
-
-        if any(one.iteration_responses is not None for one in result.comparisons):
-            write(folder / "iterations.png", plots.png(plots.iterations(result)))
-        if result.comparison.name == SINGLE:
-            title = f"{result.name}: {result.model} fitted to {result.comparison.record.name}"
-            write(folder / "overlay.png", plots.png(plots.overlay(result.comparison, title)))
-        write(folder / "convergence.png", plots.png(plots.convergence(result)))
-        write(folder / "trajectories.png", plots.png(plots.trajectories(result)))
-        if result.knowledge is not None:
-            write_knowledge_figures(result.knowledge, result.name, folder)
-        if result.minima is not None:
-            write(folder / "starts.png", plots.png(plots.waterfall(result.minima, result.name)))
-    # last: where it stands, everything else does
-    write(folder / "result.json", to_json({**result.as_json(), "history": history}))
-    with suppress(ExfitError):  # a cache that cannot be written keeps nothing
-        write(_kept(result.case), parameter_file(result))
+        yield from _tables(result.comparisons)
+    yield from _tables(result.validation)
+    for match in result.comparisons:
+        if match.iteration_responses is not None:
+            name = ITERATIONS if match.name == SINGLE else f"{match.name}-{ITERATIONS}"
+            yield name, iteration_responses_table(match.time, match.iteration_responses)
+    history = [asdict(line) for line in result.history]
+    yield WHOLE_FIT, to_json({**result.as_json(), "history": history})
 
 
-def write_knowledge_figures(known: UncertaintyAnalysis, name: str, folder: Path) -> None:
-    """Write what each parameter does to each signal over time, and how they are correlated."""
+def _tables(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, str]]:
+    """Yield the samples of each comparison under its name."""
+    for match in comparisons:
+        yield f"{match.name}.csv", comparison_table(match)
+
+
+def _of_records(main: Path) -> set[str]:
+    """Return the names of the files that a former run wrote for its records, by its main file."""
+    try:
+        content = json.loads(main.read_bytes())
+        matches = [*content.get("records", ()), *content.get("validation", ())]
+        names = [Path(match["name"]).name for match in matches]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return set()  # there is none, or it is not ours
+    endings = (".csv", ".png", f"-{ITERATIONS}")
+    return {name + ending for name in names if name for ending in endings}
+
+
+def _draw(main: Path, drawings: Callable[[], run_figures.Drawings]) -> tuple[str, ...]:
+    """Draw figures beside the numbers of a run, and return which are missing, and why.
+
+    Raises KeyboardInterrupt at an interruption.
+    """
+    try:
+        return tuple(_missing(main, drawings))
+    except KeyboardInterrupt:
+        message = f"{main.parent}: the numbers are whole, figures are missing"
+        raise KeyboardInterrupt(message) from None
+
+
+def _missing(main: Path, drawings: Callable[[], run_figures.Drawings]) -> Iterator[str]:
+    """Draw figures, and yield which are missing, and why.
+
+    Where another run writes its numbers there meanwhile, it draws its own.
+    """
     from exfit.output import plots
 
-    write(folder / "sensitivity.png", plots.png(plots.sensitivity(known, name)))
-    write(folder / "correlation.png", plots.png(plots.correlation(known, name)))
+    own = _version_of(main)
+    for name, drawing in drawings().items():
+        path = main.with_name(name)
+        try:
+            picture = plots.png(drawing())
+            if _version_of(main) != own:
+                yield f"{main.parent}: another run writes there: figures of this one are missing"
+                return
+            write(path, picture)
+        except ExfitError as fault:
+            yield str(fault)
+        except Exception as fault:  # whatever it is: the numbers stand without the figure
+            yield f"{path}: not drawn: {type(fault).__name__}: {fault}"
 
 
-def write_comparisons(comparisons: Sequence[Comparison], folder: Path, figures: bool) -> None:
-    """Write the samples and the overlay of each comparison under its name."""
-    for one in comparisons:
-        write(folder / f"{one.name}.csv", comparison_table(one))
-        if figures:
-            from exfit.output import plots
-
-            title = f"{one.name}: simulated and {one.record.name}"
-            write(folder / f"{one.name}.png", plots.png(plots.overlay(one, title)))
+def _version_of(path: Path) -> tuple[int, ...]:
+    """Return what changes when a file is replaced."""
+    try:
+        state = path.stat()
+    except OSError:
+        return ()
+    return state.st_ino, state.st_mtime_ns, state.st_size
 
 
-def write_validation(comparisons: Sequence[Comparison], folder: Path, figures: bool) -> None:
-    """Write a validation's figures as JSON, its samples and its overlays."""
-    write_comparisons(comparisons, folder, figures)
-    content = {"validation": [one.as_json() for one in comparisons]}
-    write(folder / "validation.json", to_json(content))
+def write_validation(
+    comparisons: Sequence[Comparison], folder: Path, figures: bool
+) -> tuple[str, ...]:
+    """Write a validation's figures as JSON, its samples and its overlays; return what is missing.
+
+    As every function here: raises ExfitError where the folder cannot be written.
+    """
+    main = folder / VALIDATION
+    content = {"validation": [match.as_json() for match in comparisons]}
+    with deferred_interrupts():
+        numbers = {**dict(_tables(comparisons)), VALIDATION: to_json(content)}
+        write_together(folder, numbers, _of_records(main))
+    return _draw(main, partial(run_figures.of_comparisons, comparisons)) if figures else ()
 
 
-def write_profiles(found: Profiles, folder: Path, figures: bool) -> None:
+def write_profiles(profiles: Profiles, folder: Path, figures: bool) -> tuple[str, ...]:
     """Write the profiles of parameters as JSON, as a table and as a figure."""
     rows = [
-        f"{one.name},{value:.{DIGITS}g},{cost:.{DIGITS}g}\n"
-        for one in found.profiles
-        for value, cost in zip(one.at, one.costs, strict=True)
+        f"{profile.name},{value:.{DIGITS}g},{cost:.{DIGITS}g}\n"
+        for profile in profiles.profiles
+        for value, cost in zip(profile.at, profile.costs, strict=True)
     ]
-    write(folder / "profile.csv", "".join(["parameter,value,cost\n", *rows]))
-    if figures:
-        from exfit.output import plots
-
-        write(folder / "profile.png", plots.png(plots.profiles(found)))
-    write(folder / "profile.json", to_json(found.as_json()))
-
-
-def write_design(found: Design, folder: Path, figures: bool) -> None:
-    """Write what a planned test would tell as JSON and as figures."""
-    if figures:
-        write_knowledge_figures(found.own, found.name, folder)
-    write(folder / "identify.json", to_json(found.as_json()))
+    numbers = {
+        "profile.csv": "".join(["parameter,value,cost\n", *rows]),
+        PROFILES: to_json(profiles.as_json()),
+    }
+    write_together(folder, numbers, ["profile.png"])
+    drawings = partial(run_figures.of_profiles, profiles)
+    return _draw(folder / PROFILES, drawings) if figures else ()
 
 
-def write_inspection(found: Inspection, folder: Path, figures: bool) -> None:
+def write_design(design: Design, folder: Path, figures: bool) -> tuple[str, ...]:
+    """Write what a planned test would show as JSON and as figures."""
+    numbers = {DESIGN: to_json(design.as_json())}
+    write_together(folder, numbers, ["sensitivity.png", "correlation.png"])
+    drawings = partial(run_figures.of_design, design)
+    return _draw(folder / DESIGN, drawings) if figures else ()
+
+
+def write_inspection(inspection: Inspection, folder: Path, figures: bool) -> tuple[str, ...]:
     """Write what a recorder's file holds as JSON and as a figure."""
-    if figures:
-        from exfit.output import plots
-
-        write(folder / "inspect.png", plots.png(plots.inspection(found, found.path.name)))
-    write(folder / "inspect.json", to_json(found.as_json()))
+    write_together(folder, {INSPECTION: to_json(inspection.as_json())}, ["inspect.png"])
+    drawings = partial(run_figures.of_inspection, inspection)
+    return _draw(folder / INSPECTION, drawings) if figures else ()
 
 
-def write_simulation(simulation: SimulationResult, name: str, folder: Path, figures: bool) -> None:
+def write_simulation(
+    simulation: SimulationResult, name: str, folder: Path, figures: bool
+) -> tuple[str, ...]:
     """Write a response, and its figures."""
     response = simulation.response
     header = ["t", *response.signals]
-    write(folder / "response.csv", table(header, [response.time, *response.signals.values()]))
-    if figures:
-        from exfit.output import plots
-
-        write(folder / "response.png", plots.png(plots.response(response, name)))
-        if simulation.comparison is not None:
-            title = f"{name}: simulated and {simulation.comparison.record.name}"
-            write(folder / "overlay.png", plots.png(plots.overlay(simulation.comparison, title)))
+    numbers = {RESPONSE: table(header, [response.time, *response.signals.values()])}
+    write_together(folder, numbers, ["response.png", "overlay.png"])
+    drawings = partial(run_figures.of_simulation, simulation, name)
+    return _draw(folder / RESPONSE, drawings) if figures else ()
 
 
-def write_agreement(found: Agreement, folder: Path, figures: bool) -> None:
+def write_agreement(agreement: Agreement, folder: Path, figures: bool) -> tuple[str, ...]:
     """Write how two responses differ as JSON, their samples on each clock, and a figure."""
-    write(folder / "compare.csv", agreement_table(found))
-    if figures:
-        from exfit.output import plots
-
-        write(folder / "compare.png", plots.png(plots.agreement(found)))
-    write(folder / "compare.json", to_json(found.as_json()))
+    numbers = {
+        "compare.csv": agreement_table(agreement),
+        AGREEMENT: to_json(agreement.as_json()),
+    }
+    write_together(folder, numbers, ["compare.png"])
+    drawings = partial(run_figures.of_agreement, agreement)
+    return _draw(folder / AGREEMENT, drawings) if figures else ()
 
 
 def agreement_table(found: Agreement) -> str:

@@ -1,26 +1,38 @@
 """Files that appear whole or not at all."""
 
 import os
+import re
+import time
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
+from zlib import crc32
 
 from exfit.errors import ExfitError
+from exfit.util.interrupts import deferred_interrupts
+
+# of a file that is still to be renamed: computer, process, and which of its files
+TEMPORARY = re.compile(r"\.exfit-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}\.tmp")
+ABANDONED = 86_400.0  # s: so old, a temporary file of any computer is of a run that was killed
 
 
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file beside its place and rename it, its folder made where it is missing.
 
-    Raises OSError where the place cannot be written; nothing is left beside it then.
+    Raises OSError where the place cannot be written; nothing is left beside it then, nor by an
+    interruption. What killed runs have left there is removed.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with deferred_interrupts():
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(data)
-        beside.replace(path)
-    except OSError:
-        with suppress(OSError):
-            beside.unlink()
-        raise
+        remove_abandoned(path.parent)
+        beside = _temporary(path.parent)
+        try:
+            _write_new(beside, data)
+            beside.replace(path)
+        except OSError:
+            with suppress(OSError):
+                beside.unlink()
+            raise
 
 
 def write(path: Path, content: str | bytes) -> None:
@@ -28,7 +40,121 @@ def write(path: Path, content: str | bytes) -> None:
     try:
         write_whole(path, content.encode() if isinstance(content, str) else content)
     except OSError as fault:
-        raise ExfitError(f"{path}: cannot be written: {fault.strerror}") from fault
+        raise ExfitError(_message(path, fault)) from fault
+
+
+def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable[str] = ()) -> None:
+    """Write files of a folder as one: first all beside their places, then each to its place.
+
+    Others that are ``obsolete`` disappear in between; the former version of the last of
+    ``contents`` stands until all else is in place. An interruption waits for the end.
+
+    Raises ExfitError where the folder cannot be written: then all is as it was. A single file that
+    cannot be replaced (a folder of its name, open in a program on Windows) is named by an
+    ExfitError too, but hinders no other: the numbers of a long run are not lost for it.
+    """
+    beside: dict[Path, Path] = {}
+    with deferred_interrupts():
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            remove_abandoned(folder)
+            for name, content in contents.items():
+                beside[folder / name] = _temporary(folder)
+                _write_new(beside[folder / name], content.encode())
+            for temporary in beside.values():
+                _settle(temporary)
+            faults = [
+                *_removed(folder / name for name in {*obsolete} - {*contents}),
+                *_replaced(beside),
+            ]
+        except OSError as fault:
+            raise ExfitError(_message(folder, fault)) from fault
+        finally:
+            for temporary in beside.values():
+                with suppress(OSError):
+                    temporary.unlink(missing_ok=True)
+    if faults:
+        raise ExfitError("\n".join(faults))
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove the temporary files that killed runs have left in a folder.
+
+    Those of a process that still runs stay, and those of another computer, whose processes cannot
+    be seen from here, until they are a day old.
+    """
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            name = TEMPORARY.fullmatch(entry.name)
+            if name is None:
+                continue
+            with suppress(OSError):
+                here = name[1] == _computer()
+                old = time.time() - entry.stat().st_mtime > ABANDONED
+                if old or (here and not _runs(int(name[2]))):
+                    Path(entry).unlink()
+
+
+def _temporary(folder: Path) -> Path:
+    """Return the name of a new file: neither a process nor a thread has it twice."""
+    return folder / f".exfit-{_computer()}-{os.getpid()}-{os.urandom(4).hex()}.tmp"
+
+
+def _computer() -> str:
+    from platform import node
+
+    return f"{crc32(node().encode()):08x}"
+
+
+def _runs(process: int) -> bool:
+    """Tell whether a process of this computer may still run; on Windows it cannot be asked."""
+    if os.name == "nt":
+        return True  # os.kill would send it Ctrl-C there
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _write_new(path: Path, data: bytes) -> None:
+    with path.open("xb") as file:
+        file.write(data)
+
+
+def _settle(path: Path) -> None:
+    """Have a file on the disk itself: a rename that outlives a power failure has all of it then."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+def _removed(paths: Iterable[Path]) -> list[str]:
+    """Remove files that are there, and return what hindered it."""
+    faults = []
+    for path in paths:
+        try:
+            if path.is_file():
+                path.unlink()
+        except OSError as fault:
+            faults.append(f"{path}: of a former run, cannot be removed: {fault.strerror}")
+    return faults
+
+
+def _replaced(beside: Mapping[Path, Path]) -> list[str]:
+    """Rename files to their places, and return what hindered it."""
+    faults = []
+    for path, temporary in beside.items():
+        try:
+            temporary.replace(path)
+        except OSError as fault:
+            faults.append(_message(path, fault))
+    return faults
+
+
+def _message(path: Path, fault: OSError) -> str:
+    return f"{path}: cannot be written: {fault.strerror}"
 
 
 def siblings(path: Path, suffix: str) -> list[Path]:

@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.overrides import read_parameters
-from exfit.output import run_folder
+from exfit.output import plots, run_folder
 from exfit.results.tables import DIGITS, parameter_file, table
 from exfit.util.files import write
 from exfit.util.text import to_json
@@ -192,12 +193,141 @@ def test_a_last_fit_outlives_its_folder_and_another_case_that_takes_it(fitted, f
     assert read_parameters(load_case(CASE), run_folder.last_fit(CASE)) == fitted.values
 
 
-def test_a_fit_leaves_no_figure_or_result_of_a_former_one(fitted, folder):
-    for name in ("overlay.png", "convergence.png", "trajectories.png"):
-        (folder / name).write_text("of a former fit")
-    run_folder.write_fit(fitted, folder, figures=False)
-    assert not [name for name in names(folder) if name.endswith("s.png") or "overlay" in name]
-    assert not (folder / "convergence.png").exists()
+def test_a_fit_leaves_no_figure_or_table_of_a_former_one(fitted, tmp_path, monkeypatch):
+    """A former fit of three records, drawn, whose records have other names but for one."""
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    others = [replace(fitted.comparison, name=name) for name in ("first", "second")]
+    former = replace(fitted, comparisons=tuple(others))
+    run_folder.write_fit(former, tmp_path / "run", figures=True)
+    (tmp_path / "run" / "notes.csv").write_text("the user's own")
+    assert {"first.csv", "second.png", "first-iterations.csv"} <= names(tmp_path / "run")
+    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    tables = {name for name in FILES_OF_A_FIT if not name.endswith(".png")}
+    assert names(tmp_path / "run") == tables | {"notes.csv"}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"[]",
+        b"null",
+        b'{"records": 1}',
+        b'{"records": [1]}',
+        b'{"records": [{"name": "../outside/it"}, {"name": ""}]}',
+    ],
+)
+def test_a_result_that_is_no_fit_s_takes_nothing_along(fitted, tmp_path, monkeypatch, content):
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    for name in ("outside/it.csv", "run/.csv"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text("mine")
+    (tmp_path / "run" / "result.json").write_bytes(content)
+    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    assert (tmp_path / "outside" / "it.csv").read_text() == "mine"
+    assert (tmp_path / "run" / ".csv").read_text() == "mine"
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["success"]
+
+
+def test_a_validation_leaves_no_table_or_overlay_of_a_former_one(fitted, tmp_path):
+    (match,) = fitted.validation
+    run_folder.write_validation([match, replace(match, name="former")], tmp_path, figures=True)
+    assert {"former.csv", "former.png"} <= names(tmp_path)
+    run_folder.write_validation([match], tmp_path, figures=False)
+    assert names(tmp_path) == {"down-step.csv", "validation.json"}
+
+
+@pytest.fixture
+def twice(fitted, folder):
+    """Return a folder with a former fit, and a fit to write there that has another value."""
+    other = replace(fitted.parameters["k"], value=7.0)
+    return replace(fitted, parameters={**fitted.parameters, "k": other}), folder
+
+
+def value_in(folder):
+    return json.loads((folder / "result.json").read_text())["parameters"]["k"]["value"]
+
+
+def test_a_figure_that_fails_is_reported_and_all_else_stands(twice, monkeypatch):
+    result, folder = twice
+
+    def broken(result):
+        raise ZeroDivisionError("of its own")
+
+    monkeypatch.setattr(plots, "trajectories", broken)
+    (missing,) = run_folder.write_fit(result, folder, figures=True)
+    assert missing == f"{folder / 'trajectories.png'}: not drawn: ZeroDivisionError: of its own"
+    assert names(folder) == FILES_OF_A_FIT - {"trajectories.png"}
+    assert value_in(folder) == 7.0
+
+
+def test_a_disk_that_fills_up_while_drawing_costs_figures_alone(twice, monkeypatch):
+    result, folder = twice
+
+    def full(path, content):
+        if path.suffix == ".png":
+            raise ExfitError(f"{path}: cannot be written: No space left on device")
+
+    monkeypatch.setattr(run_folder, "write", full)
+    missing = run_folder.write_fit(result, folder, figures=True)
+    assert len(missing) == sum(name.endswith(".png") for name in FILES_OF_A_FIT)
+    assert all("No space left" in text for text in missing)
+    assert value_in(folder) == 7.0
+
+
+def test_an_interruption_while_drawing_leaves_the_numbers_and_nothing_half(twice, monkeypatch):
+    result, folder = twice
+
+    def interrupted(result):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plots, "trajectories", interrupted)
+    with pytest.raises(KeyboardInterrupt, match="the numbers are whole, figures are missing"):
+        run_folder.write_fit(result, folder, figures=True)
+    assert names(folder) < FILES_OF_A_FIT
+    assert value_in(folder) == 7.0
+    assert run_folder.last_fit(CASE).read_bytes() == (folder / "parameters.yaml").read_bytes()
+
+
+def test_an_interruption_while_the_numbers_are_made_waits_for_all_of_them(twice, monkeypatch):
+    result, folder = twice
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    make = run_folder.history_table
+
+    def interrupted(result):
+        signal.raise_signal(signal.SIGINT)
+        return make(result)
+
+    monkeypatch.setattr(run_folder, "history_table", interrupted)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            run_folder.write_fit(result, folder, figures=True)
+    finally:
+        signal.signal(signal.SIGINT, former)
+    assert names(folder) == {name for name in FILES_OF_A_FIT if not name.endswith(".png")}
+    assert value_in(folder) == 7.0
+
+
+def test_figures_do_not_come_beside_the_numbers_of_another_run(fitted, twice, monkeypatch):
+    """Two runs write to one folder: the second puts its numbers there while the first draws."""
+    result, folder = twice
+    draw = plots.trajectories
+
+    def meanwhile(drawn):
+        run_folder.write_fit(result, folder, figures=False)
+        return draw(drawn)
+
+    monkeypatch.setattr(plots, "trajectories", meanwhile)
+    (missing,) = run_folder.write_fit(fitted, folder, figures=True)
+    assert "another run writes there" in missing
+    assert value_in(folder) == 7.0
+    assert not [name for name in names(folder) if name.endswith(".png")]
+
+
+def test_a_result_that_is_a_folder_is_refused(tmp_path):
+    (tmp_path / "result.json").mkdir()
+    with pytest.raises(ExfitError, match=r"result\.json: cannot be written: it is a folder"):
+        run_folder.refuse_unwritable(tmp_path)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"a\0b", b"elsewhere"])

@@ -1,21 +1,20 @@
 """What a fit found."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from exfit.output.terminal.matches import comparisons
-from exfit.output.terminal.terminal import error_of, notes, number, plain_table, remarks, written
+from exfit.output.terminal.terminal import error_of, notes, number, plain_table, remarks
 from exfit.results.model import FitResult, Minima
 
 MINIMA = 5  # columns of minima that fit beside each other
 
 
-def fit(console: Console, result: FitResult, folder: Path, before: FitResult | None = None) -> None:
-    """Show what a fit found, how well it is known, and where its files are.
+def fit(console: Console, result: FitResult, before: FitResult | None = None) -> None:
+    """Show what a fit found, and how well it is known.
 
     The values of a fit ``before`` stand beside the new ones.
     """
@@ -45,8 +44,6 @@ def fit(console: Console, result: FitResult, folder: Path, before: FitResult | N
     notes(console, result.notes)
     if result.validation or several:
         comparisons(console, [*result.comparisons, *result.validation])
-    console.print()
-    written(console, folder)
 
 
 def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
