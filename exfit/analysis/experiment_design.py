@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import InfiniteBus, OpenCircuit
 from exfit.dsp.noise import noise
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments, free_parameters, planned, with_enough_substeps
@@ -30,7 +29,6 @@ Array = NDArray[np.float64]
 
 STEPS = (0.02, 0.05, 0.10)  # pu, of the reference
 LONGER = 2.0  # times as long
-EXTRA = {"open-circuit": ("efd", "ifd"), "infinite-bus": ("efd", "ifd", "p", "q", "it")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +174,7 @@ def _variants(
     case: Case, own: Sequence[Experiment]
 ) -> Iterator[tuple[str, tuple[Experiment, ...]]]:
     """Yield tests beside the case's own; those of several records are varied together."""
-    if not isinstance(case.plant, OpenCircuit | InfiniteBus):
+    if not case.kind.closed_loop:
         return
     for size in STEPS:
         yield f"{100 * size:g} %", tuple(_scaled(one, size) for one in own)
@@ -192,7 +190,8 @@ def _variants(
 def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
     """Return the signals that are recorded, then those that could be."""
     present = [channel.signal for one in own for channel in one.channels]
-    return tuple(dict.fromkeys([*present, *EXTRA.get(case.plant.type, ())]))
+    possible = case.kind.compared if case.kind.closed_loop else ()
+    return tuple(dict.fromkeys([*present, *possible]))
 
 
 def _scaled(one: Experiment, size: float) -> Experiment:

@@ -125,7 +125,7 @@ def fit_notes(
         vt0 = setup.test.vt0 if setup.test.begin is None else None
         # a fitted vt0 lies where the record begins, or on a bound, which is reported
         yield from match_notes(comparison, None if isinstance(vt0, Unknown) else vt0)
-        if case.plant.type != "none":
+        if case.kind.per_unit:
             yield from voltage_notes(comparison)
         yield from record_notes(setup, comparison)
         yield from outlier_notes(setup.record.source.name, setup.channels)

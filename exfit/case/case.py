@@ -15,7 +15,6 @@ from exfit.case.schema import (
     FreeSection,
     InfiniteBus,
     Limit,
-    OnLine,
     OpenCircuit,
     Parameters,
     Plant,
@@ -29,6 +28,7 @@ from exfit.case.schema import (
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault, Place, dotted
 from exfit.errors import CaseError
+from exfit.plants import KINDS, PlantKind
 from exfit.records.record import Record
 from exfit.util.text import near
 
@@ -150,25 +150,31 @@ class Case:
         return (*alone, *(recording.test for recording in (*self.records, *self.validations)))
 
     @property
+    def kind(self) -> PlantKind:
+        """The kind of its plant."""
+        return KINDS[self.plant.type]
+
+    @property
     def on_load(self) -> bool:
         """Whether the breaker is closed in any of the tests."""
         plants = (
             self.plant,
             *(recording.plant for recording in (*self.records, *self.validations)),
         )
-        return any(isinstance(plant, InfiniteBus | OnLine) for plant in plants)
+        return any(KINDS[plant.type].on_load for plant in plants if plant is not None)
 
     def seen_from(self, recording: Recording) -> "Case":
         """Return the case as one record sees it: in the plant of that record."""
-        if recording.plant is None or not isinstance(self.plant, OpenCircuit | InfiniteBus):
+        plant = recording.plant
+        if plant is None or not self.kind.closed_loop:
             return self
         own = {key: getattr(self.plant, key) for key in ("machine", "parameters", "free")}
-        kind = InfiniteBus if isinstance(recording.plant, OnLine) else OpenCircuit
-        network = recording.plant.network if isinstance(recording.plant, OnLine) else None
+        on_load = KINDS[plant.type].on_load
+        section = InfiniteBus if on_load else OpenCircuit
         return replace(
             self,
-            plant=kind(**own, **dict(recording.plant)),
-            parts=with_network(self.parts, network),
+            plant=section(**own, **dict(plant)),
+            parts=with_network(self.parts, plant.given if on_load else None),
         )
 
     def values(self) -> dict[str, float]:

@@ -14,14 +14,15 @@ from exfit.models import STABILISERS, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
-from exfit.plants import MACHINE, NETWORK, STABILISER, flow_sheet
+from exfit.plants import EVENTS, KINDS, MACHINE, NETWORK, STABILISER, PlantKind, flow_sheet
+from exfit.signals import RECORDED
 from exfit.util.text import near
 
 Data = Mapping[str, Any]
 Contradictions = Iterator[tuple[str, str]]
 
-WITH_MACHINE = ("open-circuit", "infinite-bus", "machine-playback")
-WITHOUT_EXCITER = ("machine-playback",)
+# in place of a kind that does not exist, which is a fault of its own
+ANY_PLANT = replace(KINDS["open-circuit"], events=EVENTS, signals=RECORDED)
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 
@@ -67,21 +68,27 @@ class Parts:
 def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
     """Return the parts of a case file's data; add a fault for a name that stands for none."""
     plant = _mapping(data.get("plant"))
-    exciter = None if plant.get("type") in WITHOUT_EXCITER else _exciter(data, folder, faults)
-    machine = _machine(plant, faults) if plant.get("type") in WITH_MACHINE else None
+    kind = kind_of(plant)
+    exciter = _exciter(data, folder, faults) if kind.has_exciter else None
+    machine = _machine(plant, faults) if kind.has_machine else None
     stabiliser = _stabiliser(data, faults)
     found = []
     if exciter is not None:
         exponential = str(data.get("saturation")).startswith("exponential")
         found.append(exciter_part(exciter, exponential))
     if machine is not None:
-        kinds = {str(one.get("type")) for one in (plant, *plants_of_records(data).values())}
-        found.append(machine_part(machine, on_load="infinite-bus" in kinds))
-    if plant.get("type") == "infinite-bus":
+        kinds = (kind, *map(kind_of, plants_of_records(data).values()))
+        found.append(machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
+    if kind.on_load:
         found.append(network_part(_mapping(plant.get("network"))))
     if stabiliser is not None:
         found.append(stabiliser_part(stabiliser))
     return Parts(exciter, machine, stabiliser, tuple(found))
+
+
+def kind_of(plant: Data) -> PlantKind:
+    """Return the kind of a plant section; one that allows everything where there is none."""
+    return KINDS.get(str(plant.get("type")), ANY_PLANT)
 
 
 def with_network(parts: Parts, given: Data | None) -> Parts:

@@ -21,14 +21,16 @@ from pydantic import (
 
 from exfit.case.messages import FILE_NAME, PERCENT
 from exfit.case.ties import is_tie
+from exfit.plants import HEARD
 from exfit.signals import RECORDED
 
 Value = TypeVar("Value")
 if TYPE_CHECKING:
     RecordedSignal = str
+    Heard = str
 else:
+    Heard = Literal[HEARD]
     RecordedSignal = Literal[RECORDED]
-Heard = Literal["speed", "p", "vt"]
 
 
 def _nothing() -> Mapping[str, Any]:
@@ -167,7 +169,16 @@ MACHINE_FREE = Field(
 )
 
 
-class OpenCircuit(Section):
+class PlantSection(Section):
+    """What surrounds the exciter."""
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """What is known of the plant beside the data of the machine, as the case gives it."""
+        return {}
+
+
+class OpenCircuit(PlantSection):
     """A machine whose breaker is open, at rated speed."""
 
     type: Literal["open-circuit"] = Field(description="What surrounds the exciter.")
@@ -176,7 +187,7 @@ class OpenCircuit(Section):
     free: Frozen[FreeSection] = MACHINE_FREE
 
 
-class InfiniteBus(Section):
+class InfiniteBus(PlantSection):
     """A machine behind R + jX to a source of constant voltage and frequency."""
 
     type: Literal["infinite-bus"] = Field(description="What surrounds the exciter.")
@@ -188,8 +199,13 @@ class InfiniteBus(Section):
         "the start; Rc and Xc of the load compensation; pu on the machine's base."
     )
 
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values of the network."""
+        return self.network
 
-class Playback(Section):
+
+class Playback(PlantSection):
     """Recorded signals drive the exciter; efd is compared."""
 
     type: Literal["playback"] = Field(description="What surrounds the exciter: the record.")
@@ -199,8 +215,13 @@ class Playback(Section):
         "holds the recorded efd.",
     )
 
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The reference, where it is known."""
+        return {} if self.vref is None else {"vref": self.vref}
 
-class MachinePlayback(Section):
+
+class MachinePlayback(PlantSection):
     """A recorded field voltage drives the machine on open circuit; vt and ifd are compared."""
 
     type: Literal["machine-playback"] = Field(description="The machine alone; there is no model.")
@@ -209,7 +230,7 @@ class MachinePlayback(Section):
     free: Frozen[FreeSection] = MACHINE_FREE
 
 
-class NoPlant(Section):
+class NoPlant(PlantSection):
     """The model alone: its output is vt."""
 
     type: Literal["none"] = Field(description="What surrounds the model: nothing.")
@@ -541,19 +562,24 @@ class SimulationSection(Section):
     )
 
 
-class OffLine(Section):
+class OffLine(PlantSection):
     """The case's machine with its breaker open."""
 
     type: Literal["open-circuit"] = Field(description="What surrounds the exciter.")
 
 
-class OnLine(Section):
+class OnLine(PlantSection):
     """The case's machine behind R + jX to a source."""
 
     type: Literal["infinite-bus"] = Field(description="What surrounds the exciter.")
     network: Frozen[Number] = Field(
         description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
     )
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values of the network."""
+        return self.network
 
 
 class Recording(Section):

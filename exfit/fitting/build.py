@@ -16,10 +16,6 @@ from exfit.case.schema import (
     SINGLE,
     BumpTest,
     Filter,
-    InfiniteBus,
-    MachinePlayback,
-    OpenCircuit,
-    Playback,
     RecordFile,
     Recording,
     StepSection,
@@ -42,15 +38,11 @@ from exfit.plants import (
     DRIVING,
     NETWORK,
     SATURATION,
-    VREF0,
     VT0,
+    Equipment,
     SaturationForm,
     Stabilised,
-    alone,
-    infinite_bus,
     initial,
-    machine_playback,
-    open_circuit,
     playback,
 )
 from exfit.records.record import Record
@@ -79,21 +71,21 @@ def system_of(case: Case) -> System:
 
 
 def _system_of(case: Case) -> System:
-    plant, parts, saturation = case.plant, case.parts, SATURATION[case.saturation]
-    exciter, machine = parts.exciter, parts.machine
-    if machine is not None and isinstance(plant, MachinePlayback):
-        return machine_playback(machine)
-    if exciter is None:
+    kind, parts = case.kind, case.parts
+    if kind.has_exciter and parts.exciter is None:
         raise CaseError([f"{case.path}: model: missing"])
-    if machine is not None and isinstance(plant, OpenCircuit):
-        return open_circuit(exciter, machine, saturation, inputs_of(case))
-    if machine is not None and isinstance(plant, InfiniteBus):
-        given = "E" if "E" in plant.network else "Q"
-        return infinite_bus(exciter, machine, saturation, inputs_of(case), given, stabilised(case))
-    if isinstance(plant, Playback):
-        driving = driving_signals(case, exciter, saturation)
-        return playback(exciter, saturation, driving, plant.vref is not None)
-    return alone(exciter)
+    equipment = Equipment(
+        exciter=parts.exciter,
+        machine=parts.machine,
+        saturation=SATURATION[case.saturation],
+        inputs=inputs_of(case),
+        recorded=recorded_in_all(case),
+        given=frozenset(case.plant.given),
+        stabiliser=stabilised(case),
+    )
+    if kind.plays_back and parts.exciter is not None:
+        _refuse_missing_drivers(case, parts.exciter, equipment.saturation)
+    return kind.build(equipment)
 
 
 def inputs_of(case: Case) -> tuple[str, ...]:
@@ -114,20 +106,27 @@ def stabilised(case: Case) -> Stabilised | None:
     return Stabilised(model, case.stabiliser.inputs or model.inputs)
 
 
-def driving_signals(case: Case, exciter: Model, saturation: SaturationForm) -> tuple[str, ...]:
-    """Return the recorded signals that drive the exciter of a case in all its records.
+def recorded_in_all(case: Case) -> frozenset[str]:
+    """Return the signals that all records of a case hold."""
+    records = [{*file.channels} for file in _record_files(case).values()]
+    return frozenset(set.intersection(*records) if records else ())
 
-    Raises CaseError where the exciter needs the field current and a record lacks it.
-    """
+
+def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationForm) -> None:
+    """Raise CaseError where a record lacks a signal that the exciter uses."""
+    used = driven_by(exciter, saturation)
+    required = [signal for signal in case.kind.required_if_used if signal in used]
+    for place, file in _record_files(case).items():
+        for signal in required:
+            if signal not in file.channels:
+                text = f"channels.{signal}: is missing: it drives {exciter.name}"
+                raise CaseError([f"{case.path}: {place}: {text}"])
+
+
+def _record_files(case: Case) -> dict[str, RecordFile]:
+    """Return the records of a case by their place in its file."""
     files = {"record" if one.name == SINGLE else one.name: one.record for one in case.recordings}
-    files |= {f"validate.{one.name}": one.record for one in case.validations}
-    given = [set(file.channels) for file in files.values()]
-    needs = driven_by(exciter, saturation)
-    for place, file in files.items():
-        if "ifd" in needs and "ifd" not in file.channels:
-            text = f"channels.ifd: is missing: it drives {exciter.name}"
-            raise CaseError([f"{case.path}: {place}: {text}"])
-    return tuple(signal for signal in DRIVING if all(signal in signals for signals in given))
+    return files | {f"validate.{one.name}": one.record for one in case.validations}
 
 
 @cache
@@ -370,18 +369,16 @@ def _moved(test: BumpTest, record: Record, signal: str) -> Array:
 
 def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     """Return the parameters that a record gives: the levels of its signals at the start."""
-    if not isinstance(case.plant, Playback):
-        vt0 = initial_voltage(test, record)
-        if case.plant.type != "none":
-            _refuse_impossible(vt0, record)
-        return {VT0: vt0}
+    kind, vt0 = case.kind, initial_voltage(test, record)
+    if kind.per_unit and not kind.levels:
+        _refuse_impossible(vt0, record)
     levels = {
         initial(signal): initial_level(test, record, signal)
-        for signal in (*DRIVING, "efd")
+        for signal in kind.levels
         if signal in record.signals
     }
-    given = {} if case.plant.vref is None else {VREF0: case.plant.vref}
-    return {**levels, VT0: initial_voltage(test, record), **given}
+    given = {initial(name): v for name, v in case.plant.given.items() if name in kind.driving}
+    return {**levels, VT0: vt0, **given}
 
 
 def _refuse_impossible(vt0: float, record: Record) -> None:

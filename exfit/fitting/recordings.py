@@ -81,7 +81,7 @@ def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
         frozenset(
             signal
             for signal, channel in file.channels.items()
-            if case.plant.type != "none" and _as_it_stands(channel)
+            if case.kind.per_unit and _as_it_stands(channel)
         ),
     )
     _refuse_steps_outside(case, test, record, path)

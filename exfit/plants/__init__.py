@@ -1,7 +1,9 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
 from exfit.plants.alone import alone
-from exfit.plants.infinite_bus import Given, Stabilised, flow_sheet, infinite_bus
+from exfit.plants.infinite_bus import HEARD, Given, flow_sheet, infinite_bus
+from exfit.plants.kinds import EVENTS, KINDS
+from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import open_circuit
 from exfit.plants.parts import (
     MACHINE,
@@ -15,11 +17,15 @@ from exfit.plants.parts import (
     exciter_inputs,
     exciter_parameters,
 )
-from exfit.plants.playback import DRIVING, EFD0, VREF0, initial, machine_playback, playback
+from exfit.plants.plant import Equipment, PlantKind, Stabilised
+from exfit.plants.playback import DRIVING, EFD0, VREF0, initial, playback
 
 __all__ = [
     "DRIVING",
     "EFD0",
+    "EVENTS",
+    "HEARD",
+    "KINDS",
     "MACHINE",
     "MEASURED",
     "NETWORK",
@@ -27,8 +33,10 @@ __all__ = [
     "STABILISER",
     "VREF0",
     "VT0",
+    "Equipment",
     "Given",
     "Names",
+    "PlantKind",
     "SaturationForm",
     "Stabilised",
     "alone",

@@ -17,6 +17,7 @@ from exfit.plants.parts import (
     state_of,
     symbols,
 )
+from exfit.plants.plant import PlantKind, present
 
 
 @cache
@@ -26,10 +27,10 @@ def alone(model: Model) -> System:
 
     def rest(p: Signals) -> Rest:
         u = exciter_inputs(vt=p[VT0], ifd=0.0)
-        found = rest_of(model, p[VT0], u, exciter_parameters(p, model, quadratic))
-        return Rest(found.states, found.setpoints)
+        exciter = rest_of(model, p[VT0], u, exciter_parameters(p, model, quadratic))
+        return Rest(exciter.states, exciter.setpoints)
 
-    def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         vref, d = r["vref"] + u["vref"], Names()
         values = exciter_parameters(p, model, quadratic)
         output = model.equations(state_of(model, x, r), exciter_inputs(vref=vref), values, d)
@@ -43,5 +44,16 @@ def alone(model: Model) -> System:
         outputs=("vref", "vt", *model.states),
         time_constants=tuple(seconds("", model.sheet)),
         rest=rest,
-        motion=course,
+        motion=equations,
     )
+
+
+ALONE = PlantKind(
+    name="none",
+    title="the model alone",
+    needs=("exciter",),
+    events=("vref",),
+    signals=("vt",),
+    build=lambda equipment: alone(present(equipment.exciter)),
+    per_unit=False,
+)

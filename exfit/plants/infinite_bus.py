@@ -29,8 +29,9 @@ from exfit.plants.parts import (
     values_named,
     values_of,
 )
+from exfit.plants.plant import Equipment, PlantKind, Stabilised, compared, present
 
-SIGNALS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
+OUTPUTS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
 SWING = ("delta", "dw")  # the rotor's angle to the source (rad), its speed less 1 (pu)
 
 FLOW: Sheet = sheet(
@@ -44,14 +45,8 @@ FLOW: Sheet = sheet(
 REACTIVE: Sheet = sheet(("Q", 0.0, "pu", (-10.0, 10.0), "reactive power at the start"))
 SOURCE: Sheet = sheet(("E", 1.0, "pu", (0.01, 10.0), "voltage of the source"))
 
-Given = Literal["Q", "E"]  # what tells the start beside vt0 and P
-
-
-class Stabilised(NamedTuple):
-    """A power system stabiliser, and the signals that it listens to."""
-
-    model: Model
-    inputs: tuple[str, ...]
+Given = Literal["Q", "E"]  # what sets the start beside vt0 and P
+HEARD = ("speed", "p", "vt")  # what a stabiliser may listen to
 
 
 class Flow(NamedTuple):
@@ -134,11 +129,11 @@ def stabiliser_rest(stabiliser: Stabilised, heard: Names, p: Signals) -> dict[st
 
 def stabilising(stabiliser: Stabilised, heard: Names, p: Signals, x: Signals, d: Names) -> Signal:
     """Write the slopes of a stabiliser into ``d`` and return its signal vs."""
-    model, moved = stabiliser.model, Names()
+    model, slopes = stabiliser.model, Names()
     states = Names(**{name: x[STABILISER + name] for name in model.states})
     values = named_parameters(p, STABILISER, model.sheet)
-    vs = model.equations(states, listening(stabiliser, heard), values, moved)
-    for name, slope in vars(moved).items():
+    vs = model.equations(states, listening(stabiliser, heard), values, slopes)
+    for name, slope in vars(slopes).items():
         setattr(d, STABILISER + name, slope)
     return vs
 
@@ -162,7 +157,7 @@ def infinite_bus(
     """
     of_stabiliser = () if stabiliser is None else stabiliser.model.states
     own = tuple(STABILISER + name for name in of_stabiliser)
-    refuse_taken(model, (*SIGNALS, MEASURED, *SWING, *machine.states))
+    refuse_taken(model, (*OUTPUTS, MEASURED, *SWING, *machine.states))
     states = (*machine.states, *SWING, *model.states, *own)
     network = flow_sheet(given)
     stabiliser_sheet = () if stabiliser is None else stabiliser.model.sheet
@@ -177,16 +172,16 @@ def infinite_bus(
         ifd = machine.field(fluxes, stator.i, of_machine)
         vc1 = compensated(stator.v, stator.i, n)
         u = exciter_inputs(vt=vt, vc1=vc1, ifd=ifd, p=n.P, q=vt * at.i_q)
-        found = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
+        exciter = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
         waiting = {**values_of(fluxes, machine.states), "delta": stator.delta, "dw": 0.0}
         if stabiliser is not None:
             waiting |= stabiliser_rest(stabiliser, Names(speed=0.0, p=n.P, vt=vt), p)
         return Rest(
-            {**waiting, **found.states},
-            {**found.setpoints, "Pm": n.P, "source": modulus(at.ex, at.ey)},
+            {**waiting, **exciter.states},
+            {**exciter.setpoints, "Pm": n.P, "source": modulus(at.ex, at.ey)},
         )
 
-    def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
         n = named_parameters(p, NETWORK, network)
         changed = Names(**{name: u.get(name, 0.0) for name in ("E", "R", "X", "vs")})
@@ -205,9 +200,11 @@ def infinite_bus(
         vref = r["vref"] + u["vref"]
         vc1 = compensated(v, i, n)
         measured = vc1 + u.get(MEASURED, 0.0)
-        seen = exciter_inputs(vref=vref, vs=vs, vt=vt, vc1=measured, ifd=ifd, p=power, q=reactive)
+        u_exciter = exciter_inputs(
+            vref=vref, vs=vs, vt=vt, vc1=measured, ifd=ifd, p=power, q=reactive
+        )
         efd = model.equations(
-            state_of(model, x, r), seen, exciter_parameters(p, model, saturation), d
+            state_of(model, x, r), u_exciter, exciter_parameters(p, model, saturation), d
         )
         machine.slopes(fluxes, efd, ifd, i, of_machine, d)
         machine.q_slopes(fluxes, i, of_machine, d)
@@ -216,7 +213,7 @@ def infinite_bus(
         d.dw = ((r["Pm"] - of_machine.D * x["dw"]) / speed - power) / (2.0 * of_machine.H)
         outputs = dict(
             zip(
-                SIGNALS,
+                OUTPUTS,
                 (vref, vt, efd, ifd, power, reactive, it, x["delta"], speed),
                 strict=True,
             )
@@ -234,12 +231,33 @@ def infinite_bus(
         setpoints=("vref", *model.setpoints, "Pm", "source"),
         states=states,
         inputs=inputs,
-        outputs=tuple(dict.fromkeys((*SIGNALS, *states))),
+        outputs=tuple(dict.fromkeys((*OUTPUTS, *states))),
         time_constants=(
             *seconds("", model.sheet),
             *seconds(MACHINE, machine.sheet),
             *seconds(STABILISER, stabiliser_sheet),
         ),
         rest=rest,
-        motion=course,
+        motion=equations,
     )
+
+
+def _build(equipment: Equipment) -> System:
+    return infinite_bus(
+        present(equipment.exciter),
+        present(equipment.machine),
+        equipment.saturation,
+        equipment.inputs,
+        "E" if "E" in equipment.given else "Q",
+        equipment.stabiliser,
+    )
+
+
+INFINITE_BUS = PlantKind(
+    name="infinite-bus",
+    title="on load, behind R + jX to a stiff source",
+    needs=("exciter", "machine", "network"),
+    events=("vref", "vs", "E", "network"),
+    signals=compared(OUTPUTS),
+    build=_build,
+)

@@ -26,28 +26,29 @@ from exfit.plants.parts import (
     values_named,
     values_of,
 )
+from exfit.plants.plant import Equipment, PlantKind, compared, present
 
-SIGNALS = ("vref", "vt", "efd", "ifd")
+OUTPUTS = ("vref", "vt", "efd", "ifd")
 NO_CURRENT = Axes(0.0, 0.0)
 
 
 class OpenMachine(NamedTuple):
-    """A machine on open circuit at one instant; ``moved(efd, d)`` writes its slopes."""
+    """A machine on open circuit at one instant; ``slopes(efd, d)`` writes those of its states."""
 
     vt: Signal
     ifd: Signal
-    moved: Callable[[Signal, Names], None]
+    slopes: Callable[[Signal, Names], None]
 
 
 def machine_on_open_circuit(machine: Machine, x: Signals, p: Names) -> OpenMachine:
     """Return what a machine without stator current shows; the fluxes of its q axis are zero."""
-    s = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
-    ifd = machine.field(s, NO_CURRENT, p)
+    states = values_named({**x, **dict.fromkeys(machine.q_axis, 0.0)}, machine.states)
+    ifd = machine.field(states, NO_CURRENT, p)
 
-    def moved(efd: Signal, d: Names) -> None:
-        machine.slopes(s, efd, ifd, NO_CURRENT, p, d)
+    def slopes(efd: Signal, d: Names) -> None:
+        machine.slopes(states, efd, ifd, NO_CURRENT, p, d)
 
-    return OpenMachine(machine.source(s, p).voltage.q, ifd, moved)
+    return OpenMachine(machine.source(states, p).voltage.q, ifd, slopes)
 
 
 def at_rest(machine: Machine, vt: Signal, p: Names) -> tuple[dict[str, Signal], Signal]:
@@ -71,24 +72,26 @@ def open_circuit(
     ``vs`` a signal in place of a stabiliser; ``vc1`` is added to the voltage that the exciter
     measures. All per unit.
     """
-    refuse_taken(model, (*SIGNALS, MEASURED, *machine.d_axis))
+    refuse_taken(model, (*OUTPUTS, MEASURED, *machine.d_axis))
     states = (*machine.d_axis, *model.states)
 
     def rest(p: Signals) -> Rest:
         fluxes, ifd = at_rest(machine, p[VT0], named_parameters(p, MACHINE, machine.sheet))
         u = exciter_inputs(vt=p[VT0], ifd=ifd)
-        found = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
-        return Rest({**fluxes, **found.states}, found.setpoints)
+        exciter = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
+        return Rest({**fluxes, **exciter.states}, exciter.setpoints)
 
-    def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         d = Names()
         at = machine_on_open_circuit(machine, x, named_parameters(p, MACHINE, machine.sheet))
         vref = r["vref"] + u["vref"]
         measured = at.vt + u.get(MEASURED, 0.0)
-        seen = exciter_inputs(vref=vref, vt=at.vt, vc1=measured, ifd=at.ifd, vs=u.get("vs", 0.0))
+        u_exciter = exciter_inputs(
+            vref=vref, vt=at.vt, vc1=measured, ifd=at.ifd, vs=u.get("vs", 0.0)
+        )
         values = exciter_parameters(p, model, saturation)
-        efd = model.equations(state_of(model, x, r), seen, values, d)
-        at.moved(efd, d)
+        efd = model.equations(state_of(model, x, r), u_exciter, values, d)
+        at.slopes(efd, d)
         outputs = {"vref": vref, "vt": at.vt, MEASURED: at.vt, "efd": efd, "ifd": at.ifd, **x}
         return motion(d, states, outputs)
 
@@ -97,8 +100,23 @@ def open_circuit(
         setpoints=("vref", *model.setpoints),
         states=states,
         inputs=inputs,
-        outputs=(*SIGNALS, *states),
+        outputs=(*OUTPUTS, *states),
         time_constants=(*seconds("", model.sheet), *seconds(MACHINE, machine.sheet)),
         rest=rest,
-        motion=course,
+        motion=equations,
     )
+
+
+def _build(equipment: Equipment) -> System:
+    exciter, machine = present(equipment.exciter), present(equipment.machine)
+    return open_circuit(exciter, machine, equipment.saturation, equipment.inputs)
+
+
+OPEN_CIRCUIT = PlantKind(
+    name="open-circuit",
+    title="breaker open, rated speed",
+    needs=("exciter", "machine"),
+    events=("vref", "vs"),
+    signals=compared(OUTPUTS),
+    build=_build,
+)

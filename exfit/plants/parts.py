@@ -118,9 +118,9 @@ def rest_of(model: Model, output: Signal, u: Names, p: Names) -> ExciterRest:
     """Return an exciter's states at rest, and the setpoints that hold them."""
     x = Names()
     vref = model.rest(output, u, p, x)
-    found = vars(x)
-    if found.keys() != {*model.states, *model.setpoints}:
-        wrong = ", ".join(sorted(found.keys() ^ {*model.states, *model.setpoints}))
+    written = vars(x)
+    if written.keys() != {*model.states, *model.setpoints}:
+        wrong = ", ".join(sorted(written.keys() ^ {*model.states, *model.setpoints}))
         raise ModelError(f"states and rest of the model do not match: {wrong}")
-    setpoints = {name: found[name] for name in model.setpoints}
-    return ExciterRest({name: found[name] for name in model.states}, {"vref": vref, **setpoints})
+    setpoints = {name: written[name] for name in model.setpoints}
+    return ExciterRest({name: written[name] for name in model.states}, {"vref": vref, **setpoints})

@@ -1,28 +1,24 @@
-"""Recorded signals in place of the plant: they drive the exciter, or the machine, alone."""
+"""Recorded signals in place of the plant: they drive the exciter alone."""
 
 from collections.abc import Callable
 from functools import cache
 
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal
-from exfit.models.machines import Machine
 from exfit.models.sheet import Model
-from exfit.plants.open_circuit import at_rest, machine_on_open_circuit
 from exfit.plants.parts import (
-    MACHINE,
-    VT0,
     Names,
     SaturationForm,
     exciter_inputs,
     exciter_parameters,
     motion,
-    named_parameters,
     refuse_taken,
     rest_of,
     seconds,
     state_of,
     symbols,
 )
+from exfit.plants.plant import Equipment, PlantKind, present
 
 EFD0, VREF0 = "efd0", "vref0"
 DRIVING = ("vt", "ifd", "p", "q")  # what may drive an exciter
@@ -38,9 +34,9 @@ def initial(signal: str) -> str:
 def held_by(vref: Signal, efd: Signal, reference: Callable[[Signal], Signal]) -> Signal:
     """Return the efd near ``efd`` that a given reference holds, by Newton's steps."""
     for _ in range(NEWTON_STEPS):
-        there = reference(efd)
-        slope = (reference(efd + DIFFERENCE) - there) / DIFFERENCE
-        efd = efd + (vref - there) / slope
+        held = reference(efd)
+        slope = (reference(efd + DIFFERENCE) - held) / DIFFERENCE
+        efd = efd + (vref - held) / slope
     return efd
 
 
@@ -66,20 +62,20 @@ def playback(
         values = exciter_parameters(p, model, saturation)
         u = exciter_inputs(**{signal: p[initial(signal)] for signal in driving})
         if not vref_known:
-            found = rest_of(model, p[EFD0], u, values)
-            return Rest(found.states, found.setpoints)
+            exciter = rest_of(model, p[EFD0], u, values)
+            return Rest(exciter.states, exciter.setpoints)
         efd = held_by(
             p[VREF0], p[EFD0], lambda efd: rest_of(model, efd, u, values).setpoints["vref"]
         )
-        found = rest_of(model, efd, u, values)
-        return Rest(found.states, {**found.setpoints, "vref": p[VREF0]})
+        exciter = rest_of(model, efd, u, values)
+        return Rest(exciter.states, {**exciter.setpoints, "vref": p[VREF0]})
 
-    def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         recorded = {signal: p[initial(signal)] + u[signal] for signal in driving}
         vref, d = r["vref"] + u["vref"], Names()
-        seen = exciter_inputs(vref=vref, **recorded)
+        u_exciter = exciter_inputs(vref=vref, **recorded)
         values = exciter_parameters(p, model, saturation)
-        efd = model.equations(state_of(model, x, r), seen, values, d)
+        efd = model.equations(state_of(model, x, r), u_exciter, values, d)
         return motion(d, model.states, {"vref": vref, **recorded, "efd": efd, **x})
 
     return System(
@@ -95,36 +91,25 @@ def playback(
         outputs=(*signals, *model.states),
         time_constants=tuple(seconds("", model.sheet)),
         rest=rest,
-        motion=course,
+        motion=equations,
     )
 
 
-@cache
-def machine_playback(machine: Machine) -> System:
-    """Return a machine on open circuit that a recorded field voltage drives.
+def _build(equipment: Equipment) -> System:
+    driving = tuple(signal for signal in DRIVING if signal in equipment.recorded)
+    vref_known = "vref" in equipment.given
+    return playback(present(equipment.exciter), equipment.saturation, driving, vref_known)
 
-    Its input is the change of ``efd`` from the start, where it holds the parameter ``vt0``; so an
-    offset of the recorder does no harm. All per unit.
-    """
 
-    def rest(p: Signals) -> Rest:
-        fluxes, ifd = at_rest(machine, p[VT0], named_parameters(p, MACHINE, machine.sheet))
-        return Rest(fluxes, {"efd": ifd})
-
-    def course(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
-        values, d = named_parameters(p, MACHINE, machine.sheet), Names()
-        at = machine_on_open_circuit(machine, x, values)
-        efd = r["efd"] + u["efd"]
-        at.moved(efd, d)
-        return motion(d, machine.d_axis, {"efd": efd, "vt": at.vt, "ifd": at.ifd, **x})
-
-    return System(
-        parameters=(*symbols(MACHINE, machine.sheet), VT0),
-        setpoints=("efd",),
-        states=machine.d_axis,
-        inputs=("efd",),
-        outputs=("efd", "vt", "ifd", *machine.d_axis),
-        time_constants=tuple(seconds(MACHINE, machine.sheet)),
-        rest=rest,
-        motion=course,
-    )
+PLAYBACK = PlantKind(
+    name="playback",
+    title="the exciter alone, driven by recorded signals",
+    needs=("exciter",),
+    events=("vref",),
+    signals=("vref", *DRIVING, "efd"),
+    driving=("vref", *DRIVING),
+    required=("vt", "efd"),
+    required_if_used=("ifd",),
+    levels=(*DRIVING, "efd"),
+    build=_build,
+)

@@ -198,8 +198,8 @@ def test_a_stabiliser_on_open_circuit_is_said_not_to_act(tmp_path):
         ("PSS1A", "PSS9", "'PSS9' is not a stabiliser model; did you mean"),
         ("{KS: 0.5}", "{K: 0.5}", "stabiliser.parameters.K: not a parameter of PSS1A"),
         ("free: {}", "free: {H: {start: 3, min: 1, max: 9}}", "plant.free.H: both fixed and free"),
-        ("infinite-bus", "open-circuit", "test.network: does not go with plant open-circuit"),
-        ("infinite-bus", "none", "stabiliser: does not go with plant none"),
+        ("infinite-bus", "open-circuit", "test.network: not allowed with plant open-circuit"),
+        ("infinite-bus", "none", "stabiliser: not allowed with plant none"),
     ],
 )  # fmt: skip
 def test_a_fault_on_load_is_told_with_its_place(tmp_path, old, new, says):

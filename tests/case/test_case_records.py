@@ -340,7 +340,7 @@ MEANING = {
         (*TEST, "E"),
         [{"at": 1, "step": 0.1}],
         (*TEST, "E"),
-        "does not go with plant open-circuit",
+        "not allowed with plant open-circuit",
     ),
     "noise of a validation beside its weight": (
         ("validate", 0, "record", "channels"),
@@ -511,7 +511,7 @@ def test_auto_needs_vt_in_the_record():
 @pytest.mark.parametrize(
     ("place", "value", "told_at", "text"),
     [
-        (("record", "delay"), 0.1, ("record", "delay"), "does not go with plant playback"),
+        (("record", "delay"), 0.1, ("record", "delay"), "not allowed with plant playback"),
         (
             ("record", "delay"),
             {"start": 0, "min": -1, "max": 1},
@@ -547,7 +547,7 @@ def test_auto_needs_vt_in_the_record():
                 }
             ],
             ("validate", 0, "plant"),
-            "does not go with plant playback",
+            "not allowed with plant playback",
         ),
     ],
 )

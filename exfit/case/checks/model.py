@@ -12,10 +12,10 @@ from exfit.case.checks.data import Data, is_number, list_of, numbers_in, section
 from exfit.case.checks.record import noise_faults, outside, repeated_names, trial_faults
 from exfit.case.messages import PERCENT
 from exfit.case.parts import (
-    WITHOUT_EXCITER,
     Part,
     Parts,
     helpers_of,
+    kind_of,
     network_part,
     places_of_ties,
     plants_of_records,
@@ -25,6 +25,7 @@ from exfit.case.ties import TieError, Ties, is_tie
 from exfit.case.yaml import Fault, Place
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
+from exfit.plants import PlantKind
 from exfit.util.text import near, show, show_value
 
 Contradictions = Iterable[tuple[str, str]]
@@ -32,7 +33,7 @@ Contradictions = Iterable[tuple[str, str]]
 
 def contradictions(data: Data, parts: Parts, ties: Ties) -> Iterator[Fault]:
     """Yield the faults of a case file's data beyond its form."""
-    kind = str(section_of(data, "plant").get("type"))
+    kind = kind_of(section_of(data, "plant"))
     yield from _model_faults(data, kind)
     tied, faults = _tied_values(data, parts, ties)
     yield from faults
@@ -51,8 +52,8 @@ def contradictions(data: Data, parts: Parts, ties: Ties) -> Iterator[Fault]:
     if "records" not in data:
         yield from trial_faults((), data, data, kind)
     for place, trial in recorded:
-        own = section_of(trial, "plant").get("type", kind)
-        yield from trial_faults(place, trial, data, str(own))
+        plant = section_of(trial, "plant")
+        yield from trial_faults(place, trial, data, kind_of(plant) if "type" in plant else kind)
     yield from noise_faults(data, [((), data), *recorded], kind)
     yield from repeated_names(recorded)
     if "accept" in data and not list_of(data, "validate"):
@@ -64,7 +65,7 @@ def contradictions(data: Data, parts: Parts, ties: Ties) -> Iterator[Fault]:
         yield Fault(("estimate", "loss_scale"), "only with estimate.loss: huber or soft-l1")
 
 
-def _records_faults(data: Data, kind: str) -> Iterator[Fault]:
+def _records_faults(data: Data, kind: PlantKind) -> Iterator[Fault]:
     """Yield what does not fit together where there are several records, or one, or none."""
     if "records" not in data:
         if "test" not in data:
@@ -75,11 +76,13 @@ def _records_faults(data: Data, kind: str) -> Iterator[Fault]:
             yield Fault((key,), "does not go with records: each of them has its own")
 
 
-def _plant_of_record_faults(data: Data, place: Place, plant: Data, kind: str) -> Iterator[Fault]:
+def _plant_of_record_faults(
+    data: Data, place: Place, plant: Data, kind: PlantKind
+) -> Iterator[Fault]:
     """Yield the faults of the plant that a record has in place of the case's."""
-    if kind not in ("open-circuit", "infinite-bus"):
-        yield Fault(place, f"does not go with plant {kind}")
-    elif plant.get("type") == "infinite-bus" and isinstance(plant.get("network"), dict):
+    if not kind.closed_loop:
+        yield Fault(place, f"not allowed with plant {kind.name}")
+    elif kind_of(plant).on_load and isinstance(plant.get("network"), dict):
         yield from _part_faults(data, network_part(plant["network"], (*place, "network")), {}, {})
 
 
@@ -114,14 +117,14 @@ def _helper_places(data: Data, parts: Parts) -> dict[str, Place]:
     return {name: place for name, place in helpers_of(data, parts).items() if name in used}
 
 
-def _model_faults(data: Data, kind: str) -> Iterator[Fault]:
-    if kind not in WITHOUT_EXCITER:
+def _model_faults(data: Data, kind: PlantKind) -> Iterator[Fault]:
+    if kind.has_exciter:
         if "model" not in data:
             yield Fault(("model",), "is missing")
         return
     for key in ("model", "saturation", "parameters", "stabiliser"):
         if key in data:
-            yield Fault((key,), f"does not go with plant {kind}: the machine stands alone")
+            yield Fault((key,), f"not allowed with plant {kind.name}: the machine stands alone")
 
 
 def _given_of(data: Data, part: Part) -> tuple[Data, Data]:
@@ -159,14 +162,15 @@ def _part_faults(
     yield from _placed(section, places, part.check(values))
 
 
-def _stabiliser_faults(data: Data, parts: Parts, kind: str) -> Iterator[Fault]:
+def _stabiliser_faults(data: Data, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
     section = section_of(data, "stabiliser")
     if not section:
         return
-    if kind in ("playback", "none"):
-        yield Fault(("stabiliser",), f"does not go with plant {kind}: nothing feeds it")
-    kinds = {kind, *(str(plant.get("type")) for plant in plants_of_records(data).values())}
-    if kind == "open-circuit" and "infinite-bus" not in kinds and section_of(section, "free"):
+    if kind.has_exciter and not kind.has_machine:
+        yield Fault(("stabiliser",), f"not allowed with plant {kind.name}: nothing feeds it")
+    kinds = (kind, *map(kind_of, plants_of_records(data).values()))
+    on_load = any(kind.on_load for kind in kinds)
+    if kind.closed_loop and not on_load and section_of(section, "free"):
         yield Fault(("stabiliser", "free"), "on open circuit a stabiliser does not act")
     inputs = section.get("inputs")
     if parts.stabiliser is not None and isinstance(inputs, list):

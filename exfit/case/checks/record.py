@@ -1,11 +1,11 @@
 """What contradicts itself in the tests and records of a case file."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from exfit.case.checks.data import Data, is_pair, list_of, numbers_in, section_of, starts_in
 from exfit.case.yaml import Fault, Place
-from exfit.plants import DRIVING
+from exfit.plants import EVENTS, PlantKind
 from exfit.records.units import needs_base
 from exfit.util.text import show
 
@@ -23,31 +23,9 @@ TAKEN = (
     "starts",
 )
 PREFIXES = ("machine", "network", "stabiliser")
-EVENTS: Mapping[str, tuple[str, ...]] = {
-    "open-circuit": ("vref", "vs"),
-    "infinite-bus": ("vref", "vs", "E", "network"),
-    "playback": ("vref",),
-    "machine-playback": (),
-    "none": ("vref",),
-}
-SIGNALS: Mapping[str, tuple[str, ...]] = {
-    "open-circuit": ("vt", "efd", "ifd"),
-    "infinite-bus": ("vt", "efd", "ifd", "p", "q", "it"),
-    "playback": ("vref", *DRIVING, "efd"),
-    "machine-playback": ("efd", "vt", "ifd"),
-    "none": ("vt",),
-}
-DRIVERS: Mapping[str, tuple[str, ...]] = {
-    "playback": ("vref", *DRIVING),
-    "machine-playback": ("efd",),
-}
-NEEDED: Mapping[str, tuple[str, ...]] = {
-    "playback": ("vt", "efd"),
-    "machine-playback": ("efd",),
-}
 
 
-def trial_faults(place: Place, trial: Any, data: Data, kind: str) -> Iterator[Fault]:
+def trial_faults(place: Place, trial: Any, data: Data, kind: PlantKind) -> Iterator[Fault]:
     """Yield what does not fit together in a test and its record."""
     test, record = section_of(trial, "test"), section_of(trial, "record")
     yield from _event_faults((*place, "test"), test, kind)
@@ -61,13 +39,13 @@ def trial_faults(place: Place, trial: Any, data: Data, kind: str) -> Iterator[Fa
     if has_record:
         yield from _record_faults(place, test, record)
         yield from _channel_faults((*place, "record"), section_of(record, "channels"), kind)
-    elif kind in NEEDED:
-        yield Fault((*place, "record"), f"is missing: plant {kind} plays it back")
+    elif kind.plays_back:
+        yield Fault((*place, "record"), f"is missing: plant {kind.name} plays it back")
     elif not place:
         yield from _missing_without_record((*place, "test"), test)
     vt0 = starts_in(test).get("vt0")
     lowest = numbers_in(section_of(test, "vt0")).get("min")
-    if kind not in SIGNALS or kind == "none":
+    if not kind.per_unit:
         return
     if vt0 is not None and vt0 <= 0:
         yield Fault((*place, "test", "vt0"), f"{show(vt0)} is not above 0")
@@ -75,13 +53,13 @@ def trial_faults(place: Place, trial: Any, data: Data, kind: str) -> Iterator[Fa
         yield Fault((*place, "test", "vt0", "min"), f"{show(lowest)} is not above 0")
 
 
-def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
+def _channel_faults(place: Place, channels: Data, kind: PlantKind) -> Iterator[Fault]:
     for signal in channels:
-        if signal not in SIGNALS.get(kind, (signal,)):
-            known = ", ".join(SIGNALS[kind])
+        if signal not in kind.signals:
+            signals = ", ".join(kind.signals)
             here = (*place, "channels", signal)
-            yield Fault(here, f"does not go with plant {kind}, which has {known}")
-    for signal in DRIVERS.get(kind, ()):
+            yield Fault(here, f"not allowed with plant {kind.name}, which has {signals}")
+    for signal in kind.driving:
         for key in ("weight", "noise", "filter", "outliers"):
             if key in section_of(channels, signal):
                 here = (*place, "channels", signal, key)
@@ -97,21 +75,23 @@ def _channel_faults(place: Place, channels: Data, kind: str) -> Iterator[Fault]:
         here = (*place, "channels", signal)
         yield from _unit_faults(here, section_of(channels, signal), kind)
         yield from _phase_faults(here, section_of(channels, signal), signal)
-    for signal in NEEDED.get(kind, ()):
+    for signal in kind.required:
         if channels and signal not in channels:
-            yield Fault((*place, "channels", signal), f"is missing: plant {kind} needs it")
-    if kind == "machine-playback" and channels and not {"vt", "ifd"} & channels.keys():
-        yield Fault((*place, "channels"), "neither vt nor ifd: there is nothing to compare")
+            yield Fault((*place, "channels", signal), f"is missing: plant {kind.name} needs it")
+    compared = kind.compared
+    if channels and not {*compared} & {*channels, *kind.required}:
+        lacking = f"neither {' nor '.join(compared)}"
+        yield Fault((*place, "channels"), f"{lacking}: there is nothing to compare")
 
 
-def _unit_faults(place: Place, channel: Data, kind: str) -> Iterator[Fault]:
+def _unit_faults(place: Place, channel: Data, kind: PlantKind) -> Iterator[Fault]:
     """Yield a base of no unit, and a unit that nothing makes per unit, as a machine's must be."""
     unit = channel.get("unit")
     if "base" in channel and "unit" not in channel:
         yield Fault((*place, "unit"), "is missing: in which unit is base?")
     if "base" in channel or "scale" in channel or not isinstance(unit, str):
         return
-    if unit and kind != "none" and needs_base(unit):
+    if unit and kind.per_unit and needs_base(unit):
         yield Fault((*place, "base"), f"is missing: what is 1 pu in {unit}?")
 
 
@@ -127,20 +107,19 @@ def _phase_faults(place: Place, channel: Data, signal: str) -> Iterator[Fault]:
         yield Fault((*place, "averaged"), "waveforms have a window of their own: cycles")
 
 
-def _event_faults(place: Place, test: Data, kind: str) -> Iterator[Fault]:
+def _event_faults(place: Place, test: Data, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of the steps and switchings of a test."""
-    events = {"vref", "vs", "E", "network"}
-    for name in sorted(events):
+    for name in EVENTS:
         yield from _step_faults((*place, name), test, name)
-        if name in test and name not in EVENTS.get(kind, (name,)):
-            yield Fault((*place, name), f"does not go with plant {kind}")
+        if name in test and name not in kind.events:
+            yield Fault((*place, name), f"not allowed with plant {kind.name}")
     instants = _instants(test)
-    if test and kind not in NEEDED and not events & test.keys():
-        yield Fault(place, f"no step: give one of {', '.join(EVENTS.get(kind, ('vref',)))}")
-    if "begin" in test and kind in NEEDED:
-        yield Fault((*place, "begin"), f"does not go with plant {kind}: the record drives it")
+    if test and not kind.plays_back and not {*EVENTS} & test.keys():
+        yield Fault(place, f"no step: give one of {', '.join(kind.events)}")
+    if "begin" in test and kind.plays_back:
+        yield Fault((*place, "begin"), f"not allowed with plant {kind.name}: the record drives it")
     steady = numbers_in(test).get("steady_until")
-    if steady is None and kind in NEEDED and not instants:
+    if steady is None and kind.plays_back and not instants:
         yield Fault((*place, "steady_until"), "is missing: until when is the record at rest?")
     if steady is not None and instants and steady > min(instants):
         text = f"{show(steady)} s is after the first step, at {show(min(instants))} s"
@@ -151,7 +130,7 @@ def _instants(test: Data) -> list[float]:
     """Return the readable instants of all events of a test."""
     return [
         starts["at"]
-        for name in ("vref", "vs", "E", "network")
+        for name in EVENTS
         for starts in map(starts_in, list_of(test, name))
         if "at" in starts
     ]
@@ -211,7 +190,7 @@ def _record_faults(place: Place, test: Data, record: Data) -> Iterator[Fault]:
             here, f"{show(begin)} s is after {show(start)} s, where the record's window starts"
         )
     start = start if begin is None else begin
-    for name in ("vref", "vs", "E", "network"):
+    for name in EVENTS:
         for index, step in enumerate(list_of(test, name)):
             at = starts_in(step).get("at")
             if at is not None and not start <= at < end:
@@ -232,7 +211,7 @@ def _missing_without_record(place: Place, test: Data) -> Iterator[Fault]:
 
 
 def _unknown_faults(
-    place: Place, test: Data, record: Data, kind: str, has_record: bool
+    place: Place, test: Data, record: Data, kind: PlantKind, has_record: bool
 ) -> Iterator[Fault]:
     """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
     found: list[tuple[Place, Any]] = [((*place, "test", "vt0"), test.get("vt0"))]
@@ -248,8 +227,8 @@ def _unknown_faults(
     for here, value in found:
         if isinstance(value, dict):
             yield from _unknown_value_faults(here, value)
-            if kind in NEEDED:
-                yield Fault(here, f"does not go with plant {kind}: the record drives it")
+            if kind.plays_back:
+                yield Fault(here, f"not allowed with plant {kind.name}: the record drives it")
             elif value.get("start") == "auto":
                 if not has_record:
                     yield Fault((*here, "start"), "auto needs a record")
@@ -261,8 +240,8 @@ def _unknown_faults(
             here = (*place, "test", "vt0")
             yield Fault(here, f"is missing: the record cannot tell it where {key} of vt is found")
             break
-    if kind in NEEDED and numbers_in(record).get("delay", 0.0) != 0.0:
-        yield Fault((*place, "record", "delay"), f"does not go with plant {kind}")
+    if kind.plays_back and numbers_in(record).get("delay", 0.0) != 0.0:
+        yield Fault((*place, "record", "delay"), f"not allowed with plant {kind.name}")
 
 
 def _unknown_value_faults(place: Place, value: Data) -> Iterator[Fault]:
@@ -291,13 +270,13 @@ def outside(start: float | None, low: float | None, high: float | None) -> bool:
     return (low is not None and start < low) or (high is not None and start > high)
 
 
-def noise_faults(data: Data, trials: list[tuple[Place, Any]], kind: str) -> Iterator[Fault]:
+def noise_faults(data: Data, trials: list[tuple[Place, Any]], kind: PlantKind) -> Iterator[Fault]:
     """Yield channels without noise where another has it, and channels with weight and noise."""
     channels = {
         (*place, "record", "channels", signal): channel if isinstance(channel, dict) else {}
         for place, trial in trials
         for signal, channel in section_of(trial, "record", "channels").items()
-        if signal not in DRIVERS.get(kind, ())
+        if signal not in kind.driving
     }
     fitted = {place: one for place, one in channels.items() if place[0] != "validate"}
     given = any("noise" in channel for channel in fitted.values())

@@ -21,13 +21,6 @@ from exfit.output.report.sources import Samples, Sources, sources
 from exfit.results.io import Saved, read_saved
 from exfit.util.text import show
 
-PLANTS: Mapping[str, str] = {
-    "open-circuit": "breaker open, rated speed",
-    "infinite-bus": "on load, behind R + jX to a stiff source",
-    "playback": "the exciter alone, driven by recorded signals",
-    "machine-playback": "the machine alone, driven by the recorded field voltage",
-    "none": "the model alone",
-}
 OF_RECORD: Mapping[str, str] = {
     "at": "instant of a step",
     "step": "size of a step",
@@ -330,7 +323,7 @@ def _tested(case: Case, recording: Recording, trial: ExperimentSetup, role: str)
         name=recording.name,
         role=role,
         file=recording.record.file,
-        plant=PLANTS[case.seen_from(recording).plant.type],
+        plant=case.seen_from(recording).kind.title,
         done="; ".join(_done(recording.test)) or "no step of its own",
         channels="; ".join(_channel(*one) for one in recording.record.channels.items()),
         samples=len(time),

@@ -1,0 +1,23 @@
+"""The kinds of plant, by the names that a case file gives them."""
+
+from collections.abc import Mapping
+
+from exfit.plants.alone import ALONE
+from exfit.plants.infinite_bus import INFINITE_BUS
+from exfit.plants.machine_playback import MACHINE_PLAYBACK
+from exfit.plants.open_circuit import OPEN_CIRCUIT
+from exfit.plants.plant import PlantKind
+from exfit.plants.playback import PLAYBACK
+
+KINDS: Mapping[str, PlantKind] = {
+    kind.name: kind
+    for kind in (
+        OPEN_CIRCUIT,
+        INFINITE_BUS,
+        PLAYBACK,
+        MACHINE_PLAYBACK,
+        ALONE,
+    )
+}
+
+EVENTS = tuple(dict.fromkeys(event for kind in KINDS.values() for event in kind.events))

@@ -1,0 +1,104 @@
+"""A kind of plant as data: what it needs, what acts on it, what it shows, and how it is built."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypeVar
+
+from exfit.engine.system import System
+from exfit.errors import ModelError
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model
+from exfit.plants.parts import SaturationForm
+from exfit.signals import COMPARED
+
+Component = TypeVar("Component", Model, Machine)
+Part = Literal["exciter", "machine", "network"]
+
+
+class Stabilised(NamedTuple):
+    """A power system stabiliser, and the signals that it listens to."""
+
+    model: Model
+    inputs: tuple[str, ...]
+
+
+class Equipment(NamedTuple):
+    """What a plant is built of.
+
+    ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
+    ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
+    """
+
+    exciter: Model | None
+    machine: Machine | None
+    saturation: SaturationForm
+    inputs: tuple[str, ...] = ("vref",)
+    recorded: frozenset[str] = frozenset()
+    given: frozenset[str] = frozenset()
+    stabiliser: Stabilised | None = None
+
+
+@dataclass(frozen=True)
+class PlantKind:
+    """What surrounds an exciter; ``name`` as a case has it, ``title`` as a report has it.
+
+    ``needs`` are the parts that a case gives, ``events`` what a test may change, ``signals`` what
+    a record may hold. Of these ``driving`` drive the simulation in place of the plant: ``required``
+    ones must be recorded, those ``required_if_used`` where the exciter uses them; ``levels`` are
+    recorded signals whose level at the start is a parameter. ``per_unit`` says that voltages are
+    those of a machine: per unit, and above zero at rest.
+    """
+
+    name: str
+    title: str
+    needs: tuple[Part, ...]
+    events: tuple[str, ...]
+    signals: tuple[str, ...]
+    build: Callable[[Equipment], System]
+    driving: tuple[str, ...] = ()
+    required: tuple[str, ...] = ()
+    required_if_used: tuple[str, ...] = ()
+    levels: tuple[str, ...] = ()
+    per_unit: bool = True
+
+    @property
+    def has_exciter(self) -> bool:
+        """Whether there is an exciter in it."""
+        return "exciter" in self.needs
+
+    @property
+    def has_machine(self) -> bool:
+        """Whether there is a machine in it."""
+        return "machine" in self.needs
+
+    @property
+    def on_load(self) -> bool:
+        """Whether the machine feeds a network."""
+        return "network" in self.needs
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether an exciter controls a machine."""
+        return self.has_exciter and self.has_machine
+
+    @property
+    def plays_back(self) -> bool:
+        """Whether a record drives the simulation, which cannot be without one."""
+        return bool(self.driving)
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """The signals that are compared with a record."""
+        return tuple(signal for signal in self.signals if signal not in self.driving)
+
+
+def compared(outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """Return those outputs of a plant that may be compared with a record."""
+    return tuple(signal for signal in outputs if signal in COMPARED)
+
+
+def present(component: Component | None) -> Component:
+    """Return a part of the equipment; raises ModelError where it is missing."""
+    if component is None:
+        raise ModelError("the plant lacks its exciter or its machine")
+    return component

@@ -1,0 +1,66 @@
+"""The table of plants, and that whoever uses it covers every kind."""
+
+import pytest
+from pydantic import TypeAdapter
+
+from exfit.case import schema
+from exfit.models import MODELS
+from exfit.models.machines import MACHINES
+from exfit.plants import EVENTS, KINDS, SATURATION, Equipment
+from exfit.signals import RECORDED, SIGNALS
+
+EQUIPMENT = Equipment(
+    MODELS["AC8B"],
+    MACHINES["GENROU"],
+    SATURATION["quadratic"],
+    recorded=frozenset(RECORDED),
+    given=frozenset({"Q", "vref"}),
+)
+
+
+@pytest.fixture(params=KINDS)
+def kind(request):
+    return KINDS[request.param]
+
+
+def sections():
+    """Return the sections of the schema for a plant, by the names that they allow."""
+    choices = TypeAdapter(schema.CaseDocument).json_schema()["$defs"]
+    return {
+        part["properties"]["type"]["const"]: name
+        for name, part in choices.items()
+        if "const" in part.get("properties", {}).get("type", {})
+    }
+
+
+def test_each_kind_has_a_section_of_the_schema_and_each_section_a_kind():
+    assert sections().keys() == KINDS.keys()
+
+
+def test_what_a_test_may_change_has_a_key_there(kind):
+    assert {*kind.events} <= schema.BumpTest.model_fields.keys()
+
+
+def test_a_kind_is_built_of_what_it_needs_and_shows_its_signals(kind):
+    equipment = EQUIPMENT._replace(
+        exciter=EQUIPMENT.exciter if kind.has_exciter else None,
+        machine=EQUIPMENT.machine if kind.has_machine else None,
+        inputs=tuple(event for event in kind.events if event in SIGNALS),
+    )
+    system = kind.build(equipment)
+    assert {*kind.compared} <= {*system.outputs}
+    assert {*kind.driving} <= {*system.inputs}
+
+
+def test_a_record_may_hold_what_drives_and_what_is_compared(kind):
+    assert {*kind.driving, *kind.required, *kind.levels} <= {*kind.signals} <= {*RECORDED}
+    assert kind.compared
+    assert {*kind.required_if_used} <= {*kind.driving}
+
+
+def test_all_events_are_those_of_some_kind():
+    assert {*EVENTS} == {event for kind in KINDS.values() for event in kind.events}
+
+
+def test_a_kind_has_words_for_a_report(kind):
+    assert kind.title
