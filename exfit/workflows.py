@@ -43,7 +43,7 @@ from exfit.fitting.build import (
     values_of,
     with_enough_substeps,
 )
-from exfit.fitting.compression import compressed
+from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
 from exfit.records.reading import file_hash
 from exfit.results.compare_with_record import compare_with_record
@@ -93,10 +93,9 @@ def fit(
     began = clock.perf_counter()
     case = loaded(case)
     start = case.values()
-    setups, residuals = fitted(case)
+    setups, problem = fitted(case)
+    residuals, counter = problem.residuals, SimulationCounter()
     unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
-    problem = compressed(residuals)
-    simulations_before = problem.simulations
     method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
@@ -107,12 +106,10 @@ def fit(
             live(response)
         progress(history[-1])
 
-    best, search_result = search(case, residuals, method, announce, search_progress)
-    # of the search alone
-    simulations, substeps = problem.simulations - simulations_before, problem.substeps
+    best, search_result = search(case, problem, method, announce, search_progress, counter)
     values = residuals.values(best.x)
     interrupted = best.stop is estimate.Stop.INTERRUPTED
-    uncertainty = None if interrupted else uncertainty_of_solution(residuals, best.x, setups)
+    uncertainty = None if interrupted else uncertainty_of_solution(problem, best.x, setups)
     comparisons = comparisons_of(setups, residuals, values, history)
     validation = tuple(validation_of(case, setup, values) for setup in unseen)
     free = case.free()
@@ -138,8 +135,8 @@ def fit(
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,
-        simulations=simulations,
-        substeps=substeps,
+        simulations=counter.simulations,
+        substeps=counter.substeps,
         seconds=clock.perf_counter() - began,
         notes=tuple(fit_notes(case, residuals, best, setups, comparisons, validation, uncertainty)),
         validation=validation,

@@ -16,6 +16,7 @@ from exfit.case.case import Case
 from exfit.dsp.noise import noise
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments, free_parameters, planned, with_enough_substeps
+from exfit.fitting.compression import problem_of
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
@@ -91,13 +92,14 @@ def identify(case: Case, given: Mapping[str, float]) -> Design:
         seen = [
             with_enough_substeps(_seen(one, noises, finest), at, case.path) for one, noises in pairs
         ]
-        residuals = Residuals(seen, _moved(free, experiments), fixed, case.ties)
+        problem = problem_of(Residuals(seen, _moved(free, experiments), fixed, case.ties))
+        residuals = problem.residuals
         names = tuple(one.name for trial in trials for one in trial.free)
         still = np.zeros(residuals.count)
-        linear = linearisation(residuals, residuals.start, names, still)
+        linear = linearisation(problem, residuals.start, names, still)
         # a start on its bound is no result
         linear = replace(linear, held=(None,) * len(linear.names))
-        return uncertainty_of(residuals, residuals.start, linear)
+        return uncertainty_of(problem, residuals.start, linear)
 
     plans = [Plan(label, told(one).confidence) for label, one in _variants(case, own)]
     return Design(

@@ -36,7 +36,7 @@ def live_response(
 ) -> LiveResponse | None:
     """Return the judged signal of the first trial at scaled parameters theta (N,).
 
-    It mostly costs no simulation. None where there is no response, and of a record of more than
+    It costs a simulation. None where there is no response, and where the record has more than
     MOST_SAMPLES.
     """
     if len(trial.record.time) > MOST_SAMPLES:
@@ -44,13 +44,14 @@ def live_response(
     signals = trial.experiment.signals
     place = signals.index(judged_of(signals))
     channel, begin = trial.channels[place], sum(trial.experiment.sizes[:place])
+    end = begin + trial.experiment.sizes[place]
     try:
-        errors = residuals.first_errors(theta)[begin : begin + trial.experiment.sizes[place]]
         values = residuals.values(theta)
+        errors, _ = trial.experiment.errors(values)
     except UNREACHABLE:
         return None
     measured = channel.filtered(trial.experiment.measured(channel, values))
-    simulated = measured + errors / channel.weight
+    simulated = measured + errors[begin:end] / channel.weight
     return LiveResponse(channel.signal, trial.record.time[channel.kept], measured, simulated)
 
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.compression import compressed
 from exfit.fitting.nuisance import unit_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
@@ -99,21 +98,22 @@ def profile(
 
     Source: Venzon & Moolgavkar 1988.
     """
-    trials, residuals = fitted(case)
+    setups, problem = fitted(case)
+    residuals = problem.residuals
     free = [one.name for one in residuals.free]
     wanted = tuple(names) or tuple(free)
     unknown = [name for name in wanted if name not in free]
     if unknown:
         raise CaseError(f"{case.path}: {name}: not free; {near(name, free)}" for name in unknown)
-    found, minima = search(case, residuals, case.estimate.strategy, lambda _: None, watch)
+    found, minima = search(case, problem, case.estimate.strategy, lambda _: None, watch)
     if found.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
         raise KeyboardInterrupt
     notes = [] if found.success else [f"the fit did not end at a minimum: {found.message}"]
     x = found.x
     for _ in range(MOST_MINIMA):
-        known = uncertainty_at(residuals, x, names_of_records(trials))
+        known = uncertainty_at(problem, x, names_of_records(setups))
         rises = {free.index(name): known.rises[name] for name in wanted}
-        sides = _sides(residuals, x, rises, watch)
+        sides = _sides(problem.compressed, x, rises, watch)
         interrupted = any(estimate.ProfileEnd.INTERRUPTED in one.ends for one in sides)
         if interrupted or not sides[0].moved:
             break
@@ -136,7 +136,6 @@ def _sides(
     watch: Callable[[estimate.Progress], None],
 ) -> list[estimate.CostProfile]:
     """Return the profiles about x, those of like rises side by side; if x is a minimum, of all."""
-    fewer = compressed(residuals)
     alike: dict[str, list[int]] = {}
     for index, rise in rises.items():
         alike.setdefault(f"{rise:.{ALIKE}e}", []).append(index)
@@ -147,11 +146,11 @@ def _sides(
             watch(replace(progress, done=done + progress.done, total=2 * len(rises)))
 
         profiles = estimate.profiles(
-            fewer,
-            fewer.exact,
+            residuals,
+            residuals.exact,
             x,
             indices,
-            fewer.bounds,
+            residuals.bounds,
             rises[indices[0]],
             x_scale=UNIT,
             watch=tell,

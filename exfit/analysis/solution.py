@@ -22,6 +22,7 @@ from exfit.case.case import Case
 from exfit.case.schema import Unknown
 from exfit.errors import SimulationError
 from exfit.fitting.build import ExperimentSetup, robust_of
+from exfit.fitting.compression import FitProblem
 from exfit.fitting.nonlinearity import nonlinear_parameters
 from exfit.fitting.nuisance import unit_of
 from exfit.fitting.residuals import Residuals
@@ -62,17 +63,19 @@ def iteration_of(line: estimate.SolverIteration, residuals: Residuals) -> Iterat
 
 
 def uncertainty_of_solution(
-    residuals: Residuals, theta: Array, setups: Iterable[ExperimentSetup]
+    problem: FitProblem, theta: Array, setups: Iterable[ExperimentSetup]
 ) -> UncertaintyAnalysis | None:
     """Return how well the records determine the solution theta (N,), in scaled parameters.
 
     None where the derivatives there are not finite.
     """
     try:
-        uncertainty = uncertainty_at(residuals, theta, names_of_records(setups))
+        uncertainty = uncertainty_at(problem, theta, names_of_records(setups))
     except SimulationError:
         return None
-    return replace(uncertainty, nonlinear=nonlinear_parameters(residuals, theta, uncertainty))
+    return replace(
+        uncertainty, nonlinear=nonlinear_parameters(problem.compressed, theta, uncertainty)
+    )
 
 
 def comparisons_of(

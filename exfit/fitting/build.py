@@ -391,12 +391,15 @@ def _refuse_impossible(vt0: float, record: Record) -> None:
         )
 
 
-def build_experiments(case: Case) -> tuple[ExperimentSetup, ...]:
-    """Return the tests of a case with the records that it is fitted to; CaseError without any."""
+def build_experiments(case: Case, start: Values | None = None) -> tuple[ExperimentSetup, ...]:
+    """Return the tests of a case with the records that it is fitted to; CaseError without any.
+
+    ``start`` are the case's values, where they are at hand.
+    """
     if not case.recordings:
         raise CaseError([f"{case.path}: record: missing; a fit needs a record"])
-    values = case.values()
-    return tuple(build_experiment(case, one, values) for one in case.recordings)
+    values = case.values() if start is None else start
+    return tuple(build_experiment(case, recording, values) for recording in case.recordings)
 
 
 def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, float]]:
@@ -435,17 +438,21 @@ def planned(case: Case, signals: Sequence[str] = ("vt",)) -> Experiment:
     return Experiment(simulator, seen, levels)
 
 
-def residuals_of(case: Case, trials: Sequence[ExperimentSetup]) -> Residuals:
+def residuals_of(
+    case: Case, setups: Sequence[ExperimentSetup], start: Values | None = None
+) -> Residuals:
     """Return the residuals of a case as functions of its free parameters.
 
-    Raises CaseError where nothing is free.
+    ``start`` are the case's values, where they are at hand. Raises CaseError where nothing is free.
     """
-    free = free_parameters(case, trials)
+    free = free_parameters(case, setups)
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
-    names = {one.name for one in free}
-    fixed = {name: value for name, value in case.values().items() if name not in names}
-    return Residuals([one.experiment for one in trials], free, fixed, case.ties, robust_of(case))
+    names = {parameter.name for parameter in free}
+    values = case.values() if start is None else start
+    fixed = {name: value for name, value in values.items() if name not in names}
+    experiments = [setup.experiment for setup in setups]
+    return Residuals(experiments, free, fixed, case.ties, robust_of(case))
 
 
 def robust_of(case: Case) -> Robust | None:

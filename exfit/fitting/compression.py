@@ -1,15 +1,13 @@
-"""A record with many more samples than the grid of its simulation, condensed without any loss.
+"""A record with many more samples than the grid of its simulation, compressed without any loss.
 
 Between two points of the grid a response is a polynomial through six of them. However many samples
 lie there, the sum of their squared errors is a quadratic form of these six values, and six errors
 have the same sum: a search goes the same way, in a fraction of time and memory.
 """
 
-from collections.abc import MutableMapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +19,9 @@ from exfit.simulation.interpolation import NEIGHBOURS, Interpolation
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
-WORTH = 3  # times fewer errors: else it does not pay
-ROUNDING = 1e-14  # of the largest eigenvalue of such a form: smaller ones are rounding
-READS = ("shift", "delay", "scale", "offset")  # what is found of these kinds changes the samples
+LEAST_GAIN = 3  # times fewer errors: else it does not pay
+EIGENVALUE_ROUNDING = 1e-14  # of the largest of such a form: smaller ones are rounding
+CHANGING_SAMPLES = ("shift", "delay", "scale", "offset")  # nuisances that change what is compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +47,13 @@ class CompressedChannel(Channel):
 
     def filtered(self, samples: Array) -> Array:
         """Return what is compared of samples (G,): (6 K + 1,)."""
-        found = np.einsum("kij,kj->ki", self.form.maps, samples[self.form.rows])
-        return np.append(found, 0.0)
+        mapped = np.einsum("kij,kj->ki", self.form.maps, samples[self.form.rows])
+        return np.append(mapped, 0.0)
 
     def slopes(self, samples: Array, slopes: Array) -> Array:
         """Return the derivatives (6 K + 1, N) of these, given those (G, N) of samples."""
-        found = self.form.maps @ slopes[self.form.rows]
-        return np.vstack([found.reshape(-1, slopes.shape[1]), np.zeros(slopes.shape[1])])
+        mapped = self.form.maps @ slopes[self.form.rows]
+        return np.vstack([mapped.reshape(-1, slopes.shape[1]), np.zeros(slopes.shape[1])])
 
     @cached_property
     def record(self) -> Array:
@@ -68,53 +66,59 @@ class CompressedChannel(Channel):
         return self.form.theirs.size + 1
 
 
-KNOWN: MutableMapping[Residuals, Residuals | None] = WeakKeyDictionary()  # for as long as it lives
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """What a fit makes small, in two forms with the same cost and gradient at every point.
+
+    ``residuals`` are those of all samples; ``compressed`` are fewer, or the same where nothing is
+    gained.
+    """
+
+    residuals: Residuals
+    compressed: Residuals
+
+
+def problem_of(residuals: Residuals) -> FitProblem:
+    """Return both forms of the residuals of all samples."""
+    return FitProblem(residuals, compressed(residuals))
 
 
 def compressed(residuals: Residuals) -> Residuals:
     """Return residuals with the same cost and gradient at every point, but fewer of them.
 
     The Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the
-    same residuals where condensing would not save much, or where it does not hold: with filters,
+    same residuals where compression would not save much, or where it does not hold: with filters,
     with a robust loss, and where the instants at which a record is read, or its scale, are found.
-    Asked again, it returns the same: what that counts is of the whole search.
 
     Source: Golub & Van Loan 2013, section 5.3 (the least-squares problem of a factor R is that of
     all rows).
     """
-    if residuals not in KNOWN:
-        KNOWN[residuals] = _fewer(residuals)
-    return KNOWN[residuals] or residuals
-
-
-def _fewer(residuals: Residuals) -> Residuals | None:
-    """Return condensed residuals, None where they would be the same."""
     if residuals.robust is not None:
-        return None
-    experiments = [_condensed(one) for one in residuals.experiments]
+        return residuals
+    experiments = [_compressed_experiment(whole) for whole in residuals.experiments]
     if all(new is old for new, old in zip(experiments, residuals.experiments, strict=True)):
-        return None
-    return Residuals(experiments, residuals.free, residuals.fixed, residuals.ties)
+        return residuals
+    return replace(residuals, experiments=experiments)
 
 
-def _condensed(one: Experiment) -> Experiment:
+def _compressed_experiment(whole: Experiment) -> Experiment:
     """Return an experiment with fewer errors, the same where that does not pay or hold."""
-    simulator = one.simulator.on_grid()
-    possible = all(channel.plain for channel in one.channels) and not any(
-        nuisance.kind in READS for nuisance in one.nuisances
+    simulator = whole.simulator.on_grid()
+    possible = all(channel.plain for channel in whole.channels) and not any(
+        nuisance.kind in CHANGING_SAMPLES for nuisance in whole.nuisances
     )
-    fewer = NEIGHBOURS * WORTH * len(simulator.times) * len(one.channels) < sum(one.sizes)
-    if not (possible and fewer):
-        return one
-    sampling = one.simulator.sampling()
+    errors_on_grid = NEIGHBOURS * len(simulator.times) * len(whole.channels)
+    if not possible or LEAST_GAIN * errors_on_grid >= sum(whole.sizes):
+        return whole
+    sampling = whole.simulator.sampling()
     return replace(
-        one,
+        whole,
         simulator=simulator,
-        channels=tuple(_condensed_channel(channel, sampling) for channel in one.channels),
+        channels=tuple(_compressed_channel(channel, sampling) for channel in whole.channels),
     )
 
 
-def _condensed_channel(channel: Channel, sampling: Interpolation) -> CompressedChannel:
+def _compressed_channel(channel: Channel, sampling: Interpolation) -> CompressedChannel:
     return CompressedChannel(
         signal=channel.signal,
         measured=channel.measured,
@@ -131,7 +135,7 @@ def form_of(sampling: Interpolation, measured: Array, kept: NDArray[np.bool_]) -
     starts = np.flatnonzero(np.diff(first, prepend=-1))
     group = np.cumsum(np.bincount(starts, minlength=len(first))) - 1
     levels = measured[kept][starts]  # about a sample of each group squares do not cancel
-    moved = measured[kept] - levels[group]
+    deviations = measured[kept] - levels[group]
     count = len(starts)
     squares = np.zeros((count, NEIGHBOURS, NEIGHBOURS))
     products = np.zeros((count, NEIGHBOURS))
@@ -141,7 +145,7 @@ def form_of(sampling: Interpolation, measured: Array, kept: NDArray[np.bool_]) -
         if not here.any():
             continue
         weights = sampling.weights(block)[:, here]
-        own, y = group[place[block][here]], moved[place[block][here]]
+        own, y = group[place[block][here]], deviations[place[block][here]]
         low = own[0]
         size = own[-1] - low + 1
         within = own - low
@@ -153,11 +157,11 @@ def form_of(sampling: Interpolation, measured: Array, kept: NDArray[np.bool_]) -
         for i in range(NEIGHBOURS):
             products[low : low + size, i] += np.bincount(within, weights[i] * y, size)
     sizes, vectors = np.linalg.eigh(squares)
-    some = sizes > ROUNDING * sizes[:, -1:]
-    roots = np.sqrt(np.where(some, sizes, 1.0))
-    maps = np.where(some, roots, 0.0)[:, :, None] * vectors.transpose(0, 2, 1)
+    significant = sizes > EIGENVALUE_ROUNDING * sizes[:, -1:]
+    roots = np.sqrt(np.where(significant, sizes, 1.0))
+    maps = np.where(significant, roots, 0.0)[:, :, None] * vectors.transpose(0, 2, 1)
     along = np.einsum("kji,kj->ki", vectors, products)
-    theirs = np.where(some, along / roots, 0.0)
-    rest = max(float(moved @ moved - np.sum(theirs**2)), 0.0)
+    theirs = np.where(significant, along / roots, 0.0)
+    rest = max(float(deviations @ deviations - np.sum(theirs**2)), 0.0)
     rows = np.minimum(first[starts][:, None] + np.arange(NEIGHBOURS), sampling.last)
     return Form(rows, maps, theirs + maps.sum(axis=2) * levels[:, None], np.sqrt(rest))

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.estimate.problem import half_square
-from exfit.fitting.compression import compressed
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 
@@ -26,7 +25,6 @@ def nonlinear_parameters(
 
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
-    residuals = compressed(residuals)
     least, rises, linear = half_square(residuals(theta)), known.rises, known.linear
     found = [
         name

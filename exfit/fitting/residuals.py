@@ -4,8 +4,9 @@ They are functions of the scaled free parameters; what is known beforehand adds 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
-FINEST = 1e-7  # pu: no recorder's noise is less
+LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
 
 
 @dataclass(frozen=True)
@@ -35,34 +36,44 @@ class Robust:
     scale: float
 
 
+class SimulationCounter:
+    """Counts simulations, in whatever threads they run, and the most sub-steps of any of them."""
+
+    def __init__(self) -> None:
+        self.simulations, self.substeps = 0, 1
+        self._lock = Lock()
+
+    def add(self, simulations: int, substeps: int = 1) -> None:
+        """Add simulations, with the sub-steps that they took where these are known."""
+        with self._lock:
+            self.simulations += simulations
+            self.substeps = max(self.substeps, substeps)
+
+
+@dataclass(frozen=True, eq=False)
 class Residuals:
     """Residuals of all records, one behind the other, over the scaled parameters (N,).
 
     ``fixed`` holds every value that is neither free nor follows others by ``ties``. A set that
-    cannot be simulated has infinite residuals. ``simulations`` counts runs of the equations, and
-    ``substeps`` is the largest number of sub-steps that any of them took.
+    cannot be simulated has infinite residuals. ``counter`` counts the simulations that they cost.
     """
 
-    def __init__(
-        self,
-        experiments: Sequence[Experiment],
-        free: Sequence[FreeParameter],
-        fixed: Mapping[str, float],
-        ties: Ties | None = None,
-        robust: Robust | None = None,
-    ) -> None:
-        self.experiments, self.free, self.fixed = tuple(experiments), tuple(free), fixed
-        self.ties = Ties({}) if ties is None else ties
-        self.sizes = tuple(size for one in experiments for size in one.sizes)
-        self.simulations, self.substeps = 0, 1
-        self.robust = robust
-        self._last: tuple[bytes, Array] | None = None  # where it was asked for, and the errors
-        self._scales = self._loss_scales() if robust else np.zeros(0)
+    experiments: Sequence[Experiment]
+    free: Sequence[FreeParameter]
+    fixed: Mapping[str, float]
+    ties: Ties = field(default_factory=Ties)
+    robust: Robust | None = None
+    counter: SimulationCounter | None = None
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """How many errors each channel of each record has."""
+        return tuple(size for experiment in self.experiments for size in experiment.sizes)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """The channels of all records."""
-        return tuple(channel for one in self.experiments for channel in one.channels)
+        return tuple(channel for experiment in self.experiments for channel in experiment.channels)
 
     @property
     def count(self) -> int:
@@ -71,19 +82,19 @@ class Residuals:
 
     @property
     def samples(self) -> int:
-        """How many samples are compared: as many, unless they are condensed."""
+        """How many samples are compared: as many, unless they are compressed."""
         return sum(channel.samples for channel in self.channels)
 
     @property
     def start(self) -> Array:
         """The scaled start values (N,)."""
-        return np.array([one.scaled(one.start) for one in self.free])
+        return np.array([parameter.scaled(parameter.start) for parameter in self.free])
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """The scaled bounds, (N,) each."""
-        low = np.array([one.scaled(one.low) for one in self.free])
-        return low, np.array([one.scaled(one.high) for one in self.free])
+        low = np.array([parameter.scaled(parameter.low) for parameter in self.free])
+        return low, np.array([parameter.scaled(parameter.high) for parameter in self.free])
 
     @cached_property
     def noise(self) -> float:
@@ -93,71 +104,66 @@ class Residuals:
 
     def values(self, theta: Array) -> dict[str, float]:
         """Return every value by name."""
-        moved = {one.name: one.value(float(x)) for one, x in zip(self.free, theta, strict=True)}
-        return self.completed(moved)
+        pairs = zip(self.free, theta, strict=True)
+        return self.completed({free.name: free.value(float(x)) for free, x in pairs})
 
     def completed(self, free: Mapping[str, float]) -> dict[str, float]:
         """Return every value by name, given those of the free parameters."""
         return self.ties.apply({**self.fixed, **free})
 
+    def counted_by(self, counter: SimulationCounter | None) -> "Residuals":
+        """Return the same residuals, whose simulations a counter counts, if there is one."""
+        return replace(self, counter=counter)
+
     def __call__(self, theta: Array) -> Array:
         """Return the residuals (samples + priors,)."""
-        self.simulations += len(self.experiments)
+        self._count(len(self.experiments))
         try:
             values = self.values(theta)
-            found = [one.errors(values) for one in self.experiments]
+            each = [experiment.errors(values) for experiment in self.experiments]
         except UNREACHABLE:
             return np.full(self.count + len(self.priors), np.inf)
-        self.substeps = max(self.substeps, *(parts for _, parts in found))
-        errors = np.concatenate([one for one, _ in found])
-        self._last = theta.tobytes(), errors
-        return self._residuals(errors, values)
+        self._count(0, max(substeps for _, substeps in each))
+        return self._residuals(np.concatenate([errors for errors, _ in each]), values)
 
     def errors(self, theta: Array) -> tuple[Array, Array]:
         """Return the weighted errors (samples,) and their exact derivatives (samples, N).
 
         No loss is applied, and no prior is among them.
         """
-        self.simulations += len(self.experiments)
+        self._count(len(self.experiments))
         values, moves = self.values(theta), self.moves(theta)
-        found = [one.tangents(values, moves) for one in self.experiments]
-        errors = np.concatenate([one for one, _ in found])
-        self._last = theta.tobytes(), errors
-        return errors, np.concatenate([slopes for _, slopes in found])
-
-    def first_errors(self, theta: Array) -> Array:
-        """Return the weighted errors of the first record, for a look that counts no simulation.
-
-        They are simulated anew only where the last evaluation was not at theta (N,).
-        """
-        last, first = self._last, self.experiments[0]
-        if last is None or last[0] != theta.tobytes():
-            return first.errors(self.values(theta))[0]
-        return last[1][: sum(first.sizes)]
+        each = [experiment.tangents(values, moves) for experiment in self.experiments]
+        errors = np.concatenate([errors for errors, _ in each])
+        return errors, np.concatenate([slopes for _, slopes in each])
 
     def exact(self, theta: Array) -> Array:
         """Return the exact Jacobian (samples + priors, N)."""
         errors, slopes = self.errors(theta)
         if self.robust:
-            slopes *= self.robust.loss.slope(errors, self._scales)[:, None]
+            slopes *= self.robust.loss.slope(errors, self._loss_scales)[:, None]
         if not self.priors:
             return slopes
-        known = np.zeros((len(self.priors), len(theta)))
+        of_priors = np.zeros((len(self.priors), len(theta)))
         for row, (k, prior) in enumerate(self.priors.items()):
-            known[row, k] = self.noise * self.free[k].slope(float(theta[k])) / prior.std
-        return np.vstack([slopes, known])
+            of_priors[row, k] = self.noise * self.free[k].slope(float(theta[k])) / prior.std
+        return np.vstack([slopes, of_priors])
 
     def influence(self, errors: Array) -> tuple[Array, Array]:
         """Return how far each weighted error pulls, and the derivative of that; (samples,)."""
         if self.robust is None:
             return errors, np.ones_like(errors)
         loss = self.robust.loss
-        return loss.influence(errors, self._scales), loss.curvature(errors, self._scales)
+        return loss.influence(errors, self._loss_scales), loss.curvature(errors, self._loss_scales)
 
     @property
     def priors(self) -> dict[int, Prior]:
         """What is known beforehand, by the place of the parameter among the free ones."""
-        return {k: one.prior for k, one in enumerate(self.free) if one.prior is not None}
+        return {
+            k: parameter.prior
+            for k, parameter in enumerate(self.free)
+            if parameter.prior is not None
+        }
 
     def central(self, theta: Array) -> Array:
         """Return the Jacobian by central differences, all 2 N runs side by side."""
@@ -195,24 +201,28 @@ class Residuals:
 
     def _costs(self, points: Array) -> Array:
         try:
-            found = self._of_many(points)
+            residuals = self._of_many(points)
         except UNREACHABLE:
             if len(points) == 1:
                 return np.full(1, np.inf)
             return np.concatenate([self._costs(point[None, :]) for point in points])
         with np.errstate(all="ignore"):
-            costs = np.array([0.5 * float(r @ r) for r in found])
+            costs = np.array([0.5 * float(r @ r) for r in residuals])
         return np.where(np.isfinite(costs), costs, np.inf)
 
     def _of_many(self, points: Array | Sequence[Array]) -> list[Array]:
         """Return the residuals of several points, simulated side by side where that is possible."""
-        self.simulations += len(points) * len(self.experiments)
+        self._count(len(points) * len(self.experiments))
         sets = [self.values(point) for point in points]
-        parts = [one.errors_of_many(sets) for one in self.experiments]
+        parts = [experiment.errors_of_many(sets) for experiment in self.experiments]
         return [
             self._residuals(np.concatenate([part[k] for part in parts]), values)
             for k, values in enumerate(sets)
         ]
+
+    def _count(self, simulations: int, substeps: int = 1) -> None:
+        if self.counter is not None:
+            self.counter.add(simulations, substeps)
 
     def _moved(self, theta: Array, to: Array) -> list[Array]:
         return [np.where(np.arange(len(theta)) == k, to, theta) for k in range(len(theta))]
@@ -223,29 +233,34 @@ class Residuals:
         Raises SimulationError where what follows them moves infinitely fast.
         """
         try:
-            tied = self.ties.slopes(self.values(theta), [one.name for one in self.free])
+            tied = self.ties.slopes(self.values(theta), [free.name for free in self.free])
         except TieError as fault:
             raise SimulationError(str(fault)) from fault
         moves = []
-        for one, x in zip(self.free, theta, strict=True):
-            slope = one.slope(float(x))
-            followers = {name: slope * by[one.name] for name, by in tied.items() if one.name in by}
-            moves.append({one.name: slope, **followers})
+        for free, x in zip(self.free, theta, strict=True):
+            slope = free.slope(float(x))
+            followers = {
+                name: slope * slopes[free.name]
+                for name, slopes in tied.items()
+                if free.name in slopes
+            }
+            moves.append({free.name: slope, **followers})
         return moves
 
     def _residuals(self, errors: Array, values: Mapping[str, float]) -> Array:
         if self.robust:
-            errors = self.robust.loss.residual(errors, self._scales)
+            errors = self.robust.loss.residual(errors, self._loss_scales)
         if not self.priors:
             return errors
-        known = [
+        of_priors = [
             self.noise * (values[self.free[k].name] - prior.mean) / prior.std
             for k, prior in self.priors.items()
         ]
-        return np.concatenate([errors, known])
+        return np.concatenate([errors, of_priors])
 
+    @cached_property
     def _loss_scales(self) -> Array:
-        """Return the error of each sample from which on it costs less than its square."""
+        """The error of each sample from which on it costs less than its square."""
         share = 1.0 if self.robust is None else self.robust.scale
         scales = [share * channel.weight * noise_of(channel) for channel in self.channels]
         return np.repeat(scales, self.sizes)
@@ -258,7 +273,9 @@ def noise_of(channel: Channel) -> float:
     measured = channel.measured[channel.kept]
     apart = 1 if channel.filtering is None else channel.filtering.smooth_over
     # neighbours in one window of an average scatter little: they share most of it
-    return max(noise(measured[::apart] if len(measured) > NEIGHBOURS * apart else measured), FINEST)
+    return max(
+        noise(measured[::apart] if len(measured) > NEIGHBOURS * apart else measured), LEAST_NOISE
+    )
 
 
 JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {

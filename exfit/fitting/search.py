@@ -8,49 +8,53 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import ExperimentSetup, build_experiments, residuals_of
-from exfit.fitting.compression import compressed
-from exfit.fitting.residuals import JACOBIANS, Residuals
+from exfit.fitting.compression import FitProblem, problem_of
+from exfit.fitting.residuals import JACOBIANS, SimulationCounter
 
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
-def fitted(case: Case) -> tuple[tuple[ExperimentSetup, ...], Residuals]:
+def fitted(case: Case) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
     """Return the tests of a case with the records that it is fitted to, and what is made small.
 
     Raises ExfitError where there is none, or one that cannot be fitted.
     """
-    given = case.values()
-    trials = tuple(trial.with_enough_substeps(given) for trial in build_experiments(case))
-    residuals = residuals_of(case, trials)
-    refuse_unfit(case, residuals)
-    return trials, residuals
+    start = case.values()
+    setups = tuple(setup.with_enough_substeps(start) for setup in build_experiments(case, start))
+    problem = problem_of(residuals_of(case, setups, start))
+    refuse_unfit(case, problem)
+    return setups, problem
 
 
-def names_of_records(trials: Iterable[ExperimentSetup]) -> tuple[str, ...]:
+def names_of_records(setups: Iterable[ExperimentSetup]) -> tuple[str, ...]:
     """Return the names of all that is found about the records themselves."""
-    return tuple(one.name for trial in trials for one in trial.free)
+    return tuple(parameter.name for setup in setups for parameter in setup.free)
 
 
 def search(
     case: Case,
-    residuals: Residuals,
+    problem: FitProblem,
     method: estimate.Method,
     announce: Callable[[estimate.SolverIteration], None],
     progress: Callable[[estimate.Progress], None],
+    counter: SimulationCounter | None = None,
 ) -> tuple[estimate.Result, estimate.MultistartResult | None]:
-    """Return the best point found from the start of a case, or from all its starts."""
+    """Return the best point found from the start of a case, or from all its starts.
+
+    ``counter`` counts the simulations of the search alone.
+    """
     asked = case.estimate
-    fewer = compressed(residuals)
-    known = len(fewer.priors)
-    share = (fewer.samples + known) / (fewer.count + known)
+    residuals = problem.compressed.counted_by(counter)
+    priors = len(residuals.priors)
+    share = (residuals.samples + priors) / (residuals.count + priors)
     good_enough = asked.good_enough.rmse * np.sqrt(share)
-    jacobian = JACOBIANS[asked.jacobian](fewer)
+    jacobian = JACOBIANS[asked.jacobian](residuals)
     if asked.starts == 1:
         found = estimate.least_squares(
-            fewer,
-            fewer.start,
+            residuals,
+            residuals.start,
             jac=jacobian,
-            bounds=fewer.bounds,
+            bounds=residuals.bounds,
             method=method,
             max_iterations=asked.iterations,
             gtol=asked.tolerance.gradient,
@@ -61,12 +65,12 @@ def search(
         )
         return found, None
     minima = estimate.multistart(
-        fewer,
+        residuals,
         jacobian,
-        fewer.bounds,
+        residuals.bounds,
         asked.starts,
-        x0=fewer.start,
-        screen=fewer.costs,
+        x0=residuals.start,
+        screen=residuals.costs,
         refine=asked.refine,
         watch=progress,
         method=method,
@@ -84,18 +88,19 @@ def search(
     return best, minima
 
 
-def refuse_unfit(case: Case, residuals: Residuals) -> None:
+def refuse_unfit(case: Case, problem: FitProblem) -> None:
     """Raise ExfitError where a record cannot be fitted: it is too short, flat, or out of scale."""
-    samples, unknown = residuals.count, len(residuals.free)
-    if samples < unknown:
-        raise CaseError([f"{case.path}: record: {samples} samples for {unknown} free parameters"])
+    residuals = problem.residuals
+    samples, free = residuals.count, len(residuals.free)
+    if samples < free:
+        raise CaseError([f"{case.path}: record: {samples} samples for {free} free parameters"])
     for channel in residuals.channels:
         measured = channel.measured[channel.kept]
         if np.all(measured == measured[0]):
             level = f"{channel.signal} is {measured[0]:g} pu throughout"
             raise CaseError([f"{case.path}: record: {level}: it shows no test"])
     with np.errstate(over="ignore"):
-        start = compressed(residuals)(residuals.start)
+        start = problem.compressed(residuals.start)
         square = float(start @ start)
     if not np.isfinite(square):
         largest = float(np.max(np.abs(start)))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.fitting.compression import compressed
+from exfit.fitting.compression import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference import (
     Confidence,
@@ -88,35 +88,35 @@ class UncertaintyAnalysis:
 
 
 def uncertainty_at(
-    residuals: Residuals, theta: Array, of_record: tuple[str, ...]
+    problem: FitProblem, theta: Array, of_record: tuple[str, ...]
 ) -> UncertaintyAnalysis:
-    """Return what the records tell at the scaled parameters theta (N,).
+    """Return how well the records determine the scaled parameters theta (N,).
 
     ``of_record`` names what belongs to a record and is no parameter of the unit. Raises
     SimulationError where a derivative is not finite.
     """
-    linear = linearisation(residuals, theta, of_record)
-    return uncertainty_of(residuals, theta, linear)
+    return uncertainty_of(problem, theta, linearisation(problem, theta, of_record))
 
 
-def uncertainty_of(
-    residuals: Residuals, theta: Array, linear: Linearisation
-) -> UncertaintyAnalysis:
-    """Return what a linearisation of the residuals at theta (N,) tells."""
-    known, courses = confidence(linear), tuple(sensitivity(residuals, theta, linear))
-    return UncertaintyAnalysis(linear, known, identifiability(linear, known), courses)
+def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> UncertaintyAnalysis:
+    """Return the uncertainty that a linearisation at theta (N,) shows."""
+    intervals, courses = confidence(linear), tuple(sensitivity(problem, theta, linear))
+    return UncertaintyAnalysis(linear, intervals, identifiability(linear, intervals), courses)
 
 
-def sensitivity(residuals: Residuals, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:
-    """Yield what each channel shows: at the record's samples or, where condensed, of the grid."""
+def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:
+    """Yield that of each channel: at the record's samples or, where compressed, of the grid."""
+    residuals = problem.residuals
     values, moves = residuals.values(theta), residuals.moves(theta)
     size = linear.size / slopes_of(residuals, theta)
     labels = iter(linear.channels)
-    for one, whole in zip(compressed(residuals).experiments, residuals.experiments, strict=True):
-        _, slopes = one.response_with_derivatives(values, moves)
-        late = 0.0 if one is whole else one.simulator.delay  # the grid is the simulation's
-        for k in range(len(one.channels)):
-            yield Sensitivity(next(labels).label, one.simulator.times + late, slopes[:, k] * size)
+    pairs = zip(problem.compressed.experiments, residuals.experiments, strict=True)
+    for experiment, whole in pairs:
+        _, slopes = experiment.response_with_derivatives(values, moves)
+        simulator = experiment.simulator
+        delay = 0.0 if experiment is whole else simulator.delay  # the grid is the simulation's
+        for k in range(len(experiment.channels)):
+            yield Sensitivity(next(labels).label, simulator.times + delay, slopes[:, k] * size)
 
 
 def slopes_of(residuals: Residuals, theta: Array) -> Array:
@@ -126,39 +126,41 @@ def slopes_of(residuals: Residuals, theta: Array) -> Array:
 
 
 def linearisation(
-    residuals: Residuals, theta: Array, of_record: tuple[str, ...], errors: Array | None = None
+    problem: FitProblem, theta: Array, of_record: tuple[str, ...], errors: Array | None = None
 ) -> Linearisation:
     """Return the errors and their exact derivatives at theta, in the parameters' own units.
 
     ``errors`` takes the place of those at theta. Raises SimulationError where a derivative is not
     finite.
     """
-    values, fewer = residuals.values(theta), compressed(residuals)
-    found, slopes = fewer.errors(theta)
+    residuals = problem.residuals
+    values, free = residuals.values(theta), residuals.free
+    compressed_errors, slopes = problem.compressed.errors(theta)
     if not np.isfinite(slopes).all():
-        at = ", ".join(f"{one.name} = {values[one.name]:g}" for one in residuals.free)
+        at = ", ".join(f"{parameter.name} = {values[parameter.name]:g}" for parameter in free)
         raise SimulationError(f"the derivatives are not finite at {at}")
-    if errors is None:
-        errors = found if fewer is residuals else residuals(theta)[: residuals.count]
+    if errors is None and problem.compressed is residuals:
+        errors = compressed_errors
+    elif errors is None:
+        errors = residuals(theta)[: residuals.count]
     influence, curvature = residuals.influence(errors)
-    free = residuals.free
     return Linearisation(
-        names=tuple(one.name for one in free),
+        names=tuple(parameter.name for parameter in free),
         units=tuple("" for _ in free),
-        values=np.array([values[one.name] for one in free]),
-        logarithmic=np.array([one.logarithmic for one in free]),
-        width=np.array([one.high - one.low for one in free]),
-        held=tuple(one.bound(values[one.name]) for one in free),
+        values=np.array([values[parameter.name] for parameter in free]),
+        logarithmic=np.array([parameter.logarithmic for parameter in free]),
+        width=np.array([parameter.high - parameter.low for parameter in free]),
+        held=tuple(parameter.bound(values[parameter.name]) for parameter in free),
         errors=errors,
         jacobian=slopes / slopes_of(residuals, theta),
         influence=influence,
         curvature=curvature,
-        channels=tuple(_channels(residuals, fewer.sizes)),
+        channels=tuple(_channels(residuals, problem.compressed.sizes)),
         priors=tuple(
-            PriorRow(k, known.mean, known.std, residuals.noise)
-            for k, known in residuals.priors.items()
+            PriorRow(k, prior.mean, prior.std, residuals.noise)
+            for k, prior in residuals.priors.items()
         ),
-        nuisances=tuple(one.name in of_record for one in free),
+        nuisances=tuple(parameter.name in of_record for parameter in free),
     )
 
 

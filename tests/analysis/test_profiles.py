@@ -157,9 +157,9 @@ def search_ends(monkeypatch):
     search = module.search
 
     def replaced(change):
-        def other(case, residuals, *rest):
-            found, minima = search(case, residuals, *rest)
-            return change(residuals, found), minima
+        def other(case, problem, *rest):
+            found, minima = search(case, problem, *rest)
+            return change(problem.residuals, found), minima
 
         monkeypatch.setattr(module, "search", other)
 

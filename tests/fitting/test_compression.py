@@ -1,17 +1,14 @@
 """Condensed records: the same cost, gradient and J'J as those of all samples, and when not."""
 
-import gc
-import weakref
-
 import numpy as np
 import pytest
 from records import UNIT, case_of, found_in, one, synthetic
 
-from exfit import workflows
 from exfit.fitting import compression as module
 from exfit.fitting.build import build_experiments, residuals_of
-from exfit.fitting.compression import compressed
+from exfit.fitting.compression import FitProblem, compressed, problem_of
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import search
 from exfit.fitting.uncertainty import linearisation, uncertainty_at
 from exfit.inference import confidence
 from exfit.workflows import fit
@@ -70,7 +67,7 @@ def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, reco
     """Where samples are left out, too, some steps of the grid whole; and the last parts of both."""
     every = residuals(dense_case(tmp_path, record, test=test))
     few = compressed(every)
-    assert module.WORTH * few.count < every.count
+    assert module.LEAST_GAIN * few.count < every.count
     rng = np.random.default_rng(SEED)
     for _ in range(3):
         theta = every.start + rng.uniform(-0.3, 0.3, len(every.start))
@@ -81,8 +78,7 @@ def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, reco
 def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
     case = dense_case(tmp_path, sections={"estimate": {"strategy": "auto"}})
     ours = fit(case)
-    for user in ("study", "fitting.uncertainty", "fitting.nonlinearity"):
-        monkeypatch.setattr(f"exfit.{user}.compressed", lambda whole: whole)
+    monkeypatch.setattr(module, "compressed", lambda whole: whole)
     every = fit(case)
     assert (ours.message, ours.nfev, ours.njev) == (every.message, every.nfev, every.njev)
     assert ours.cost == pytest.approx(every.cost, rel=AGREE)
@@ -91,11 +87,10 @@ def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
         assert ours.values[name] == pytest.approx(value, rel=1e-6)
 
 
-def test_errors_and_intervals_are_those_of_all_samples(tmp_path, monkeypatch):
+def test_errors_and_intervals_are_those_of_all_samples(tmp_path):
     whole = residuals(dense_case(tmp_path))
-    ours = confidence(linearisation(whole, whole.start, ()))
-    monkeypatch.setattr("exfit.fitting.uncertainty.compressed", lambda whole: whole)
-    every = confidence(linearisation(whole, whole.start, ()))
+    ours = confidence(linearisation(problem_of(whole), whole.start, ()))
+    every = confidence(linearisation(FitProblem(whole, whole), whole.start, ()))
     assert ours.dof == pytest.approx(every.dof, rel=1e-6)
     for name, one_ in every.parameters.items():
         assert ours.parameters[name].std_error == pytest.approx(one_.std_error, rel=1e-6)
@@ -115,24 +110,22 @@ def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
     case = dense_case(tmp_path)
     every = residuals(case)
     few = compressed(every)
-    monkeypatch.setattr("exfit.workflows.estimate.least_squares", stopped)
-    for search in (lambda whole: whole, compressed):
-        monkeypatch.setattr("exfit.fitting.search.compressed", search)
+    monkeypatch.setattr("exfit.fitting.search.estimate.least_squares", stopped)
+    for problem in (FitProblem(every, every), FitProblem(every, few)):
         with pytest.raises(KeyboardInterrupt):
-            workflows.search(case, every, "auto", print, print)
+            search(case, problem, "auto", print, print)
     squares = [count * limit**2 for count, limit in asked.items()]
     assert set(asked) == {every.count + 1, few.count + 1}
     assert squares[0] == pytest.approx(squares[1], rel=1e-12)
 
 
-def test_what_moves_is_told_at_the_instants_of_the_record(tmp_path, monkeypatch):
+def test_sensitivities_are_at_the_instants_of_the_record(tmp_path):
     """A recorder's delay is in them, too."""
     case = dense_case(tmp_path, {"delay": 0.2})
-    found = residuals(case)
-    theta = found.start
-    (ours, _) = uncertainty_at(found, theta, ()).sensitivity
-    monkeypatch.setattr("exfit.fitting.uncertainty.compressed", lambda whole: whole)
-    (every, _) = uncertainty_at(found, theta, ()).sensitivity
+    whole = residuals(case)
+    theta = whole.start
+    (ours, _) = uncertainty_at(problem_of(whole), theta, ()).sensitivity
+    (every, _) = uncertainty_at(FitProblem(whole, whole), theta, ()).sensitivity
     assert len(ours.time) < len(every.time)
     later = ours.time <= every.time[-1]
     for k in range(len(theta)):
@@ -140,18 +133,6 @@ def test_what_moves_is_told_at_the_instants_of_the_record(tmp_path, monkeypatch)
         # which lies between samples up to a millisecond apart
         most = 1e-3 * np.max(np.abs(line))
         np.testing.assert_allclose(ours.moved[later, k], line, rtol=0.0, atol=most)
-
-
-def test_a_record_is_condensed_once_whatever_comes_between_and_then_forgotten(tmp_path):
-    first = residuals(dense_case(tmp_path))
-    second = Residuals(first.experiments, first.free, first.fixed, first.ties)
-    few = compressed(first)
-    assert compressed(second) is not few
-    assert compressed(first) is few
-    gone = weakref.ref(few)
-    del first, few
-    gc.collect()
-    assert gone() is None
 
 
 def filtered(filter_):

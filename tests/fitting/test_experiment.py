@@ -8,6 +8,7 @@ from records import SAMPLES, UNIT, case_of, config, found_in, recording, several
 
 from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage
 from exfit.fitting.build import build_experiments, residuals_of
+from exfit.fitting.compression import problem_of
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import noise_of
 from exfit.fitting.uncertainty import uncertainty_at
@@ -58,7 +59,7 @@ def test_how_far_a_signal_moves_in_per_unit_does_not_depend_on_its_weight(tmp_pa
     moved = []
     for weight in (1.0, WEIGHT):
         residuals = open_case(tmp_path, weight)
-        courses = uncertainty_at(residuals, residuals.start, ()).sensitivity
+        courses = uncertainty_at(problem_of(residuals), residuals.start, ()).sensitivity
         moved.append(np.concatenate([one.moved for one in courses]))
     assert np.ptp(moved[0]) > 0.1
     assert moved[1] == pytest.approx(moved[0], rel=1e-9, abs=1e-15)

@@ -1,6 +1,7 @@
 """Residuals and their Jacobians over the scaled free parameters."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 
@@ -18,11 +19,12 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.fitting.residuals import (
     CENTRAL_STEP,
-    FINEST,
     JACOBIANS,
+    LEAST_NOISE,
     ONE_SIDED_STEP,
     Residuals,
     Robust,
+    SimulationCounter,
 )
 from exfit.models import MODELS
 from exfit.plants import VT0
@@ -165,15 +167,16 @@ def test_what_is_fixed_stays(exciter):
 
 
 def test_a_set_that_cannot_be_simulated_costs_infinity(exciter):
-    residuals = problem(exciter)
-    residuals.fixed = {**residuals.fixed, VT0: float("nan")}
+    whole = problem(exciter)
+    residuals = replace(whole, fixed={**whole.fixed, VT0: float("nan")})
     got = residuals(residuals.start)
     assert got.shape == (101,)
     assert (got == np.inf).all()
 
 
 def test_every_run_is_counted(exciter):
-    residuals = problem(exciter)
+    counter = SimulationCounter()
+    residuals = problem(exciter).counted_by(counter)
     count = len(residuals.free)
     for call, cost in (
         (residuals, 1),
@@ -181,10 +184,17 @@ def test_every_run_is_counted(exciter):
         (residuals.central, 2 * count),
         (residuals.forward, 2 * count),
     ):
-        before = residuals.simulations
+        before = counter.simulations
         call(residuals.start)
-        assert residuals.simulations == before + cost
-    assert residuals.substeps >= 1
+        assert counter.simulations == before + cost
+    assert counter.substeps >= 1
+
+
+def test_simulations_in_many_threads_are_all_counted():
+    counter = SimulationCounter()
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda k: counter.add(1, k), range(10_000)))
+    assert (counter.simulations, counter.substeps) == (10_000, 9_999)
 
 
 def with_extras(exciter, free, ties=None, robust=None):
@@ -192,7 +202,7 @@ def with_extras(exciter, free, ties=None, robust=None):
     plain = problem(exciter)
     names = {one.name for one in free}
     fixed = {name: value for name, value in plain.fixed.items() if name not in names}
-    return Residuals(plain.experiments, free, fixed, ties, robust)
+    return Residuals(plain.experiments, free, fixed, ties or Ties(), robust)
 
 
 def test_a_prior_is_one_more_error_in_the_unit_of_the_noise():
@@ -218,7 +228,7 @@ def test_a_loss_applies_to_samples_and_not_to_priors(name):
     loss = LOSSES[name]
     residuals = with_extras("AC1A", free, robust=Robust(loss, 2.0))
     found = residuals(residuals.start)
-    scale = 2.0 * max(noise(plain.channels[0].measured), FINEST)
+    scale = 2.0 * max(noise(plain.channels[0].measured), LEAST_NOISE)
     assert found[:-1] == pytest.approx(loss.residual(plain(plain.start), scale), rel=1e-12)
     assert found[-1] == pytest.approx(-1e8 * residuals.noise, rel=1e-6)
     differences = residuals.central(residuals.start)

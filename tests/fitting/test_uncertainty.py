@@ -14,6 +14,7 @@ from scipy.stats import t as student
 from exfit.case.load import load_case
 from exfit.estimate import least_squares
 from exfit.fitting.build import build_experiments, residuals_of
+from exfit.fitting.compression import problem_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT
 from exfit.fitting.uncertainty import uncertainty_at
@@ -188,7 +189,7 @@ def known_with(exact, noise, given=None):
         residuals, exact.start, residuals.exact, residuals.bounds, "lm-then-dgn", x_scale=UNIT
     )
     assert found.success
-    return uncertainty_at(residuals, found.x, ()).confidence
+    return uncertainty_at(problem_of(residuals), found.x, ()).confidence
 
 
 RECORDS = 100

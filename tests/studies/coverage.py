@@ -32,6 +32,7 @@ from linearised import autoregressive
 from exfit.case.load import load_case
 from exfit.estimate import least_squares
 from exfit.fitting.build import build_experiments, residuals_of
+from exfit.fitting.compression import problem_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT
 from exfit.fitting.uncertainty import uncertainty_at
@@ -139,7 +140,7 @@ def outcome(residuals, aside, profiled):
     """Fit from a start that is aside (N,) of the truth, and return what it came to."""
     truth = np.log([TRUTH[one.name] for one in residuals.free])
     found = fitted(residuals, truth + aside)
-    told = uncertainty_at(residuals, found.x, ())
+    told = uncertainty_at(problem_of(residuals), found.x, ())
     known, missed, values = told.confidence, found.x - truth, np.exp(found.x)
     covariance = known.covariance / np.outer(values, values)
     distance = float(missed @ np.linalg.solve(covariance, missed))

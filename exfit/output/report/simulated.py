@@ -11,6 +11,7 @@ from exfit.analysis.iteration_responses import iteration_response
 from exfit.analysis.model_check import FLAT_DRIFT, flat_drift
 from exfit.errors import SimulationError
 from exfit.fitting.build import ExperimentSetup, compared, residuals_of
+from exfit.fitting.compression import FitProblem, problem_of
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
@@ -94,6 +95,7 @@ class Simulated:
 def simulated(found: Sources) -> Simulated:
     """Return what the fitted values do; raises SimulationError where they cannot be simulated."""
     residuals = residuals_of(found.case, found.trials)
+    problem = problem_of(residuals)
     fitted = found.saved.fitted()
     theta = np.array([one.scaled(fitted[one.name]) for one in residuals.free])
     values = residuals.values(theta)
@@ -105,7 +107,7 @@ def simulated(found: Sources) -> Simulated:
     experiments = [one.experiment for one in trials]
     known = found.saved.at("knowledge") is not None
     return Simulated(
-        moved=tuple(_moved(residuals, theta, trials)) if known else (),
+        moved=tuple(_moved(problem, theta, trials)) if known else (),
         flat=tuple(_flat(experiments, values)),
         small=tuple(_small(experiments, values)),
         limited=tuple(_limited((*trials, *unseen), values)),
@@ -119,17 +121,15 @@ def _flat(experiments: Sequence[Experiment], values: Values) -> Iterator[Flat]:
         yield Flat(one.name, flat_drift(simulator, at, one.signals))
 
 
-def _moved(
-    residuals: Residuals, theta: Array, trials: Sequence[ExperimentSetup]
-) -> Iterator[Moved]:
+def _moved(problem: FitProblem, theta: Array, trials: Sequence[ExperimentSetup]) -> Iterator[Moved]:
     """Yield what 1 % more of each parameter does; what belongs to a record is left out."""
     try:
-        linear = linearisation(residuals, theta, names_of_records(trials))
+        linear = linearisation(problem, theta, names_of_records(trials))
     except SimulationError:
         return
     shown = [k for k, of_record in enumerate(linear.nuisances) if not of_record]
     names = tuple(linear.names[k] for k in shown)
-    for one in sensitivity(residuals, theta, linear):
+    for one in sensitivity(problem, theta, linear):
         yield Moved(one.label, one.time, names, PERCENT * one.moved[:, shown])
 
 
