@@ -1,11 +1,14 @@
-"""What a planned test would tell of the parameters: the design of an experiment, without a record.
+"""The design of an experiment: how well a planned test would determine the parameters.
+
+It needs no record.
 
 Source: Walter & Pronzato 1997, Identification of Parametric Models from Experimental Data,
 chapter 6.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -13,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.dsp.noise import noise
+from exfit.dsp.noise import noise as noise_of
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments, free_parameters, planned, with_enough_substeps
 from exfit.fitting.compression import problem_of
@@ -34,7 +37,7 @@ LONGER = 2.0  # times as long
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A test that could be made, and how well it would tell the parameters."""
+    """A test that could be made, and how well it would determine the parameters."""
 
     label: str
     confidence: Confidence
@@ -42,9 +45,9 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """What the test of a case would tell, and others beside it.
+    """How well the test of a case would determine its parameters, and others beside it.
 
-    ``noise`` is the standard deviation that was taken for each signal, per unit; of each record,
+    ``noise`` is the standard deviation that was assumed for each signal, per unit; of each record,
     where they differ.
     """
 
@@ -67,162 +70,194 @@ class Design:
         }
 
 
-def identify(case: Case, given: Mapping[str, float]) -> Design:
-    """Return how well tests would tell the free parameters of a case, at their start values.
+def identify(case: Case, noise: Mapping[str, float]) -> Design:
+    """Return how well tests would determine the free parameters of a case, at their start values.
 
     The case's own test comes first, on the clock of its record if it has one; beside it steps of
-    2, 5 and 10 %, a test twice as long, and further signals. ``given`` is the noise of signals, per
+    2, 5 and 10 %, a test twice as long, and further signals. ``noise`` is that of signals, per
     unit; else it is the case's, else the record's, else `NOISE`. Raises ExfitError for input that
     cannot be used.
     """
-    trials = build_experiments(case) if case.recordings else ()
-    free = free_parameters(case, trials)
+    setups = build_experiments(case) if case.recordings else ()
+    free = free_parameters(case, setups)
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty: there is nothing to identify"])
-    values = {**case.values(), **{one.name: one.start for one in free}}
-    own = [trial.experiment for trial in trials] or [planned(case)]
-    _refuse_noise(given)
-    levels = [_noise(one, given) for one in own]
-    finest = min(min(noises.values()) for noises in levels)
-    fixed = {name: v for name, v in values.items() if name not in {one.name for one in free}}
-
-    def told(experiments: Sequence[Experiment]) -> UncertaintyAnalysis:
-        at = {**values, **_steps(experiments)}
-        pairs = zip(experiments, levels, strict=True)
-        seen = [
-            with_enough_substeps(_seen(one, noises, finest), at, case.path) for one, noises in pairs
-        ]
-        problem = problem_of(Residuals(seen, _moved(free, experiments), fixed, case.ties))
-        residuals = problem.residuals
-        names = tuple(one.name for trial in trials for one in trial.free)
-        still = np.zeros(residuals.count)
-        linear = linearisation(problem, residuals.start, names, still)
-        # a start on its bound is no result
-        linear = replace(linear, held=(None,) * len(linear.names))
-        return uncertainty_of(problem, residuals.start, linear)
-
-    plans = [Plan(label, told(one).confidence) for label, one in _variants(case, own)]
+    own = [setup.experiment for setup in setups] or [planned(case)]
+    _refuse_noise(noise)
+    levels = [_noise_levels(experiment, noise) for experiment in own]
+    records = tuple(parameter.name for setup in setups for parameter in setup.free)
+    uncertainty_after = partial(
+        _uncertainty_after, case=case, free=free, levels=levels, records=records
+    )
+    plans = [
+        Plan(label, uncertainty_after(experiments).confidence)
+        for label, experiments in _variants(case, own)
+    ]
     return Design(
         case.path.stem,
-        told(own),
+        uncertainty_after(own),
         tuple(plans),
-        _told_noise(case, own, levels),
+        _noise_by_signal(case, own, levels),
     )
 
 
-def _refuse_noise(given: Mapping[str, float]) -> None:
-    unknown = [name for name in given if name not in NOISE]
+def _uncertainty_after(
+    experiments: Sequence[Experiment],
+    case: Case,
+    free: Sequence[FreeParameter],
+    levels: Sequence[Mapping[str, float]],
+    records: tuple[str, ...],
+) -> UncertaintyAnalysis:
+    """Return how well experiments with these levels of noise would determine what is free.
+
+    ``records`` names what is found about the records themselves.
+    """
+    starts = {parameter.name: parameter.start for parameter in free}
+    fixed = {name: value for name, value in case.values().items() if name not in starts}
+    at = {**fixed, **starts, **_steps(experiments)}
+    finest = min(min(of_signal.values()) for of_signal in levels)
+    expected = [
+        with_enough_substeps(_with_noise(experiment, of_signal, finest), at, case.path)
+        for experiment, of_signal in zip(experiments, levels, strict=True)
+    ]
+    problem = problem_of(Residuals(expected, _with_steps(free, experiments), fixed, case.ties))
+    residuals = problem.residuals
+    linear = linearisation(problem, residuals.start, records, np.zeros(residuals.count))
+    # a start on its bound is no result
+    linear = replace(linear, held=(None,) * len(linear.names))
+    return uncertainty_of(problem, residuals.start, linear)
+
+
+def _refuse_noise(noise: Mapping[str, float]) -> None:
+    """Raise CaseError for a signal that does not exist, or a level that is none."""
+    unknown = [name for name in noise if name not in NOISE]
     if unknown:
-        raise CaseError(f"--noise: {name}: not a signal; {near(name, NOISE)}" for name in unknown)
-    wrong = {name: level for name, level in given.items() if not 0.0 < level < inf}
+        raise CaseError(f"noise: {name}: not a signal; {near(name, NOISE)}" for name in unknown)
+    wrong = {name: level for name, level in noise.items() if not 0.0 < level < inf}
     if wrong:
         raise CaseError(
-            f"--noise: {name}: {level:g}: must be finite and above 0"
-            for name, level in wrong.items()
+            f"noise: {name}: {level:g}: must be finite and above 0" for name, level in wrong.items()
         )
 
 
 def _steps(experiments: Sequence[Experiment]) -> dict[str, float]:
     """Return the sizes that the tests have of steps which a fit would find."""
     return {
-        unknown.name: one.simulator.inputs.steps[unknown.step].step
-        for one in experiments
-        for unknown in one.nuisances
-        if unknown.kind == "step"
+        nuisance.name: experiment.simulator.inputs.steps[nuisance.step].step
+        for experiment in experiments
+        for nuisance in experiment.nuisances
+        if nuisance.kind == "step"
     }
 
 
-def _moved(free: Sequence[FreeParameter], experiments: Sequence[Experiment]) -> list[FreeParameter]:
+def _with_steps(
+    free: Sequence[FreeParameter], experiments: Sequence[Experiment]
+) -> list[FreeParameter]:
     """Return what is free, with the sizes of the tests' steps to start from."""
     sizes = _steps(experiments)
-    return [replace(one, start=sizes.get(one.name, one.start)) for one in free]
+    return [
+        replace(parameter, start=sizes.get(parameter.name, parameter.start)) for parameter in free
+    ]
 
 
-def _noise(own: Experiment, given: Mapping[str, float]) -> dict[str, float]:
+def _noise_levels(experiment: Experiment, given: Mapping[str, float]) -> dict[str, float]:
     """Return the noise of each signal in a test."""
-    found = dict(NOISE)
-    for channel in own.channels:
-        recorded = noise(channel.measured[channel.kept]) if np.ptp(channel.measured) else 0.0
-        known = channel.noise or recorded
-        if known > 0.0:
-            found[channel.signal] = known
-    return {**found, **given}
+    levels = dict(NOISE)
+    for channel in experiment.channels:
+        recorded = noise_of(channel.measured[channel.kept]) if np.ptp(channel.measured) else 0.0
+        level = channel.noise or recorded
+        if level > 0.0:
+            levels[channel.signal] = level
+    return {**levels, **given}
 
 
-def _told_noise(
+def _noise_by_signal(
     case: Case, own: Sequence[Experiment], levels: Sequence[Mapping[str, float]]
 ) -> dict[str, float]:
     """Return the noise of each signal, under the name of its record too where they differ."""
-    found = {}
+    by_signal = {}
     for signal in _signals(case, own):
-        if len({noises[signal] for noises in levels}) == 1:
-            found[signal] = levels[0][signal]
+        if len({of_signal[signal] for of_signal in levels}) == 1:
+            by_signal[signal] = levels[0][signal]
         else:
-            pairs = zip(own, levels, strict=True)
-            found |= {f"{one.name} {signal}": noises[signal] for one, noises in pairs}
-    return found
+            by_signal |= {
+                f"{experiment.name} {signal}": of_signal[signal]
+                for experiment, of_signal in zip(own, levels, strict=True)
+            }
+    return by_signal
 
 
-def _seen(one: Experiment, levels: Mapping[str, float], finest: float) -> Experiment:
+def _with_noise(experiment: Experiment, levels: Mapping[str, float], finest: float) -> Experiment:
     """Return an experiment whose channels have the noise that is expected of them."""
     channels = tuple(
         replace(channel, noise=levels[channel.signal], weight=finest / levels[channel.signal])
-        for channel in one.channels
+        for channel in experiment.channels
     )
-    return replace(one, channels=channels)
+    return replace(experiment, channels=channels)
 
 
 def _variants(
     case: Case, own: Sequence[Experiment]
 ) -> Iterator[tuple[str, tuple[Experiment, ...]]]:
     """Yield tests beside the case's own; those of several records are varied together."""
+    for label, vary in _variations(case, own):
+        yield label, tuple(vary(experiment) for experiment in own)
+
+
+def _variations(
+    case: Case, own: Sequence[Experiment]
+) -> Iterator[tuple[str, Callable[[Experiment], Experiment]]]:
+    """Yield by name how a test can be varied in the plant of a case."""
     if not case.kind.closed_loop:
         return
     for size in STEPS:
-        yield f"{100 * size:g} %", tuple(_scaled(one, size) for one in own)
-    yield "longer", tuple(_longer(one) for one in own)
-    present = {channel.signal for one in own for channel in one.channels}
+        yield f"{100 * size:g} %", partial(_scaled, size=size)
+    yield "longer", _longer
+    present = {channel.signal for experiment in own for channel in experiment.channels}
     extra = [signal for signal in _signals(case, own) if signal not in present]
     for signal in extra:
-        yield f"+ {signal}", tuple(_with(one, (signal,)) for one in own)
+        yield f"+ {signal}", partial(_with_signals, signals=(signal,))
     if len(extra) > 1:
-        yield "+ all", tuple(_with(one, extra) for one in own)
+        yield "+ all", partial(_with_signals, signals=extra)
 
 
 def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
     """Return the signals that are recorded, then those that could be."""
-    present = [channel.signal for one in own for channel in one.channels]
+    present = [channel.signal for experiment in own for channel in experiment.channels]
     possible = case.kind.compared if case.kind.closed_loop else ()
     return tuple(dict.fromkeys([*present, *possible]))
 
 
-def _scaled(one: Experiment, size: float) -> Experiment:
+def _scaled(experiment: Experiment, size: float) -> Experiment:
     """Return a test whose first step of the reference has a given size, others in proportion."""
-    steps = one.simulator.inputs.steps
-    first = next((change.step for change in steps if change.signal == "vref"), None)
+    steps = experiment.simulator.inputs.steps
+    first = next((step.step for step in steps if step.signal == "vref"), None)
     if first is None:
-        return one
+        return experiment
     share = size / abs(first)
-    moved = tuple(
-        change._replace(step=share * change.step) if change.signal in ("vref", "vs") else change
-        for change in steps
+    scaled = tuple(
+        step._replace(step=share * step.step) if step.signal in ("vref", "vs") else step
+        for step in steps
     )
-    return replace(one, simulator=one.simulator.with_inputs(moved, one.simulator.delay))
+    simulator = experiment.simulator
+    return replace(experiment, simulator=simulator.with_inputs(scaled, simulator.delay))
 
 
-def _longer(one: Experiment) -> Experiment:
+def _longer(experiment: Experiment) -> Experiment:
     """Return a test that goes on as long as it is."""
-    old = one.simulator
+    old = experiment.simulator
     times = np.concatenate([old.times, old.times[1:] + (old.times[-1] - old.times[0])])
-    course = replace(old.inputs, end=float(times[-1]) + max(0.0, -old.delay))
-    simulator = Simulator(old.system, course, times, old.step, old.least, old.delay)
-    still = np.zeros(len(times))
-    channels = tuple(replace(c, measured=still, filtering=None) for c in one.channels)
-    return replace(one, simulator=simulator, channels=channels)
+    inputs = replace(old.inputs, end=float(times[-1]) + max(0.0, -old.delay))
+    simulator = Simulator(old.system, inputs, times, old.step, old.least, old.delay)
+    zeros = np.zeros(len(times))
+    channels = tuple(
+        replace(channel, measured=zeros, filtering=None) for channel in experiment.channels
+    )
+    return replace(experiment, simulator=simulator, channels=channels)
 
 
-def _with(one: Experiment, signals: Sequence[str]) -> Experiment:
+def _with_signals(experiment: Experiment, signals: Sequence[str]) -> Experiment:
     """Return a test at which further signals are recorded."""
-    still = np.zeros(len(one.simulator.times))
-    more = tuple(Channel(signal, still) for signal in signals)
-    return replace(one, channels=(*one.channels, *more))
+    zeros = np.zeros(len(experiment.simulator.times))
+    further = tuple(Channel(signal, zeros) for signal in signals)
+    return replace(experiment, channels=(*experiment.channels, *further))

@@ -1,6 +1,6 @@
 """The profile likelihood of a case's parameters: how far each can move if the others follow."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError
+from exfit.fitting.compression import FitProblem
 from exfit.fitting.nuisance import unit_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
@@ -20,7 +21,7 @@ from exfit.util.text import near
 Array = NDArray[np.float64]
 
 LOWER = "a lower minimum was met on the way: the profiles are about that one"
-ALIKE = 6  # digits: rises that differ less are equal but for rounding
+DIGITS_OF_RISE = 6  # rises that differ less are equal but for rounding
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 ENDS = {
@@ -71,17 +72,17 @@ class Profiles:
             "interrupted": self.interrupted,
             "notes": list(self.notes),
             "parameters": {
-                one.name: {
-                    "value": one.value,
-                    "low": one.low,
-                    "high": one.high,
-                    "ends": list(one.ends),
-                    "rise": one.rise,
-                    "linear": one.linear,
-                    "at": one.at.tolist(),
-                    "costs": one.costs.tolist(),
+                profile.name: {
+                    "value": profile.value,
+                    "low": profile.low,
+                    "high": profile.high,
+                    "ends": list(profile.ends),
+                    "rise": profile.rise,
+                    "linear": profile.linear,
+                    "at": profile.at.tolist(),
+                    "costs": profile.costs.tolist(),
                 }
-                for one in self.profiles
+                for profile in self.profiles
             },
         }
 
@@ -89,63 +90,91 @@ class Profiles:
 def profile(
     case: Case,
     names: Iterable[str] = (),
-    watch: Callable[[estimate.Progress], None] = lambda _: None,
+    progress: Callable[[estimate.Progress], None] = lambda _: None,
 ) -> Profiles:
     """Fit a case and return the profiles of some of its free parameters, all by default.
 
-    ``watch`` is told the progress; an interruption keeps what is done of the profiles, one of the
-    fit before them is passed on. Raises ExfitError for input that cannot be used.
+    ``progress`` is called with how far it is; an interruption keeps what is done of the profiles,
+    one of the fit before them is passed on. Raises ExfitError for input that cannot be used.
 
     Source: Venzon & Moolgavkar 1988.
     """
     setups, problem = fitted(case)
-    residuals = problem.residuals
-    free = [one.name for one in residuals.free]
-    wanted = tuple(names) or tuple(free)
-    unknown = [name for name in wanted if name not in free]
-    if unknown:
-        raise CaseError(f"{case.path}: {name}: not free; {near(name, free)}" for name in unknown)
-    found, minima = search(case, problem, case.estimate.strategy, lambda _: None, watch)
-    if found.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
-        raise KeyboardInterrupt
-    notes = [] if found.success else [f"the fit did not end at a minimum: {found.message}"]
-    x = found.x
+    wanted = _indices(case, problem.residuals, names)
+    best = _minimum(case, problem, progress)
+    x, records = best.x, names_of_records(setups)
     for _ in range(MOST_MINIMA):
-        known = uncertainty_at(problem, x, names_of_records(setups))
-        rises = {free.index(name): known.rises[name] for name in wanted}
-        sides = _sides(problem.compressed, x, rises, watch)
-        interrupted = any(estimate.ProfileEnd.INTERRUPTED in one.ends for one in sides)
-        if interrupted or not sides[0].moved:
+        uncertainty = uncertainty_at(problem, x, records)
+        rises = {index: uncertainty.rises[name] for name, index in wanted.items()}
+        cost_profiles = _cost_profiles(problem.compressed, x, rises, progress)
+        interrupted = any(_interrupted(cost_profile) for cost_profile in cost_profiles)
+        if interrupted or not cost_profiles[0].moved:
             break
-        x = sides[0].x  # its residuals, and so the rise, are others
-    if not np.array_equal(sides[0].x, found.x):
-        notes.append(LOWER)
+        x = cost_profiles[0].x  # its residuals, and so the rise, are others
     return Profiles(
         name=case.path.stem,
-        cost=sides[0].cost,
-        profiles=tuple(_profile(case, residuals, known, one) for one in sides),
-        notes=tuple(notes),
+        cost=cost_profiles[0].cost,
+        profiles=tuple(
+            _profile(case, problem.residuals, uncertainty, cost_profile)
+            for cost_profile in cost_profiles
+        ),
+        notes=tuple(_notes(best, cost_profiles[0].x)),
         interrupted=interrupted,
     )
 
 
-def _sides(
+def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str, int]:
+    """Return where the named parameters stand among the free ones, all if none is named.
+
+    Raises CaseError for a name that is not free.
+    """
+    free = {parameter.name: index for index, parameter in enumerate(residuals.free)}
+    wanted = tuple(names) or tuple(free)
+    unknown = [name for name in wanted if name not in free]
+    if unknown:
+        raise CaseError(f"{case.path}: {name}: not free; {near(name, free)}" for name in unknown)
+    return {name: free[name] for name in wanted}
+
+
+def _minimum(
+    case: Case, problem: FitProblem, progress: Callable[[estimate.Progress], None]
+) -> estimate.Result:
+    """Return the fit of a case; raises KeyboardInterrupt where it was interrupted."""
+    best, minima = search(case, problem, case.estimate.strategy, lambda _: None, progress)
+    if best.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
+        raise KeyboardInterrupt
+    return best
+
+
+def _notes(best: estimate.Result, x: Array) -> Iterator[str]:
+    """Yield what must be known of the minimum x that the profiles are about."""
+    if not best.success:
+        yield f"the fit did not end at a minimum: {best.message}"
+    if not np.array_equal(x, best.x):
+        yield LOWER
+
+
+def _interrupted(cost_profile: estimate.CostProfile) -> bool:
+    return estimate.ProfileEnd.INTERRUPTED in cost_profile.ends
+
+
+def _cost_profiles(
     residuals: Residuals,
     x: Array,
     rises: Mapping[int, float],
-    watch: Callable[[estimate.Progress], None],
+    progress: Callable[[estimate.Progress], None],
 ) -> list[estimate.CostProfile]:
     """Return the profiles about x, those of like rises side by side; if x is a minimum, of all."""
     alike: dict[str, list[int]] = {}
     for index, rise in rises.items():
-        alike.setdefault(f"{rise:.{ALIKE}e}", []).append(index)
-    found: dict[int, estimate.CostProfile] = {}
+        alike.setdefault(f"{rise:.{DIGITS_OF_RISE}e}", []).append(index)
+    by_index: dict[int, estimate.CostProfile] = {}
     for indices in alike.values():
 
-        def tell(progress: estimate.Progress, done: int = 2 * len(found)) -> None:
-            watch(replace(progress, done=done + progress.done, total=2 * len(rises)))
+        def announce(now: estimate.Progress, done: int = 2 * len(by_index)) -> None:
+            progress(replace(now, done=done + now.done, total=2 * len(rises)))
 
-        profiles = estimate.profiles(
+        cost_profiles = estimate.profiles(
             residuals,
             residuals.exact,
             x,
@@ -153,31 +182,35 @@ def _sides(
             residuals.bounds,
             rises[indices[0]],
             x_scale=UNIT,
-            watch=tell,
+            watch=announce,
         )
-        found |= {one.index: one for one in profiles}
-        if profiles[0].moved:
-            return list(profiles)
-        if any(estimate.ProfileEnd.INTERRUPTED in one.ends for one in profiles):
+        by_index |= {cost_profile.index: cost_profile for cost_profile in cost_profiles}
+        if cost_profiles[0].moved:
+            return list(cost_profiles)
+        if any(_interrupted(cost_profile) for cost_profile in cost_profiles):
             break
-    return [found[index] for index in rises if index in found]
+    return [by_index[index] for index in rises if index in by_index]
 
 
 def _profile(
-    case: Case, residuals: Residuals, known: UncertaintyAnalysis, found: estimate.CostProfile
+    case: Case,
+    residuals: Residuals,
+    uncertainty: UncertaintyAnalysis,
+    cost_profile: estimate.CostProfile,
 ) -> Profile:
     """Return a profile in the parameter's own values."""
-    one = residuals.free[found.index]
-    below, above = found.ends
+    parameter = residuals.free[cost_profile.index]
+    low, high = cost_profile.low, cost_profile.high
+    below, above = cost_profile.ends
     return Profile(
-        name=one.name,
-        unit=case.units().get(one.name, unit_of(one.name)),
-        value=one.value(float(found.x[found.index])),
-        at=np.array([one.value(float(x)) for x in found.at]),
-        costs=found.costs,
-        low=None if found.low is None else one.value(found.low),
-        high=None if found.high is None else one.value(found.high),
+        name=parameter.name,
+        unit=case.units().get(parameter.name, unit_of(parameter.name)),
+        value=parameter.value(float(cost_profile.x[cost_profile.index])),
+        at=np.array([parameter.value(float(x)) for x in cost_profile.at]),
+        costs=cost_profile.costs,
+        low=None if low is None else parameter.value(low),
+        high=None if high is None else parameter.value(high),
         ends=(ENDS[below], ENDS[above]),
-        rise=known.rises[one.name],
-        linear=known.confidence.parameters[one.name].interval,
+        rise=uncertainty.rises[parameter.name],
+        linear=uncertainty.confidence.parameters[parameter.name].interval,
     )

@@ -227,10 +227,10 @@ def test_a_step_whose_size_is_unknown_is_made_larger_too(changed):
 
 def test_what_cannot_be_identified_is_refused(changed, plain):
     case = plain("ac1a")
-    with pytest.raises(CaseError, match=r"--noise: EFD: not a signal; did you mean efd\?"):
+    with pytest.raises(CaseError, match=r"noise: EFD: not a signal; did you mean efd\?"):
         identify(case, {"EFD": 1e-3})
     for level in (0.0, -1e-4, float("nan"), float("inf")):
-        with pytest.raises(CaseError, match=r"--noise: vt: .*: must be finite and above 0"):
+        with pytest.raises(CaseError, match=r"noise: vt: .*: must be finite and above 0"):
             identify(case, {"vt": level})
     with pytest.raises(CaseError, match=r"parameters\.free: empty: there is nothing to identify"):
         identify(load_case(CONFIGS / "models" / "ac1a.yaml"), {})

@@ -131,7 +131,7 @@ def test_an_interruption_keeps_what_is_done():
         if line.stage == "profiling" and line.done == 1:
             raise KeyboardInterrupt
 
-    found = profile(case_of("first_order"), watch=watch)
+    found = profile(case_of("first_order"), progress=watch)
     assert found.interrupted
     assert [one.name for one in found.profiles] == ["k", "a"]
     ends = [end for one in found.profiles for end in one.ends]
@@ -193,7 +193,7 @@ def test_an_interruption_of_the_fit_ends_all(search_ends):
     search_ends(lambda _, found: replace(found, success=False, stop=Stop.INTERRUPTED))
     told = []
     with pytest.raises(KeyboardInterrupt):
-        profile(case_of("first_order"), watch=told.append)
+        profile(case_of("first_order"), progress=told.append)
     assert told == []
 
 
