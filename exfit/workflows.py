@@ -69,7 +69,7 @@ def _ignore(_: object) -> None:
 
 def fit(
     case: CaseOrPath,
-    strategy: estimate.Method | None = None,
+    strategy: str | None = None,
     progress: Callable[[Iteration], None] = _ignore,
     search_progress: Callable[[estimate.Progress], None] = _ignore,
     live: Callable[[LiveResponse], None] | None = None,

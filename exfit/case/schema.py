@@ -23,13 +23,16 @@ from exfit.case.messages import FILE_NAME, PERCENT
 from exfit.case.ties import is_tie
 from exfit.plants import HEARD
 from exfit.signals import RECORDED
+from exfit.util.strategies import DEFAULT_STRATEGY, EXPLAINED, STRATEGIES
 
 Value = TypeVar("Value")
 if TYPE_CHECKING:
     RecordedSignal = str
     Heard = str
+    Strategy = str
 else:
     Heard = Literal[HEARD]
+    Strategy = Literal[tuple(STRATEGIES)]
     RecordedSignal = Literal[RECORDED]
 
 
@@ -522,9 +525,8 @@ class Limit(Section):
 class Estimate(Section):
     """How the free parameters are found."""
 
-    strategy: Literal["gn", "dgn", "lm", "lm-then-dgn", "auto", "robust"] = Field(
-        default="lm-then-dgn",
-        description="Gauss-Newton, damped Gauss-Newton, Levenberg-Marquardt, or several of them.",
+    strategy: Strategy = Field(
+        default=DEFAULT_STRATEGY, description=f"How the search goes. {EXPLAINED}."
     )
     jacobian: Literal["exact", "central", "forward", "backward"] = Field(
         default="exact", description="Derivatives: exact, or by differences."

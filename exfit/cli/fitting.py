@@ -1,7 +1,6 @@
 """The commands fit, simulate, validate and check."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -20,17 +19,17 @@ from exfit.cli.options import (
     warn,
 )
 from exfit.cli.watched import fit_again_and_again, fit_in_sight
-
-if TYPE_CHECKING:
-    from exfit.estimate import Method
-
-STRATEGIES = ("gn", "dgn", "lm", "lm-then-dgn", "auto", "robust")
+from exfit.util.strategies import EXPLAINED, STRATEGIES
 
 
 @click.command()
 @case_argument
 @output_option
-@click.option("--strategy", type=click.Choice(STRATEGIES), help="In place of the case's own.")
+@click.option(
+    "--strategy",
+    type=click.Choice([*STRATEGIES]),
+    help=f"In place of the case's own. {EXPLAINED}.",
+)
 @plots_option
 @click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
 @quiet_option
@@ -38,7 +37,7 @@ STRATEGIES = ("gn", "dgn", "lm", "lm-then-dgn", "auto", "robust")
 def fit(
     case: Path,
     output: Path | None,
-    strategy: "Method | None",
+    strategy: str | None,
     plots: bool,
     watch: bool,
     quiet: bool,

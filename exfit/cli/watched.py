@@ -9,14 +9,13 @@ from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
-    from exfit.estimate import Method
     from exfit.results.model import FitResult
 
 
 def fit_in_sight(
     case: "Case",
     folder: Path,
-    strategy: "Method | None",
+    strategy: str | None,
     plots: bool,
     before: "FitResult | None" = None,
 ) -> "FitResult":
@@ -42,7 +41,7 @@ def fit_in_sight(
     return result
 
 
-def fit_again_and_again(case: Path, folder: Path, strategy: "Method | None", plots: bool) -> None:
+def fit_again_and_again(case: Path, folder: Path, strategy: str | None, plots: bool) -> None:
     """Fit a case, and again whenever a file of it changes, until Ctrl-C.
 
     Raises ExfitError where there is no such file, or no place for the results: a change of the

@@ -20,13 +20,11 @@ from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Sto
 from exfit.estimate.profile import CostProfile, ProfileEnd, profile, profiles
 from exfit.estimate.solver import least_squares
 from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart
-from exfit.estimate.strategies import Method
 
 __all__ = [
     "STATUS",
     "CostProfile",
     "LocalMinimum",
-    "Method",
     "MultistartResult",
     "ProfileEnd",
     "Progress",

@@ -10,7 +10,7 @@ from exfit.estimate.box import checked
 from exfit.estimate.problem import RELATIVE_STEP, Differences, Function, Problem
 from exfit.estimate.run import SearchRun
 from exfit.estimate.stopping import Rules
-from exfit.estimate.strategies import STRATEGIES, Method
+from exfit.estimate.strategies import STRATEGIES
 
 
 def least_squares(
@@ -18,7 +18,7 @@ def least_squares(
     x0: ArrayLike,
     jac: Differences | Function = "2-point",
     bounds: tuple[ArrayLike, ArrayLike] = (-inf, inf),
-    method: Method = "auto",
+    method: str = "auto",
     *,
     max_iterations: int = 100,
     gtol: float = 1e-8,
@@ -34,13 +34,7 @@ def least_squares(
     take differences, inside the bounds, and count them in nfev. A trial that is not finite, or
     whose fun raises ArithmeticError, is rejected. fun is never called outside the bounds.
 
-    method    gn           full Gauss-Newton steps, or nothing
-              dgn          the same direction, shortened until Armijo's rule holds
-              lm           Levenberg-Marquardt within a trust region
-              lm-then-dgn  lm until a full Gauss-Newton step proves good, then dgn; lm again where
-                           a kink stalls that
-              auto         dgn; if that is not good enough, lm-then-dgn from x0; the better one
-              robust       gn while it works, then lm
+    ``method`` is a name of `exfit.util.strategies.STRATEGIES`, where each is explained.
 
     x_scale      what counts as one unit of each variable; None takes it from the columns of J.
                  Use 1 for logarithms

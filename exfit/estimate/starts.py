@@ -13,8 +13,8 @@ from exfit.estimate.arrays import Array
 from exfit.estimate.box import checked
 from exfit.estimate.problem import Function, exact, half_square, residuals_at
 from exfit.estimate.solver import least_squares
-from exfit.estimate.strategies import Method
 from exfit.estimate.threads import side_by_side, until
+from exfit.util.strategies import DEFAULT_STRATEGY
 
 SEED = 1  # any: what matters is that a run can be repeated
 CHUNK = 256  # points screened between two reports
@@ -66,7 +66,7 @@ def multistart(
     workers: int | None = None,
     seed: int = SEED,
     watch: Watch = lambda _: None,
-    method: Method = "lm-then-dgn",
+    method: str = DEFAULT_STRATEGY,
     max_iterations: int = 100,
     gtol: float = 1e-8,
     ftol: float = 1e-8,

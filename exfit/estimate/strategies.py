@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from math import sqrt
-from typing import Literal
 
 from exfit.estimate.answer import Stop
 from exfit.estimate.gauss_newton import FullStep, LineSearch
@@ -11,7 +10,6 @@ from exfit.estimate.run import Outcome, SearchRun
 from exfit.estimate.search import Search
 from exfit.estimate.trust_region import TrustRegion
 
-Method = Literal["gn", "dgn", "lm", "lm-then-dgn", "auto", "robust"]
 Strategy = Callable[[SearchRun, LinearModel, float | None], Outcome]
 
 

@@ -34,7 +34,7 @@ def names_of_records(setups: Iterable[ExperimentSetup]) -> tuple[str, ...]:
 def search(
     case: Case,
     problem: FitProblem,
-    method: estimate.Method,
+    method: str,
     announce: Callable[[estimate.SolverIteration], None],
     progress: Callable[[estimate.Progress], None],
     counter: SimulationCounter | None = None,

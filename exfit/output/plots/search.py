@@ -9,13 +9,9 @@ from matplotlib.ticker import MaxNLocator
 
 from exfit.output.plots.style import LIMIT, MEASURED, SIMULATED, WIDTH, tidy
 from exfit.results.model import FitResult, Minima
+from exfit.util.strategies import PHASES
 
-PHASES: Mapping[str, str] = {"lm": "#2b6cb0", "dgn": "#c1272d", "gn": "#2f855a"}
-PHASE_NAMES: Mapping[str, str] = {
-    "lm": "Levenberg-Marquardt",
-    "dgn": "damped Gauss-Newton",
-    "gn": "Gauss-Newton",
-}
+COLOURS: Mapping[str, str] = {"lm": "#2b6cb0", "dgn": "#c1272d", "gn": "#2f855a"}  # of phases
 
 
 def convergence(result: FitResult) -> Figure:
@@ -52,10 +48,10 @@ def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: st
             [numbers[k] for k in chosen],
             [values[k] for k in chosen],
             marker,
-            color=PHASES[phase],
+            color=COLOURS[phase],
             markersize=4,
             clip_on=False,
-            label=PHASE_NAMES[phase],
+            label=PHASES[phase],
         )
 
 

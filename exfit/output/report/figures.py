@@ -1,6 +1,6 @@
 """The charts of a report, each with a text that says what it shows."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from exfit.output.report.content import Fitted, Iteration, Match, Report, Signal
 from exfit.output.report.simulated import Courses, Moved, Small
 from exfit.results.tables import clock_digits
 from exfit.signals import label_of
+from exfit.util.strategies import PHASES
 from exfit.util.text import show
 
 if TYPE_CHECKING:
@@ -30,11 +31,6 @@ MOST_POINTS = 40_000  # drawn in all overlays: 400 KB
 MOST_SENT = 16_000  # samples for the interactive overlays: 600 KB
 DIGITS = 7  # of a sample: beyond what a recorder resolves
 COLOURS, DASHES = 7, 3  # of lines in the style sheet
-PHASES: Mapping[str, str] = {
-    "lm": "Levenberg-Marquardt",
-    "dgn": "damped Gauss-Newton",
-    "gn": "Gauss-Newton",
-}
 TIME = "time (s)"
 ZERO, HALF_TURN = Rule(0.0, style="level"), Rule(-180.0, style="level")
 
