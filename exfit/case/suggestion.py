@@ -8,8 +8,9 @@ from pathlib import Path
 import yaml
 
 from exfit.case.templates import commented
+from exfit.records.channel_inspection import AT_REST_PU, InspectedChannel
 from exfit.records.channel_recognition import connection_of
-from exfit.records.inspection import AT_REST_PU, InspectedChannel, InspectedPhases, Inspection
+from exfit.records.inspection import InspectedPhases, Inspection
 from exfit.records.steps import RecordedStep
 from exfit.records.units import quantity_of
 from exfit.signals import COMPARED, RECORDED, SIGNALS

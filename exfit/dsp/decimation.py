@@ -1,4 +1,4 @@
-"""Long lines drawn with few points: what is seen of them stays the same."""
+"""Thin long lines for drawing: they look the same with few points."""
 
 from collections.abc import Sequence
 
@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-PIXELS = 2000  # stretches of a line: a figure has no more dots across
+PIXELS = 2000  # a figure has no more dots across
 
 
 def envelope(x: Array, y: Array, bins: int = PIXELS) -> tuple[Array, Array]:
-    """Return a line (M,) thinned to the least and greatest of each of so many stretches.
+    """Return a line (M,) thinned to the least and greatest value of each of the bins.
 
-    A line with no more points than that stays as it is; a gap (nan) as long as a stretch stays one.
+    A line with no more points than that stays as it is; a gap (nan) as long as a bin stays one.
     """
     rows = kept_rows([y], bins)
     return x[rows], y[rows]
@@ -29,10 +29,10 @@ def kept_rows(signals: Sequence[Array], bins: int) -> NDArray[np.intp]:
         return np.arange(count)
     size = -(-count // bins)
     starts = np.arange(0, count, size)
-    kept = [np.array([0, count - 1])]
+    rows = [np.array([0, count - 1])]
     for signal in signals:
         for pick, beyond in ((np.argmin, np.inf), (np.argmax, -np.inf)):
             filled = np.full(len(starts) * size, beyond)
             filled[:count] = np.where(np.isnan(signal), beyond, signal)
-            kept.append(starts + pick(filled.reshape(-1, size), axis=1))
-    return np.unique(np.concatenate(kept))
+            rows.append(starts + pick(filled.reshape(-1, size), axis=1))
+    return np.unique(np.concatenate(rows))

@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 TAIL = 0.05  # share of the response after the step whose mean is its final value
 BAND = 0.02  # of the step: within it the response has settled
-RISE = (0.1, 0.9)  # of the step
+RISE_LEVELS = (0.1, 0.9)  # of the step
 
 
 LABELS = (
@@ -58,7 +58,7 @@ def features(time: Array, signal: Array, step_at: float, until: float) -> Featur
     peak = int(np.argmax(way))
     # a response that still rises at the end passes the mean of its tail without any overshoot
     overshoots = bool(way[peak] > 1.0 and not tail[peak])
-    begin, end = (_first_crossing(t, way, level) for level in RISE)
+    begin, end = (_first_crossing(t, way, level) for level in RISE_LEVELS)
     return Features(
         initial_value=initial,
         final_value=final,

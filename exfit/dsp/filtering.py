@@ -1,4 +1,4 @@
-"""What is done alike to a recorded signal and to its simulation before they are compared."""
+"""Filters that a recorded signal and its simulation both pass before they are compared."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,16 +8,16 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise, spread
+from exfit.dsp.sampling import even_step
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.intp]
 
-ORDER = 2  # of the Butterworth filter, which runs twice
+BUTTERWORTH_ORDER = 2  # of the Butterworth filter, which runs twice
 FEWEST_FILTERED = 10  # samples: the filter starts on a mirror of three times its length
 FEWEST_AVERAGED = 2  # samples of a line
-UNEVEN = 0.01  # of a sampling step
-WINDOW = 7  # samples around one that is held against its neighbours; 3 may be spikes
+OUTLIER_WINDOW = 7  # samples, of which the middle one is compared with the rest; 3 may be spikes
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ class Filtering:
 
         assert isinstance(self.filter, LowPass)
         rate = 1.0 / float(np.mean(np.diff(self.time)))
-        return np.asarray(butter(ORDER, self.filter.cutoff, fs=rate, output="sos"))
+        return np.asarray(butter(BUTTERWORTH_ORDER, self.filter.cutoff, fs=rate, output="sos"))
 
     def _low_passed(self, values: Array) -> Array:
         from scipy.signal import sosfiltfilt
@@ -199,18 +199,22 @@ def outliers(time: Array, samples: Array, limit: float, scatter: float | None = 
         time: (M,), s, increasing.
         samples: (M,), finite.
         limit: in standard deviations.
-        scatter: the noise of the record where it is known, else it is told from the samples.
+        scatter: the noise of the record where it is known, else it is estimated from the samples.
 
     Source: Hampel 1974 (the rule); Siegel 1982 (the line).
 
     Raises:
         ValueError: fewer than seven samples.
     """
-    if len(samples) < WINDOW:
-        raise ValueError(f"{len(samples)} samples: spikes show among {WINDOW} or more")
-    from_line = _from_lines(sliding_window_view(time, WINDOW), sliding_window_view(samples, WINDOW))
+    if len(samples) < OUTLIER_WINDOW:
+        raise ValueError(
+            f"{len(samples)} samples: spikes are found among at least {OUTLIER_WINDOW}"
+        )
+    from_line = _from_lines(
+        sliding_window_view(time, OUTLIER_WINDOW), sliding_window_view(samples, OUTLIER_WINDOW)
+    )
     place = np.arange(len(samples))
-    window = np.clip(place - WINDOW // 2, 0, len(samples) - WINDOW)
+    window = np.clip(place - OUTLIER_WINDOW // 2, 0, len(samples) - OUTLIER_WINDOW)
     away = np.abs(from_line[window, place - window])
     scale = np.maximum(spread(from_line), noise(samples) if scatter is None else scatter)
     return np.asarray(away > limit * scale[window])
@@ -218,13 +222,13 @@ def outliers(time: Array, samples: Array, limit: float, scatter: float | None = 
 
 def _from_lines(time: Array, samples: Array) -> Array:
     """Return how far each sample of each row lies from the row's repeated-median line."""
-    others = [np.flatnonzero(np.arange(WINDOW) != one) for one in range(WINDOW)]
+    others = [np.flatnonzero(np.arange(OUTLIER_WINDOW) != k) for k in range(OUTLIER_WINDOW)]
     slopes = [
-        np.median((samples[:, rest] - samples[:, [one]]) / (time[:, rest] - time[:, [one]]), axis=1)
-        for one, rest in enumerate(others)
+        np.median((samples[:, rest] - samples[:, [k]]) / (time[:, rest] - time[:, [k]]), axis=1)
+        for k, rest in enumerate(others)
     ]
     slope = np.median(slopes, axis=0)
-    level = samples - slope[:, None] * (time - time[:, [WINDOW // 2]])
+    level = samples - slope[:, None] * (time - time[:, [OUTLIER_WINDOW // 2]])
     return np.asarray(level - np.median(level, axis=1, keepdims=True))
 
 
@@ -232,16 +236,9 @@ def _check_filter(time: Array, cutoff: float) -> None:
     """Raise a ValueError where a low-pass filter cannot work."""
     if len(time) < FEWEST_FILTERED:
         raise ValueError(
-            f"{len(time)} samples: the low-pass filter needs {FEWEST_FILTERED} or more"
+            f"{len(time)} samples: the low-pass filter needs at least {FEWEST_FILTERED}"
         )
-    steps = np.diff(time)
-    step = float(np.mean(steps))
-    uneven = float(np.max(np.abs(steps - step))) / step
-    if uneven > UNEVEN:
-        raise ValueError(
-            f"the low-pass filter needs even sampling: a step differs by {100 * uneven:.3g} % "
-            f"from the mean of {step:g} s, allowed is {100 * UNEVEN:g} %"
-        )
+    step = even_step(time, "the low-pass filter")
     if not 0.0 < cutoff < 0.5 / step:
         raise ValueError(
             f"cutoff of {cutoff:g} Hz: it must lie between 0 and half the sampling rate, "
@@ -252,7 +249,7 @@ def _check_filter(time: Array, cutoff: float) -> None:
 def _check_average(time: Array, window: float) -> None:
     """Raise a ValueError where a moving average has nothing to average."""
     if len(time) < FEWEST_AVERAGED:
-        raise ValueError(f"{len(time)} samples: an average needs {FEWEST_AVERAGED} or more")
+        raise ValueError(f"{len(time)} samples: an average needs at least {FEWEST_AVERAGED}")
     if window > time[-1] - time[0]:
         raise ValueError(
             f"an average over {window:g} s: the record is {time[-1] - time[0]:g} s long"

@@ -1,4 +1,4 @@
-"""The noise of a record, told from the course of its signal."""
+"""The noise of a record, estimated from the signal itself."""
 
 from math import sqrt
 from statistics import NormalDist
@@ -12,15 +12,15 @@ Array = NDArray[np.float64]
 NEIGHBOURS = 3  # samples of a second difference; their median is free of a lone spike
 SECOND_DIFFERENCE = sqrt(6.0)  # spread of x[k-1] - 2 x[k] + x[k+1] over that of white x
 MEDIAN_DEVIATION = NormalDist().inv_cdf(0.75)  # median of |x|, over the spread of a normal x
-ROUNDING = 1.0 / sqrt(12.0)  # spread of what rounding leaves, over the step it rounds to
+UNIFORM_SPREAD = 1.0 / sqrt(12.0)  # over the width: of what rounding leaves, over its step
 
 
 def noise(samples: Array) -> float:
     """Return the standard deviation of the white noise on a slow signal (M,), in its unit.
 
-    It is the median absolute deviation of the second differences, which neither the course of the
-    signal nor rare spikes move, and no less than what rounding to the recorder's steps leaves.
-    Uneven sampling passes where the signal is slow against its longest step.
+    It is the median absolute deviation of the second differences, which neither the slow changes
+    of the signal nor rare spikes affect, and no less than what rounding to the recorder's steps
+    leaves. Uneven sampling passes where the signal is slow against its longest step.
 
     Source: Rousseeuw and Croux 1993 (median absolute deviation).
 
@@ -28,9 +28,11 @@ def noise(samples: Array) -> float:
         ValueError: fewer than three samples.
     """
     if len(samples) < NEIGHBOURS:
-        raise ValueError(f"{len(samples)} samples: noise shows from {NEIGHBOURS} on")
+        raise ValueError(
+            f"{len(samples)} samples: the noise is estimated from at least {NEIGHBOURS}"
+        )
     scatter = spread(np.diff(samples, 2)) / SECOND_DIFFERENCE
-    return max(float(scatter), ROUNDING * _quantum(samples))
+    return max(float(scatter), UNIFORM_SPREAD * _quantum(samples))
 
 
 def spread(values: Array, axis: int = -1) -> Array:

@@ -7,17 +7,18 @@ from math import ceil, floor
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.sampling import GAP_STEPS
+
 Array = NDArray[np.float64]
 
-EVEN = 0.01  # of a sampling step that an instant may lie off an even clock: stamps are rounded
-GAP = 3.0  # sampling steps: across more no curve through the samples is known
-PASSED = 0.8  # of half the new rate: up to here a signal stays as it is
+OFF_CLOCK = 0.01  # of a sampling step: an instant may lie so far off, as stamps are rounded
+PASSBAND = 0.8  # of half the new rate: up to here a signal stays as it is
 ATTENUATION = 72.0  # dB by the formula, 70 in fact: of a step, less than a recorder resolves
-FINER = 2  # times the mean rate, of the even clock that uneven samples are put on
-DENOMINATOR = 1000  # largest of a ratio of rates that is taken exactly
-AS_ASKED = 1e-4  # of the rate: as near to its nominal rate is a recorder's own
-SMOOTH = 5  # samples to one of the new rate, where these are read off a cubic spline
-FEWEST = 2  # samples of a signal
+OVERSAMPLING = 2  # times the mean rate, of the even clock that uneven samples are put on
+MOST_DENOMINATOR = 1000  # largest of a ratio of rates that is taken exactly
+RATE_TOLERANCE = 1e-4  # of the rate: a recorder's own is as close to its nominal one
+SAMPLES_FOR_SPLINE = 5  # to one of the new rate, where these are read off a cubic spline
+FEWEST_SAMPLES_TO_RESAMPLE = 2
 
 
 def resampled(
@@ -37,7 +38,7 @@ def resampled(
     signal without a kink.
 
     White noise keeps 0.88 rate / old rate of its variance; neighbours are then correlated by 0.13,
-    the next by -0.12, so that second differences tell 0.88 of its standard deviation.
+    the next by -0.12, so that second differences give 0.88 of its standard deviation.
 
     The clock's rate is the one asked for within 0.01 %, so that a recorder whose own is not quite
     the nominal one needs no curve between its samples. Uneven samples are first put on an even
@@ -57,22 +58,24 @@ def resampled(
     """
     own = _mean_rate(time, signals, rate)
     if not _is_even(time, own):
-        ratio = ceil(FINER * own / rate)
-        fine = _clock(time, ratio * rate, floor((time[-1] - time[0]) * ratio * rate + EVEN) + 1)
+        ratio = ceil(OVERSAMPLING * own / rate)
+        fine = _clock(
+            time, ratio * rate, floor((time[-1] - time[0]) * ratio * rate + OFF_CLOCK) + 1
+        )
         return fine[::ratio], {
             name: _filtered(_spline(time, signal, fine), ratio * rate, Fraction(1, ratio), rate)
             for name, signal in signals.items()
         }
-    share = Fraction(rate / own).limit_denominator(DENOMINATOR)
-    exact = abs(float(share) * own - rate) <= AS_ASKED * rate
+    share = Fraction(rate / own).limit_denominator(MOST_DENOMINATOR)
+    exact = abs(float(share) * own - rate) <= RATE_TOLERANCE * rate
     if not exact:
-        share = _finer_share(SMOOTH * rate / own)
+        share = _finer_share(SAMPLES_FOR_SPLINE * rate / own)
     fine = _clock(time, float(share) * own, floor((len(time) - 1) * share) + 1)
-    moved = {name: _filtered(signal, own, share, rate) for name, signal in signals.items()}
+    filtered = {name: _filtered(signal, own, share, rate) for name, signal in signals.items()}
     if exact:
-        return fine, moved
+        return fine, filtered
     clock = _clock(time, rate, floor((fine[-1] - fine[0]) * rate) + 1)
-    return clock, {name: _spline(fine, signal, clock) for name, signal in moved.items()}
+    return clock, {name: _spline(fine, signal, clock) for name, signal in filtered.items()}
 
 
 def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
@@ -81,16 +84,18 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
         lost = ~np.isfinite(signal)
         if lost.any():
             raise ValueError(
-                f"{name}: no finite number at {time[lost][0]:g} s; resampling needs all of them"
+                f"{name}: no finite number at {time[lost][0]:g} s; resampling needs every sample"
             )
-    if len(time) < FEWEST:
-        raise ValueError(f"{len(time)} samples: resampling needs {FEWEST} or more")
+    if len(time) < FEWEST_SAMPLES_TO_RESAMPLE:
+        raise ValueError(
+            f"{len(time)} samples: resampling needs at least {FEWEST_SAMPLES_TO_RESAMPLE}"
+        )
     steps = np.diff(time)
     longest, usual = int(np.argmax(steps)), float(np.median(steps))
-    if steps[longest] > GAP * usual:
+    if steps[longest] > GAP_STEPS * usual:
         raise ValueError(
             f"a gap of {steps[longest]:g} s after {time[longest]:g} s: resampling bridges at most "
-            f"{GAP:g} sampling steps of {usual:g} s"
+            f"{GAP_STEPS:g} sampling steps of {usual:g} s"
         )
     length = float(time[-1] - time[0])
     own = len(steps) / length
@@ -105,7 +110,7 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
 def _is_even(time: Array, rate: float) -> bool:
     """Tell whether instants lie on an even clock, up to the rounding of their stamps."""
     away = time - np.linspace(time[0], time[-1], len(time))
-    return float(np.max(np.abs(away))) * rate <= EVEN
+    return float(np.max(np.abs(away))) * rate <= OFF_CLOCK
 
 
 def _clock(time: Array, rate: float, count: int) -> Array:
@@ -131,9 +136,9 @@ def _filtered(signal: Array, own: float, share: Fraction, rate: float) -> Array:
 
     up, down = share.as_integer_ratio()
     finest, half = own * up, 0.5 * rate
-    taps, beta = kaiserord(ATTENUATION, (1.0 - PASSED) * half / (0.5 * finest))
+    taps, beta = kaiserord(ATTENUATION, (1.0 - PASSBAND) * half / (0.5 * finest))
     late = ceil(taps / (2 * down))  # new samples, whole ones: they are left out again
-    cutoff = 0.5 * (1.0 + PASSED) * half
+    cutoff = 0.5 * (1.0 + PASSBAND) * half
     response = firwin(2 * late * down + 1, cutoff, window=("kaiser", beta), fs=finest)
     # apart from the line between its ends a signal starts and stops at zero, and a level, which is
     # large, meets no ripple
@@ -142,6 +147,6 @@ def _filtered(signal: Array, own: float, share: Fraction, rate: float) -> Array:
     longer = np.pad(signal - line, before * down, mode="reflect", reflect_type="odd")
     first = late + before * up
     count = floor((len(signal) - 1) * share) + 1
-    moved = upfirdn(up * response, longer, up, down)[first : first + count]
+    filtered = upfirdn(up * response, longer, up, down)[first : first + count]
     rise = (signal[-1] - signal[0]) / (len(signal) - 1)
-    return np.asarray(moved + signal[0] + rise * np.arange(count) * (down / up))
+    return np.asarray(filtered + signal[0] + rise * np.arange(count) * (down / up))

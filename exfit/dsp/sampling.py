@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-GAP = 3.0  # median steps: a longer one is a gap
-EVEN = 0.01  # of the median step: what differs by more makes the sampling uneven
-FEWEST = 2  # samples that have a step between them
+GAP_STEPS = 3.0  # median steps: a longer one is a gap
+MOST_UNEVEN = 0.01  # of a sampling step: steps that differ by more are uneven
+FEWEST_STAMPS = 2  # that have a step between them
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,29 @@ class Sampling:
     @property
     def even(self) -> bool:
         """Tell whether the steps are alike, gaps aside."""
-        return max(self.largest - self.step, self.step - self.smallest) <= EVEN * self.step
+        return max(self.largest - self.step, self.step - self.smallest) <= MOST_UNEVEN * self.step
+
+
+def present_samples(time: Array, samples: Array) -> tuple[Array, Array]:
+    """Return those instants and samples (M,) of a signal that are not missing (nan)."""
+    present = np.isfinite(samples)
+    return (time, samples) if present.all() else (time[present], samples[present])
+
+
+def even_step(time: Array, purpose: str) -> float:
+    """Return the mean sampling step (s) of an even clock (M,), 2 <= M.
+
+    Raises ValueError where a step differs from it by more than 1 %; ``purpose`` is what needs it.
+    """
+    steps = np.diff(time)
+    step = float(np.mean(steps))
+    uneven = float(np.max(np.abs(steps - step))) / step
+    if uneven > MOST_UNEVEN:
+        raise ValueError(
+            f"{purpose} needs even sampling: a step differs by {100 * uneven:.3g} % from the mean "
+            f"of {step:g} s, allowed is {100 * MOST_UNEVEN:g} %"
+        )
+    return step
 
 
 def increasing(time: Array) -> Mask:
@@ -61,18 +83,18 @@ def increasing(time: Array) -> Mask:
 
 def sampling_of(time: Array) -> Sampling:
     """Return how a clock (M,) in s runs; raises ValueError for fewer than two samples."""
-    if len(time) < FEWEST:
-        raise ValueError(f"{len(time)} samples; at least {FEWEST} are needed")
+    if len(time) < FEWEST_STAMPS:
+        raise ValueError(f"{len(time)} samples; at least {FEWEST_STAMPS} are needed")
     forward = increasing(time)
-    kept = time[forward]
-    steps = np.diff(kept)
+    valid = time[forward]
+    steps = np.diff(valid)
     step = float(np.median(steps)) if len(steps) else 0.0
-    jumps = np.flatnonzero(steps > GAP * step)
+    jumps = np.flatnonzero(steps > GAP_STEPS * step)
     gaps = tuple(
-        Gap(float(kept[k]), float(kept[k + 1]), max(round(float(steps[k]) / step) - 1, 1))
+        Gap(float(valid[k]), float(valid[k + 1]), max(round(float(steps[k]) / step) - 1, 1))
         for k in jumps
     )
     usual = np.delete(steps, jumps)
     smallest, largest = (float(np.min(usual)), float(np.max(usual))) if len(usual) else (0.0, 0.0)
     backward = tuple(int(k) for k in np.flatnonzero(~forward))
-    return Sampling(float(kept[0]), float(kept[-1]), step, smallest, largest, gaps, backward)
+    return Sampling(float(valid[0]), float(valid[-1]), step, smallest, largest, gaps, backward)

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.sampling import even_step
+
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Connection = Literal["phase-to-ground", "phase-to-phase"]
@@ -18,21 +20,20 @@ LINE_VOLTAGE: Mapping[Connection, float] = MappingProxyType(
 )  # over the voltage that is recorded
 PHASES = 3
 SPACE_VECTOR = sqrt(2.0) / PHASES * np.exp(2j * pi / PHASES * np.arange(PHASES))
-FREQUENCIES = (40.0, 70.0)  # Hz: systems of 50 and 60 Hz, and units that run off them
+MAINS_FREQUENCIES = (40.0, 70.0)  # Hz: systems of 50 and 60 Hz, and units that run off them
 FEWEST_PER_CYCLE = 8  # samples: fewer do not show the third harmonic
-FEWEST_CYCLES = 3  # beside the window: fewer do not tell the frequency
-UNEVEN = 0.01  # of a sampling step
+FEWEST_CYCLES = 3  # beside the window: fewer do not determine the frequency
 MOST_NEGATIVE = 0.2  # of the positive sequence: a unit shows 0.02, one that lost a phase 0.5
-DEAD = 0.1  # of the largest voltage: below it noise turns the phase
-DRIFT = 1.0  # Hz: beyond it the window is no whole cycle to 2 %
+LOWEST_VOLTAGE = 0.1  # of the largest voltage: below it noise turns the phase
+MOST_DRIFT = 1.0  # Hz: beyond it the window is no whole cycle to 2 %
 HARMONICS = 40  # orders that the window takes out, as far as IEC 61000-3-2 counts them
 NEAR_NYQUIST = 0.9  # of half the sampling rate: beyond it the samples show no harmonic
-UNBALANCE = 0.05  # of the mean: IEC 60034-1 has machines made for a system of 0.01
-SPIKES = 0.01  # of the samples: so many may lie off without a wrong column
+MOST_UNBALANCE = 0.05  # of the mean: IEC 60034-1 has machines made for a system of 0.01
+MOST_OUTLIERS = 0.01  # of the samples: so many may lie off without a wrong column
 
 
 @dataclass(frozen=True, eq=False)
-class PhasorCourse:
+class PositiveSequence:
     """The positive sequence of three waveforms: RMS ``voltage`` (K,) at ``time`` (K,), in s.
 
     It is the mean over a ``window`` (s) about each instant, and shorter than the record by one
@@ -48,7 +49,7 @@ class PhasorCourse:
 
 def vt_of_waveforms(
     time: Array, phases: Array, base: float, connection: Connection, cycles: int = 1
-) -> PhasorCourse:
+) -> PositiveSequence:
     """Return the terminal voltage per unit that three waveforms (M, 3) show.
 
     Args:
@@ -60,8 +61,8 @@ def vt_of_waveforms(
 
     Raises ValueError as ``positive_sequence``.
     """
-    course = positive_sequence(time, phases, cycles)
-    return replace(course, voltage=course.voltage * (LINE_VOLTAGE[connection] / base))
+    sequence = positive_sequence(time, phases, cycles)
+    return replace(sequence, voltage=sequence.voltage * (LINE_VOLTAGE[connection] / base))
 
 
 def vt_of_rms(phases: Array, base: float, connection: Connection) -> Array:
@@ -86,21 +87,22 @@ def mean_rms(phases: Array) -> Array:
     """
     _check_columns(phases)
     mean = np.asarray(np.mean(phases, axis=1))
-    seen = np.isfinite(mean)
-    if not seen.any():
-        raise ValueError("at no instant do all three phases have a number")
-    away = np.max(np.abs(phases[seen] - mean[seen, None]), axis=1)
-    lasting = float(np.quantile(away - UNBALANCE * np.abs(mean[seen]), 1.0 - SPIKES))
-    if lasting > 0.0 or not np.median(mean[seen]) > 0.0:
-        levels = ", ".join(f"{level:.4g}" for level in np.median(phases[seen], axis=0))
+    present = np.isfinite(mean)
+    if not present.any():
+        raise ValueError("there is no instant at which all three phases have a number")
+    away = np.max(np.abs(phases[present] - mean[present, None]), axis=1)
+    lasting = float(np.quantile(away - MOST_UNBALANCE * np.abs(mean[present]), 1.0 - MOST_OUTLIERS))
+    if lasting > 0.0 or not np.median(mean[present]) > 0.0:
+        levels = ", ".join(f"{level:.4g}" for level in np.median(phases[present], axis=0))
         raise ValueError(
-            f"the phases' RMS values, {levels} (medians), lie more than {100 * UNBALANCE:g} % off "
-            "their mean: one is missing, or a column is another signal"
+            f"the phases' RMS values, {levels} (medians), lie more than "
+            f"{100 * MOST_UNBALANCE:g} % off their mean: one is missing, or a column is "
+            "another signal"
         )
     return mean
 
 
-def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PhasorCourse:
+def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PositiveSequence:
     """Return the RMS value of the positive sequence of three waveforms (M, 3), without delay.
 
     Their space vector, turned back by the record's own frequency, is averaged over a window of
@@ -128,8 +130,8 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PhasorCour
     _check_columns(phases)
     if not np.isfinite(phases).all():
         at = time[~np.isfinite(phases).all(axis=1)][0]
-        raise ValueError(f"a waveform has no finite number at {at:g} s; its window needs all")
-    step = _even_step(time)
+        raise ValueError(f"a waveform has no finite number at {at:g} s; none may be missing")
+    step = _waveform_step(time)
     clock: Array = step * np.arange(len(time), dtype=np.float64)
     vector: Complex = phases @ SPACE_VECTOR
     frequency = _checked(_frequency(clock, vector), step, len(time), cycles)
@@ -143,13 +145,13 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PhasorCour
     window = cycles / frequency
     _check_balance(time[kept], np.abs(positive), np.abs(negative))
     drift = _drift(positive, step, round(0.5 * window / step))
-    if np.max(np.abs(drift)) > DRIFT:
+    if np.max(np.abs(drift)) > MOST_DRIFT:
         raise ValueError(
             f"the frequency moves by {np.max(np.abs(drift)):.3g} Hz off its mean of "
-            f"{frequency:.5g} Hz; at most {DRIFT:g} Hz"
+            f"{frequency:.5g} Hz; at most {MOST_DRIFT:g} Hz"
         )
     voltage = np.abs(positive) / np.sinc(drift * window)
-    return PhasorCourse(time[kept], voltage, kept, frequency, window)
+    return PositiveSequence(time[kept], voltage, kept, frequency, window)
 
 
 def _check_columns(phases: Array) -> None:
@@ -158,22 +160,15 @@ def _check_columns(phases: Array) -> None:
         raise ValueError(f"phases of shape {phases.shape}: {PHASES} columns are needed")
 
 
-def _even_step(time: Array) -> float:
+def _waveform_step(time: Array) -> float:
     """Return the sampling step (s); raises ValueError where it varies, or is too long."""
-    steps = np.diff(time)
-    step = float(np.mean(steps)) if len(steps) else np.inf
-    if step > 1.0 / (FEWEST_PER_CYCLE * FREQUENCIES[0]):
+    step = float(np.mean(np.diff(time))) if len(time) > 1 else np.inf
+    if step > 1.0 / (FEWEST_PER_CYCLE * MAINS_FREQUENCIES[0]):
         raise ValueError(
-            f"a sampling rate of {1.0 / step:.4g} Hz: a waveform needs {FEWEST_PER_CYCLE} samples "
-            "a cycle"
+            f"a sampling rate of {1.0 / step:.4g} Hz: a waveform needs at least "
+            f"{FEWEST_PER_CYCLE} samples a cycle"
         )
-    uneven = float(np.max(np.abs(steps - step))) / step
-    if uneven > UNEVEN:
-        raise ValueError(
-            f"the phasor of a waveform needs even sampling: a step differs by {100 * uneven:.3g} % "
-            f"from the mean of {step:g} s, allowed is {100 * UNEVEN:g} %"
-        )
-    return step
+    return even_step(time, "the phasor of a waveform")
 
 
 def _frequency(clock: Array, vector: Complex) -> float:
@@ -184,20 +179,20 @@ def _frequency(clock: Array, vector: Complex) -> float:
 
 def _checked(frequency: float, step: float, count: int, cycles: int) -> float:
     """Return a frequency (Hz); raises ValueError where it is no unit's, or badly seen."""
-    low, high = FREQUENCIES
+    low, high = MAINS_FREQUENCIES
     if low <= -frequency <= high:
         raise ValueError(
             "the negative sequence dominates: two phases are swapped, or one has the wrong sign"
         )
     if not low <= frequency <= high:
         raise ValueError(
-            f"the three waveforms turn with {frequency:.3f} Hz; a unit's lies within {low:g} ... "
-            f"{high:g} Hz"
+            f"the space vector of the three waveforms turns with {frequency:.3f} Hz; it must "
+            f"be within {low:g} ... {high:g} Hz"
         )
     if frequency * step * FEWEST_PER_CYCLE > 1.0:
         raise ValueError(
             f"{1.0 / (frequency * step):.3g} samples a cycle of {frequency:.4g} Hz; a waveform "
-            f"needs {FEWEST_PER_CYCLE}"
+            f"needs at least {FEWEST_PER_CYCLE}"
         )
     if count * step * frequency < cycles + FEWEST_CYCLES:
         raise ValueError(
@@ -238,10 +233,10 @@ def _weights(per_cycle: float, cycles: int) -> Array:
 def _check_balance(time: Array, positive: Array, negative: Array) -> None:
     """Raise a ValueError where the voltage is gone, or is not that of three phases."""
     low = int(np.argmin(positive))
-    if positive[low] < DEAD * np.max(positive):
+    if positive[low] < LOWEST_VOLTAGE * np.max(positive):
         raise ValueError(
-            f"at {time[low]:g} s the voltage is below {100 * DEAD:g} % of its largest: its phase "
-            "is lost there; choose a window of the record without it"
+            f"at {time[low]:g} s the voltage is below {100 * LOWEST_VOLTAGE:g} % of its "
+            "largest: its phase is lost there; choose a window of the record without it"
         )
     worst = int(np.argmax(negative / positive))
     share = float(negative[worst] / positive[worst])

@@ -26,7 +26,7 @@ class Guess:
     why: str
 
 
-def guessed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Guess]:
+def guess_signals(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Guess]:
     """Return the signals that columns seem to be, by column: each signal once, by the surest word.
 
     The unit must be one of the signal; where the name shows nothing, MW and Mvar still do.

@@ -1,27 +1,29 @@
-"""The steps of a test, told from all channels of a record together."""
+"""The steps of a test, as all channels of a record together show them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.noise import UNIFORM_SPREAD
 from exfit.dsp.quality import mains_frequency, noise_of
-from exfit.dsp.step_detection import BEFORE, DetectedStep, find_step, find_steps
+from exfit.dsp.sampling import present_samples
+from exfit.dsp.step_detection import SAMPLES_AT_REST, DetectedStep, find_step, find_steps
 
 Array = NDArray[np.float64]
 
-COARSE = 20_000  # samples in which the steps of a longer record are looked for first
-AROUND = 50  # of those samples, before and behind a step, in which its instant is then told
-SAME_STEP = 0.25  # s: as far apart may channels show one step, beside their standard errors
-ERRORS = 3.0  # standard errors
-SHAPE = 0.1 * 3.0**-0.5  # of a rise: as far may its shape move the instant, evenly up to a tenth
-LEVELS = 12  # that a switched signal has, at most
-SETTLED = 0.1  # of a record, at its end
-MARGIN = 0.005  # of a stretch between two steps
-LASTS = 3.0  # times the noise: a smaller change of a channel is none
-SMALL_CHANGE = 8.0  # times the noise: what moves from the beginning by less has no step there
-ROUNDING = 12.0**-0.5  # standard deviation of what is uniform, over its width
+COARSE_SAMPLES = 20_000  # in which the steps of a longer record are first looked for
+COARSE_AROUND_STEP = 50  # of these, before and after a step, from which its instant is then taken
+SAME_STEP = 0.25  # s: channels may show one step this far apart, beside their standard errors
+SAME_STEP_ERRORS = 3.0  # these standard errors
+# of a rise: its shape may move the instant by up to a tenth, equally likely each way
+SHAPE_ERROR = 0.1 * 3.0**-0.5
+MOST_LEVELS = 12  # of a signal that switches
+END_SHARE = 0.1  # of a record or of the time between two steps: its end, where levels are taken
+MARGIN_SHARE = 0.005  # of the time between two steps, left out at its end
+LASTING_CHANGE = 3.0  # times the noise: a smaller change of level is none
+CHANGE_FROM_START = 8.0  # times the noise: a smaller change since the first sample is none
 
 
 @dataclass(frozen=True)
@@ -41,11 +43,18 @@ class LevelChange:
 
 
 @dataclass(frozen=True)
-class RecordedStep:
-    """A step of the test, its instant told from all channels that show it, ``seen_in``.
+class ChannelSteps:
+    """The steps of one channel; ``remark`` says why it shows none."""
 
-    ``sizes`` is by how much each channel stands elsewhere at the end of it, those without a lasting
-    change left out.
+    changes: tuple[LevelChange, ...] = ()
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class RecordedStep:
+    """A step of the test, with its instant from all channels that show it, ``seen_in``.
+
+    ``sizes`` are the lasting changes of level by channel.
     """
 
     at: float
@@ -55,28 +64,30 @@ class RecordedStep:
     from_start: bool
 
 
-def changes_of(time: Array, column: Array, reference: bool) -> "tuple[LevelChange, ...] | str":
-    """Return the steps of a channel, or why it shows none; what switches must be a reference."""
-    seen = np.isfinite(column)
-    t, y = (time, column) if seen.all() else (time[seen], column[seen])
+def steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSteps:
+    """Return the steps of a channel (M,); one that switches counts as a ``reference`` only."""
+    t, y = present_samples(time, samples)
     if not len(y):
-        return "every sample is missing"
+        return ChannelSteps(remark="every sample is missing")
     if np.min(y) == np.max(y):
-        return "never changes"
+        return ChannelSteps(remark="never changes")
     frequency = mains_frequency(t, y)
     if frequency:
-        return f"a waveform of {frequency:.4g} Hz"
+        return ChannelSteps(remark=f"a waveform of {frequency:.4g} Hz")
     if switches(y):
-        return _switched(t, y) if reference else "switches between a few levels"
-    block = -(-len(y) // COARSE)
+        if reference:
+            return ChannelSteps(tuple(_jumps(t, y)))
+        return ChannelSteps(remark="switches between a few levels")
+    block = -(-len(y) // COARSE_SAMPLES)
     try:
-        return tuple(_finer(t, y, one, block) for one in find_steps(*_coarse(t, y, block)))
+        steps = find_steps(*_block_medians(t, y, block))
     except ValueError as fault:
-        return str(fault)
+        return ChannelSteps(remark=str(fault))
+    return ChannelSteps(tuple(_refined(t, y, step, block) for step in steps))
 
 
-def _coarse(time: Array, samples: Array, block: int) -> tuple[Array, Array]:
-    """Return the medians of blocks of a record, and their mean instants; what is left over goes."""
+def _block_medians(time: Array, samples: Array, block: int) -> tuple[Array, Array]:
+    """Return the medians of whole blocks of samples, and their mean instants."""
     if block == 1:
         return time, samples
     whole = len(time) // block * block
@@ -86,140 +97,152 @@ def _coarse(time: Array, samples: Array, block: int) -> tuple[Array, Array]:
     )
 
 
-def _finer(time: Array, samples: Array, found: DetectedStep, block: int) -> LevelChange:
-    """Return a step whose instant is told from fewer, whole samples around it."""
-    coarse = LevelChange(found.at, _error(found), found.size, found.level)
+def _refined(time: Array, samples: Array, coarse: DetectedStep, block: int) -> LevelChange:
+    """Return a step with its instant from smaller blocks, or single samples, around it."""
+    change = LevelChange(coarse.at, _error(coarse), coarse.size, coarse.level)
     if block == 1:
-        return coarse
-    at, far = int(np.searchsorted(time, found.at)), AROUND * block
-    near = slice(max(at - far, 0), at + far)
-    inner = -(-2 * far // COARSE)
+        return change
+    middle, reach = int(np.searchsorted(time, coarse.at)), COARSE_AROUND_STEP * block
+    near = slice(max(middle - reach, 0), middle + reach)
+    smaller_block = -(-2 * reach // COARSE_SAMPLES)
     try:
-        onset = find_step(*_coarse(time[near], samples[near], inner))
+        fine = find_step(*_block_medians(time[near], samples[near], smaller_block))
     except ValueError:
-        return coarse
-    same = abs(onset.at - found.at) <= 0.5 * (time[near][-1] - time[near][0])
-    return replace(coarse, at=onset.at, error=_error(onset)) if same else coarse
+        return change
+    same = abs(fine.at - coarse.at) <= 0.5 * (time[near][-1] - time[near][0])
+    return replace(change, at=fine.at, error=_error(fine)) if same else change
 
 
-def _error(onset: DetectedStep) -> float:
-    """Return the standard error of an instant: what noise leaves, and the shape of the rise."""
-    return float(np.hypot(onset.spread, SHAPE * onset.rise))
+def _error(step: DetectedStep) -> float:
+    """Return the standard error of an instant, from the noise and from the shape of the rise."""
+    return float(np.hypot(step.spread, SHAPE_ERROR * step.rise))
 
 
 def switches(samples: Array) -> bool:
     """Tell whether a channel jumps between a few levels, as a recorded reference does."""
     jumps = np.flatnonzero(np.diff(samples)) + 1
     ends = np.concatenate([[0], jumps, [len(samples)]])
-    return 0 < len(jumps) < LEVELS and bool(np.min(np.diff(ends)) >= BEFORE)
+    return 0 < len(jumps) < MOST_LEVELS and bool(np.min(np.diff(ends)) >= SAMPLES_AT_REST)
 
 
-def _switched(time: Array, samples: Array) -> tuple[LevelChange, ...]:
-    """Return the steps of a channel that jumps: each between two samples."""
-    return tuple(
-        LevelChange(
+def _jumps(time: Array, samples: Array) -> Iterator[LevelChange]:
+    """Yield the steps of a channel that jumps, each between two samples."""
+    for k in np.flatnonzero(np.diff(samples)):
+        yield LevelChange(
             at=float(time[k] + time[k + 1]) / 2.0,
-            error=float(time[k + 1] - time[k]) * ROUNDING,
+            error=float(time[k + 1] - time[k]) * UNIFORM_SPREAD,
             size=float(samples[k + 1] - samples[k]),
             level=float(samples[k]),
             jumps=True,
         )
-        for k in np.flatnonzero(np.diff(samples))
-    )
 
 
-def from_start(
-    time: Array, samples: Mapping[str, Array], found: Mapping[str, "tuple[LevelChange, ...] | str"]
-) -> dict[str, tuple[LevelChange, ...]]:
+def changes_from_start(time: Array, signals: Mapping[str, Array]) -> dict[str, LevelChange]:
     """Return the changes of channels that move from their first sample on and then settle."""
-    changes: dict[str, tuple[LevelChange, ...]] = {}
-    for name, column in samples.items():
-        y = column[np.isfinite(column)]
-        if not isinstance(found[name], str) or len(y) < 2 * BEFORE or mains_frequency(time, column):
+    changes = {}
+    for name, samples in signals.items():
+        y = samples[np.isfinite(samples)]
+        if len(y) < 2 * SAMPLES_AT_REST or mains_frequency(time, samples):
             continue
-        end = y[-max(round(SETTLED * len(y)), BEFORE) :]
+        end = y[-max(round(END_SHARE * len(y)), SAMPLES_AT_REST) :]
         size = float(np.median(end) - y[0])
-        settled = np.ptp(end) < SETTLED * abs(size)
-        if settled and abs(size) > SMALL_CHANGE * noise_of(y):
+        settled = np.ptp(end) < END_SHARE * abs(size)
+        if settled and abs(size) > CHANGE_FROM_START * noise_of(y):
             error = float(time[1] - time[0])
-            changes[name] = (
-                LevelChange(float(time[0]), error, size, float(y[0]), from_start=True),
-            )
+            changes[name] = LevelChange(float(time[0]), error, size, float(y[0]), from_start=True)
     return changes
 
 
-def together(changes: Mapping[str, "tuple[LevelChange, ...] | str"]) -> tuple[RecordedStep, ...]:
-    """Return the steps of the test: what several channels show at one time is one step."""
-    shown = sorted(
-        ((one.at, name, one) for name, some in changes.items() if isinstance(some, tuple)
-         for one in some),
+def combined_steps(changes: Mapping[str, Sequence[LevelChange]]) -> tuple[RecordedStep, ...]:
+    """Return the steps of the test, given those of its channels.
+
+    What several channels show at one time is one step; two steps of one channel are two.
+    """
+    in_time = sorted(
+        ((change.at, name, change) for name, own in changes.items() for change in own),
         key=lambda entry: entry[:2],
-    )  # fmt: skip
-    groups: list[list[tuple[str, LevelChange]]] = []
-    for at, name, one in shown:
-        near = groups and any(
-            at - other.at <= SAME_STEP + ERRORS * (one.error + other.error)
-            for _, other in groups[-1]
-        )
-        if near and name not in dict(groups[-1]):
-            groups[-1].append((name, one))
+    )
+    groups: list[dict[str, LevelChange]] = []
+    for _, name, change in in_time:
+        if groups and name not in groups[-1] and _close(change, groups[-1].values()):
+            groups[-1][name] = change
         else:
-            groups.append([(name, one)])
-    return tuple(_step(dict(group)) for group in groups)
+            groups.append({name: change})
+    return tuple(_combined(group) for group in groups)
 
 
-def _step(shown: Mapping[str, LevelChange]) -> RecordedStep:
+def _close(change: LevelChange, others: Iterable[LevelChange]) -> bool:
+    """Tell whether a channel may show the step that one of the others shows."""
+    return any(
+        change.at - other.at <= SAME_STEP + SAME_STEP_ERRORS * (change.error + other.error)
+        for other in others
+    )
+
+
+def _combined(group: Mapping[str, LevelChange]) -> RecordedStep:
     """Return the step that channels show, its instant their mean, weighted by standard errors.
 
-    Where they scatter more than these say, so much more is the error of the mean (Birge 1932).
-    A reference that was recorded tells it alone: it does not respond, it jumps.
+    Where they scatter more than these errors explain, the error of the mean grows as much (Birge
+    1932). A recorded reference alone gives the instant: it does not respond, it jumps.
     """
-    told = {name: one for name, one in shown.items() if one.jumps} or shown
-    at = np.array([one.at for one in told.values()])
+    changes = [change for change in group.values() if change.jumps] or [*group.values()]
+    instants = np.array([change.at for change in changes])
     # an error of nothing at all is one that the clock cannot show
-    errors = np.maximum([one.error for one in told.values()], 1e-9 + 1e-12 * np.abs(at))
+    errors = np.maximum([change.error for change in changes], 1e-9 + 1e-12 * np.abs(instants))
     weights = errors**-2.0
-    mean = float(weights @ at / np.sum(weights))
+    mean = float(weights @ instants / np.sum(weights))
     error = float(np.sum(weights) ** -0.5)
-    if len(at) > 1:
-        error *= max(1.0, float(np.sqrt(weights @ (at - mean) ** 2 / (len(at) - 1))))
-    sizes = {name: one.size for name, one in shown.items()}
-    at_start = all(one.from_start for one in shown.values())
-    return RecordedStep(mean, error, tuple(shown), sizes, at_start)
+    if len(instants) > 1:
+        excess = weights @ (instants - mean) ** 2 / (len(instants) - 1)
+        error *= max(1.0, float(np.sqrt(excess)))
+    sizes = {name: change.size for name, change in group.items()}
+    from_start = all(change.from_start for change in group.values())
+    return RecordedStep(mean, error, tuple(group), sizes, from_start)
 
 
 def with_sizes(
-    steps: tuple[RecordedStep, ...],
-    courses: Mapping[str, Array],
+    steps: Sequence[RecordedStep],
+    signals: Mapping[str, Array],
     noises: Mapping[str, float],
     time: Array,
 ) -> tuple[RecordedStep, ...]:
-    """Return the steps with the change of each channel: between the ends of what lies before and
-    behind."""
-    edges = [float(time[0]), *(one.at for one in steps), float(time[-1])]
-    found = []
+    """Return the steps with the lasting change of each signal (M,).
+
+    It is the difference of the levels at the ends of the intervals before and after the step.
+    """
+    edges = [float(time[0]), *(step.at for step in steps), float(time[-1])]
+    sized = []
     for k, step in enumerate(steps):
-        sizes = {}
-        for name, column in courses.items():
-            begins = step.from_start and k == 0
-            rest = 1.0 if k == 0 else SETTLED
-            before = (
-                float(column[0]) if begins else _end(time, column, edges[k], edges[k + 1], rest)
-            )
-            size = _end(time, column, edges[k + 1], edges[k + 2], SETTLED) - before
-            if abs(size) > LASTS * noises.get(name, 0.0):
-                sizes[name] = size
-        found.append(replace(step, sizes=sizes))
-    return tuple(found)
+        changes = {
+            name: _end_level(time, samples, edges[k + 1], edges[k + 2], END_SHARE)
+            - _level_before(time, samples, step, edges[k], k == 0)
+            for name, samples in signals.items()
+        }
+        sizes = {
+            name: change
+            for name, change in changes.items()
+            if abs(change) > LASTING_CHANGE * noises.get(name, 0.0)
+        }
+        sized.append(replace(step, sizes=sizes))
+    return tuple(sized)
 
 
-def _end(time: Array, column: Array, start: float, end: float, share: float) -> float:
-    """Return the level of a channel in the last share of a stretch, nan without samples there.
+def _level_before(
+    time: Array, samples: Array, step: RecordedStep, start: float, first: bool
+) -> float:
+    """Return the level of a signal before a step, since the step before it at ``start``."""
+    if first and step.from_start:
+        return float(samples[0])
+    return _end_level(time, samples, start, step.at, 1.0 if first else END_SHARE)
+
+
+def _end_level(time: Array, samples: Array, start: float, end: float, share: float) -> float:
+    """Return the level of a signal in the last share of an interval, nan without samples there.
 
     The samples nearest to the end are left out: a step may come a little before it is seen.
     """
     length = end - start
-    first, last = np.searchsorted(time, [end - share * length, end - MARGIN * length])
-    there = column[first : max(last, first + 1)]
-    seen = there[np.isfinite(there)]
-    return float(np.median(seen)) if len(seen) else float("nan")
+    first, last = np.searchsorted(time, [end - share * length, end - MARGIN_SHARE * length])
+    inside = samples[first : max(last, first + 1)]
+    present = inside[np.isfinite(inside)]
+    return float(np.median(present)) if len(present) else float("nan")

@@ -1,4 +1,4 @@
-"""Units of columns: what a recorder writes behind a name, or in a row or a field of its own."""
+"""Units of columns: what a recorder writes after a name, or in a row or a field of its own."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -18,14 +18,14 @@ WORDS: Mapping[str, str] = {
     "pu": "pu", "p.u.": "pu", "p.u": "pu", "p. u.": "pu", "per unit": "pu",
     "percent": "%", "deg": "deg", "°": "deg", "grad": "deg", "min": "min", "h": "h",
 }  # fmt: skip
-OTHERS = frozenset(
+OTHER_UNITS = frozenset(
     ("%", "‰", "-", "rad", "rad/s", "el.deg", "°C", "K", "rpm", "r/min", "1/min", "min-1", "U/min",
      "1/s", "m/s", "bar", "dB")
 )  # fmt: skip
-PLAIN = frozenset(("", "-", "1", "pu"))  # of numbers that need no base
+PER_UNIT = frozenset(("", "-", "1", "pu"))  # of numbers that need no base
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 
-# a prefix is told by its case; S is a phase, and so is a small a
+# a prefix depends on its case; S is a phase, and so is a small a
 _PREFIXED = re.compile(
     r"(?P<prefix>[nuµμmkKMG]?)(?P<body>(?i:VA|var|Hz|Ohm)|[VvAWwΩs]|Nm|Pa)"
     r"(?:[ _]?(?i:dc|ac|rms|eff))?"
@@ -41,9 +41,9 @@ _OF_PHASES = re.compile(r"[uve]\w{0,4}|.*(?:volt|spannung|phase|tensi)\w*", re.I
 def unit_of(text: str) -> str | None:
     """Return the unit that a text is, as it is written, without brackets; None where it is none."""
     text = text.strip()
-    found = _BARE.fullmatch(text)
-    unit = found[1] if found else text
-    return unit if unit in OTHERS or unit.casefold() in WORDS or _prefixed(unit) else None
+    bracketed = _BARE.fullmatch(text)
+    unit = bracketed[1] if bracketed else text
+    return unit if unit in OTHER_UNITS or unit.casefold() in WORDS or _prefixed(unit) else None
 
 
 def usual(unit: str) -> str:
@@ -53,10 +53,10 @@ def usual(unit: str) -> str:
     return word or (_prefixed(unit) or (unit, ""))[0]
 
 
-def alike(one: str, other: str) -> bool:
+def alike(unit: str, other: str) -> bool:
     """Tell whether two texts are the same unit: kV and KV, pu and p.u.; but not MW and mW."""
-    return usual(one) == usual(other) or (
-        unit_of(one) is None and one.strip().casefold() == other.strip().casefold()
+    return usual(unit) == usual(other) or (
+        unit_of(unit) is None and unit.strip().casefold() == other.strip().casefold()
     )
 
 
@@ -67,13 +67,13 @@ def quantity_of(unit: str | None) -> str | None:
     symbol = usual(unit)
     if symbol in SECONDS or symbol == "h":
         return "time"
-    found = _prefixed(symbol)
-    return found[1] if found else None
+    prefixed = _prefixed(symbol)
+    return prefixed[1] if prefixed else None
 
 
 def needs_base(unit: str) -> bool:
     """Tell whether numbers of a unit are per unit only after a division by their base."""
-    return usual(unit) not in PLAIN
+    return usual(unit) not in PER_UNIT
 
 
 def unit_in(name: str) -> str | None:
@@ -94,9 +94,9 @@ def _split(name: str) -> tuple[str, str | None]:
     """Return a name without its unit, and the unit."""
     name = name.strip()
     for form, holds in FORMS:
-        found = form.fullmatch(name)
-        if found and holds(found["name"], found["unit"]) and name not in OTHERS:
-            return found["name"] or name, found["unit"]
+        parts = form.fullmatch(name)
+        if parts and holds(parts["name"], parts["unit"]) and name not in OTHER_UNITS:
+            return parts["name"] or name, parts["unit"]
     return name, None
 
 
@@ -104,11 +104,11 @@ def _in_brackets(name: str, unit: str) -> bool:
     return unit_of(unit) is not None and not (unit == "A" and _OF_PHASES.fullmatch(name))
 
 
-def _behind_in(_: str, unit: str) -> bool:
+def _after_in(_: str, unit: str) -> bool:
     return unit_of(unit) is not None
 
 
-def _behind_stroke(name: str, unit: str) -> bool:
+def _after_slash(name: str, unit: str) -> bool:
     """Tell whether a unit is that of what stands before it, and no part of one, as in V/Hz."""
     before = quantity_of(name.split()[-1])
     of_another = unit_of(name.split()[-1]) is not None and before != quantity_of(unit)
@@ -116,9 +116,9 @@ def _behind_stroke(name: str, unit: str) -> bool:
 
 
 def _apart(name: str, unit: str) -> bool:
-    """Tell whether a unit stands behind a mark that may also be a part of the name.
+    """Tell whether a unit stands after a mark that may also be a part of the name.
 
-    There letters alone are phases, and min is a limit, except behind a time.
+    There letters alone are phases, and min is a limit, except after a time.
     """
     quantity = quantity_of(unit)
     if quantity == "time":
@@ -130,19 +130,19 @@ def _apart(name: str, unit: str) -> bool:
 # how a unit is set apart from the name before it, and whether the two are a name and its unit
 FORMS: tuple[tuple[re.Pattern[str], Callable[[str, str], bool]], ...] = (
     (re.compile(r"(?P<name>.*?)\s*[\[({<]\s*(?P<unit>[^\[\](){}<>]+?)\s*[\])}>]"), _in_brackets),
-    (re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>.*\S)"), _behind_in),
-    (re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S+)"), _behind_stroke),
+    (re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>.*\S)"), _after_in),
+    (re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*(?P<unit>\S+)"), _after_slash),
     (re.compile(r"(?P<name>.*[^\s_,])(?:\s*,\s*|\s+|_+)(?P<unit>[^\s_,]+)"), _apart),
 )
 
 
 def _prefixed(unit: str) -> tuple[str, str] | None:
     """Return the usual spelling of a prefix and a unit, and the quantity; None for other texts."""
-    found = _PREFIXED.fullmatch(unit)
-    if found is None:
+    parts = _PREFIXED.fullmatch(unit)
+    if parts is None:
         return None
-    prefix = found["prefix"] or found["small"] or (found["milli"] or "").casefold()
-    body = found["body"] or found["ampere"] or found["second"]
+    prefix = parts["prefix"] or parts["small"] or (parts["milli"] or "").casefold()
+    body = parts["body"] or parts["ampere"] or parts["second"]
     symbol, quantity = BODIES[body.casefold()]
     if _MEGA.fullmatch(prefix + body):
         prefix = "M"

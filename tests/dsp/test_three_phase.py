@@ -241,7 +241,7 @@ def test_rms_values_that_are_not_positive_are_refused(level):
 def test_rms_values_of_which_one_is_always_missing_are_refused():
     phases = np.full((50, 3), 9.0)
     phases[:, 1] = np.nan
-    with pytest.raises(ValueError, match="at no instant"):
+    with pytest.raises(ValueError, match="no instant at which all three"):
         mean_rms(phases)
 
 
@@ -276,12 +276,12 @@ REFUSED = {
     "nan": (TIME, with_gap(), r"no finite number at 0\.35 s"),
     "two columns": (TIME, waves(TIME)[:, :2], "3 columns"),
     "uneven": (uneven(), waves(TIME), r"a step differs by 2 %.* allowed is 1 %"),
-    "too slow": (clock(300.0), waves(clock(300.0)), "300 Hz: a waveform needs 8 samples"),
+    "too slow": (clock(300.0), waves(clock(300.0)), "300 Hz: a waveform needs at least 8 samples"),
     "few a cycle": (clock(350.0), waves(clock(350.0)), "7 samples a cycle of 50 Hz"),
-    "25 Hz": (TIME, waves(TIME, 25.0), "25.000 Hz; a unit's lies within 40 ... 70 Hz"),
-    "RMS values": (TIME, np.tile([9.0, 9.1, 9.3], (len(TIME), 1)), "0.000 Hz; a unit's"),
+    "25 Hz": (TIME, waves(TIME, 25.0), r"25\.000 Hz; it must be within 40 \.\.\. 70 Hz"),
+    "RMS values": (TIME, np.tile([9.0, 9.1, 9.3], (len(TIME), 1)), r"0\.000 Hz; it must be within"),
     "short": (TIME[:150], waves(TIME[:150]), "needs 4 cycles"),
-    "one sample": (TIME[:1], waves(TIME[:1]), "needs 8 samples"),
+    "one sample": (TIME[:1], waves(TIME[:1]), "needs at least 8 samples"),
     "dead": (TIME, waves(TIME, voltage=np.where(TIME < 0.5, 1.0, 0.01)), "phase is lost"),
     "drift": (clock(2000.0, 4.0), None, "the frequency moves by"),
 }

@@ -18,10 +18,11 @@ from exfit.dsp.quality import quantum, spikes, stuck
 from exfit.dsp.sampling import sampling_of
 from exfit.errors import RecordError
 from exfit.output import plots
-from exfit.records.channel_recognition import connection_of, guessed, three_phases
+from exfit.records.channel_inspection import SPIKE_LIMIT
+from exfit.records.channel_recognition import connection_of, guess_signals, three_phases
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
-from exfit.records.steps import LevelChange, together
+from exfit.records.steps import LevelChange, combined_steps
 from exfit.records.units import unit_in
 
 FIELD = "field_record"
@@ -290,10 +291,10 @@ def test_rounding_alone_is_no_stuck_recorder(coarse):
 def test_white_noise_has_no_spikes_and_each_spike_is_found_at_its_place():
     time = 0.01 * np.arange(20_000)
     noisy = RNG.normal(0.0, 1.0, time.size)
-    assert len(spikes(time, noisy, 1.0)) <= 1
+    assert len(spikes(time, noisy, 1.0, SPIKE_LIMIT)) <= 1
     places = np.arange(100, 20_000, 400)
     noisy[places] += 25.0  # six times what seven samples of noise may scatter by
-    assert set(places) <= set(spikes(time, noisy, 1.0))
+    assert set(places) <= set(spikes(time, noisy, 1.0, SPIKE_LIMIT))
 
 
 def test_gaps_are_told_against_the_median_step():
@@ -335,14 +336,14 @@ NAMES = {
 )
 def test_a_name_tells_its_signal(name, signal):
     units = {name: unit} if (unit := unit_in(name)) else {}
-    found = guessed([name], units)
+    found = guess_signals([name], units)
     assert (found[name].signal if found else None) == signal
 
 
 def test_each_signal_goes_to_the_surest_name_once():
-    found = guessed(["U", "Ugen", "V"], {})
+    found = guess_signals(["U", "Ugen", "V"], {})
     assert {name: guess.signal for name, guess in found.items()} == {"Ugen": "vt"}
-    assert guessed(["channel 7"], {"channel 7": "MW"})["channel 7"].signal == "p"
+    assert guess_signals(["channel 7"], {"channel 7": "MW"})["channel 7"].signal == "p"
 
 
 @pytest.mark.parametrize(
@@ -462,11 +463,11 @@ def test_the_figure_marks_steps_gaps_and_spikes():
 
 def test_one_step_in_several_channels_is_told_by_the_mean_of_least_variance():
     shown = {"a": (LevelChange(1.0, 0.001, 0.1, 0.0),), "b": (LevelChange(1.002, 0.002, 0.2, 0.0),)}
-    (step,) = together(shown)
+    (step,) = combined_steps(shown)
     assert step.at == pytest.approx((4.0 * 1.0 + 1.002) / 5.0)
     assert step.error == pytest.approx(0.002 / 5.0**0.5)  # they scatter less than they err
-    (alone,) = together({**shown, "ref": (LevelChange(1.01, 0.005, 0.1, 0.0, jumps=True),)})
+    (alone,) = combined_steps({**shown, "ref": (LevelChange(1.01, 0.005, 0.1, 0.0, jumps=True),)})
     assert (alone.at, alone.error) == (1.01, 0.005)
     assert alone.seen_in == ("a", "b", "ref")
     far = {"a": (LevelChange(1.0, 0.001, 0.1, 0.0), LevelChange(1.1, 0.001, 0.1, 0.0))}
-    assert len(together(far)) == 2  # of one channel, two are two
+    assert len(combined_steps(far)) == 2  # of one channel, two are two

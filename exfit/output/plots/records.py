@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from exfit.dsp.decimation import PIXELS, envelope
 from exfit.output.plots.style import LIMIT, SIMULATED, START, WIDTH, tidy
-from exfit.records.inspection import InspectedChannel, Inspection
+from exfit.records.channel_inspection import InspectedChannel
+from exfit.records.inspection import Inspection
 from exfit.records.steps import RecordedStep
 
 Array = NDArray[np.float64]

@@ -7,7 +7,8 @@ from rich.text import Text
 
 from exfit.dsp.sampling import Sampling
 from exfit.output.terminal.terminal import notes, number, plain_table
-from exfit.records.inspection import InspectedChannel, Inspection
+from exfit.records.channel_inspection import InspectedChannel
+from exfit.records.inspection import Inspection
 
 NAME = 22  # letters of a channel's name that leave room for its numbers
 

@@ -1,0 +1,137 @@
+"""What the samples of one channel show: its level, its noise, and what the recorder did to it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.noise import UNIFORM_SPREAD
+from exfit.dsp.quality import mains_frequency, noise_of, quantum, spikes, stuck
+from exfit.dsp.sampling import present_samples
+from exfit.records.steps import ChannelSteps, LevelChange, RecordedStep, switches
+
+Array = NDArray[np.float64]
+
+SPIKE_LIMIT = 6.0  # times the noise: a sample farther off the line through its neighbours is one
+PLACES_LISTED = 5  # of spikes and of other faults, the first ones
+NOISELESS = 1e-6  # of the range: with less noise a channel at rest stands still, as simulated ones
+OWN_NOISE = 1.01  # times what rounding leaves: the noise of a channel that is not rounded coarsely
+AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a step
+
+
+@dataclass(frozen=True)
+class InspectedChannel:
+    """A column of numbers, in its own unit; the figures are 0 where it has no sample.
+
+    ``level`` is where it rests before the first step, the median without one. ``spikes`` counts all
+    of them, ``spikes_at`` are the instants (s) of the first; ``stuck`` are the intervals (s) in
+    which it stands still; ``frequency`` (Hz) is that of a waveform, whose noise, spikes and steps
+    are not looked for. ``remark`` says why there is no step. ``unit_from`` is the source of the
+    unit: file or name.
+    """
+
+    name: str
+    unit: str | None
+    unit_from: str
+    low: float = 0.0
+    high: float = 0.0
+    level: float = 0.0
+    noise: float = 0.0
+    quantum: float | None = None
+    missing: int = 0
+    spikes: int = 0
+    spikes_at: tuple[float, ...] = ()
+    stuck: tuple[tuple[float, float], ...] = ()
+    frequency: float | None = None
+    steps: tuple[LevelChange, ...] = ()
+    remark: str = ""
+    signal: str | None = None
+    why: str = ""
+
+    @property
+    def constant(self) -> bool:
+        """Tell whether it never changes."""
+        return self.low == self.high
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What must be known before the channel is used, in sentences."""
+        return tuple(f"{self.name}: {finding}" for finding in self._findings())
+
+    def _findings(self) -> Iterator[str]:
+        if self.missing:
+            yield f"{self.missing} samples are missing"
+        if self.constant:
+            yield f"never changes: {self.low:.6g} throughout"
+            return
+        if self.spikes:
+            yield self._spikes_in_words()
+        for start, end in self.stuck[:PLACES_LISTED]:
+            yield f"stands still from {start:.6g} to {end:.6g} s"
+        if self._is_implausible_voltage():
+            yield f"{self.level:.5g} at rest cannot be a voltage in pu: what is its unit?"
+
+    def _spikes_in_words(self) -> str:
+        instants = ", ".join(f"{at:.6g}" for at in self.spikes_at)
+        more = ", ..." if self.spikes > len(self.spikes_at) else ""
+        count = "1 spike" if self.spikes == 1 else f"{self.spikes} spikes"
+        return f"{count}, at {instants}{more} s"
+
+    def _is_implausible_voltage(self) -> bool:
+        low, high = AT_REST_PU
+        per_unit = self.signal == "vt" and self.unit in (None, "pu")
+        return per_unit and (self.level > high or 0.0 < self.level < low)
+
+
+def inspect_channel(
+    name: str,
+    unit: tuple[str | None, str],
+    time: Array,
+    samples: Array,
+    own_steps: ChannelSteps,
+    steps: Sequence[RecordedStep],
+) -> InspectedChannel:
+    """Return what the samples (M,) of one channel show.
+
+    ``unit`` is that of the channel and its source, ``own_steps`` are those that it shows, ``steps``
+    those of the test.
+    """
+    t, y = present_samples(time, samples)
+    missing = len(samples) - len(y)
+    if not len(y):
+        return InspectedChannel(name, *unit, missing=missing, remark=own_steps.remark)
+    frequency = mains_frequency(t, y)
+    noise = 0.0 if frequency or switches(y) else noise_of(y)
+    outlying = spikes(t, y, noise, SPIKE_LIMIT) if noise else np.zeros(0, np.intp)
+    rounding = quantum(y)
+    # what is rounded more coarsely than its noise stands still most of the time
+    noisy = noise > max(
+        NOISELESS * float(np.ptp(y)), OWN_NOISE * UNIFORM_SPREAD * (rounding or 0.0)
+    )
+    still = stuck(y) if noisy else ()
+    return InspectedChannel(
+        name,
+        *unit,
+        low=float(np.min(y)),
+        high=float(np.max(y)),
+        level=_level_at_rest(t, y, steps),
+        noise=noise,
+        quantum=rounding,
+        missing=missing,
+        spikes=len(outlying),
+        spikes_at=tuple(float(t[row]) for row in outlying[:PLACES_LISTED]),
+        stuck=tuple((float(t[first]), float(t[last])) for first, last in still),
+        frequency=frequency,
+        steps=own_steps.changes,
+        remark=own_steps.remark,
+    )
+
+
+def _level_at_rest(time: Array, samples: Array, steps: Sequence[RecordedStep]) -> float:
+    """Return the median before the first step; of all samples where none is before it."""
+    if steps and steps[0].from_start:
+        return float(samples[0])
+    first = steps[0].at if steps else time[-1]
+    before = samples[time < first]
+    return float(np.median(before if len(before) else samples))
