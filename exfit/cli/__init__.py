@@ -14,9 +14,10 @@ from exfit.cli.comparing import compare
 from exfit.cli.exchange import export, import_
 from exfit.cli.fitting import check, fit, simulate, validate
 from exfit.cli.knowing import identify, profile
-from exfit.cli.options import Refusal
+from exfit.cli.options import Interruption, Refusal
 from exfit.cli.records import inspect_, new
 from exfit.cli.reporting import report
+from exfit.cli.streams import unfailing_output
 from exfit.errors import ExfitError
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
@@ -28,7 +29,15 @@ gc.set_threshold(100_000)
 
 
 class Commands(click.Group):
-    """The commands; what they refuse is told without a traceback."""
+    """The commands; what they refuse is reported without a traceback."""
+
+    def main(self, *arguments: Any, **settings: Any) -> Any:
+        """Run as a program: no output that fails keeps a command from its files."""
+        with unfailing_output() as exit_code:
+            try:
+                return super().main(*arguments, **settings)
+            except SystemExit as ended:
+                raise SystemExit(exit_code(ended.code)) from None
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command, and turn what is wrong with its input into a message."""
@@ -36,6 +45,8 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except ExfitError as fault:
             raise Refusal(str(fault)) from fault
+        except KeyboardInterrupt as interruption:
+            raise Interruption(str(interruption)) from None
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from exfit.cli import completion
+from exfit.cli.options import print_json
 
 
 @click.command(short_help="List the models, or describe one.")
@@ -45,6 +46,5 @@ def models(name: str | None, folder: Path | None) -> None:
 def schema() -> None:
     """Print the JSON Schema of a case file, for editors that complete and check."""
     from exfit.case.json_schema import json_schema
-    from exfit.util.text import to_json
 
-    click.echo(to_json(json_schema()), nl=False)
+    print_json(json_schema())

@@ -4,7 +4,14 @@ from pathlib import Path
 
 import click
 
-from exfit.cli.options import json_option, output_option, plots_option, quiet_option, warn
+from exfit.cli.options import (
+    json_option,
+    output_option,
+    plots_option,
+    print_json,
+    quiet_option,
+    warn,
+)
 from exfit.errors import ExfitError
 
 
@@ -50,14 +57,13 @@ def compare(
     from exfit.analysis.comparison import ColumnChoice
     from exfit.analysis.comparison import compare as compared
     from exfit.output import run_folder
-    from exfit.util.text import to_json
 
     folder = output or Path("runs") / "compare"
     run_folder.refuse_unwritable(folder)
     found = compared(a, b, record, ColumnChoice(_columns(columns), time), shift, step_at)
     warn(run_folder.write_agreement(found, folder, plots))
     if as_json:
-        click.echo(to_json(found.as_json()), nl=False)
+        print_json(found.as_json())
     elif not quiet:
         from exfit.output import terminal
 

@@ -15,6 +15,7 @@ from exfit.cli.options import (
     output_option,
     parameters_option,
     plots_option,
+    print_json,
     quiet_option,
     warn,
 )
@@ -61,7 +62,6 @@ def fit(
         return
     from exfit import workflows
     from exfit.output import run_folder
-    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "fit")
@@ -72,7 +72,7 @@ def fit(
             warn(run_folder.write_fit(result, folder, plots))
         finally:  # whatever becomes of the files
             if as_json:
-                click.echo(to_json(result.as_json()), nl=False)
+                print_json(result.as_json())
     else:
         result = fit_in_sight(loaded, folder, strategy, plots)
     done = result.success and not result.interrupted
@@ -160,7 +160,6 @@ def validate(
     from exfit import workflows
     from exfit.fitting.overrides import read_parameters
     from exfit.output import run_folder
-    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "validate")
@@ -169,7 +168,7 @@ def validate(
     found = workflows.validate(loaded, read_parameters(loaded, source), record)
     warn(run_folder.write_validation(found, folder, plots))
     if as_json:
-        click.echo(to_json({"validation": [one.as_json() for one in found]}), nl=False)
+        print_json({"validation": [one.as_json() for one in found]})
     elif not quiet:
         from exfit.output import terminal
 

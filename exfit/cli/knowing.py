@@ -14,6 +14,7 @@ from exfit.cli.options import (
     load,
     output_option,
     plots_option,
+    print_json,
     quiet_option,
     warn,
 )
@@ -48,7 +49,6 @@ def profile(
     """
     from exfit import workflows
     from exfit.output import run_folder
-    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "profile")
@@ -63,7 +63,7 @@ def profile(
             found = workflows.profile(loaded, parameters, watch)
     warn(run_folder.write_profiles(found, folder, plots))
     if as_json:
-        click.echo(to_json(found.as_json()), nl=False)
+        print_json(found.as_json())
     elif not quiet:
         terminal.profiles(console, found)
         terminal.written(console, folder)
@@ -99,7 +99,6 @@ def identify(
     """
     from exfit import workflows
     from exfit.output import run_folder
-    from exfit.util.text import to_json
 
     loaded = load(case)
     folder = output or folder_of(case, "identify")
@@ -107,7 +106,7 @@ def identify(
     found = workflows.identify(loaded, assignments(noise, "--noise"))
     warn(run_folder.write_design(found, folder, plots))
     if as_json:
-        click.echo(to_json(found.as_json()), nl=False)
+        print_json(found.as_json())
     elif not quiet:
         from exfit.output import terminal
 

@@ -1,6 +1,7 @@
 """What several commands share: their options, and small steps on the way."""
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,17 @@ class Refusal(click.ClickException):
         click.echo("Error: " + "\n       ".join(lines), err=True, file=file)
 
 
+class Interruption(click.ClickException):
+    """Ctrl-C where no result is at hand that it could keep: the exit code that shells expect."""
+
+    exit_code = 130
+
+    def show(self, file: Any = None) -> None:
+        """Print the message below the terminal's own ^C."""
+        line = ": ".join(filter(None, ("Interrupted", self.message)))
+        click.echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
+
+
 def load(case: Path) -> "Case":
     """Return the case of a file; raises CaseError with all faults of it."""
     from exfit.case.load import load_case
@@ -66,11 +78,19 @@ def write_text(text: str, output: Path | None, warnings: Iterable[str]) -> None:
     """Write a file, or to the terminal, and the warnings to standard error."""
     from exfit.util.files import write
 
-    if output is None:
-        click.echo(text, nl=False)
+    if output is None:  # a file that a shell makes of it is UTF-8, as exfit reads it
+        click.echo(text if sys.stdout.isatty() else text.encode(), nl=False)
     else:
         write(output, text)
     warn(warnings)
+
+
+def print_json(content: Mapping[str, Any]) -> None:
+    """Write JSON to standard output, which may be unable to hold every character as it is."""
+    from exfit.util.text import to_json
+
+    encoding = str(sys.stdout.encoding or "")
+    click.echo(to_json(content, ascii_only=not encoding.lower().startswith("utf")), nl=False)
 
 
 def warn(texts: Iterable[str]) -> None:

@@ -12,6 +12,7 @@ from exfit.cli.options import (
     json_option,
     output_option,
     plots_option,
+    print_json,
     quiet_option,
     refuse_existing,
     warn,
@@ -63,7 +64,6 @@ def inspect_(
     """
     from exfit.case.suggestion import bump_section, record_section
     from exfit.output import run_folder
-    from exfit.util.text import to_json
 
     # files of one record in several formats have one stem
     folder = output or Path("runs") / f"{file.name}-inspect"
@@ -71,7 +71,7 @@ def inspect_(
     found = _inspected(file, clock, unit, sheet)
     warn(run_folder.write_inspection(found, folder, plots))
     if as_json:
-        click.echo(to_json(found.as_json()), nl=False)
+        print_json(found.as_json())
     elif not quiet:
         from exfit.output import terminal
 

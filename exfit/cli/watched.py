@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from exfit.cli.options import Refusal, load, warn
+from exfit.cli.streams import output_is_lost
 from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
@@ -64,4 +65,6 @@ def fit_again_and_again(case: Path, folder: Path, strategy: str | None, plots: b
             if before is not None and before.interrupted:
                 return
             terminal.waiting(console, stamps)
+            if output_is_lost():
+                return
             terminal.again(console, changed(stamps))

@@ -6,9 +6,9 @@ from math import isfinite
 from typing import Any
 
 
-def to_json(content: Mapping[str, Any]) -> str:
+def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
     """Return JSON that every reader takes: numbers that are not finite become null."""
-    return json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(_finite(content), indent=2, ensure_ascii=ascii_only) + "\n"
 
 
 def _finite(content: Any) -> Any:
