@@ -1,9 +1,9 @@
-"""The gallery of the README: what the commands draw and print of the sample records.
+"""The gallery of the documentation: what the commands draw and print of the sample records.
 
     python tests/gallery.py
 
-runs the commands, writes sample_data/gallery and puts the pictures with their captions into the
-README. A picture that has only changed by what another machine would change stays as it is.
+runs the commands, writes docs/img and puts the pictures with their captions into docs/gallery.md.
+A picture that has only changed by what another machine would change stays as it is.
 """
 
 import io
@@ -31,14 +31,14 @@ from exfit.cli import main
 from exfit.output import plots, terminal
 
 ROOT = Path(__file__).parent.parent
-README = ROOT / "README.md"
-GALLERY = "sample_data/gallery"
+PAGE = ROOT / "docs" / "gallery.md"
+FOLDER = PAGE.parent / "img"
 BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 
-DPI = 84  # of the figures: 756 points wide, nearly twice what a column of the README shows
+DPI = 84  # of the figures: 756 points wide, that of a page
 COLOURS = 256  # of a figure; its lines have a few, each with shades to white
 HEIGHT = 40  # lines of the terminal
-SECONDS = 0.09  # that a fit takes, which no two runs share; README.md, Speed
+SECONDS = 0.09  # that a fit takes, which no two runs share; docs/performance.md
 FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that is seen
 # fonts of a server: a picture of its own has none
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
@@ -73,12 +73,12 @@ class Run:
 
     @property
     def terminal(self) -> Picture | None:
-        return next((one for one in self.pictures if one.source is None), None)
+        return next((picture for picture in self.pictures if picture.source is None), None)
 
     @property
     def figures(self) -> set[str]:
         """The figures that become pictures, as the command names their files."""
-        return {one.source for one in self.pictures if one.source}
+        return {picture.source for picture in self.pictures if picture.source}
 
     @property
     def folder(self) -> Path:
@@ -94,34 +94,36 @@ FIT, BOTH, FIELD = (
     f"configs/{name}.yaml" for name in ("ac1a_typical", "ac1a_both", "field_record")
 )
 RECORD = FILE.relative_to(ROOT).as_posix()
-RUNS = (
+RUNS = (  # in the order of the page
     Run(
         f"exfit fit {FIT}",
         (
             Picture(
-                "fit.svg", "the iterations with the response, then the values and what is open"
+                "fit.svg", "the iterations with the response, the fitted values and the findings"
             ),
             Picture("overlay.png", "measured, start values and fitted", "overlay.png"),
-            Picture("iterations.png", "how the fit came about", "iterations.png"),
+            Picture("iterations.png", "the response after each iteration", "iterations.png"),
             Picture("convergence.png", "cost, gradient and damping", "convergence.png"),
-            Picture("sensitivity.png", "what each parameter does", "sensitivity.png"),
-            Picture("correlation.png", "which parameters move together", "correlation.png"),
+            Picture("correlation.png", "correlation of the estimates", "correlation.png"),
+            Picture(
+                "sensitivity.png", "effect of each parameter on the voltage", "sensitivity.png"
+            ),
         ),
         columns=126,
     ),
     Run(
         f"exfit profile {FIT} KA KC KD",
-        (Picture("profile.png", "how far each can move, the others fitted", "profile.png"),),
+        (Picture("profile.png", "profiles of three parameters", "profile.png"),),
     ),
     Run(
         f"exfit identify {FIT}",
-        (Picture("identify.svg", "what a planned test would tell"),),
+        (Picture("identify.svg", "which parameters a planned test identifies"),),
     ),
     Run(
         f"exfit inspect {RECORD}",
         (
-            Picture("inspect.svg", "what a recorder's file holds, and the case that it suggests"),
-            Picture("inspect.png", "its step, spikes and gap", "inspect.png"),
+            Picture("inspect.svg", "contents of a recorder's file, and the sections of a case"),
+            Picture("inspect.png", "step, spikes and gap of that record", "inspect.png"),
         ),
     ),
     Run(
@@ -134,18 +136,8 @@ RUNS = (
     ),
     Run(
         "exfit compare runs/ac1a_typical-simulate runs/ac1a_typical-fit sample_data/ac1a_up.csv",
-        (Picture("compare.png", "two responses beside a record", "compare.png"),),
+        (Picture("compare.png", "two responses and a record", "compare.png"),),
     ),
-)
-# rows of the table, two pictures each; the first picture stands above it
-WIDE = "fit.svg"
-ROWS = (
-    ("overlay.png", "iterations.png"),
-    ("convergence.png", "correlation.png"),
-    ("identify.svg", "profile.png"),
-    ("sensitivity.png", "compare.png"),
-    ("inspect.svg", "inspect.png"),
-    ("field_overlay.png", "response.png"),
 )
 # what a command draws beside its pictures
 DRAWN = (
@@ -168,16 +160,16 @@ class Still(terminal.Watch):
 
 def drawn() -> dict[str, bytes]:
     """Return every picture by its name, of commands that run in a copy of cases and records."""
-    found: dict[str, bytes] = {}
+    pictures: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory() as room, chdir(room):
         shutil.copytree(ROOT / "configs", "configs")
-        shutil.copytree(ROOT / "sample_data", "sample_data", ignore=lambda *_: ["gallery"])
+        shutil.copytree(ROOT / "sample_data", "sample_data")
         for run in RUNS:
-            shown = ran(run)
-            for one in run.pictures:
-                source = run.folder / one.source if one.source else None
-                found[one.name] = smaller(source.read_bytes()) if source else shown
-    return found
+            screen = ran(run)
+            for picture in run.pictures:
+                source = run.folder / picture.source if picture.source else None
+                pictures[picture.name] = smaller(source.read_bytes()) if source else screen
+    return pictures
 
 
 def ran(run: Run) -> bytes:
@@ -214,11 +206,9 @@ def ran(run: Run) -> bytes:
     return svg.replace(*FRAME).encode()
 
 
-def in_no_time(shown):
-    """Return what shows a fit, with the same seconds for each."""
-    return lambda console, result, *others: shown(
-        console, replace(result, seconds=SECONDS), *others
-    )
+def in_no_time(show):
+    """Return a function that shows a fit, with the same seconds for each."""
+    return lambda console, result, *others: show(console, replace(result, seconds=SECONDS), *others)
 
 
 def smaller(png: bytes) -> bytes:
@@ -226,14 +216,14 @@ def smaller(png: bytes) -> bytes:
     out, about = io.BytesIO(), PngImagePlugin.PngInfo()
     about.add_text("Software", DRAWN_BY)
     image = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=np.int64)
-    found, place, counts = np.unique(
+    packed, place, counts = np.unique(
         image @ (1 << 16, 1 << 8, 1), return_inverse=True, return_counts=True
     )
-    colours = np.stack([found >> 16, found >> 8 & 255, found & 255], axis=1)
-    kept = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
-    nearest = np.argmin(np.sum((colours[:, None] - kept) ** 2, axis=2), axis=1)
+    colours = np.stack([packed >> 16, packed >> 8 & 255, packed & 255], axis=1)
+    palette = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
+    nearest = np.argmin(np.sum((colours[:, None] - palette) ** 2, axis=2), axis=1)
     few = Image.fromarray(nearest[place].reshape(image.shape[:2]).astype(np.uint8))
-    few.putpalette(kept.astype(np.uint8).tobytes())
+    few.putpalette(palette.astype(np.uint8).tobytes())
     few.save(out, "PNG", optimize=True, pnginfo=about)
     return out.getvalue()
 
@@ -287,56 +277,35 @@ def same_word(one: str, other: str) -> bool:
 
 
 def section() -> str:
-    """Return the gallery of the README."""
-    made = {one.name: (run, one) for run in RUNS for one in run.pictures}
-    return "\n".join(
-        [
-            BEGIN,
-            *(f"{line}\n" for line in (captioned(*made[WIDE]), shown(made[WIDE][1]))),
-            "| | |",
-            "|---|---|",
-            *(
-                line
-                for row in ROWS
-                for line in (
-                    f"| {' | '.join(shown(made[name][1]) for name in row)} |",
-                    f"| {' | '.join(captioned(*made[name]) for name in row)} |",
-                )
-            ),
-            END,
-        ]
+    """Return the gallery of the page: the command of each picture, and the picture."""
+    pictures = [(run, picture) for run in RUNS for picture in run.pictures]
+    return "\n\n".join(
+        f"{picture.caption[0].upper()}{picture.caption[1:]}:<br>`{run.command}`\n\n"
+        f"![{picture.caption}](img/{picture.name})"
+        for run, picture in pictures
     )
 
 
-def shown(one: Picture) -> str:
-    return f"![{one.caption}]({GALLERY}/{one.name})"
-
-
-def captioned(run: Run, one: Picture) -> str:
-    return f"{one.caption[0].upper()}{one.caption[1:]}:<br>`{run.command}`"
-
-
-def with_section(readme: str) -> str:
-    """Return the README with the gallery in its place."""
-    before, _, rest = readme.partition(BEGIN)
+def with_section(page: str) -> str:
+    """Return the page with the gallery in its place."""
+    before, _, rest = page.partition(BEGIN)
     _, _, after = rest.partition(END)
-    return f"{before}{section()}{after}"
+    return f"{before}{BEGIN}\n{section()}\n\n{END}{after}"
 
 
 def write() -> None:
-    """Write the gallery and its section of the README; what is no part of it any more goes."""
-    folder = ROOT / GALLERY
-    folder.mkdir(exist_ok=True)
+    """Write the gallery and its page; what is no part of it any more goes."""
+    FOLDER.mkdir(exist_ok=True)
     pictures = drawn()
-    for path in folder.iterdir():
+    for path in FOLDER.iterdir():
         if path.name not in pictures:
             path.unlink()
     for name, content in pictures.items():
-        path = folder / name
+        path = FOLDER / name
         if not (path.exists() and same(path.read_bytes(), content)):
             path.write_bytes(content)
             print(f"{path}: {len(content) / 1e3:.0f} kB")
-    README.write_text(with_section(README.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(with_section(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

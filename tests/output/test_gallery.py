@@ -1,4 +1,6 @@
-"""The gallery of the README is what the commands draw and print now."""
+"""The gallery of the documentation is what the commands draw and print now."""
+
+import re
 
 import gallery
 import matplotlib
@@ -8,12 +10,10 @@ from field_record import AT, FILE, QUANTUM, UNIT, VT0, field_record
 from gallery import (
     BEGIN,
     END,
-    GALLERY,
-    README,
+    FOLDER,
+    PAGE,
     ROOT,
-    ROWS,
     RUNS,
-    WIDE,
     drawn,
     same,
     same_word,
@@ -27,8 +27,7 @@ from exfit.output import plots
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 
-FOLDER = ROOT / GALLERY
-PICTURES = [one.name for run in RUNS for one in run.pictures]
+PICTURES = [picture.name for run in RUNS for picture in run.pictures]
 LARGEST, TOGETHER = 60_000, 600_000  # bytes: a page that opens at once
 
 
@@ -44,13 +43,13 @@ def test_no_picture_is_left_of_a_command_that_is_gone():
     assert sorted(path.name for path in FOLDER.iterdir()) == sorted(PICTURES)
 
 
-def test_the_readme_shows_every_picture_once_with_its_command():
-    readme = README.read_text(encoding="utf-8")
-    assert with_section(readme) == readme
-    shown = readme.partition(BEGIN)[2].partition(END)[0]
-    assert sorted([WIDE, *(name for row in ROWS for name in row)]) == sorted(PICTURES)
+def test_the_page_shows_every_picture_once_with_its_command():
+    page = PAGE.read_text(encoding="utf-8")
+    assert with_section(page) == page
+    gallery = page.partition(BEGIN)[2].partition(END)[0]
+    assert sorted(re.findall(r"\(img/(.+?)\)", gallery)) == sorted(PICTURES)
     for run in RUNS:
-        assert shown.count(f"`{run.command}`") == len(run.pictures)
+        assert gallery.count(f"`{run.command}`") == len(run.pictures)
 
 
 def test_the_pictures_are_small():

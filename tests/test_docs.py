@@ -1,0 +1,284 @@
+"""The README and the pages of docs/ are true: commands, output, cases, models, tables, links."""
+
+import importlib.util
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from places import ROOT
+
+from exfit import workflows
+from exfit.case.load import load_case
+from exfit.cli import main
+from exfit.errors import CaseError
+from exfit.fitting.recordings import measured
+from exfit.models import MODELS, STABILISERS
+from exfit.models.machines import MACHINES
+from exfit.output import run_folder
+
+DOCS = ROOT / "docs"
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in [ROOT / "README.md", *DOCS.glob("*.md"), DOCS / "models" / "index.md"]
+}
+README = PAGES["README.md"]
+NOTEBOOK = DOCS / "tutorial_python.ipynb"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+WITH_SESSIONS = [name for name, page in PAGES.items() if "```console" in page]
+WIDTH = 120  # of the terminal: no table of a page is cut off
+
+MACHINE = "model: AC1A\nplant: {type: open-circuit, machine: GENROU}\n"
+FAULTY_CASE = """\
+model: AC1A
+plant:
+  type: open-circuit
+  machine: GENROU
+  parameters: {Xd: 0.25, Xpd: 0.3, Xppd: 0.25, Xl: 0.2}
+test:
+  vref:
+    - {at: 1.0, step: 0.05}
+record:
+  file: record.csv
+  time: t
+  channels: {vt: vt}
+parameters:
+  fixed: {KEE: 1.0}
+  free:
+    # of a data sheet
+    KA: {start: 9000, min: 10, max: 5000}
+"""
+
+
+def block(page: str, language: str, number: int = 0) -> str:
+    """Return a block of a page in a language, by default the first."""
+    blocks = [body for name, body in BLOCK.findall(PAGES[f"docs/{page}"]) if name == language]
+    return blocks[number]
+
+
+def first_column(page: str, after: str) -> list[str]:
+    """Return the first cells of the first table behind some words, without its head."""
+    rows = re.search(r"(?:^\|.*\n)+", page.partition(after)[2], re.MULTILINE)[0].splitlines()
+    return [row.split("|")[1].strip() for row in rows[2:]]
+
+
+def one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+# ---- commands and what they print
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Return a folder with a copy of the cases and records, as a user has it."""
+    folder = tmp_path_factory.mktemp("exfit")
+    for name in ("configs", "sample_data"):
+        shutil.copytree(ROOT / name, folder / name)
+    return folder
+
+
+@pytest.fixture
+def run(folder, monkeypatch, capsys):
+    """Return a function that runs a command there: its exit code, and what it prints on one line.
+
+    Figures are drawn, but not in pixels.
+    """
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)
+
+    def command(line: str) -> tuple[int, str]:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main(line.split()[1:], prog_name="exfit")
+        captured = capsys.readouterr()
+        return int(ended.value.code or 0), one_line(captured.err + captured.out)
+
+    return command
+
+
+def session(body: str) -> Iterator[tuple[str, str]]:
+    """Yield each command of exfit in a console block, with what the page says that it prints."""
+    for part in re.split(r"^\$ ", body, flags=re.MULTILINE)[1:]:
+        line, _, output = part.partition("\n")
+        command = line.rpartition("&& ")[2]
+        if command.startswith("exfit "):
+            yield command, one_line(output)
+
+
+def edited(text: str, language: str, body: str) -> str:
+    """Return a case as a page changes it: lines of a diff, or a section in place of a comment."""
+    if language == "yaml":
+        before, _, _ = text.partition("# validate:")
+        return before + body
+    for old, new in re.findall(r"^-(.*\n)\+(.*\n)", body, re.MULTILINE):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.mark.parametrize("name", WITH_SESSIONS)
+def test_the_commands_of_a_page_print_what_it_says(name, run):
+    printed, case = "", None
+    for language, body in BLOCK.findall(PAGES[name]):
+        if language == "console":
+            for command, output in session(body):
+                code, printed = run(command)
+                assert (printed == output) if output else (code == 0), (command, printed)
+                if command.startswith("exfit new"):
+                    case = Path(command.split()[-1])
+        elif language == "text" and printed:
+            missing = [line for line in body.splitlines() if one_line(line) not in printed]
+            assert missing == [], printed
+        elif case and language in ("diff", "yaml"):
+            case.write_text(edited(case.read_text(encoding="utf-8"), language, body), "utf-8")
+
+
+def test_two_commands_install_and_run_and_test():
+    lines = [line for line in README.splitlines() if line.startswith("$ pip install")]
+    assert len(lines) == 2
+
+
+def options_of(command: click.Command) -> set[str]:
+    return {name for it in command.params for name in (*it.opts, *it.secondary_opts)}
+
+
+def test_every_option_that_a_page_names_is_one_of_a_command():
+    commands = [main, *main.commands.values()]
+    options = {name for command in commands for name in options_of(command)}
+    for name, page in PAGES.items():
+        words = set(re.findall(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*", page))
+        assert words - options <= {"--help", "--strict"}, name  # of mypy
+
+
+def test_every_command_that_a_page_names_is_one_of_exfit():
+    for name, page in PAGES.items():
+        assert set(re.findall(r"(?:`|^\$ |&& )exfit ([a-z]+)", page)) <= set(main.commands), name
+
+
+def test_the_table_of_commands_names_every_command_and_no_other():
+    cells = first_column(README, "## Commands")
+    assert sorted(re.match(r"`exfit (\w+)", cell)[1] for cell in cells) == sorted(main.commands)
+
+
+def test_the_options_in_common_are_those_of_a_fit():
+    cells = first_column(PAGES["docs/commands.md"], "## Options")
+    assert {cell.strip("`").split()[0] for cell in cells} <= options_of(main.commands["fit"])
+
+
+# ---- cases and models
+
+
+@pytest.fixture
+def cases(folder, tmp_path):
+    """Return a folder for cases, beside a copy of the records."""
+    (tmp_path / "sample_data").symlink_to(folder / "sample_data")
+    (tmp_path / "cases").mkdir()
+    return tmp_path / "cases"
+
+
+def test_the_case_of_the_page_is_valid_and_its_records_can_be_read(cases):
+    path = cases / "case.yaml"
+    path.write_text(block("case_file.md", "yaml"), encoding="utf-8")
+    case = load_case(path)
+    assert measured(case, case.test, case.record).time.size > 1
+    for recording in case.validations:
+        assert measured(case, recording.test, recording.record).time.size > 1
+
+
+def test_the_faults_of_a_case_are_reported_as_the_page_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("unit3.yaml").write_text(FAULTY_CASE, encoding="utf-8")
+    with pytest.raises(CaseError) as refused:
+        load_case(Path("unit3.yaml"))
+    assert one_line(f"Error: {refused.value}") == one_line(block("case_file.md", "text"))
+
+
+def test_the_record_of_the_page_is_read_in_the_recorders_units(cases):
+    head = block("case_file.md", "yaml").partition("record:")[0]
+    (cases / "case.yaml").write_text(head + block("records.md", "yaml"), encoding="utf-8")
+    case = load_case(cases / "case.yaml")
+    record = measured(case, case.test, case.record)
+    assert record.signals["vt"][0] == pytest.approx(1.0, abs=0.01)
+    assert record.signals["ifd"][0] == pytest.approx(1.12, abs=0.01)
+
+
+def test_the_records_of_the_page_are_a_valid_part_of_a_case(cases):
+    (cases / "case.yaml").write_text(MACHINE + block("records.md", "yaml", 1), encoding="utf-8")
+    case = load_case(cases / "case.yaml")
+    assert [recording.name for recording in case.recordings] == ["up", "on-line"]
+    assert case.on_load
+
+
+def test_the_unit_on_load_of_the_page_can_be_simulated(cases):
+    (cases / "case.yaml").write_text("model: AC1A\n" + block("plants.md", "yaml"), "utf-8")
+    response = workflows.simulate(load_case(cases / "case.yaml"), {}).response
+    assert response.signals["p"][0] == pytest.approx(0.8, rel=1e-9)
+    assert response.signals["vt"][0] == pytest.approx(1.0, rel=1e-9)
+    assert np.ptp(response.signals["delta"]) > 0.05
+
+
+def test_the_model_of_the_page_starts_at_rest_and_follows_a_step(cases):
+    (cases / "my_exciter.py").write_text(block("own_model.md", "python"), encoding="utf-8")
+    (cases / "case.yaml").write_text(block("own_model.md", "yaml"), encoding="utf-8")
+    response = workflows.simulate(load_case(cases / "case.yaml"), {}).response
+    vt = response.signals["vt"]
+    assert vt[response.time <= 1.0] == pytest.approx(1.0, abs=1e-9)
+    assert np.all(np.isfinite(vt))
+    # a static exciter, without an integral: the loop leaves 1 / (1 + KA) and saturation
+    assert vt[-1] == pytest.approx(1.02, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/models/index.md"])
+def test_every_model_is_named(name):
+    assert {*MODELS, *MACHINES, *STABILISERS} <= set(re.findall(r"\w+", PAGES[name]))
+
+
+def test_a_fit_writes_the_files_of_the_table_and_no_others(tmp_path):
+    result = workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))
+    run_folder.write_fit(result, tmp_path / "run", figures=True)
+    cells = first_column(PAGES["docs/reports.md"], "A fit writes these files")
+    (validation,) = result.validation
+    names = re.findall(r"`([^`]+)`", " ".join(cells))
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {
+        name.replace("NAME", validation.name) for name in names
+    }
+
+
+def test_the_tables_of_keys_are_those_of_the_schema():
+    spec = importlib.util.spec_from_file_location("docs_generate", DOCS / "generate.py")
+    generate = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(generate)
+    page = PAGES["docs/case_file.md"]
+    assert generate.with_key_tables(page) == page, "run python docs/generate.py"
+
+
+def test_the_strategies_of_the_page_are_those_of_a_case():
+    cells = first_column(PAGES["docs/case_file.md"], "## Strategies")
+    (option,) = (it for it in main.commands["fit"].params if it.name == "strategy")
+    assert sorted(cell.strip("`") for cell in cells) == sorted(option.type.choices)
+
+
+# ---- links
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_link_of_a_page_leads_to_a_file(name):
+    links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", PAGES[name])
+    near = (ROOT / name).parent
+    assert [link for link in links if "://" not in link and not (near / link).exists()] == []
+
+
+@pytest.mark.parametrize("index", ["README.md", "docs/index.md"])
+def test_an_index_links_every_page(index):
+    links = {(ROOT / index).parent / link for link in re.findall(r"\]\(([^)#\s]+)", PAGES[index])}
+    pages = {ROOT / name for name in PAGES} | {NOTEBOOK}
+    indexes = {ROOT / "README.md", DOCS / "index.md"}
+    assert pages - indexes - links <= {DOCS / "changelog.md"}  # the README links its source
