@@ -36,15 +36,11 @@ from exfit.case import load
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
 from exfit.errors import CaseError
-from exfit.fitting.build import (
-    ExperimentSetup,
-    build_experiment,
-    plain_simulator,
-    values_of,
-    with_enough_substeps,
-)
+from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
+from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
+from exfit.fitting.system import values_of
 from exfit.records.reading import file_hash
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import (

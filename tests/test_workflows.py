@@ -7,7 +7,8 @@ import pytest
 from places import ROOT
 
 from exfit.case.load import load_case
-from exfit.fitting.build import build_experiment, build_experiments, values_of
+from exfit.fitting.build import build_experiment, build_experiments
+from exfit.fitting.system import values_of
 from exfit.plants import VT0
 from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit, simulate, validate

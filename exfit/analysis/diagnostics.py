@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
-from exfit.fitting.build import system_of
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import Residuals, noise_of
+from exfit.fitting.system import system_of
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.records.record import Record
 from exfit.results.model import Comparison

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.fitting.build import ExperimentSetup, compared
 from exfit.fitting.residuals import UNREACHABLE, Residuals
+from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.results.model import Comparison, Iteration, IterationResponses, judged_of
 from exfit.util.threads import in_threads
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from exfit.analysis.diagnostics import typical_notes
 from exfit.case.case import Case
-from exfit.fitting.build import build_experiments, free_parameters, planned
+from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
 from exfit.simulation.inputs import Inputs

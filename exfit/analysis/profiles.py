@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.compression import FitProblem
 from exfit.fitting.nuisance import unit_of
+from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at

@@ -21,12 +21,12 @@ from exfit.analysis.iteration_responses import skipped_response_notes, with_iter
 from exfit.case.case import Case
 from exfit.case.schema import Unknown
 from exfit.errors import SimulationError
-from exfit.fitting.build import ExperimentSetup, robust_of
-from exfit.fitting.compression import FitProblem
 from exfit.fitting.nonlinearity import nonlinear_parameters
 from exfit.fitting.nuisance import unit_of
+from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, names_of_records
+from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import Comparison, FittedParameter, Iteration, Minima, Minimum

@@ -66,23 +66,6 @@ class CompressedChannel(Channel):
         return self.form.theirs.size + 1
 
 
-@dataclass(frozen=True, eq=False)
-class FitProblem:
-    """What a fit makes small, in two forms with the same cost and gradient at every point.
-
-    ``residuals`` are those of all samples; ``compressed`` are fewer, or the same where nothing is
-    gained.
-    """
-
-    residuals: Residuals
-    compressed: Residuals
-
-
-def problem_of(residuals: Residuals) -> FitProblem:
-    """Return both forms of the residuals of all samples."""
-    return FitProblem(residuals, compressed(residuals))
-
-
 def compressed(residuals: Residuals) -> Residuals:
     """Return residuals with the same cost and gradient at every point, but fewer of them.
 

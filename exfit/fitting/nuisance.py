@@ -1,98 +1,13 @@
 """What a fit finds about a record beside the parameters of the unit: instants, sizes, levels."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
-from math import inf
 from typing import Literal
 
-import numpy as np
-
-from exfit.case.case import Case
-from exfit.case.schema import SINGLE, BumpTest, FindableStep, RecordFile, Recording, Unknown, known
-from exfit.dsp.filtering import outliers
-from exfit.dsp.step_detection import find_step
-from exfit.errors import CaseError, RecordError
+from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
 from exfit.fitting.experiment import Nuisance
 from exfit.fitting.parameters import FreeParameter
-from exfit.records.record import Record
 from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
-
-AROUND = 0.25  # s: how far the instant may be from where a record shows the step
-SHARE = 0.5  # of the size that a record shows: how far the size may be from it
-
-
-def with_detected_steps(case: Case, recording: Recording, record: Record) -> BumpTest:
-    """Return the test of a recording with a start and bounds for all that a fit finds.
-
-    Where the instant of a step is to be found, the record is at rest until its lower bound.
-    Raises CaseError or RecordError where the record shows no step to start from.
-    """
-    place = f"{case.path}: {prefix_of(recording)}test"
-    test = recording.test
-    channel = recording.record.channels.get("vt")
-    limit = None if channel is None else channel.outliers
-    steps = tuple(
-        _bounded(f"{place}.vref[{k}]", one, record, limit) for k, one in enumerate(test.vref)
-    )
-    instants = [known(step.at) or 0.0 for step in steps]
-    for k, (before, at) in enumerate(pairwise(instants), 1):
-        if at <= before:
-            text = f"{at:g} s is not after {before:.4g} s, where the record shows the step before"
-            raise CaseError([f"{place}.vref[{k}].at: {text}"])
-    test = test.model_copy(update={"vref": steps})
-    return test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
-
-
-def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | None:
-    """Return until when a record is at rest, s: until the earliest instant that it may show."""
-    delay = _lowest(file.delay)
-    found = [step.at for step in (*test.vref, *test.vs) if isinstance(step.at, Unknown)]
-    if test.steady_until is not None or not (found or delay < 0.0):
-        return test.steady_until
-    earliest = min([*test.instants, *map(_lowest, found)]) if test.instants else inf
-    return max(earliest + min(delay, 0.0), float(record.time[1]))
-
-
-def _lowest(value: float | Unknown) -> float:
-    """Return the least that a value may be."""
-    if isinstance(value, Unknown):
-        return -inf if value.min is None else value.min
-    return value
-
-
-def _bounded(place: str, step: FindableStep, record: Record, limit: float | None) -> FindableStep:
-    """Return a step of the reference, with numbers where it says auto; ``limit``: of outliers."""
-    auto = [
-        key
-        for key in ("at", "step")
-        if isinstance(value := getattr(step, key), Unknown) and value.start == "auto"
-    ]
-    if not auto:
-        return step
-    vt = record.signals["vt"]
-    seen = np.isfinite(vt)
-    try:
-        if limit is not None:
-            seen[seen] = ~outliers(record.time[seen], vt[seen], limit)
-        found = find_step(record.time[seen], vt[seen])
-    except ValueError as fault:
-        raise RecordError(f"{record.source}: {fault}; {place} asks for start: auto") from fault
-    first, last = float(record.time[0]), float(record.time[-1])
-    bounds = {
-        "at": (found.at, max(first, found.at - AROUND), min(last, found.at + AROUND)),
-        "step": (found.size, *sorted(((1 - SHARE) * found.size, (1 + SHARE) * found.size))),
-    }
-    update = {}
-    for key in auto:
-        value, (start, low, high) = getattr(step, key), bounds[key]
-        low = low if value.min is None else value.min
-        high = high if value.max is None else value.max
-        if not low <= start <= high:
-            text = f"the record shows {start:.4g}, outside {low:g} ... {high:g}"
-            raise CaseError([f"{place}.{key}: {text}"])
-        update[key] = Unknown(start=start, min=low, max=high)
-    return step.model_copy(update=update)
 
 
 def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> bool:

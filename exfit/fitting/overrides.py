@@ -9,8 +9,8 @@ from exfit.case.case import Case
 from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.fitting.build import values_of
 from exfit.fitting.nuisance import names_of
+from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
 from exfit.util.text import near
 
@@ -19,28 +19,33 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
     """Return changes of values by name: KA, machine.Tpd0, or what is found about a record.
 
     Raises CaseError, naming ``place``, for a name that the case does not know, a value that its
-    data sheet excludes, or values that do not fit together.
+    data sheet excludes, or values that contradict each other.
     """
     rows = {part.prefix + row.symbol: row for part in case.parts.all for row in part.sheet}
-    known = [*rows, *(name for name in case.values() if name not in rows), *_of_records(case)]
-    faults = []
-    for name, value in given.items():
-        if name not in known:
-            faults.append(f"{place}: {name}: not a parameter; {near(name, known)}")
-        elif name not in rows and not isfinite(value):
-            faults.append(f"{place}: {name}: {value:g} is not a finite number")
-    faults += [f"{place}: {text}" for text in _outside(rows, given)]
+    faults = [*_wrong_names(case, given, rows), *_outside(rows, given)]
     if not faults:
         try:
             values = values_of(case, given)
         except TieError as fault:
             raise CaseError([f"{place}: {fault}"]) from None
         following = {name: values[name] for name in case.ties.by_name if name not in given}
-        faults = [f"{place}: {text}" for text in _outside(rows, following)]
-        faults += [f"{place}: {text}" for text in contradictions(case, values)]
+        faults = [*_outside(rows, following), *contradictions(case, values)]
     if faults:
-        raise CaseError(faults)
+        raise CaseError(f"{place}: {fault}" for fault in faults)
     return dict(given)
+
+
+def _wrong_names(
+    case: Case, given: Mapping[str, float], rows: Mapping[str, Parameter]
+) -> Iterator[str]:
+    """Yield the names that the case does not have, and values without a sheet that are infinite."""
+    helpers = [name for name in case.values() if name not in rows]
+    names = [*rows, *helpers, *_of_records(case)]
+    for name, value in given.items():
+        if name not in names:
+            yield f"{name}: not a parameter; {near(name, names)}"
+        elif name not in rows and not isfinite(value):
+            yield f"{name}: {value:g} is not a finite number"
 
 
 def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
@@ -61,28 +66,31 @@ def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
 def read_parameters(case: Case, path: Path) -> dict[str, float]:
     """Return the changes that a file of parameters makes to a case.
 
-    What follows others in the case is left to them, if the file agrees; so is what the file tells
-    of records that the case does not have. Raises CaseError where it is not such a file, or is of
-    another model.
+    What follows others in the case is left to them, if the file agrees; so is what the file says
+    about records that the case does not have. Raises CaseError where it is not such a file, or is
+    of another model.
     """
     top, faults = read_yaml(read_text(path), path)
     content = top.value if isinstance(top.value, dict) else {}
-    parameters = content.get("parameters")
-    texts = [f"{path}: {fault.text}" for fault in faults]
+    parameters, about = content.get("parameters"), content.get("records", {})
+    texts = [fault.text for fault in faults]
     if not isinstance(parameters, dict) or not parameters:
-        raise CaseError([*texts, f"{path}: parameters: missing"])
+        raise CaseError(f"{path}: {text}" for text in (*texts, "parameters: missing"))
     if str(content.get("model", case.subject)).upper() != case.subject:
-        texts.append(f"{path}: model: {content['model']}, but {case.path} has {case.subject}")
-    texts += [f"{path}: parameters.{text}" for text in _no_numbers(parameters)]
-    about = content.get("records", {})
-    if not isinstance(about, dict):
-        texts.append(f"{path}: records: not a mapping (key: value)")
-        about = {}
-    texts += [f"{path}: records.{text}" for text in _no_numbers(about)]
+        texts.append(f"model: {content['model']}, but {case.path} has {case.subject}")
+    texts += _no_numbers("parameters", parameters)
+    texts += _no_numbers("records", about)
     if texts:
-        raise CaseError(texts)
-    about = {name: value for name, value in about.items() if name in _of_records(case)}
-    given = changed_values(case, {**parameters, **about}, str(path))
+        raise CaseError(f"{path}: {text}" for text in texts)
+    names = _of_records(case)
+    of_records = {name: value for name, value in about.items() if name in names}
+    return _without_agreeing_ties(
+        case, changed_values(case, {**parameters, **of_records}, str(path))
+    )
+
+
+def _without_agreeing_ties(case: Case, given: Mapping[str, float]) -> dict[str, float]:
+    """Return changes without those of tied parameters that the ties give as well."""
     others = {name: value for name, value in given.items() if name not in case.ties.by_name}
     following = values_of(case, others)
     return {
@@ -92,13 +100,16 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
     }
 
 
-def _no_numbers(given: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the values that are no numbers."""
+def _no_numbers(key: str, given: Any) -> Iterator[str]:
+    """Yield the values of a section that are no numbers."""
+    if not isinstance(given, dict):
+        yield f"{key}: not a mapping (key: value)"
+        return
     for name, value in given.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
-            yield f"{name}: {value!r} is not a number"
+            yield f"{key}.{name}: {value!r} is not a number"
 
 
 def _of_records(case: Case) -> list[str]:
     """Return the names of all that a fit of a case finds about its records."""
-    return [name for one in case.recordings for name in names_of(one)]
+    return [name for recording in case.recordings for name in names_of(recording)]

@@ -154,24 +154,3 @@ def source_of(channel: ChannelSection | PhasesSection) -> Column | ThreePhases:
         channel.connection,
         channel.cycles,
     )
-
-
-def initial_level(test: BumpTest, record: Record, signal: str) -> float:
-    """Return the mean of a recorded signal while the unit is still at rest.
-
-    Raises RecordError where it has no sample there.
-    """
-    until = np.inf if test.steady is None else test.steady
-    rest = record.signals[signal][record.time < until]
-    rest = rest[np.isfinite(rest)]
-    if not len(rest):
-        raise RecordError(
-            f"{record.source}: {signal}: no sample before {show(until)} s tells where it starts"
-        )
-    return float(np.mean(rest))
-
-
-def initial_voltage(test: BumpTest, record: Record) -> float:
-    """Return the voltage before the first step: as the test gives it, else the record's mean."""
-    vt0 = known(test.vt0)
-    return initial_level(test, record, "vt") if vt0 is None else vt0

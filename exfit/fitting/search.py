@@ -7,9 +7,10 @@ import numpy as np
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
-from exfit.fitting.build import ExperimentSetup, build_experiments, residuals_of
-from exfit.fitting.compression import FitProblem, problem_of
+from exfit.fitting.build import build_experiments
+from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.residuals import JACOBIANS, SimulationCounter
+from exfit.fitting.setup import ExperimentSetup
 
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 

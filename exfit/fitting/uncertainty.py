@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
-from exfit.fitting.compression import FitProblem
+from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference import (
     Confidence,
@@ -139,14 +139,13 @@ def linearisation(
     if not np.isfinite(slopes).all():
         at = ", ".join(f"{parameter.name} = {values[parameter.name]:g}" for parameter in free)
         raise SimulationError(f"the derivatives are not finite at {at}")
-    if errors is None and problem.compressed is residuals:
-        errors = compressed_errors
-    elif errors is None:
-        errors = residuals(theta)[: residuals.count]
+    if errors is None:
+        same = problem.compressed is residuals
+        errors = compressed_errors if same else residuals(theta)[: residuals.count]
     influence, curvature = residuals.influence(errors)
     return Linearisation(
         names=tuple(parameter.name for parameter in free),
-        units=tuple("" for _ in free),
+        units=("",) * len(free),
         values=np.array([values[parameter.name] for parameter in free]),
         logarithmic=np.array([parameter.logarithmic for parameter in free]),
         width=np.array([parameter.high - parameter.low for parameter in free]),
@@ -156,12 +155,14 @@ def linearisation(
         influence=influence,
         curvature=curvature,
         channels=tuple(_channels(residuals, problem.compressed.sizes)),
-        priors=tuple(
-            PriorRow(k, prior.mean, prior.std, residuals.noise)
-            for k, prior in residuals.priors.items()
-        ),
+        priors=tuple(_prior_rows(residuals)),
         nuisances=tuple(parameter.name in of_record for parameter in free),
     )
+
+
+def _prior_rows(residuals: Residuals) -> Iterator[PriorRow]:
+    for k, prior in residuals.priors.items():
+        yield PriorRow(k, prior.mean, prior.std, residuals.noise)
 
 
 def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[ResidualBlock]:

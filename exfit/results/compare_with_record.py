@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
-from exfit.fitting.build import ExperimentSetup, compared
+from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.results.model import Comparison, Overlay
 
 Array = NDArray[np.float64]

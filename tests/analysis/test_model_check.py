@@ -8,7 +8,8 @@ from places import ROOT
 
 from exfit.analysis.model_check import AGREEMENT, STEPS, check, deviations, flat_drift
 from exfit.case.load import load_case, parse_case
-from exfit.fitting.build import build_experiments, residuals_of
+from exfit.fitting.build import build_experiments
+from exfit.fitting.problem import residuals_of
 from exfit.fitting.residuals import Residuals
 
 WITHOUT_RECORD = """\

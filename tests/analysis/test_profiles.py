@@ -12,7 +12,8 @@ from exfit.analysis.profiles import profile
 from exfit.case.load import load_case
 from exfit.errors import CaseError
 from exfit.estimate import Stop, least_squares
-from exfit.fitting.build import build_experiments, residuals_of
+from exfit.fitting.build import build_experiments
+from exfit.fitting.problem import residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT
 from exfit.workflows import fit

@@ -18,7 +18,8 @@ from exfit.case.load import load_case, parse_case
 from exfit.case.schema import CaseDocument
 from exfit.case.yaml import dotted, scalar
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.recordings import initial_voltage, measured
+from exfit.fitting.levels import initial_voltage
+from exfit.fitting.recordings import measured
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import MACHINE, SATURATION

@@ -15,7 +15,8 @@ from exfit.case.json_schema import json_schema
 from exfit.case.load import parse_case
 from exfit.cli import main
 from exfit.errors import CaseError, ExfitError
-from exfit.fitting.build import build_experiments, residuals_of
+from exfit.fitting.build import build_experiments
+from exfit.fitting.problem import residuals_of
 
 EXAMPLE = yaml.safe_load("""\
 model: AC1A

@@ -12,8 +12,9 @@ from places import ROOT
 from exfit.analysis.profiles import profile
 from exfit.case.load import load_case
 from exfit.errors import SimulationError
-from exfit.fitting.build import build_experiments, values_of
+from exfit.fitting.build import build_experiments
 from exfit.fitting.recordings import measured
+from exfit.fitting.system import values_of
 from exfit.plants import SATURATION, VT0
 from exfit.results.compare_with_record import compare_with_record
 from exfit.simulation.simulator import Simulator

@@ -24,8 +24,9 @@ from tables import read_columns
 
 from exfit.analysis.solution import validation_of
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.build import build_experiment, build_experiments, residuals_of
+from exfit.fitting.build import build_experiment, build_experiments
 from exfit.fitting.nuisance import names_of
+from exfit.fitting.problem import residuals_of
 from exfit.plants import VT0
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.tables import parameter_file

@@ -22,8 +22,10 @@ from tables import read_columns
 
 from exfit.analysis.model_check import check
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.build import build_experiments, residuals_of, values_of
+from exfit.fitting.build import build_experiments
 from exfit.fitting.overrides import changed_values, read_parameters
+from exfit.fitting.problem import residuals_of
+from exfit.fitting.system import values_of
 from exfit.output.run_folder import write_fit
 from exfit.workflows import fit, simulate, validate
 
@@ -468,7 +470,7 @@ def test_a_filter_that_does_not_go_with_the_record_is_refused(tmp_path, time, re
     ("mask", "vt0", "named"),
     [
         ([[0.0, 9.0]], 1.0, "vt: fewer than 3 samples"),
-        ([[0.0, 1.0]], None, "vt: no sample before 1 s tells where it starts"),
+        ([[0.0, 1.0]], None, "vt: no sample before 1 s: its start is unknown"),
     ],
 )
 def test_a_mask_that_leaves_nothing_is_refused(tmp_path, mask, vt0, named):
@@ -492,7 +494,7 @@ def test_a_signal_that_drives_must_have_no_gap(tmp_path):
     columns["vt"] = np.where(columns["t"] == 0.5, np.nan, columns["vt"])
     write(tmp_path / "record.csv", **columns)
     content["record"] |= {"file": "record.csv", "gaps": "skip"}
-    with pytest.raises(RecordError, match="it drives, and has a gap at"):
+    with pytest.raises(RecordError, match="drives the simulation, but has a gap at"):
         build_experiments(case_of({**content, "validate": []}, tmp_path))
 
 

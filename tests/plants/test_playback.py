@@ -152,7 +152,7 @@ def test_a_reference_that_holds_nothing_is_refused(tmp_path):
 
 def test_an_exciter_that_needs_the_field_current_says_so(tmp_path):
     text = exciter().replace("ifd: ifd, ", "")
-    with pytest.raises(CaseError, match=r"record: channels\.ifd: is missing: it drives AC1A"):
+    with pytest.raises(CaseError, match=r"record: channels\.ifd: missing; it drives AC1A"):
         simulate(case_of(text, tmp_path), {})
 
 

@@ -9,7 +9,8 @@ from places import CONFIGS
 from scipy.integrate import solve_ivp
 
 from exfit.case.load import load_case
-from exfit.fitting.build import build_experiments, free_parameters
+from exfit.fitting.build import build_experiments
+from exfit.fitting.problem import free_parameters
 from exfit.models import MODELS
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limit_hits import limits_hit, nearest

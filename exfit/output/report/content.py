@@ -13,8 +13,8 @@ from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, Recording
 from exfit.dsp.features import Features
 from exfit.errors import ExfitError
 from exfit.exchange.psse.export import export
-from exfit.fitting.build import ExperimentSetup
 from exfit.fitting.nuisance import unit_of
+from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.wording import listed
 from exfit.output.report.simulated import Simulated, simulated
 from exfit.output.report.sources import Samples, Sources, sources

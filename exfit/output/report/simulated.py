@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from exfit.analysis.iteration_responses import iteration_response
 from exfit.analysis.model_check import FLAT_DRIFT, flat_drift
 from exfit.errors import SimulationError
-from exfit.fitting.build import ExperimentSetup, compared, residuals_of
-from exfit.fitting.compression import FitProblem, problem_of
 from exfit.fitting.experiment import Experiment
+from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
+from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.fitting.uncertainty import linearisation, sensitivity
 from exfit.output.report.sources import Sources
 from exfit.results.model import judged_of

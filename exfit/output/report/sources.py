@@ -12,8 +12,9 @@ from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
-from exfit.fitting.build import ExperimentSetup, build_experiment
+from exfit.fitting.build import build_experiment
 from exfit.fitting.search import fitted
+from exfit.fitting.setup import ExperimentSetup
 from exfit.records.reading import file_hash
 from exfit.results.io import Saved
 from exfit.results.model import Overlay

@@ -1,0 +1,111 @@
+"""The channels of a record as they are compared: masked, cleaned, filtered, weighted."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.case import Case
+from exfit.case.schema import (
+    ChannelSection,
+    Filter,
+    MedianSection,
+    PhasesSection,
+    RecordFile,
+)
+from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage, outliers
+from exfit.errors import RecordError
+from exfit.fitting.experiment import Channel
+from exfit.fitting.recordings import column_of
+from exfit.records.record import Record
+
+Mask = NDArray[np.bool_]
+Section = ChannelSection | PhasesSection
+
+LEAST_WINDOWS = 10  # of a running median in a record: a wider one hides the response
+FEWEST_SAMPLES = 3  # of a channel: fewer do not show its noise
+
+
+def without_masked(record: Record, file: RecordFile, driving: Sequence[str]) -> Record:
+    """Return a record with nan in place of what is masked; what drives stays as it is.
+
+    Raises RecordError where a signal that drives has a gap.
+    """
+    masked = np.zeros(len(record.time), dtype=bool)
+    for first, last in file.mask:
+        masked |= (record.time >= first) & (record.time <= last)
+    signals = dict(record.signals)
+    for signal, samples in record.signals.items():
+        if signal not in driving:
+            signals[signal] = np.where(masked, np.nan, samples)
+        elif np.isnan(samples).any():
+            at = record.time[np.isnan(samples)][0]
+            raise RecordError(
+                f"{record.source}: {signal}: drives the simulation, but has a gap at {at:g} s"
+            )
+    return replace(record, signals=signals)
+
+
+def channel_of(case: Case, file: RecordFile, record: Record, signal: str) -> Channel:
+    """Return a channel of a record, with what is done to it before it is compared.
+
+    Raises RecordError where too little of it is left, or where it cannot be filtered.
+    """
+    section, samples = file.channels[signal], record.signals[signal]
+    kept = _kept(record, signal, section)
+    filtering = _filtering(record, signal, section, kept)
+    weight, noise = section.weight, section.noise
+    if noise is not None:
+        weight = finest_noise(case, noise) / noise
+    if not isinstance(section, ChannelSection):
+        return Channel(signal, samples, weight, filtering, noise)
+    column = column_of(section)
+    return Channel(signal, samples, weight, filtering, noise, column.scale, column.offset)
+
+
+def _kept(record: Record, signal: str, section: Section) -> Mask:
+    """Return which samples of a channel are compared: numbers, and no outliers."""
+    samples = record.signals[signal]
+    kept = np.isfinite(samples)
+    if section.outliers is not None:
+        try:
+            kept[kept] = ~outliers(record.time[kept], samples[kept], section.outliers)
+        except ValueError as fault:
+            raise RecordError(f"{record.source}: {signal}: outliers: {fault}") from fault
+    if np.count_nonzero(kept) < FEWEST_SAMPLES:
+        raise RecordError(f"{record.source}: {signal}: fewer than {FEWEST_SAMPLES} samples left")
+    return kept
+
+
+def _filtering(record: Record, signal: str, section: Section, kept: Mask) -> Filtering | None:
+    """Return what is done to the samples of a channel, None where nothing is."""
+    widest = len(kept) // LEAST_WINDOWS
+    if isinstance(section.filter, MedianSection) and section.filter.median > widest:
+        samples = f"{section.filter.median} samples; at most {widest}, a tenth of the record"
+        raise RecordError(f"{record.source}: {signal}: filter: median: {samples}")
+    window = record.averaged.get(signal, section.averaged)
+    if section.filter is None and window is None and kept.all():
+        return None
+    average = None if window is None else MovingAverage(window)
+    try:
+        return Filtering(record.time, kept, _filter(section.filter), average)
+    except ValueError as fault:
+        what = "filter" if window is None else "filter or average"
+        raise RecordError(f"{record.source}: {signal}: {what}: {fault}") from fault
+
+
+def _filter(section: Filter | None) -> LowPass | Median | None:
+    if section is None:
+        return None
+    if isinstance(section, MedianSection):
+        return Median(section.median)
+    return LowPass(section.lowpass)
+
+
+def finest_noise(case: Case, own: float) -> float:
+    """Return the least noise that a case gives for a fitted channel, its ``own`` where none has."""
+    channels = [
+        entry for recording in case.recordings for entry in recording.record.channels.values()
+    ]
+    return min((entry.noise for entry in channels if entry.noise is not None), default=own)

@@ -1,0 +1,46 @@
+"""The steps of a test, as the simulation takes them."""
+
+from collections.abc import Mapping
+
+from exfit.case.case import Case
+from exfit.case.schema import BumpTest, StepSection, Switch, Unknown, known
+from exfit.errors import CaseError
+from exfit.plants import NETWORK
+from exfit.simulation.inputs import InputStep
+
+Values = Mapping[str, float]
+
+
+def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
+    """Return what a test changes, in the order of time; a switch says what is from then on.
+
+    ``values`` are those of the network at the start. Raises CaseError where the source would lose
+    its voltage.
+    """
+    steps = [
+        InputStep(
+            known(step.at) or 0.0, known(step.step) or 0.0, signal, isinstance(step.at, Unknown)
+        )
+        for signal in ("vref", "vs")
+        for step in getattr(test, signal)
+    ]
+    now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
+    events: list[StepSection | Switch] = [*test.E, *test.network]
+    for event in sorted(events, key=lambda event: event.at):
+        for name, level in now.items():
+            step = _step_of(event, name, level)
+            if step is not None:
+                steps.append(InputStep(event.at, step, name))
+                now[name] = None if level is None else level + step
+        if now["E"] is not None and now["E"] <= 0.0:
+            text = f"at {event.at:g} s the source falls to {now['E']:g} pu; it must stay above 0"
+            raise CaseError([f"{case.path}: test: {text}"])
+    return sorted(steps, key=lambda step: step.at)
+
+
+def _step_of(event: StepSection | Switch, name: str, level: float | None) -> float | None:
+    """Return by how much an event changes R, X or E; None where it leaves it."""
+    if isinstance(event, StepSection):
+        return event.step if name == "E" else None
+    then: float | None = getattr(event, name)
+    return None if then is None or level is None else then - level

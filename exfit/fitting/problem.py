@@ -1,0 +1,72 @@
+"""The problem of a fit: its residuals, as functions of all that is free."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from exfit.case.case import Case
+from exfit.dsp.robust_loss import LOSSES
+from exfit.errors import CaseError
+from exfit.fitting.compression import compressed
+from exfit.fitting.parameters import FreeParameter, Prior
+from exfit.fitting.residuals import Residuals, Robust
+from exfit.fitting.setup import ExperimentSetup
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """What a fit makes small, in two forms with the same cost and gradient at every point.
+
+    ``residuals`` are those of all samples; ``compressed`` are fewer, or the same where nothing is
+    gained.
+    """
+
+    residuals: Residuals
+    compressed: Residuals
+
+
+def problem_of(residuals: Residuals) -> FitProblem:
+    """Return both forms of the residuals of all samples."""
+    return FitProblem(residuals, compressed(residuals))
+
+
+def residuals_of(
+    case: Case, setups: Sequence[ExperimentSetup], start: Values | None = None
+) -> Residuals:
+    """Return the residuals of a case as functions of its free parameters.
+
+    ``start`` are the case's values, where they are at hand. Raises CaseError where nothing is free.
+    """
+    free = free_parameters(case, setups)
+    if not free:
+        raise CaseError([f"{case.path}: parameters.free: empty; a fit needs a free parameter"])
+    names = {parameter.name for parameter in free}
+    values = case.values() if start is None else start
+    fixed = {name: value for name, value in values.items() if name not in names}
+    experiments = [setup.experiment for setup in setups]
+    return Residuals(experiments, free, fixed, case.ties, robust_of(case))
+
+
+def robust_of(case: Case) -> Robust | None:
+    """Return the loss that a case has in place of the squares."""
+    estimate = case.estimate
+    if estimate.loss == "least-squares":
+        return None
+    return Robust(LOSSES[estimate.loss], estimate.loss_scale)
+
+
+def free_parameters(case: Case, setups: Sequence[ExperimentSetup] = ()) -> list[FreeParameter]:
+    """Return the free parameters of a case, then what is found about its records."""
+    shared = [
+        FreeParameter(
+            name,
+            section.start,
+            section.min,
+            section.max,
+            section.scale == "log",
+            None if section.prior is None else Prior(section.prior.mean, section.prior.sigma),
+        )
+        for name, section in case.free().items()
+    ]
+    return [*shared, *(parameter for setup in setups for parameter in setup.free)]

@@ -1,0 +1,123 @@
+"""The system of a case: its exciter in its plant, and the values of its parameters."""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from traceback import extract_tb
+
+from exfit.case.case import Case
+from exfit.case.schema import SINGLE, RecordFile
+from exfit.case.ties import Ties
+from exfit.engine.system import System, trace
+from exfit.errors import CaseError, ModelError
+from exfit.models.sheet import Model
+from exfit.plants import (
+    DRIVING,
+    SATURATION,
+    Equipment,
+    SaturationForm,
+    Stabilised,
+    initial,
+    playback,
+)
+from exfit.simulation.simulator import parameters_used
+
+Values = Mapping[str, float]
+
+
+def system_of(case: Case) -> System:
+    """Return the exciter of a case in its plant.
+
+    Raises ModelError where the equations of a user's own model cannot be traced, CaseError where a
+    record lacks a signal that drives it.
+    """
+    system = _system_of(case)
+    if case.model is not None and case.model.endswith(".py"):
+        _refuse_untraceable(system, (case.folder / case.model).absolute())
+    return system
+
+
+def _system_of(case: Case) -> System:
+    kind, parts = case.kind, case.parts
+    if kind.has_exciter and parts.exciter is None:
+        raise CaseError([f"{case.path}: model: missing"])
+    equipment = Equipment(
+        exciter=parts.exciter,
+        machine=parts.machine,
+        saturation=SATURATION[case.saturation],
+        inputs=inputs_of(case),
+        recorded=recorded_in_all(case),
+        given=frozenset(case.plant.given),
+        stabiliser=stabilised(case),
+    )
+    if kind.plays_back and parts.exciter is not None:
+        _refuse_missing_drivers(case, parts.exciter, equipment.saturation)
+    return kind.build(equipment)
+
+
+def inputs_of(case: Case) -> tuple[str, ...]:
+    """Return the inputs that the tests of a case change; the reference always is one."""
+    changed = {"vref"}
+    for test in case.tests:
+        changed |= {name for name in ("vs", "E") if getattr(test, name)}
+        for switch in test.network:
+            changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
+    return tuple(name for name in ("vref", "vs", "E", "R", "X") if name in changed)
+
+
+def stabilised(case: Case) -> Stabilised | None:
+    """Return the stabiliser of a case with the signals that it listens to."""
+    model = case.parts.stabiliser
+    if model is None or case.stabiliser is None:
+        return None
+    return Stabilised(model, case.stabiliser.inputs or model.inputs)
+
+
+def recorded_in_all(case: Case) -> frozenset[str]:
+    """Return the signals that all records of a case hold."""
+    records = [{*file.channels} for file in _record_files(case).values()]
+    return frozenset(set.intersection(*records) if records else ())
+
+
+def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationForm) -> None:
+    """Raise CaseError where a record lacks a signal that the exciter uses."""
+    used = driven_by(exciter, saturation)
+    required = [signal for signal in case.kind.required_if_used if signal in used]
+    for place, file in _record_files(case).items():
+        for signal in required:
+            if signal not in file.channels:
+                text = f"channels.{signal}: missing; it drives {exciter.name}"
+                raise CaseError([f"{case.path}: {place}: {text}"])
+
+
+def _record_files(case: Case) -> dict[str, RecordFile]:
+    """Return the records of a case by their place in its file."""
+    fitted = {
+        "record" if recording.name == SINGLE else recording.name: recording.record
+        for recording in case.recordings
+    }
+    return fitted | {f"validate.{unseen.name}": unseen.record for unseen in case.validations}
+
+
+@cache
+def driven_by(exciter: Model, saturation: SaturationForm) -> frozenset[str]:
+    """Return the signals of its plant that reach an exciter."""
+    used = parameters_used(playback(exciter, saturation, DRIVING))
+    return frozenset(signal for signal in DRIVING if initial(signal) in used)
+
+
+def _refuse_untraceable(system: System, path: Path) -> None:
+    """Raise ModelError, naming file and line, where a model's equations fail."""
+    try:
+        trace(system, system.outputs)
+    except Exception as fault:  # whatever a user's Python may raise
+        frames = extract_tb(fault.__traceback__)
+        lines = [f":{frame.lineno}" for frame in frames if Path(frame.filename) == path]
+        kind = "" if isinstance(fault, ModelError) else f"{type(fault).__name__}: "
+        raise ModelError(f"{path}{lines[-1] if lines else ''}: {kind}{fault}") from fault
+
+
+def values_of(case: Case, changed: Values) -> dict[str, float]:
+    """Return every value of a case: as it has them, with changes upon them, and what follows."""
+    following = {name: tie for name, tie in case.ties.by_name.items() if name not in changed}
+    return Ties(following).apply({**case.values(), **changed})
