@@ -20,15 +20,15 @@ from exfit.util.text import near
 
 Array = NDArray[np.float64]
 
-LOWER = "a lower minimum was met on the way: the profiles are about that one"
+LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
 DIGITS_OF_RISE = 6  # rises that differ less are equal but for rounding
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 ENDS = {
     estimate.ProfileEnd.RISE: "",
-    estimate.ProfileEnd.BOUND: "the record refutes no value down or up to its bound",
+    estimate.ProfileEnd.BOUND: "the record does not exclude the bound",
     estimate.ProfileEnd.FLAT: "the cost hardly rises",
-    estimate.ProfileEnd.FAILED: "there is no response beyond",
+    estimate.ProfileEnd.FAILED: "no response beyond",
     estimate.ProfileEnd.INTERRUPTED: "interrupted",
 }
 

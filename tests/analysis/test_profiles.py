@@ -84,7 +84,7 @@ def test_kd_of_ac1a_is_open_down_to_its_bound(kd):
     (one,) = kd.profiles
     assert one.linear is None
     assert one.low is None
-    assert one.ends == ("the record refutes no value down or up to its bound", "")
+    assert one.ends == ("the record does not exclude the bound", "")
     assert one.at[0] == 0.03556
     assert one.costs[0] < kd.cost + one.rise
     # what the record was made with lies inside
@@ -174,7 +174,7 @@ def test_profiles_are_about_a_lower_minimum_that_is_met_on_the_way(search_ends, 
 
     search_ends(beside)
     found = profile(case_of("first_order"))
-    told = "a lower minimum was met on the way: the profiles are about that one"
+    told = "the profiles led to a lower minimum than the fit: they are about that one"
     assert found.notes == (told,)
     assert found.cost == pytest.approx(nearly_linear.cost, rel=1e-6)
     for one, other in zip(found.profiles, nearly_linear.profiles, strict=True):

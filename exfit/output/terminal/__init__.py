@@ -1,14 +1,14 @@
 """What the terminal shows: tables and lines, with rich."""
 
 from exfit.output.terminal.agreement import agreement
+from exfit.output.terminal.catalogue import catalogue, machine, model
 from exfit.output.terminal.checks import check
+from exfit.output.terminal.comparisons import comparisons
 from exfit.output.terminal.fits import fit
-from exfit.output.terminal.knowledge import design, profiles
-from exfit.output.terminal.matches import comparisons
 from exfit.output.terminal.progress import Bar, Watch, task
 from exfit.output.terminal.records import inspection
-from exfit.output.terminal.sheets import catalogue, machine, model
 from exfit.output.terminal.terminal import again, console, notes, waiting, written
+from exfit.output.terminal.uncertainty import design, profiles
 
 __all__ = [
     "Bar",

@@ -1,4 +1,4 @@
-"""What a recorder's file holds."""
+"""The content of a recorder's file."""
 
 from collections.abc import Sequence
 
@@ -10,25 +10,25 @@ from exfit.output.terminal.terminal import notes, number, plain_table
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 
-NAME = 22  # letters of a channel's name that leave room for its numbers
+NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers
 
 
-def inspection(console: Console, found: Inspection, record: Sequence[str]) -> None:
+def inspection(console: Console, result: Inspection, record: Sequence[str]) -> None:
     """Show what a file holds, and the sections of a case that it suggests."""
-    clock = " and ".join(found.clock.columns)
+    clock = " and ".join(result.clock.columns)
     console.print(
-        f"{found.path.name}: {len(found.time)} samples by {clock}, "
-        f"{found.sampling.start:.6g} ... {found.sampling.end:.6g} s",
+        f"{result.path.name}: {len(result.time)} samples by {clock}, "
+        f"{result.sampling.start:.6g} ... {result.sampling.end:.6g} s",
         markup=False,
     )
-    console.print(in_words(found.sampling), markup=False)
+    console.print(in_words(result.sampling), markup=False)
     console.print()
-    _channels(console, found.channels)
+    _channels(console, result.channels)
     console.print()
-    _steps(console, found)
+    _steps(console, result)
     console.print()
-    if found.findings:
-        notes(console, found.findings)
+    if result.findings:
+        notes(console, result.findings)
         console.print()
     console.print("for a case; what is in # comments is a guess to check:")
     console.print()
@@ -54,29 +54,31 @@ def in_words(sampling: Sampling) -> str:
 def _channels(console: Console, channels: Sequence[InspectedChannel]) -> None:
     heads = ("at rest", "smallest", "largest", "noise", "rounded to")
     table = plain_table("channel", "unit", "is", *heads, numbers=heads)
-    for one in channels:
-        name = one.name if len(one.name) <= NAME else one.name[: NAME - 1] + "…"
-        unit = (one.unit or "") + ("?" if one.unit_from == "name" else "")
+    for channel in channels:
+        name = channel.name
+        if len(name) > NAME_WIDTH:
+            name = name[: NAME_WIDTH - 1] + "…"
+        unit = (channel.unit or "") + ("?" if channel.unit_from == "name" else "")
         cells = (
             name,
             unit,
-            f"{one.signal}?" if one.signal else "",
-            number(one.level),
-            number(one.low),
-            number(one.high),
-            f"{one.frequency:.4g} Hz" if one.frequency else number(one.noise, 2),
-            number(one.quantum, 2),
+            f"{channel.signal}?" if channel.signal else "",
+            number(channel.level),
+            number(channel.low),
+            number(channel.high),
+            f"{channel.frequency:.4g} Hz" if channel.frequency else number(channel.noise, 2),
+            number(channel.quantum, 2),
         )
         table.add_row(*(Text(cell) for cell in cells))
     console.print(table)
 
 
-def _steps(console: Console, found: Inspection) -> None:
-    if not found.steps:
-        console.print("no step is seen in any channel")
+def _steps(console: Console, result: Inspection) -> None:
+    if not result.steps:
+        console.print("no step in any channel")
         return
     table = plain_table("step at (s)", "+- (s)", "changes for good", numbers=("step at (s)",))
-    for step in found.steps:
+    for step in result.steps:
         sizes = ", ".join(f"{name} {size:+.4g}" for name, size in step.sizes.items())
         at = f"{step.at:.4f}" if not step.from_start else f"<= {step.at:.4g}"
         table.add_row(at, "-" if step.from_start else f"{step.error:.1g}", Text(sizes))

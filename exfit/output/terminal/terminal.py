@@ -15,8 +15,8 @@ NARROW = 80  # columns where the width is unknown
 
 def console() -> Console:
     """Return the terminal; a file or pipe is taken for a narrow one."""
-    found = Console(highlight=False)
-    return found if found.is_terminal else Console(highlight=False, width=NARROW)
+    terminal = Console(highlight=False)
+    return terminal if terminal.is_terminal else Console(highlight=False, width=NARROW)
 
 
 def plain_table(*columns: str, numbers: Sequence[str] = ()) -> Table:
@@ -53,16 +53,21 @@ def written(console: Console, folder: Path) -> None:
     console.print(f"written to {folder}", soft_wrap=True, markup=False)
 
 
-def error_of(one: Uncertainty, of_record: bool = False) -> str:
+def error_of(uncertainty: Uncertainty, of_record: bool = False) -> str:
     """Return a standard error as it is shown: in percent, but of a record in its own unit."""
-    if one.relative_error is not None and not of_record:
-        return percent(one.relative_error)
-    return "-" if one.std_error is None else f"{one.std_error:.1e}"
+    if uncertainty.relative_error is not None and not of_record:
+        return percent(uncertainty.relative_error)
+    return "-" if uncertainty.std_error is None else f"{uncertainty.std_error:.1e}"
 
 
 def notes(console: Console, texts: Iterable[str]) -> None:
     """Show what must be known beside the numbers."""
-    remarks(console, "note", texts)
+    _remarks(console, "note:", texts)
+
+
+def unresolved(console: Console, texts: Iterable[str]) -> None:
+    """Show what the records do not determine."""
+    _remarks(console, "unresolved:", texts)
 
 
 def percent(share: float) -> str:
@@ -70,7 +75,7 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
 
 
-def remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
+def _remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
     """Show sentences one below the other, each behind its kind."""
     table = Table.grid(padding=(0, 1))
     table.add_column(style="yellow", no_wrap=True)

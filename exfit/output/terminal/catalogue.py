@@ -19,8 +19,8 @@ def catalogue(
 ) -> None:
     """Show the names of all models."""
     table = plain_table("exciter", "also", "")
-    for one in models:
-        table.add_row(one.name, ", ".join(one.aliases), one.title.partition(" (")[0])
+    for exciter in models:
+        table.add_row(exciter.name, ", ".join(exciter.aliases), exciter.title.partition(" (")[0])
     console.print(table)
     console.print()
     table = plain_table("machine", "")
@@ -29,30 +29,30 @@ def catalogue(
     console.print(table)
     console.print()
     table = plain_table("stabiliser", "")
-    for one in stabilisers:
-        table.add_row(one.name, one.title.partition(" (")[0])
+    for stabiliser in stabilisers:
+        table.add_row(stabiliser.name, stabiliser.title.partition(" (")[0])
     console.print(table)
 
 
-def model(console: Console, one: Model) -> None:
+def model(console: Console, described: Model) -> None:
     """Show a model's drawing, data sheet and states."""
-    _described(console, one, one.drawing)
+    _describe(console, described, described.drawing)
 
 
-def machine(console: Console, one: Machine) -> None:
+def machine(console: Console, described: Machine) -> None:
     """Show a machine's data sheet and states."""
-    _described(console, one)
+    _describe(console, described)
 
 
-def _described(console: Console, one: Model | Machine, *drawing: str) -> None:
-    console.print(f"[bold]{one.name}[/]: {one.title}")
+def _describe(console: Console, described: Model | Machine, *drawing: str) -> None:
+    console.print(f"[bold]{described.name}[/]: {described.title}")
     for text in drawing:
         console.print()
         console.print(text, markup=False, soft_wrap=True)
     console.print()
-    console.print(data_sheet(one.sheet))
+    console.print(data_sheet(described.sheet))
     console.print()
-    console.print(f"states: {', '.join(one.states)}")
+    console.print(f"states: {', '.join(described.states)}")
 
 
 def data_sheet(rows: Sheet) -> Table:

@@ -1,0 +1,48 @@
+"""How well parameters are determined: profiles, and planned tests."""
+
+from rich.console import Console
+
+from exfit.analysis.experiment_design import Design
+from exfit.analysis.profiles import Profiles
+from exfit.output.terminal.terminal import error_of, notes, number, plain_table, unresolved
+
+
+def profiles(console: Console, result: Profiles) -> None:
+    """Show the intervals that profiles give, beside those of the linear theory."""
+    numbers = ("fitted", "min 95 %", "max 95 %", "linear min", "linear max")
+    table = plain_table("parameter", *numbers, "unit", numbers=numbers)
+    for profile in result.profiles:
+        linear = (None, None) if profile.linear is None else profile.linear
+        cells = (number(value) for value in (profile.value, profile.low, profile.high, *linear))
+        style = "yellow" if any(profile.ends) else ""
+        table.add_row(profile.name, *cells, profile.unit, style=style)
+    console.print()
+    console.print(table)
+    console.print()
+    sides = ("no lower limit", "no upper limit")
+    unresolved(
+        console,
+        (
+            f"{profile.name} has {side}: {end}"
+            for profile in result.profiles
+            for side, end in zip(sides, profile.ends, strict=True)
+            if end
+        ),
+    )
+    notes(console, result.notes)
+
+
+def design(console: Console, result: Design) -> None:
+    """Show how well planned tests would determine each parameter: standard errors in percent."""
+    listed = ", ".join(f"{signal} {level:.2g}" for signal, level in result.noise.items())
+    console.print(f"expected standard errors, with noise (pu): {listed}")
+    console.print("of this test; of steps of 2, 5, 10 %; twice as long; with further signals")
+    console.print()
+    heads = ["this test", *(plan.label for plan in result.plans)]
+    table = plain_table("parameter", *heads, numbers=heads)
+    tests = [result.own.confidence, *(plan.confidence for plan in result.plans)]
+    for name in result.own.linear.names:
+        table.add_row(name, *(error_of(confidence.parameters[name]) for confidence in tests))
+    console.print(table)
+    console.print()
+    unresolved(console, result.sentences)
