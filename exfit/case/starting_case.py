@@ -7,44 +7,26 @@ from exfit.case.suggestion import FILL_IN, bump_section, record_section, relativ
 from exfit.case.templates import commented, parameter_line
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import Machine
-from exfit.models.sheet import Model, Parameter, Sheet
+from exfit.models.sheet import Model, Parameter
+from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 from exfit.util.text import yaml_number
 
 ALONE = "FIRST_ORDER"  # the model whose output is vt itself
 ON_LOAD = 0.05  # pu of power at rest: with less the breaker is taken for open
 BOUNDS = (0.1, 10.0)  # times the typical value
-GAINS = ("pu", "pu/s", "pu s")  # units of a gain
-# in what a parameter means: what a fit of a bump test leaves as it is
-STAYS = (
-    "transducer", "exciter constant", "source", "supply", "on load", "limit", "gate", "feedforward",
-    "setting", "feedback gain of the field voltage loop", "1 for an integral",
-)  # fmt: skip
-PID = "proportional gain"
-BEHIND_PID = ("KA",)
-LOADING, ROTATING = "KC", "KD"
 
 
 def free_of(model: Model) -> tuple[Parameter, ...]:
-    """Return the parameters of a model that a bump test is fitted for.
+    """Return the parameters that a bump test is fitted for: those marked in the data sheet.
 
-    They are the gains and time constants of its data sheet that are typically above zero. Left out
-    are limits and saturation, which a small step hardly reaches; the transducer, which is known;
-    KE and what scales the supply, which base values fix; what acts on load or in a limiter; a gain
-    behind a PID, whose products with the PID's gains alone act; a lead that its lag cancels; and
-    the rectifier's loading where it moves nothing but a ceiling, in a static exciter.
+    Of a sheet without a mark, as a user's own may be, they are its time constants and gains.
     """
-    rows = model.sheet
-    rotating = {row.symbol for row in rows} >= {ROTATING}
-    pid = any(PID in row.meaning for row in rows)
-    return tuple(
+    marked = tuple(row for row in model.sheet if row.free)
+    return marked or tuple(
         row
-        for row in rows
-        if row.typical > 0.0
-        and _may_be_free(row)
-        and not (pid and row.symbol in BEHIND_PID)
-        and not (row.symbol == LOADING and not rotating)
-        and not _cancels(row, rows)
+        for row in model.sheet
+        if row.typical > 0.0 and (row.unit == "s" or row.symbol.upper().startswith("K"))
     )
 
 
@@ -57,23 +39,23 @@ def bounds_of(row: Parameter) -> tuple[float, float]:
 
 
 def starting_case(
-    model: Model, name: str, machine: Machine, found: Inspection, folder: Path
+    model: Model, name: str, machine: Machine, inspection: Inspection, folder: Path
 ) -> str:
     """Return the text of a case of a model, by the ``name`` that the case gives it, and a record.
 
-    ``folder`` is where the case will stand. What must be filled in is no number, so that the case
-    is refused until it is.
+    ``folder`` is where the case will be written. What must be filled in is no number, so that the
+    case is refused until it is.
     """
     lines = [
-        f"# {model.name} on the record {_plain(found.path.name)}: a case to start from.",
-        "# Values are typical: put those of the unit in their place. `exfit check` tries",
-        "# the case, `exfit identify` tells what its test leaves open, `exfit fit` fits.",
-        *(f"# Look: {_plain(text)}." for text in found.findings),
+        f"# {model.name} on the record {_plain(inspection.path.name)}: a case to start from.",
+        "# Values are typical: replace them by those of the unit. `exfit check` tries",
+        "# the case, `exfit identify` shows what its test resolves, `exfit fit` fits.",
+        *(f"# note: {_plain(text)}." for text in inspection.findings),
         "# about: {Plant: ..., Unit: ..., Rated: ..., Tested by: ...}  # for reports",
         f"model: {name}",
-        *_plant(model, machine, found),
-        *bump_section(found, vt0=model.name == ALONE),
-        *record_section(found, relative(found.path, folder), only=("vt",)),
+        *_plant(model, machine, inspection),
+        *bump_section(inspection, vt0=model.name == ALONE),
+        *record_section(inspection, relative(inspection.path, folder), only=("vt",)),
         *_parameters(model),
         "# validate:               # a record that the fit does not see, as the step down",
         "#   - name: down",
@@ -83,44 +65,15 @@ def starting_case(
     return "\n".join(lines) + "\n"
 
 
-def _may_be_free(row: Parameter) -> bool:
-    """Tell whether a parameter is a gain or a time constant, and none that stays."""
-    if any(word in row.meaning for word in STAYS):
-        return False
-    gain = row.symbol.startswith("K") and row.unit in GAINS
-    return gain or row.unit in ("s", "1/s") or "lead" in row.meaning
-
-
-def _cancels(row: Parameter, rows: Sheet) -> bool:
-    """Tell whether a lead and its lag are alike."""
-    other = (
-        row.meaning.replace("lead", "lag")
-        if "lead" in row.meaning
-        else row.meaning.replace("lag", "lead")
-    )
-    return any(
-        one.meaning == other and one.typical == row.typical for one in rows if one is not row
-    )
-
-
-def _plant(model: Model, machine: Machine, found: Inspection) -> Iterator[str]:
+def _plant(model: Model, machine: Machine, inspection: Inspection) -> Iterator[str]:
     yield "plant:"
     if model.name == ALONE:
         yield "  type: none"
         return
-    power = found.channel_of("p")
-    per_unit = power is not None and power.unit in (None, "pu")
-    on_load = power is not None and (not per_unit or abs(power.level) > ON_LOAD)
-    if on_load and power is not None:
-        reactive = found.channel_of("q")
+    power = inspection.channel_of("p")
+    if power is not None and _on_load(power):
         yield commented("  type: infinite-bus", f"{_plain(power.name)} shows power")
-        yield "  network:"
-        yield commented(f"    f0: {FILL_IN}", "Hz, rated frequency")
-        yield commented("    R: 0.0", "pu, resistance to the source")
-        yield commented(f"    X: {FILL_IN}", "pu, reactance to the source: transformer and grid")
-        yield commented(f"    P: {_level(found, 'p')}", "pu of the machine, before the step")
-        told = reactive is not None and reactive.unit in (None, "pu")
-        yield commented(f"    Q: {_level(found, 'q') if told else FILL_IN}", "pu, before the step")
+        yield from _network(inspection)
     else:
         yield commented("  type: open-circuit", "the breaker is open, at rated speed")
     yield commented(f"  machine: {machine.name}", machine.title)
@@ -129,28 +82,46 @@ def _plant(model: Model, machine: Machine, found: Inspection) -> Iterator[str]:
         yield parameter_line(row, yaml_number(row.typical), "    ")
 
 
-def _level(found: Inspection, signal: str) -> str:
-    one = found.channel_of(signal)
-    if one is None or one.unit not in (None, "pu"):
+def _on_load(power: InspectedChannel) -> bool:
+    """Tell whether a channel shows active power at rest."""
+    return not _per_unit(power) or abs(power.level) > ON_LOAD
+
+
+def _network(inspection: Inspection) -> Iterator[str]:
+    yield "  network:"
+    yield commented(f"    f0: {FILL_IN}", "Hz, rated frequency")
+    yield commented("    R: 0.0", "pu, resistance to the source")
+    yield commented(f"    X: {FILL_IN}", "pu, reactance to the source: transformer and grid")
+    yield commented(f"    P: {_level(inspection, 'p')}", "pu of the machine, before the step")
+    yield commented(f"    Q: {_level(inspection, 'q')}", "pu, before the step")
+
+
+def _per_unit(channel: InspectedChannel) -> bool:
+    return channel.unit in (None, "pu")
+
+
+def _level(inspection: Inspection, signal: str) -> str:
+    """Return the level of a signal at rest, to be filled in where the record does not show it."""
+    channel = inspection.channel_of(signal)
+    if channel is None or not _per_unit(channel):
         return FILL_IN
-    return yaml_number(float(f"{one.level:.4g}"))
+    return yaml_number(float(f"{channel.level:.4g}"))
 
 
 def _parameters(model: Model) -> Iterator[str]:
     free = free_of(model)
     yield "parameters:"
     if len(free) < len(model.sheet):
-        yield commented("  fixed:", "stays as it is; what a fit shall find goes under free")
+        yield commented("  fixed:", "stays as it is; move to free what a fit is to find")
     for row in model.sheet:
         if row not in free:
             yield parameter_line(row, yaml_number(row.typical), "    ")
     if free:
         yield commented("  free:", "found between a tenth and ten times the typical value")
     for row in free:
-        low, high = bounds_of(row)
         yield f"    # {row.unit}, {row.meaning}"
-        values = (f"{_short(row.typical)}", f"{_short(low)}", f"{_short(high)}")
-        yield f"    {row.symbol}: {{start: {values[0]}, min: {values[1]}, max: {values[2]}}}"
+        start, low, high = map(_short, (row.typical, *bounds_of(row)))
+        yield f"    {row.symbol}: {{start: {start}, min: {low}, max: {high}}}"
 
 
 def _short(value: float) -> str:

@@ -2,13 +2,23 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from exfit.errors import ModelError
 
+FREE: Literal["free"] = "free"  # ends the row of a parameter that a bump test is fitted for
+
 
 class Parameter(NamedTuple):
-    """One row of a data sheet; ``low`` and ``high`` bound every value it may take."""
+    """One row of a data sheet; ``low`` and ``high`` bound every value it may take.
+
+    ``free`` says that a fit of a bump test finds it, unless the case says otherwise. Fixed are, as
+    a rule, limits and saturation, which a small step hardly reaches; the transducer, which is
+    known; KE and what scales the supply, which base values fix; what acts on load or in a limiter;
+    a gain behind a PID, of which the products with the PID's gains alone act; a lead and its lag
+    that typically cancel; and the rectifier's loading in a static exciter, where it moves a ceiling
+    alone.
+    """
 
     symbol: str
     typical: float
@@ -16,17 +26,22 @@ class Parameter(NamedTuple):
     low: float
     high: float
     meaning: str
+    free: bool = False
 
 
 Sheet = tuple[Parameter, ...]
-Row = tuple[str, float, str, tuple[float, float], str]
+Limits = tuple[float, float]
+Row = tuple[str, float, str, Limits, str] | tuple[str, float, str, Limits, str, Literal["free"]]
 
 
 def sheet(*rows: Row) -> Sheet:
-    """Return the data sheet of rows (symbol, typical value, unit, (low, high), meaning)."""
+    """Return the data sheet of rows (symbol, typical value, unit, (low, high), meaning).
+
+    FREE behind the meaning marks a parameter that a bump test is fitted for.
+    """
     return tuple(
-        Parameter(symbol, typical, unit, *limits, meaning)
-        for symbol, typical, unit, limits, meaning in rows
+        Parameter(symbol, typical, unit, *limits, meaning, bool(mark))
+        for symbol, typical, unit, limits, meaning, *mark in rows
     )
 
 

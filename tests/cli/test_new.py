@@ -164,7 +164,7 @@ def test_findings_of_the_record_stand_at_the_top_of_the_case(record, tmp_path):
     vt = table.content["vt"].copy()
     vt[600] += 0.1
     path = started("SEXS", Columns({**table.content, "vt": vt}, path=table.path), tmp_path)
-    assert "# Look: vt: 1 spike, at 6 s." in path.read_text()
+    assert "# note: vt: 1 spike, at 6 s." in path.read_text()
 
 
 def test_a_path_leads_from_the_case_to_the_record(record, tmp_path):

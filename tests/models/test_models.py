@@ -66,6 +66,31 @@ def test_a_sheet_names_each_parameter_once_with_unit_and_meaning(sheet):
     assert all(row.unit for row in sheet)
 
 
+def test_each_exciter_marks_what_a_bump_test_is_fitted_for(model):
+    """Of gains and times, which start above zero; never of a limit or a point of saturation."""
+    free = [row for row in MODELS[model].sheet if row.free]
+    assert free
+    for row in free:
+        assert row.typical > 0.0, row.symbol
+        assert not row.symbol.endswith(("MIN", "MAX")), row.symbol
+        assert row.symbol not in {"E1", "SE1", "E2", "SE2", "TR", "KE"}, row.symbol
+        assert row.unit == "s" or row.symbol[0] in "Kka" or "lead" in row.meaning, row.symbol
+
+
+def test_a_lead_is_fitted_only_where_its_lag_does_not_cancel_it(model):
+    rows = {row.meaning: row for row in MODELS[model].sheet}
+    for row in rows.values():
+        partner = rows.get(row.meaning.replace("lead", "lag"))
+        if "lead" in row.meaning and partner is not None and partner.typical == row.typical:
+            assert not row.free, row.symbol
+            assert not partner.free, partner.symbol
+
+
+def test_no_data_of_machines_and_stabilisers_are_fitted_unless_a_case_says_so():
+    parts = (*MACHINES.values(), *models.STABILISERS.values())
+    assert not [row.symbol for part in parts for row in part.sheet if row.free]
+
+
 def test_a_typical_value_lies_within_its_range(sheet):
     for row in sheet:
         assert row.low <= row.typical <= row.high, row.symbol

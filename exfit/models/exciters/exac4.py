@@ -15,16 +15,16 @@ modelled: UEL and OEL, which are added to vs.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, lead_lag
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import FREE, record, sheet
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
     ("VIMAX", 10.0, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
     ("VIMIN", -10.0, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
-    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
-    ("TA", 0.015, "s", (0.0, 10.0), "regulator time constant"),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", FREE),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", FREE),
+    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    ("TA", 0.015, "s", (0.0, 10.0), "regulator time constant", FREE),
     ("VRMAX", 5.64, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
     ("VRMIN", -4.53, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
     ("KC", 0.0, "pu", (0.0, 100.0), "rectifier loading factor"),

@@ -16,7 +16,7 @@ modelled: UEL and OEL, which here are added to the error.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, lead_lag, regulator_output, washout
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import FREE, record, sheet
 
 SHEET = sheet(
     ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -24,13 +24,13 @@ SHEET = sheet(
     ("VIMIN", -0.2, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
     ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
     ("TB", 1.0, "s", (0.0, 100.0), "regulator lag"),
-    ("KA", 80.0, "pu", (0.01, 100000.0), "regulator gain"),
-    ("TA", 0.05, "s", (0.0, 10.0), "regulator time constant"),
+    ("KA", 80.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    ("TA", 0.05, "s", (0.0, 10.0), "regulator time constant", FREE),
     ("VRMAX", 8.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -3.0, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
     ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
-    ("KF", 0.1, "pu", (0.0, 10.0), "stabilising feedback gain"),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant"),
+    ("KF", 0.1, "pu", (0.0, 10.0), "stabilising feedback gain", FREE),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", FREE),
 )
 
 RECORDS = (record("EXST1", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF"),)

@@ -8,11 +8,11 @@ After a unit step from rest, vt = k/a (1 - exp(-a t)).
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.sheet import sheet
+from exfit.models.sheet import FREE, sheet
 
 SHEET = sheet(
-    ("k", 4.0, "1/s", (0.000001, 1000000.0), "gain"),
-    ("a", 2.0, "1/s", (0.000001, 1000000.0), "pole"),
+    ("k", 4.0, "1/s", (0.000001, 1000000.0), "gain", FREE),
+    ("a", 2.0, "1/s", (0.000001, 1000000.0), "pole", FREE),
 )
 
 STATES = "V"

@@ -17,7 +17,7 @@ only. The standard has no OEL gate here.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller, source_voltage
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import FREE, record, sheet
 
 ALIASES = ("ESST3A",)
 
@@ -25,10 +25,10 @@ SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
     ("VIMAX", 0.2, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
     ("VIMIN", -0.2, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
-    ("KM", 7.93, "pu", (0.01, 100000.0), "gain of the field voltage loop"),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag"),
-    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("KM", 7.93, "pu", (0.01, 100000.0), "gain of the field voltage loop", FREE),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", FREE),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", FREE),
+    ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
     ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
     ("VRMAX", 10.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", -10.0, "pu", (-9999.0, 9999.0), "regulator floor"),
@@ -40,7 +40,7 @@ SHEET = sheet(
     ("XL", 0.081, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
     ("VGMAX", 5.8, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
     ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
-    ("TM", 0.4, "s", (0.001, 10.0), "time constant of the field voltage loop"),
+    ("TM", 0.4, "s", (0.001, 10.0), "time constant of the field voltage loop", FREE),
     ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
     ("VMMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
 )

@@ -16,7 +16,7 @@ only. Not modelled: UEL at the summing point, and VGMAX of later editions.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, pi, pi_rest, smaller, source_voltage
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import FREE, record, sheet
 
 ALIASES = ("ESST4B",)
 
@@ -24,13 +24,13 @@ ALIASES = ("ESST4B",)
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KPR", 2.97, "pu", (0.0, 100000.0), "proportional gain of the regulator"),
-    ("KIR", 2.97, "pu/s", (0.0, 100000.0), "integral gain of the regulator"),
+    ("KPR", 2.97, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
+    ("KIR", 2.97, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
     ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant"),
-    ("KPM", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field voltage loop"),
-    ("KIM", 0.2, "pu/s", (0.0, 100000.0), "integral gain of the field voltage loop"),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", FREE),
+    ("KPM", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field voltage loop", FREE),
+    ("KIM", 0.2, "pu/s", (0.0, 100000.0), "integral gain of the field voltage loop", FREE),
     ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
     ("VMMIN", -0.87, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
     ("KG", 0.1, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),

@@ -23,18 +23,18 @@ has the gate; while none acts they have no effect.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, limited_lag, limited_lead_lag, smaller
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import FREE, record, sheet
 
 SHEET = sheet(
     ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead"),
-    ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag"),
-    ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead"),
-    ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag"),
-    ("KR", 200.0, "pu", (0.01, 100000.0), "regulator gain"),
+    ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead", FREE),
+    ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag", FREE),
+    ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead", FREE),
+    ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag", FREE),
+    ("KR", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
     ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling, and at rated voltage"),
     ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor, and at rated voltage"),
-    ("T1", 0.004, "s", (0.0, 10.0), "firing circuit time constant"),
+    ("T1", 0.004, "s", (0.0, 10.0), "firing circuit time constant", FREE),
     ("KC", 0.004, "pu", (0.0, 100.0), "rectifier loading factor"),
 )
 

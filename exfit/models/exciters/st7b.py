@@ -27,7 +27,7 @@ test.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, smaller
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import FREE, record, sheet
 
 SHEET = sheet(
     ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -35,7 +35,7 @@ SHEET = sheet(
     ("TF", 1.0, "s", (0.0, 100.0), "lag of the measured voltage"),
     ("VMAX", 1.6, "pu", (-9999.0, 9999.0), "ceiling of the reference"),
     ("VMIN", 0.4, "pu", (-9999.0, 9999.0), "floor of the reference"),
-    ("KPA", 40.0, "pu", (0.01, 100000.0), "proportional gain"),
+    ("KPA", 40.0, "pu", (0.01, 100000.0), "proportional gain", FREE),
     ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage at rated voltage"),
     ("VRMIN", -4.5, "pu", (-9999.0, 9999.0), "floor of the field voltage at rated voltage"),
     ("KH", 1.0, "pu", (0.0, 100.0), "feedback to the high-value gate"),
@@ -43,7 +43,7 @@ SHEET = sheet(
     ("TC", 1.0, "s", (0.0, 100.0), "regulator lead"),
     ("TB", 1.0, "s", (0.0, 100.0), "regulator lag"),
     ("KIA", 1.0, "pu", (0.0, 10.0), "feedback gain, 1 for an integral"),
-    ("TIA", 3.0, "s", (0.01, 100.0), "feedback time constant, that of the integral"),
+    ("TIA", 3.0, "s", (0.01, 100.0), "feedback time constant, that of the integral", FREE),
 )
 
 RECORDS = (
