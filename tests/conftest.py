@@ -1,7 +1,9 @@
-"""What all tests share: the models that they run over, and the folder of their machine code."""
+"""What all tests share: the models that they run over, and the folder of machine code."""
 
 import os
 
+import hypothesis
+import pytest
 from oracle import EXCITERS, SATURATED, SURROUNDED
 
 from exfit.models import MODELS
@@ -10,13 +12,8 @@ from exfit.models import MODELS
 # names of PSS/E
 FEW = ("FIRST_ORDER", "DC1A", "IEEET1", "AC1A", "AC8B", "ST1A", "ST4B", "SEXS")
 
-# the arguments of tests that run over the catalogue, and all that each stands for
-OVER = {
-    "model": MODELS,  # every model
-    "exciter": EXCITERS,  # every model that stands on a machine
-    "surrounded": SURROUNDED,  # an exciter, a machine and a form of saturation
-    "saturated": SATURATED,  # a model and a form of saturation
-}
+hypothesis.settings.register_profile("few", max_examples=30, deadline=None)
+hypothesis.settings.register_profile("all", max_examples=200, deadline=None)
 
 
 def pytest_addoption(parser):
@@ -34,26 +31,53 @@ def pytest_configure(config):
     Its names are hashes of what the code is made from.
     """
     config.addinivalue_line("markers", "long: runs with --models=all only")
+    hypothesis.settings.load_profile(config.getoption("models"))
     if "EXFIT_CACHE" not in os.environ:
         os.environ["EXFIT_CACHE"] = str(config.cache.mkdir("machine_code"))
-
-
-def pytest_generate_tests(metafunc):
-    for argument in OVER.keys() & set(metafunc.fixturenames):
-        entries = [entry for entry in OVER[argument] if _runs(metafunc.config, entry)]
-        names = [entry if isinstance(entry, str) else "-".join(entry) for entry in entries]
-        metafunc.parametrize(argument, entries, ids=names, scope="session")
-
-
-def _runs(config, entry):
-    name = entry if isinstance(entry, str) else entry[0]
-    return config.getoption("models") == "all" or name in FEW
 
 
 def pytest_collection_modifyitems(config, items):
     if config.getoption("models") == "all":
         return
-    left_out = [item for item in items if item.get_closest_marker("long")]
+    left_out = [item for item in items if _is_left_out(item)]
     if left_out:
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not item.get_closest_marker("long")]
+        items[:] = [item for item in items if not _is_left_out(item)]
+
+
+def _is_left_out(item):
+    """Tell whether a test takes long, or is given a model that is not one of the few."""
+    if item.get_closest_marker("long"):
+        return True
+    given = item.callspec.params.values() if hasattr(item, "callspec") else ()
+    firsts = [value[0] if isinstance(value, tuple) and value else value for value in given]
+    names = [name for name in firsts if isinstance(name, str) and name in MODELS]
+    return any(name not in FEW for name in names)
+
+
+def joined(names):
+    return "-".join(names)
+
+
+@pytest.fixture(scope="session", params=list(MODELS))
+def model(request):
+    """Name each model of the catalogue in turn."""
+    return request.param
+
+
+@pytest.fixture(scope="session", params=EXCITERS)
+def exciter(request):
+    """Name each model of the catalogue that stands on a machine in turn."""
+    return request.param
+
+
+@pytest.fixture(scope="session", params=SURROUNDED, ids=joined)
+def surrounded(request):
+    """Name an exciter, a machine and a form of saturation in turn."""
+    return request.param
+
+
+@pytest.fixture(scope="session", params=SATURATED, ids=joined)
+def saturated(request):
+    """Name a model and a form of saturation in turn."""
+    return request.param

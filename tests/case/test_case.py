@@ -8,7 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -64,6 +64,12 @@ model: FIRST_ORDER
 plant: {type: none}
 test: {vt0: 0, duration: 5, vref: [{at: 0, step: 1}]}
 """
+
+
+@pytest.fixture(scope="module")
+def validator():
+    """Return what another program checks a case with, by the schema."""
+    return jsonschema.Draft202012Validator(json_schema())
 
 
 @pytest.fixture
@@ -718,7 +724,6 @@ def test_other_plain_scalars_are_text(text):
     assert scalar(text) == text
 
 
-@settings(max_examples=200, deadline=None)
 @given(
     st.floats(allow_nan=False, allow_infinity=False),
     st.sampled_from(["{!r}", "{:.17g}", "{:.17e}", "{:+.3f}"]),
@@ -749,10 +754,9 @@ BEYOND_THE_SCHEMA = {
 
 
 @pytest.mark.parametrize("fault", [fault for fault in FORM if fault not in BEYOND_THE_SCHEMA])
-def test_the_schema_refuses_what_the_case_refuses(fault):
+def test_the_schema_refuses_what_the_case_refuses(fault, validator):
     old, new, _, _ = FORM[fault]
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(yaml.safe_load(changed(old, new)), json_schema())
+    assert not validator.is_valid(yaml.safe_load(changed(old, new)))
 
 
 def test_every_key_of_the_schema_is_described():
@@ -882,7 +886,6 @@ def damaged_cases(draw):
     return text.encode("utf-8", "surrogatepass")
 
 
-@settings(max_examples=200, deadline=None)
 @given(damaged_cases())
 def test_no_damage_gives_anything_but_a_case_or_its_refusal(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "damaged.yaml"

@@ -117,6 +117,7 @@ def test_differences_of_what_moves_are_those_of_runs_one_by_one(everything_open)
     assert costs == pytest.approx(one_by_one, rel=1e-12)
 
 
+@pytest.mark.long
 def test_up_and_down_find_their_instants_and_sizes(tmp_path):
     content = several(
         *(

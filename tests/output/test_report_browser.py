@@ -32,7 +32,10 @@ FLAGS = (
     "--disable-sync",
 )
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-CASES = ("ac1a_typical", "ac8b_unit1", "ac8b_on_line", "several")
+CASES = (
+    "ac1a_typical",
+    *(pytest.param(n, marks=pytest.mark.long) for n in ("ac8b_unit1", "ac8b_on_line", "several")),
+)
 WIDTHS = (390, 1280)  # of a telephone and of a desk, px
 BLANK = 0.02  # spread of the pixels, of white: a page of text and lines has ten times that
 WHEEL = -400.0  # towards the reader

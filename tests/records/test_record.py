@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import savemat
 from tables import refused
@@ -452,7 +452,6 @@ def test_a_sample_of_an_array_may_be_missing_where_that_is_allowed():
     refused(lambda: Record.from_arrays([0, 1], {"time": [0, 1]}), "named time")
 
 
-@settings(max_examples=200, deadline=None)
 @given(
     at=st.integers(0, len(GOOD)),
     cut=st.integers(0, 12),

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from tables import refused
 
@@ -716,7 +716,6 @@ DIALECTS = [
 ]
 
 
-@settings(max_examples=150, deadline=None)
 @given(
     rows=st.integers(1, 4).flatmap(
         lambda width: st.lists(
@@ -752,7 +751,6 @@ def test_numbers_written_in_any_dialect_are_read_back(
     assert np.array_equal(np.stack([*columns.values()], axis=1), np.array(rows))
 
 
-@settings(max_examples=150, deadline=None)
 @given(
     instants=st.lists(st.integers(0, 10**13), min_size=2, max_size=6, unique=True).map(sorted),
     day_first=st.booleans(),
@@ -780,7 +778,6 @@ def test_instants_written_as_timestamps_are_read_back(
 LETTERS = st.text(alphabet="0123456789.,;:-/ \t\n\r\"'#%eEnaTZ+[]kVst", max_size=80)
 
 
-@settings(max_examples=400, deadline=None)
 @example(data=b'",.0\n276.875387363.\n",6...-3;77')  # separators within a quoted cell
 @example(data=b'--"\n4"Ee569\n76776E6;,315e23e;-0;-.-;"463e2E93862.e,\n\n')  # comments alone
 @given(data=st.one_of(st.binary(max_size=80), LETTERS.map(str.encode)))
@@ -801,7 +798,6 @@ def test_random_bytes_are_read_or_refused(tmp_path_factory, data):
             table.instants([name, table.names[-1]])
 
 
-@settings(max_examples=300, deadline=None)
 @given(
     text=st.sampled_from([TWO, GERMAN, STAMPED, TIMED]),
     at=st.integers(0, 120),
