@@ -57,6 +57,10 @@ CaseOrPath = Case | str | PathLike[str]
 ValuesOrResult = Values | FitResult
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
+INTERRUPTED_AFTERWARDS = (
+    "interrupted after the search: intervals, or comparisons with records that the fit never saw, "
+    "are missing"
+)
 
 
 def _ignore(_: object) -> None:
@@ -105,9 +109,15 @@ def fit(
     best, search_result = search(case, problem, method, announce, search_progress, counter)
     values = residuals.values(best.x)
     interrupted = best.stop is estimate.Stop.INTERRUPTED
-    uncertainty = None if interrupted else uncertainty_of_solution(problem, best.x, setups)
     comparisons = comparisons_of(setups, residuals, values, history)
-    validation = tuple(validation_of(case, setup, values) for setup in unseen)
+    uncertainty, validation, unfinished = None, list[Comparison](), list[str]()
+    try:
+        if not interrupted:
+            uncertainty = uncertainty_of_solution(problem, best.x, setups)
+        for setup in unseen:
+            validation.append(validation_of(case, setup, values))
+    except KeyboardInterrupt:  # what the search came to stays
+        interrupted, unfinished = True, [INTERRUPTED_AFTERWARDS]
     free = case.free()
     return FitResult(
         case=case.path,
@@ -134,8 +144,11 @@ def fit(
         simulations=counter.simulations,
         substeps=counter.substeps,
         seconds=clock.perf_counter() - began,
-        notes=tuple(fit_notes(case, residuals, best, setups, comparisons, validation, uncertainty)),
-        validation=validation,
+        notes=(
+            *fit_notes(case, residuals, best, setups, comparisons, validation, uncertainty),
+            *unfinished,
+        ),
+        validation=tuple(validation),
         versions=versions(),
         inputs=inputs(case, *setups, *unseen),
         about=case.about,

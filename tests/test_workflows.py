@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
+from exfit import workflows
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiment, build_experiments
 from exfit.fitting.system import values_of
@@ -197,6 +198,21 @@ def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):
         path.write_text(f"{text}simulation: {{step: {step}}}\n")
         told.append(any("halving the step" in note for note in fit(load_case(path)).notes))
     assert told == [True, False]
+
+
+@pytest.mark.parametrize("step", ["uncertainty_of_solution", "validation_of"])
+def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, step):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    whole = fit(case("first_order"))
+    monkeypatch.setattr(workflows, step, interrupt)
+    result = fit(case("first_order"))
+    assert result.interrupted
+    assert result.success
+    assert result.values == whole.values
+    assert result.validation == ()
+    assert workflows.INTERRUPTED_AFTERWARDS in result.notes
 
 
 def test_an_interruption_before_the_second_jacobian_is_told_without_a_note_on_redundance():

@@ -98,8 +98,11 @@ def comparisons_of(
 def minima_of(
     residuals: Residuals, search_result: estimate.MultistartResult | None
 ) -> Minima | None:
-    """Return the minima of a search from many starts, in the parameters' own values."""
-    if search_result is None:
+    """Return the minima of a search from many starts, in the parameters' own values.
+
+    None where it was interrupted before it came to one.
+    """
+    if search_result is None or not search_result.minima:
         return None
     names = [parameter.name for parameter in residuals.free]
 
@@ -144,7 +147,7 @@ def validation_of(
     """Return how fitted values do on a record that the fit never saw.
 
     What that record leaves open about itself (its instants, its levels) is fitted to it, with the
-    parameters of the unit as they are.
+    parameters of the unit as they are. Raises KeyboardInterrupt at an interruption.
     """
     limit = None if case.accept is None else case.accept.rmse
     fine = setup.with_enough_substeps(values)
@@ -159,6 +162,8 @@ def validation_of(
             method="lm-then-dgn",
             x_scale=UNIT,
         )
+        if aligned.stop is estimate.Stop.INTERRUPTED:
+            raise KeyboardInterrupt
         values = residuals.values(aligned.x)
     return compare_with_record(fine, name or setup.name, values, None, limit)
 

@@ -8,7 +8,7 @@ from threading import Event
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exfit.estimate.answer import Progress, Result, Stop
+from exfit.estimate.answer import Progress, Result, SolverIteration, Stop
 from exfit.estimate.arrays import Array
 from exfit.estimate.box import checked
 from exfit.estimate.problem import Function, exact, half_square, residuals_at
@@ -35,6 +35,9 @@ class LocalMinimum:
 class MultistartResult:
     """What a search from many starts found: the distinct ``minima``, the lowest first.
 
+    best         of the lowest minimum; after an interruption of the lowest point seen: that may be
+                 one of a refinement that was cut short, or a start that was only screened, with
+                 Stop.INTERRUPTED then; None where no point has a cost
     start_costs  (count,) of the starts, the user's own first; inf where not finite, nan where an
                  interruption came before
     end_costs    (count,) of what each start led to; nan where it was not refined
@@ -43,6 +46,7 @@ class MultistartResult:
     """
 
     minima: tuple[LocalMinimum, ...]
+    best: Result | None
     start_costs: Array
     end_costs: Array
     failed: int
@@ -96,7 +100,7 @@ def multistart(
     Source: Sobol 1967; Owen 1998 (scrambling).
     """
     points = spread(bounds, count, x0, seed)
-    stop, ends = Event(), dict[int, StartOutcome]()
+    stop, ends, cut_short = Event(), dict[int, StartOutcome](), list[Result]()
     costs = screened(until(stop, fun), points, screen, workers, watch, stop)
     order = np.argsort(costs, kind="stable")[: np.count_nonzero(np.isfinite(costs))]
     if x0 is not None and np.isfinite(costs[0]):
@@ -119,6 +123,7 @@ def multistart(
             good_enough=good_enough,
         )
         if result.stop is Stop.INTERRUPTED:
+            cut_short.append(result)
             raise KeyboardInterrupt
         ends[k] = end_of(result, nothing)
 
@@ -130,8 +135,14 @@ def multistart(
     end_costs = np.full(count, nan)
     end_costs[list(ends)] = [end.result.cost for end in ends.values()]
     failed = int(np.count_nonzero(np.isinf(costs)))
+    minima = tuple(minimum(group, fun, jac) for group in distinct(ends[k] for k in sorted(ends)))
+    candidates = [local.result for local in minima[:1]]
+    if stop.is_set() and np.isfinite(costs).any():
+        start = points[np.nanargmin(costs)]
+        candidates += [*cut_short, interrupted_at(fun, jac, bounds, start, x_scale)]
     return MultistartResult(
-        minima=tuple(minimum(group, fun, jac) for group in distinct(ends[k] for k in sorted(ends))),
+        minima=minima,
+        best=min(candidates, key=lambda result: result.cost, default=None),
         start_costs=costs,
         end_costs=end_costs,
         failed=failed,
@@ -187,6 +198,21 @@ def screened(
 def one_by_one(fun: Function, points: Array) -> list[float]:
     """Return the cost of each point."""
     return [half_square(residuals_at(fun, x)) for x in points]
+
+
+def interrupted_at(
+    fun: Function,
+    jac: Function,
+    bounds: tuple[ArrayLike, ArrayLike],
+    start: Array,
+    x_scale: ArrayLike | None,
+) -> Result:
+    """Return a start as the result of a search that was interrupted there."""
+
+    def interrupt(_: SolverIteration) -> None:
+        raise KeyboardInterrupt
+
+    return least_squares(fun, start, jac, bounds, x_scale=x_scale, callback=interrupt)
 
 
 @dataclass(frozen=True)

@@ -81,9 +81,9 @@ def search(
         x_scale=UNIT,
         good_enough=good_enough,
     )
-    if not minima.minima:
+    best = minima.best
+    if best is None:
         raise KeyboardInterrupt
-    best = minima.minima[0].result
     for line in best.history:
         announce(line)
     return best, minima

@@ -601,6 +601,41 @@ def test_ctrl_c_keeps_the_best_point_and_ends_with_3():
     assert len(columns("runs/case-fit/history.csv")["f"]) == stored["nit"] + 1
 
 
+SEARCH_INTERRUPTED = """\
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
+from exfit.cli import main
+from exfit import workflows
+fit = workflows.fit
+def interrupted(*arguments, search_progress, **more):
+    def watch(progress):
+        search_progress(progress)
+        if progress.stage == "STAGE":
+            signal.raise_signal(signal.SIGINT)
+    return fit(*arguments, search_progress=watch, **more)
+workflows.fit = interrupted
+main()
+"""
+
+
+@pytest.mark.parametrize("stage", ["screening", "refining"])
+def test_ctrl_c_in_a_search_from_many_starts_keeps_the_best_point_and_ends_with_3(stage):
+    case = case_file(changed(CASE, ("estimate", {"starts": 20})))
+    ran = program(SEARCH_INTERRUPTED.replace("STAGE", stage), "fit", case)
+    assert (ran.code, ran.err) == (3, "")
+    stored = json.loads(Path("runs/case-fit/result.json").read_text())
+    assert stored["interrupted"]
+    assert stored["cost"] <= stored["start_cost"]
+    names = {path.name for path in Path("runs/case-fit").iterdir()}
+    if stage == "screening":
+        assert "NOT CONVERGED: interrupted" in ran.out
+        assert not stored["success"]
+        assert stored["minima"] is None
+        assert {one["interval"] for one in stored["parameters"].values()} == {None}
+        assert "starts.png" not in names
+    assert names >= {"overlay.png", "convergence.png", "response.csv", "parameters.yaml"}
+
+
 def test_an_interruption_at_the_start_leaves_the_start_and_all_figures(run, monkeypatch):
     def stop(self, line):
         raise KeyboardInterrupt

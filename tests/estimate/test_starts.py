@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from known_minima import CERTIFIED
 
-from exfit.estimate import least_squares, multistart
+from exfit.estimate import Stop, least_squares, multistart
 
 # the four zeros of Himmelblau's function (Himmelblau 1972), to the digits that are known
 ZEROS = [(3.0, 2.0), (-2.805118, 3.131312), (-3.779310, -3.283186), (3.584428, -1.848126)]
@@ -213,6 +213,59 @@ def test_an_interruption_from_watch_keeps_what_is_done(stage, workers):
     assert found.unrefined == 500 - refined
     assert (refined >= 5) if stage == "refining" else (refined == 0)
     assert refined < 500
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_an_interruption_of_the_screening_keeps_the_best_start(workers):
+    def watch(progress):
+        raise KeyboardInterrupt
+
+    result = multistart(*HIMMELBLAU, 500, workers=workers, watch=watch)
+    assert result.minima == ()
+    assert result.best.stop is Stop.INTERRUPTED
+    assert result.best.cost == pytest.approx(np.nanmin(result.start_costs), rel=1e-12)
+    assert result.best.cost == pytest.approx(cost_of(himmelblau, result.best.x), rel=1e-12)
+    assert len(result.best.history) == 1
+
+
+def test_an_interruption_of_the_first_refinement_keeps_its_best_point():
+    costs, sent = [], Event()
+
+    def fun(x):
+        if costs and costs[-1] < 1.0 and not sent.is_set():
+            sent.set()
+            raise KeyboardInterrupt
+        costs.append(cost_of(himmelblau, x))
+        return himmelblau(x)
+
+    result = multistart(fun, himmelblau_slopes, BOX, 1, x0=[0.0, 0.0])
+    assert (result.minima, result.interrupted) == ((), True)
+    assert result.best.stop is Stop.INTERRUPTED
+    assert result.best.cost == pytest.approx(min(costs), rel=1e-12)
+    assert result.best.history[0].cost == pytest.approx(costs[0], rel=1e-12)
+
+
+def test_an_interruption_keeps_a_start_that_is_better_than_the_minimum_found():
+    """The one start that is refined leads to the higher valley, where the search is stopped."""
+
+    def watch(progress):
+        if progress.stage == "refining":
+            raise KeyboardInterrupt
+
+    given = (two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
+    result = multistart(*given, x0=[-1.2], refine=1, watch=watch)
+    (higher,) = result.minima
+    assert higher.x[0] < 0.0 < result.best.x[0]
+    assert higher.cost > result.best.cost
+    assert result.best.cost == pytest.approx(np.min(result.start_costs), rel=1e-12)
+    assert result.best.stop is Stop.INTERRUPTED
+
+
+def test_without_an_interruption_the_best_is_the_lowest_minimum():
+    result = multistart(*HIMMELBLAU, COUNT)
+    assert result.best is result.minima[0].result
+    nothing = multistart(lambda x: x * np.nan, himmelblau_slopes, BOX, 8)
+    assert nothing.best is None
 
 
 @pytest.fixture
