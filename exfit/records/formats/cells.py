@@ -2,7 +2,7 @@
 
 import re
 
-SHOWN = 40  # characters of a cell in a message
+CELL_SHOWN = 40  # characters of a cell in a message
 EMPTY = "an empty cell"
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*|,[0-9]+)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
 INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
@@ -12,7 +12,7 @@ THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
 
 
 def is_number(cell: str, comma: bool | None) -> bool:
-    """Tell whether a cell is a number with that decimal mark, ASCII, not 1_000; nan and inf too."""
+    """Tell whether a cell is an ASCII number with that decimal mark; nan and inf too, not 1_000."""
     cell = cell.strip()
     if NUMBER.fullmatch(cell):
         return ("." if comma else ",") not in cell
@@ -24,9 +24,9 @@ def is_missing(cell: str) -> bool:
     return MISSING.fullmatch(cell.strip()) is not None
 
 
-def shown(cell: object) -> str:
-    """Return a cell as a message shows it, text in quotes."""
-    return repr(cell.strip()[:SHOWN]) if isinstance(cell, str) else str(cell)[:SHOWN]
+def quoted(cell: object) -> str:
+    """Return a cell as messages quote it, text in quotes."""
+    return repr(cell.strip()[:CELL_SHOWN]) if isinstance(cell, str) else str(cell)[:CELL_SHOWN]
 
 
 def why_not(cell: str, comma: bool | None) -> str:
@@ -34,11 +34,11 @@ def why_not(cell: str, comma: bool | None) -> str:
     cell = cell.strip()
     if not cell:
         return EMPTY
-    what = f"{shown(cell)} is not a number"
+    what = f"{quoted(cell)} is not a number"
     if THOUSANDS.fullmatch(cell):
-        return f"{what}; thousands may not be set apart"
+        return f"{what}; thousands separators are not allowed"
     if MINUTES.fullmatch(cell):
-        return f"{what}; minutes and seconds are read with their hours only, as 0:{cell}"
+        return f"{what}; minutes and seconds need their hours, as in 0:{cell}"
     if comma and NUMBER.fullmatch(cell):
-        return f"{what} with a decimal comma, as others are"
+        return f"{what} with a decimal comma, which other cells have"
     return what

@@ -1,4 +1,4 @@
-"""A table whose columns are fetched one by one: what the readers of binary files share."""
+"""A table whose columns are fetched one by one, as all readers of binary files give it."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ SECOND = np.timedelta64(1, "s")
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """A Table over columns that are fetched when they are asked for, by position.
+    """A Table over columns that are fetched by position when they are requested.
 
     ``fetch`` returns float64, or datetime64[ns] for timestamps and timedelta64[ns] for times of
     day, nan or NaT where a sample is missing; it raises RecordError for a column of anything else.
-    ``where`` names the place of a sample, counted from 0. ``said`` are the columns of the time
-    where the kind of file itself says so, ``stamps`` those known to hold timestamps.
+    ``where`` names the place of a sample, counted from 0. ``time_columns`` are those of the time
+    where the kind of file defines them, ``stamps`` those that hold timestamps.
     """
 
     path: Path
@@ -41,18 +41,18 @@ class Columns:
     units: Mapping[str, str]
     fetch: Callable[[int], NDArray[Any]]
     where: Callable[[int], str]
-    said: tuple[str, ...] = ()
+    time_columns: tuple[str, ...] = ()
     stamps: tuple[str, ...] = ()
 
     @cached_property
     def clock(self) -> tuple[str, ...]:
         """The column that holds the time, or those of date and time; empty where none seems to."""
-        return self.said or find_clock(self.names, self.stamps, partial(increases, self))
+        return self.time_columns or find_clock(self.names, self.stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
         """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
 
-        Raises RecordError for a column that is not there or there twice, that holds no numbers or
+        Raises RecordError for a column that is missing or there twice, that holds no numbers or
         lacks one, and for columns that are not equally long.
         """
         columns = {name: self._numbers(name, name in gappy) for name in names}
@@ -65,14 +65,14 @@ class Columns:
         ``columns`` are one, or a date and a time of day; ``unit`` is that of numbers: s, ms, us or
         min. Raises RecordError where it contradicts the file, and where a sample is missing.
         """
-        found = {name: self._whole(name) for name in columns}
-        refuse_uneven(self.path, found)
+        whole = {name: self._whole(name) for name in columns}
+        refuse_uneven(self.path, whole)
         first = columns[0]
-        if len(found) == 1 and found[first].dtype.kind == "f":
-            return in_seconds(self.path, first, found[first], self.units.get(first), unit)
+        if len(whole) == 1 and whole[first].dtype.kind == "f":
+            return in_seconds(self.path, first, whole[first], self.units.get(first), unit)
         if unit is not None:
-            raise column_error(self.path, first, f"timestamps, no numbers of {unit}")
-        ticks = self._ticks(found)
+            raise column_error(self.path, first, f"timestamps, not numbers of {unit}")
+        ticks = self._ticks(whole)
         return np.asarray((ticks - ticks[0]) / SECOND, np.float64)
 
     def place(self, row: int) -> str:
@@ -93,17 +93,17 @@ class Columns:
             raise column_error(self.where(int(lost[0])), name, "the sample is missing")
         return column
 
-    def _ticks(self, found: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    def _ticks(self, columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
         """Return instants of one column, or of a date and a time of day."""
-        kinds = "".join(sorted(column.dtype.kind for column in found.values()))
+        kinds = "".join(sorted(column.dtype.kind for column in columns.values()))
         if kinds not in ("M", "m", "Mm"):
-            names = " and ".join(map(repr, found))
+            names = " and ".join(map(repr, columns))
             raise RecordError(f"{self.path}: columns {names} are not a date and a time of day")
-        first, *rest = found.values()
+        first, *rest = columns.values()
         return first + rest[0] if rest else first
 
 
-def needed(path: Path, package: str, extra: str) -> RecordError:
+def missing_package(path: Path, package: str, extra: str) -> RecordError:
     """Return the error of an optional package that is not installed."""
     return RecordError(
         f'{path}: reading it needs the package {package}: pip install "exfit[{extra}]"'
@@ -111,9 +111,9 @@ def needed(path: Path, package: str, extra: str) -> RecordError:
 
 
 def sound(path: Path, kind: str, read: Callable[[], T]) -> T:
-    """Return what a package reads of a file, or raise RecordError that it is none of its kind."""
+    """Return what a package reads of a file; raises RecordError where it is not of that kind."""
     try:
         return read()
-    except Exception as error:  # a damaged file fails in a package in many ways
+    except Exception as error:  # damaged files make a package fail in many ways
         what = str(error).partition("\n")[0] or type(error).__name__
         raise RecordError(f"{path}: not {kind}, or damaged: {what}") from None

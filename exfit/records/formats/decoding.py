@@ -1,4 +1,4 @@
-"""The bytes of a text file: which characters they are, and where its lines end."""
+"""Decode the bytes of a text file: its encoding and its line ends."""
 
 import codecs
 import io
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from exfit.errors import RecordError
 
-CHUNK = 1 << 20  # bytes checked at a time
+CHECKED_BYTES = 1 << 20  # at a time
 BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF16_LE, "utf-16-le"),
@@ -81,8 +81,8 @@ def _is_utf8(data: bytes) -> bool:
         return True
     decoder = codecs.getincrementaldecoder("utf-8")()
     try:
-        for at in range(0, len(data), CHUNK):
-            decoder.decode(data[at : at + CHUNK])
+        for at in range(0, len(data), CHECKED_BYTES):
+            decoder.decode(data[at : at + CHECKED_BYTES])
         decoder.decode(b"", final=True)
     except UnicodeDecodeError:
         return False

@@ -13,22 +13,25 @@ from pathlib import Path
 from typing import NamedTuple
 
 from exfit.errors import RecordError
-from exfit.records.formats.cells import INFINITE, NUMBER, SHOWN, is_missing
+from exfit.records.formats.cells import CELL_SHOWN, INFINITE, NUMBER, is_missing
 from exfit.records.formats.heads import is_units, names_of, units_of
 from exfit.records.formats.timestamps import is_timestamp
 
-HEAD = 300  # lines in which the first row of numbers must stand
+HEAD_LINES = 300  # in which the first row of numbers must stand
 SEPARATORS: Mapping[str | None, str] = {
-    ";": "semicolons", "\t": "tabs", ",": "commas", None: "blanks"
+    ";": "semicolons", "\t": "tabs", ",": "commas", None: "spaces"
 }  # fmt: skip
-COMMENTS = ("//", "#", "%", "!", "'", ";")
-OPTIONAL = ("", "comment")  # names of a last column that rows may leave out; LabVIEW's is Comment
+COMMENT_MARKS = ("//", "#", "%", "!", "'", ";")
+OPTIONAL_NAMES = (
+    "",
+    "comment",
+)  # names of a last column that rows may leave out; LabVIEW's is Comment
 TOKEN = re.compile(r'"[^"]*"|\S+')
 TOKEN_WITH_UNIT = re.compile(r'"[^"]*"|\S+(?:[ \t]+(?:\[[^\[\]]*\]|\([^()]*\)))?')
 
 
-class Row(NamedTuple):
-    """A line of the file, its cells without blanks around them, and whether it is a comment."""
+class TextRow(NamedTuple):
+    """A line of the file, its cells without spaces around them, and whether it is a comment."""
 
     line: int
     cells: tuple[str, ...]
@@ -61,6 +64,29 @@ class _Layout:
     named: bool
     fault: str | None = None
 
+    @property
+    def rank(self) -> tuple[bool, bool, float, bool]:
+        """How plausible the reading is; the largest rank is the best."""
+        several = self.dialect.cells > 1
+        return several, self.share == 1.0 and self.named, self.share, self.named
+
+
+class _Shape(NamedTuple):
+    """What rows of numbers have in common: how many cells, and values in which columns."""
+
+    separator: str | None
+    cells: int
+    columns: Sequence[int]
+    ends_empty: bool
+
+
+class _Heading(NamedTuple):
+    """Names and units of the columns, empty where there are none, and what is wrong with them."""
+
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    fault: str | None = None
+
 
 def is_value(cell: str) -> bool:
     """Tell whether a cell is a number, with a point or a comma, or a timestamp."""
@@ -89,97 +115,102 @@ def split_rows(
 
 def is_comment(text: str, separator: str | None) -> bool:
     """Tell whether a row, or its first cell, begins with the mark of a comment."""
-    return text.lstrip().startswith(tuple(mark for mark in COMMENTS if mark != separator))
+    return text.lstrip().startswith(tuple(mark for mark in COMMENT_MARKS if mark != separator))
 
 
 def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
     """Return how a file is written, by its first lines.
 
-    Raises RecordError where there are no rows of numbers, where their names do not go with them,
+    Raises RecordError where there are no rows of numbers, where their names do not fit them,
     and where two separators are possible.
     """
-    layouts: list[_Layout] = []
-    for separator in SEPARATORS:
-        if separator is None and any(one.dialect.separator == "\t" for one in layouts):
-            continue
-        found = _layout(path, head, separator)
-        if found is not None and (found.dialect.cells > 1 or separator is None):
-            layouts.append(found)
+    layouts = _layouts(path, head)
     if not layouts:
-        raise _nothing(path, head)
-    best = max(layouts, key=_rank)
-    like = [one for one in layouts if _rank(one) == _rank(best)]
-    if len(like) > 1:
-        one, other = (SEPARATORS[layout.dialect.separator] for layout in like[:2])
+        raise _no_numbers(path, head)
+    best = max(layouts, key=lambda layout: layout.rank)
+    equal = [layout for layout in layouts if layout.rank == best.rank]
+    if len(equal) > 1:
+        first, second = (SEPARATORS[layout.dialect.separator] for layout in equal[:2])
         line = best.dialect.first_line
-        shown = head[line - 1].strip()[:SHOWN]
-        raise RecordError(f"{path}:{line}: {one} or {other} could separate the columns: {shown!r}")
+        text = head[line - 1].strip()[:CELL_SHOWN]
+        raise RecordError(
+            f"{path}:{line}: {first} or {second} could separate the columns: {text!r}"
+        )
     if best.fault is not None:
         raise RecordError(f"{path}:{best.fault}")
     return best.dialect
 
 
-def _rank(layout: _Layout) -> tuple[bool, bool, float, bool]:
-    several = layout.dialect.cells > 1
-    return several, layout.share == 1.0 and layout.named, layout.share, layout.named
+def _layouts(path: Path, head: Sequence[str]) -> list[_Layout]:
+    """Return the readings of the head with each separator; spaces only where tabs give none."""
+    layouts: list[_Layout] = []
+    for separator in SEPARATORS:
+        if separator is None and any(layout.dialect.separator == "\t" for layout in layouts):
+            continue
+        layout = _layout(path, head, separator)
+        if layout is not None and (layout.dialect.cells > 1 or separator is None):
+            layouts.append(layout)
+    return layouts
 
 
-def _nothing(path: Path, head: Sequence[str]) -> RecordError:
-    full = [line for line in head if line.strip()]
-    if not full:
-        return RecordError(f"{path}: the file is empty: a row of column names belongs there")
-    if len(full) == 1:
-        list(split_rows(path, head, ",", 1))  # a name without end is told
+def _no_numbers(path: Path, head: Sequence[str]) -> RecordError:
+    """Return the error of a file without rows of numbers."""
+    filled = [line for line in head if line.strip()]
+    if not filled:
+        return RecordError(f"{path}: the file is empty")
+    if len(filled) == 1:
+        list(split_rows(path, head, ",", 1))  # raises for a name without end
         return RecordError(f"{path}: no samples below the column names")
     return RecordError(f"{path}: no row of numbers in its first {len(head)} lines")
 
 
 def _layout(path: Path, head: Sequence[str], separator: str | None) -> _Layout | None:
     """Return the reading of the head with a separator, None where it has no row of numbers."""
-    split = split_rows(path, head, separator, 1)
-    rows = [_row(line, cells, head[line - 1], separator) for line, cells in split]
-    rows = [row for row in rows if any(row.cells)]
+    rows = _filled_rows(path, head, separator)
     plain = [row for row in rows if not row.comment]
     if not plain:
         return None
     cells = _width(plain)
-    own = [row for row in plain if len(row.cells) == cells]
-    columns = _value_columns(own[len(own) // 2 :], cells)
-    full = [at for at, row in enumerate(rows) if _is_full(row, cells, columns)]
-    if not columns or not full:
+    columns = _value_columns(plain, cells)
+    first = next((at for at, row in enumerate(rows) if _is_full(row, cells, columns)), None)
+    if first is None:
         return None
-    first = full[0]
-    damaged = list(takewhile(lambda row: _is_partial(row, cells, columns), rows[:first][::-1]))
-    body = damaged[-1] if damaged else rows[first]
-    above = rows[: first - len(damaged)]
-    ends_empty = not rows[first].cells[-1]
-    names, units, fault = _heading(above, body, cells, columns, separator, ends_empty)
-    if ends_empty and names[-1:] == ("",):
-        names = names[:-1]
-    below = [row for row in plain if row.line >= body.line]
+    shape = _Shape(separator, cells, columns, ends_empty=not rows[first].cells[-1])
+    damaged = [*takewhile(lambda row: _is_partial(row, shape), reversed(rows[:first]))]
+    start = first - len(damaged)
+    names, units, fault = _heading(rows[:start], rows[start], shape)
+    first_line = rows[start].line
+    below = [row for row in plain if row.line >= first_line]
     dialect = Dialect(
         separator,
         has_comma(row.cells for row in below),
         names_of(names or ("",) * cells),
         units_of(names, units),
         cells,
-        body.line,
+        first_line,
     )
-    return _Layout(dialect, _share(below), bool(names), fault)
+    return _Layout(dialect, _share_of_values(below), bool(names), fault)
 
 
-def _row(line: int, cells: list[str], text: str, separator: str | None) -> Row:
+def _filled_rows(path: Path, head: Sequence[str], separator: str | None) -> list[TextRow]:
+    """Return the lines of the head that hold something."""
+    split = split_rows(path, head, separator, 1)
+    rows = [_row(line, cells, head[line - 1], separator) for line, cells in split]
+    return [row for row in rows if any(row.cells)]
+
+
+def _row(line: int, cells: list[str], text: str, separator: str | None) -> TextRow:
     """Return a line of the head, a comment without its mark."""
     comment = is_comment(cells[0], separator)
     if comment:
-        mark = next(mark for mark in COMMENTS if cells[0].lstrip().startswith(mark))
+        mark = next(mark for mark in COMMENT_MARKS if cells[0].lstrip().startswith(mark))
         text = text.lstrip().removeprefix(mark)
         first = cells[0].lstrip().removeprefix(mark)
         cells = [first, *cells[1:]] if first or separator is not None else cells[1:]
-    return Row(line, tuple(cell.strip() for cell in cells), text, comment)
+    return TextRow(line, tuple(cell.strip() for cell in cells), text, comment)
 
 
-def _width(rows: Sequence[Row]) -> int:
+def _width(rows: Sequence[TextRow]) -> int:
     """Return how many cells most rows of numbers have; there may be more rows of titles above."""
     shares = [_share_of_full(row) for row in rows]
     for least in (0.5, 0.0, -1.0):
@@ -190,19 +221,21 @@ def _width(rows: Sequence[Row]) -> int:
     return max(counts, key=lambda width: (counts[width], width == len(rows[-1].cells)))
 
 
-def _share_of_full(row: Row) -> float:
+def _share_of_full(row: TextRow) -> float:
     """Return the share of values in those cells of a row that hold something."""
     full = [is_value(cell) for cell in row.cells if not is_missing(cell)]
     return sum(full) / len(full) if full else 0.0
 
 
-def _value_columns(rows: Sequence[Row], cells: int) -> list[int]:
-    """Return the columns in which at least half of the rows have a value."""
-    counts = [sum(is_value(row.cells[at]) for row in rows) for at in range(cells)]
-    return [at for at, found in enumerate(counts) if found and 2 * found >= len(rows)]
+def _value_columns(rows: Sequence[TextRow], cells: int) -> list[int]:
+    """Return the columns in which at least half of the later rows have a value."""
+    complete = [row for row in rows if len(row.cells) == cells]
+    later = complete[len(complete) // 2 :]
+    counts = [sum(is_value(row.cells[at]) for row in later) for at in range(cells)]
+    return [at for at, count in enumerate(counts) if count and 2 * count >= len(later)]
 
 
-def _is_full(row: Row, cells: int, columns: Sequence[int]) -> bool:
+def _is_full(row: TextRow, cells: int, columns: Sequence[int]) -> bool:
     if row.comment or len(row.cells) != cells:
         return False
     values = [is_value(row.cells[at]) for at in columns]
@@ -210,55 +243,63 @@ def _is_full(row: Row, cells: int, columns: Sequence[int]) -> bool:
     return any(values) and all(value or gap for value, gap in zip(values, gaps, strict=True))
 
 
-def _is_partial(row: Row, cells: int, columns: Sequence[int]) -> bool:
+def _is_partial(row: TextRow, shape: _Shape) -> bool:
     """Tell whether a row has some of the values that belong there, or too many or too few."""
     if row.comment:
         return False
-    if len(row.cells) == cells:
-        return any(is_value(row.cells[at]) for at in columns)
+    if len(row.cells) == shape.cells:
+        return any(is_value(row.cells[at]) for at in shape.columns)
     return len(row.cells) > 1 and all(is_value(cell) or is_missing(cell) for cell in row.cells)
 
 
-def _heading(
-    above: Sequence[Row],
-    body: Row,
-    cells: int,
-    columns: Sequence[int],
-    separator: str | None,
-    ends_empty: bool,
-) -> tuple[tuple[str, ...], tuple[str, ...], str | None]:
-    """Return names and units of the columns, empty where there are none, and what is wrong."""
+def _heading(above: Sequence[TextRow], first: TextRow, shape: _Shape) -> _Heading:
+    """Return what the rows above the ``first`` row of numbers call its columns."""
     plain = [row for row in above if not row.comment]
     for rows in (plain, [row for row in above if row.comment]):
-        fitted = _fitted(rows[-1], cells, separator, ends_empty) if rows else ()
-        if not any(fitted) or any(is_value(fitted[at]) for at in columns):
-            continue
-        if len(rows) > 1 and is_units(fitted):
-            names = _fitted(rows[-2], cells, separator, ends_empty)
-            if any(name and not is_value(name) for name in names):
-                return names, fitted, None
-        return fitted, (), None
-    last = plain[-1] if plain else body
+        heading = _named(rows, shape)
+        if heading is not None:
+            return heading
+    return _Heading(fault=_fault_of_names(plain, first, shape))
+
+
+def _named(rows: Sequence[TextRow], shape: _Shape) -> _Heading | None:
+    """Return the names in the last row, or those above a row of units; None where it has none."""
+    last = _fitted(rows[-1], shape) if rows else ()
+    if not any(last) or any(is_value(last[at]) for at in shape.columns):
+        return None
+    names = last
+    units: tuple[str, ...] = ()
+    if len(rows) > 1 and is_units(last):
+        above = _fitted(rows[-2], shape)
+        if any(name and not is_value(name) for name in above):
+            names, units = above, last
+    if shape.ends_empty and not names[-1]:
+        names = names[:-1]
+    return _Heading(names, units)
+
+
+def _fault_of_names(plain: Sequence[TextRow], first: TextRow, shape: _Shape) -> str | None:
+    """Return what is wrong with the row above the numbers, None where it may be a title."""
+    last = plain[-1] if plain else first
     if len(last.cells) > 1 and not any(map(is_value, last.cells)):
-        fault = f"cells in this row: {len(body.cells)}, columns: {len(last.cells)}"
-        return (), (), f"{body.line}: {fault}"
-    if (plain and len(last.cells) == cells > 1) or not _is_full(body, cells, columns):
-        shown = ", ".join(map(repr, last.cells))[: 2 * SHOWN]
-        fault = f"neither a row of names nor one of numbers: {shown}"
-        return (), (), f"{last.line}: {fault}"
-    return (), (), None
+        return f"{first.line}: cells in this row: {len(first.cells)}, columns: {len(last.cells)}"
+    unfit = bool(plain) and len(last.cells) == shape.cells > 1
+    if unfit or not _is_full(first, shape.cells, shape.columns):
+        text = ", ".join(map(repr, last.cells))[: 2 * CELL_SHOWN]
+        return f"{last.line}: neither a row of names nor one of numbers: {text}"
+    return None
 
 
-def _fitted(row: Row, cells: int, separator: str | None, ends_empty: bool) -> tuple[str, ...]:
+def _fitted(row: TextRow, shape: _Shape) -> tuple[str, ...]:
     """Return the cells of a row as names for a row of numbers; none where they do not fit."""
-    found = row.cells
-    if separator is None and len(found) != cells:
-        found = tuple(token.strip('"').strip() for token in TOKEN_WITH_UNIT.findall(row.text))
-    if len(found) == cells + 1 and found[-1].casefold() in OPTIONAL:
-        found = found[:-1]
-    if len(found) == cells - 1 and ends_empty:
-        found = (*found, "")
-    return found if len(found) == cells else ()
+    cells = row.cells
+    if shape.separator is None and len(cells) != shape.cells:
+        cells = tuple(token.strip('"').strip() for token in TOKEN_WITH_UNIT.findall(row.text))
+    if len(cells) == shape.cells + 1 and cells[-1].casefold() in OPTIONAL_NAMES:
+        cells = cells[:-1]
+    if len(cells) == shape.cells - 1 and shape.ends_empty:
+        cells = (*cells, "")
+    return cells if len(cells) == shape.cells else ()
 
 
 def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:
@@ -270,7 +311,7 @@ def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:
     return None
 
 
-def _share(rows: Sequence[Row]) -> float:
+def _share_of_values(rows: Sequence[TextRow]) -> float:
     """Return the share of cells that are values, or say that there is none."""
     cells = [cell for row in rows for cell in row.cells]
     return sum(is_value(cell) or is_missing(cell) for cell in cells) / len(cells)

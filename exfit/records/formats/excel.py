@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.cells import shown
-from exfit.records.formats.columns import Columns, needed, sound
+from exfit.records.formats.cells import quoted
+from exfit.records.formats.columns import Columns, missing_package, sound
 from exfit.records.formats.heads import is_units, names_of, units_of
 from exfit.records.formats.table import Table, column_error, read_bytes
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Row = Sequence[Any]
 
 FEWEST_CELLS = 2  # of a row that holds a sample: the time and one signal
-STAMPS = ("timestamp", "time of day")  # kinds of cells
+STAMP_KINDS = ("timestamp", "time of day")  # kinds of cells
 WORKBOOK = "an Excel workbook"
 
 
@@ -56,23 +56,23 @@ def read_excel(path: Path, sheet: str | None = None) -> Table:
             or the package python-calamine missing.
     """
     data = read_bytes(path)
-    found = _tables(path, _workbook(path, data), sheet)
-    several = ", ".join(repr(one.name) for one in found)
-    if len(found) > 1:
-        raise RecordError(f"{path}: name one of the sheets with a table: {several}")
-    if not found:
+    tables = _tables(path, _workbook(path, data), sheet)
+    if len(tables) > 1:
+        names = ", ".join(repr(table.name) for table in tables)
+        raise RecordError(f"{path}: name one of the sheets with a table: {names}")
+    if not tables:
         where = "" if sheet is None else f" on the sheet {sheet!r}"
         raise RecordError(
             f"{path}: no table{where}: a row of names above rows of numbers, {FEWEST_CELLS} or more"
         )
-    return _columns(path, hashlib.sha256(data).hexdigest(), found[0], sheet is not None)
+    return _columns(path, hashlib.sha256(data).hexdigest(), tables[0], sheet is not None)
 
 
 def _workbook(path: Path, data: bytes) -> "CalamineWorkbook":
     try:
         from python_calamine import CalamineWorkbook
     except ImportError:
-        raise needed(path, "python-calamine", "excel") from None
+        raise missing_package(path, "python-calamine", "excel") from None
     return sound(path, WORKBOOK, lambda: CalamineWorkbook.from_filelike(io.BytesIO(data)))
 
 
@@ -81,13 +81,11 @@ def _tables(path: Path, book: "CalamineWorkbook", sheet: str | None) -> list[_Sh
     names = book.sheet_names
     if sheet is not None and sheet not in names:
         raise RecordError(f"{path}: no sheet {sheet!r}; there are {', '.join(map(repr, names))}")
-    found = []
-    for name in names if sheet is None else [sheet]:
-        rows = sound(path, WORKBOOK, partial(_rows, book, name))
-        table = _table(name, rows)
-        if table is not None:
-            found.append(table)
-    return found
+    tables = (
+        _table(name, sound(path, WORKBOOK, partial(_rows, book, name)))
+        for name in (names if sheet is None else [sheet])
+    )
+    return [table for table in tables if table is not None]
 
 
 def _rows(book: "CalamineWorkbook", name: str) -> list[Row]:
@@ -102,7 +100,7 @@ def _table(name: str, rows: Sequence[Row]) -> _Sheet | None:
             continue
         head = filled[max(place - 2, 0) : place]
         units = head.pop() if len(head) > 1 and _is_units(rows[head[-1]]) else None
-        if head and _names(rows[head[-1]], rows[at]):
+        if head and _is_head(rows[head[-1]], rows[at]):
             return _sheet(name, rows, head[-1], units, tuple(filled[place:]))
     return None
 
@@ -118,7 +116,7 @@ def _is_units(row: Row) -> bool:
     return all(isinstance(cell, str) for cell in row) and is_units(row)
 
 
-def _names(row: Row, below: Row) -> bool:
+def _is_head(row: Row, below: Row) -> bool:
     """Tell whether a row names the columns of the one below: texts over two cells or more."""
     named = [isinstance(cell, str) and cell.strip() != "" for cell in row]
     over = sum(name and cell != "" for name, cell in zip(named, below, strict=True))
@@ -132,14 +130,14 @@ def _sheet(
     places = [
         at for at in range(len(below)) if any(rows[row][at] != "" for row in (head, *samples))
     ]
-    called = names_of(rows[head])
-    names = tuple(called[at] for at in places)
-    said = () if units is None else [below[at] for at in places]
-    return _Sheet(name, rows, tuple(places), names, units_of(names, said), samples)
+    all_names = names_of(rows[head])
+    names = tuple(all_names[at] for at in places)
+    own_units = () if units is None else [below[at] for at in places]
+    return _Sheet(name, rows, tuple(places), names, units_of(names, own_units), samples)
 
 
-def _columns(path: Path, sha256: str, sheet: _Sheet, asked: bool) -> Columns:
-    place = f"{path}: sheet {sheet.name!r}, row" if asked else f"{path}: row"
+def _columns(path: Path, sha256: str, sheet: _Sheet, name_sheet: bool) -> Columns:
+    place = f"{path}: sheet {sheet.name!r}, row" if name_sheet else f"{path}: row"
 
     def where(row: int) -> str:
         return f"{place} {sheet.samples[row] + 1}"
@@ -158,7 +156,7 @@ def _columns(path: Path, sha256: str, sheet: _Sheet, asked: bool) -> Columns:
         stamps=tuple(
             name
             for name, at in zip(sheet.names, sheet.places, strict=True)
-            if _kind(sheet.rows[sheet.samples[0]][at]) in STAMPS
+            if _kind(sheet.rows[sheet.samples[0]][at]) in STAMP_KINDS
         ),
     )
 
@@ -167,15 +165,15 @@ def _column(cells: Sequence[Any], name: str, where: Callable[[int], str]) -> NDA
     """Return cells of one kind as an array: numbers, timestamps or times of day."""
     if all(type(cell) is float for cell in cells):  # as nearly always: five times as fast
         return np.array(cells)
-    kind = next((_kind(cell) for cell in cells if _kind(cell) not in ("", "text")), "number")
+    kinds = [_kind(cell) for cell in cells]
+    kind = next((kind for kind in kinds if kind not in ("", "text")), "number")
     for row, cell in enumerate(cells):
-        if _kind(cell) not in ("", kind):
-            raise column_error(where(row), name, f"{shown(cell)} is not a {kind}")
-    if kind == "number":
-        return np.array([np.nan if cell == "" else float(cell) for cell in cells])
-    if kind == "timestamp":
-        return np.array([None if cell == "" else cell for cell in cells], "datetime64[ns]")
-    return np.array([None if cell == "" else _of_day(cell) for cell in cells], "timedelta64[ns]")
+        if kinds[row] not in ("", kind):
+            raise column_error(where(row), name, f"{quoted(cell)} is not a {kind}")
+    convert, missing, dtype = ARRAYS[kind]
+    return np.array(
+        [convert(cell) if own else missing for cell, own in zip(cells, kinds, strict=True)], dtype
+    )
 
 
 def _kind(cell: Any) -> str:
@@ -194,3 +192,11 @@ def _of_day(cell: time | timedelta) -> timedelta:
     return timedelta(
         hours=cell.hour, minutes=cell.minute, seconds=cell.second, microseconds=cell.microsecond
     )
+
+
+# kind of the cells -> what converts one, what stands for a missing one, and the type of the array
+ARRAYS: dict[str, tuple[Callable[[Any], Any], Any, str]] = {
+    "number": (float, np.nan, "float64"),
+    "timestamp": (lambda stamp: stamp, None, "datetime64[ns]"),
+    "time of day": (_of_day, None, "timedelta64[ns]"),
+}

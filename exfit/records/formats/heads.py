@@ -1,8 +1,8 @@
 """The head of a table: a row of names, and perhaps a row of units below it.
 
-Names stay as the file has them, without blanks around them: ``Ut [kV]``, not ``Ut``. A column
-without a name is called by its number in the row, counted from 1; names that stand there twice are
-refused only where they are asked for.
+Names stay as the file has them, without spaces around them: ``Ut [kV]``, not ``Ut``. A column
+without a name is called by its number in the row, counted from 1; names that occur twice are
+refused only where they are requested.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,16 +18,16 @@ def names_of(cells: Sequence[str]) -> tuple[str, ...]:
 
 
 def is_units(cells: Sequence[str]) -> bool:
-    """Tell whether a row is one of units: each cell is one, or says that there is none."""
+    """Tell whether a row is one of units: each cell is a unit, or the mark that there is none."""
     return all(cell.strip() in NO_UNIT or unit_of(cell) for cell in cells)
 
 
 def units_of(names: Sequence[str], row: Sequence[str] = ()) -> dict[str, str]:
     """Return the units by column: from a row or fields of their own, else out of the names."""
-    said = dict(zip(names, map(unit_of, row), strict=False))
-    return stated({name: said.get(name) or unit_in(name) for name in names})
+    own = dict(zip(names, map(unit_of, row), strict=False))
+    return stated({name: own.get(name) or unit_in(name) for name in names})
 
 
 def stated(units: Mapping[str, str | None]) -> dict[str, str]:
-    """Return those units that say something."""
+    """Return the units of those columns that have one."""
     return {name: unit for name, unit in units.items() if unit and unit not in NO_UNIT}

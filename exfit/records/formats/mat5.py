@@ -5,17 +5,18 @@ Checked here is that the elements nest as they should (MathWorks, "MAT-File Form
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import prod
 
 HEAD = 128  # bytes before the first element; their last two tell the order of bytes
 ORDERS = {b"IM": "<", b"MI": ">"}
 MATRIX, COMPRESSED = 14, 15
 FLAGS = (6,)
-COUNTS = (5, 6)  # int32; other programs than MATLAB write uint32
+COUNTS = (5, 6)  # int32; programs other than MATLAB write uint32
 NAMES = (1, 16)  # int8; others write UTF-8
 WIDTHS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 CELL, STRUCT, OBJECT, CHARACTERS, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
+NESTED = (CELL, STRUCT, OBJECT, FUNCTION)
 NUMBERS = range(6, 16)  # classes from double to uint64
 COMPLEX = 0x0800
 DEEPEST = 50
@@ -24,7 +25,7 @@ Element = tuple[int, memoryview]
 
 
 class Damage(Exception):
-    """An element that is not what its place asks for."""
+    """An element that is not what its place requires."""
 
 
 def is_mat5(data: bytes) -> bool:
@@ -48,7 +49,7 @@ def _elements(data: memoryview, order: str, padded: bool = True) -> Iterator[Ele
     at = 0
     while at < len(data):
         if len(data) - at < 8:
-            raise Damage(f"{len(data) - at} bytes behind the last element")
+            raise Damage(f"{len(data) - at} bytes after the last element")
         kind, size = struct.unpack_from(order + "II", data, at)
         start = at + 8
         if kind >> 16:  # a small element: its size in the upper half, its content in the tag
@@ -81,35 +82,49 @@ def _check_matrix(kind: int, data: memoryview, order: str, depth: int = 0) -> No
 
 
 def _check_content(word: int, count: int, parts: Iterator[Element], order: str, depth: int) -> None:
-    """Raise Damage where what follows the name of an array is not as its class asks."""
+    """Raise Damage where what follows the name of an array is not as its class requires."""
     kind = word & 0xFF
     if kind in (STRUCT, OBJECT):
         if kind == OBJECT:
             _part(parts, NAMES)
-        width = struct.unpack(order + "i", _part(parts, COUNTS, 4))[0]
-        fields = _part(parts, NAMES)
-        if width <= 0 or len(fields) % width:
-            raise Damage(f"{len(fields)} bytes of names of {width} bytes each")
-        count *= len(fields) // width
-    if kind in (CELL, STRUCT, OBJECT, FUNCTION):
-        arrays = [*parts]
-        for inner, content in arrays:
-            _check_matrix(inner, content, order, depth + 1)
-        if len(arrays) != count and kind != FUNCTION:
-            raise Damage(f"{len(arrays)} arrays in an array of {count}")
+        count *= _count_fields(parts, order)
+    if kind in NESTED:
+        _check_nested(kind, count, parts, order, depth)
         return
     if kind == SPARSE:
         _part(parts, COUNTS)
         _part(parts, COUNTS)
     elif kind not in NUMBERS and kind != CHARACTERS:
         raise Damage(f"an array of class {kind}")
-    found = [(inner, len(content)) for inner, content in parts]
-    if len(found) != (2 if word & COMPLEX else 1):
-        raise Damage(f"{len(found)} parts of numbers in an array")
-    for inner, size in found:
+    _check_numbers(kind, count, bool(word & COMPLEX), [*parts])
+
+
+def _count_fields(parts: Iterator[Element], order: str) -> int:
+    """Return how many fields a struct has; raises Damage where their names have no even width."""
+    width: int = struct.unpack(order + "i", _part(parts, COUNTS, 4))[0]
+    names = _part(parts, NAMES)
+    if width <= 0 or len(names) % width:
+        raise Damage(f"{len(names)} bytes of names of {width} bytes each")
+    return len(names) // width
+
+
+def _check_nested(kind: int, count: int, parts: Iterator[Element], order: str, depth: int) -> None:
+    """Raise Damage where the elements of cells or structs are no arrays, or not so many."""
+    arrays = [*parts]
+    for inner, content in arrays:
+        _check_matrix(inner, content, order, depth + 1)
+    if len(arrays) != count and kind != FUNCTION:
+        raise Damage(f"{len(arrays)} arrays in an array of {count}")
+
+
+def _check_numbers(kind: int, count: int, is_complex: bool, parts: Sequence[Element]) -> None:
+    """Raise Damage where the parts of an array, real and imaginary, have not its size."""
+    if len(parts) != (2 if is_complex else 1):
+        raise Damage(f"{len(parts)} parts of numbers in an array")
+    for inner, content in parts:
         width = WIDTHS.get(inner, 0)
-        if width == 0 or (kind in NUMBERS and size != count * width):
-            raise Damage(f"{size} bytes of type {inner} in an array of {count}")
+        if width == 0 or (kind in NUMBERS and len(content) != count * width):
+            raise Damage(f"{len(content)} bytes of type {inner} in an array of {count}")
 
 
 def _part(parts: Iterator[Element], kinds: tuple[int, ...], size: int | None = None) -> memoryview:

@@ -20,7 +20,7 @@ HDF5_OFFSET = 512  # of the HDF5 signature in a file of version 7.3
 MATLAB = "a MATLAB file"
 DEEPEST = 8  # structs in structs
 
-Found = tuple[str, NDArray[Any]]
+NamedVector = tuple[str, NDArray[Any]]
 
 
 def read_mat(path: Path) -> Table:
@@ -29,8 +29,8 @@ def read_mat(path: Path) -> Table:
     Columns are called as in MATLAB: ``Ut`` for a vector, ``data(:,2)`` for a column of a matrix,
     ``s.Ut`` for a field of a struct and ``s(2).Ut`` where there are several. What Simulink saves
     as a structure with time gives ``s.time``, and each of its signals by its label: ``s.Ut``, else
-    ``s.signals(1).values``. Scalars are left out. Vectors may differ in length, as long as none are
-    asked for together that do; complex numbers and text are refused when they are asked for.
+    ``s.signals(1).values``. Scalars are left out. Vectors may differ in length, as long as those
+    requested together do not; complex numbers and text are refused when they are requested.
 
     Raises RecordError for a file that is damaged, of version 7.3 (HDF5), or without any vector.
     """
@@ -39,16 +39,18 @@ def read_mat(path: Path) -> Table:
         raise RecordError(
             f"{path}: version 7.3 (HDF5) is not read; in MATLAB: save('{path.name}', '-v7')"
         )
-    found = [one for name, value in _loaded(path, data).items() for one in _vectors(name, value)]
-    names = tuple(name for name, _ in found)
-    if not any(_is_real(values) for _, values in found):
+    vectors = [
+        vector for name, value in _loaded(path, data).items() for vector in _vectors(name, value)
+    ]
+    names = tuple(name for name, _ in vectors)
+    if not any(_is_real(values) for _, values in vectors):
         raise RecordError(f"{path}: no vector of numbers in it; objects such as timeseries are not")
     return Columns(
         path=path,
         sha256=hashlib.sha256(data).hexdigest(),
         names=names,
         units=units_of(names),
-        fetch=lambda at: _numbers(path, *found[at]),
+        fetch=lambda at: _numbers(path, *vectors[at]),
         where=lambda row: f"{path}: sample {row + 1}",
     )
 
@@ -65,7 +67,7 @@ def _loaded(path: Path, data: bytes) -> dict[str, Any]:
     return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 
-def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[Found]:
+def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[NamedVector]:
     """Yield what may be columns in a variable, by name."""
     if not isinstance(value, np.ndarray) or depth > DEEPEST:
         return
@@ -80,7 +82,7 @@ def _vectors(name: str, value: Any, depth: int = 0) -> Iterator[Found]:
         yield name, value.ravel()
 
 
-def _of_structs(name: str, value: NDArray[Any], depth: int) -> Iterator[Found]:
+def _of_structs(name: str, value: NDArray[Any], depth: int) -> Iterator[NamedVector]:
     """Yield the columns in the fields of a struct, or of several."""
     structs = value.ravel()
     for at, struct in enumerate(structs):
@@ -95,7 +97,7 @@ def _of_structs(name: str, value: NDArray[Any], depth: int) -> Iterator[Found]:
             yield from _vectors(f"{own}.signals", signals, depth + 1)
 
 
-def _signals(name: str, signals: NDArray[Any], depth: int) -> Iterator[Found]:
+def _signals(name: str, signals: NDArray[Any], depth: int) -> Iterator[NamedVector]:
     """Yield the signals of a structure with time, by their labels where they have one."""
     structs = signals.ravel()
     for at, signal in enumerate(structs):

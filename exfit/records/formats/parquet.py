@@ -1,4 +1,4 @@
-"""Parquet files, by pyarrow; a column is read when it is asked for."""
+"""Parquet files, by pyarrow; a column is read when it is requested."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats.columns import Columns, needed, sound
+from exfit.records.formats.columns import Columns, missing_package, sound
 from exfit.records.formats.heads import stated
 from exfit.records.formats.table import Table, column_error, readable
 from exfit.records.units import unit_in
@@ -32,7 +32,7 @@ def read_parquet(path: Path) -> Table:
     try:
         from pyarrow.parquet import ParquetFile
     except ImportError:
-        raise needed(path, "pyarrow", "parquet") from None
+        raise missing_package(path, "pyarrow", "parquet") from None
     sha256 = _hash(path)
 
     def opened() -> "ParquetFile":
@@ -65,11 +65,11 @@ def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":
 
 def _units(schema: "pa.Schema") -> dict[str, str]:
     return stated(
-        {field.name: _said(field.metadata or {}) or unit_in(field.name) for field in schema}
+        {field.name: _unit_of(field.metadata or {}) or unit_in(field.name) for field in schema}
     )
 
 
-def _said(metadata: Mapping[bytes, bytes]) -> str | None:
+def _unit_of(metadata: Mapping[bytes, bytes]) -> str | None:
     """Return the unit in the metadata of a column."""
     return next(
         (metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if key in metadata), None

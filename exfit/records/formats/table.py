@@ -17,7 +17,7 @@ COLUMNS_SHOWN = 30
 
 
 class Table(Protocol):
-    """Named columns, each (M,); what a fault is in, the messages call by its place in the file."""
+    """Named columns, each (M,); messages name a fault by its place in the file."""
 
     @property
     def path(self) -> Path:
@@ -57,21 +57,21 @@ class Table(Protocol):
 
 
 def position(path: Path, names: Sequence[str], name: str) -> int:
-    """Return the position of a column; raises RecordError where it is not there, or there twice."""
-    found = [at for at, known in enumerate(names) if known == name]
-    if not found:
+    """Return the position of a column; raises RecordError where it is missing or there twice."""
+    places = [at for at, other in enumerate(names) if other == name]
+    if not places:
         raise RecordError(f"{path}: no column {name!r}{_near(name, names)}")
-    if len(found) > 1:
-        places = " and ".join(str(at + 1) for at in found)
-        raise RecordError(f"{path}: {name!r} names more than one column: {places}")
-    return found[0]
+    if len(places) > 1:
+        numbers = " and ".join(str(at + 1) for at in places)
+        raise RecordError(f"{path}: {name!r} names more than one column: {numbers}")
+    return places[0]
 
 
 def listed(names: Sequence[str]) -> str:
     """Return columns as a message lists them, the first of many."""
-    known = ", ".join(map(repr, names[:COLUMNS_SHOWN]))
+    first = ", ".join(map(repr, names[:COLUMNS_SHOWN]))
     more = f" and {len(names) - COLUMNS_SHOWN} more" if len(names) > COLUMNS_SHOWN else ""
-    return known + more
+    return first + more
 
 
 def increases(table: Table, columns: Sequence[str]) -> bool:
@@ -95,7 +95,7 @@ def refuse_uneven(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
 
 
 def column_error(place: Path | str, name: str, what: str) -> RecordError:
-    """Return the error of a column, or of a cell of it: where, in which column, what was seen."""
+    """Return the error of a column or one of its cells: its place, its column, what is wrong."""
     return RecordError(f"{place}: column {name!r}: {what}")
 
 
@@ -117,9 +117,9 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def _near(name: str, names: Sequence[str]) -> str:
-    """Return which columns there are, those first that read alike."""
+    """Return a hint at similar column names, and all of them."""
     from difflib import get_close_matches
 
     near = get_close_matches(name, names)
-    meant = f"; is {' or '.join(map(repr, near))} meant" if near else ""
-    return f"{meant}; the columns are {listed(names)}"
+    hint = f"did you mean {' or '.join(map(repr, near))}? The" if near else "the"
+    return f"; {hint} columns are {listed(names)}"

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from exfit.errors import RecordError
 from exfit.records.clock import find_clock, in_seconds
-from exfit.records.formats.cells import is_missing, is_number, shown, why_not
+from exfit.records.formats.cells import is_missing, is_number, quoted, why_not
 from exfit.records.formats.decoding import Text, decoded
 from exfit.records.formats.dialect import (
-    HEAD,
+    HEAD_LINES,
     Dialect,
     find_dialect,
     has_comma,
@@ -33,12 +33,12 @@ from exfit.records.formats.timestamps import (
     seconds_since_first,
 )
 
-CHUNK = 1 << 22  # bytes looked at together
+SCANNED_BYTES = 1 << 22  # looked at together
 
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """A delimited text as a Table: what is wanted of it is read when it is asked for."""
+    """A delimited text as a Table, whose columns are read when they are requested."""
 
     path: Path
     sha256: str
@@ -47,7 +47,7 @@ class TextTable:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The columns, as the file has them without blanks around; 1, 2 ... where it has none."""
+        """The columns, as the file has them without spaces around; 1, 2 ... where it has none."""
         return self.dialect.names
 
     @property
@@ -87,7 +87,7 @@ class TextTable:
             numbers = self.numbers([name])[name]
             return in_seconds(self.path, name, numbers, self.units.get(name), unit)
         if unit is not None:
-            what = f"{shown(first[places[0]])} is a timestamp, no number of {unit}"
+            what = f"{quoted(first[places[0]])} is a timestamp, no number of {unit}"
             raise column_error(self.path, columns[0], what)
         return self._stamps(columns, places)
 
@@ -97,7 +97,7 @@ class TextTable:
         return f"{self.path}:{line}"
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
-        """Yield line number and cells of each row, one by one: slow, to say where a fault is."""
+        """Yield line number and cells of each row, one by one: slow, for the place of a fault."""
         dialect = self.dialect
         for line, cells in split_rows(
             self.path, self.text.lines(self._start), dialect.separator, dialect.first_line
@@ -124,8 +124,8 @@ class TextTable:
                 return False
         period = cells if separator is not None else cells + 1
         phase, blank = 0, True
-        for start in range(self._start, end, CHUNK):
-            letters = np.frombuffer(data, np.uint8, min(CHUNK, end - start), start)
+        for start in range(self._start, end, SCANNED_BYTES):
+            letters = np.frombuffer(data, np.uint8, min(SCANNED_BYTES, end - start), start)
             ends_line = letters == ord("\n")
             if separator is not None:
                 marks = ends_line[ends_line | (letters == ord(separator))]
@@ -170,7 +170,7 @@ class TextTable:
     def _load(
         self, places: Mapping[str, int], gappy: frozenset[str], cell_by_cell: frozenset[str] = NONE
     ) -> Array:
-        """Return the columns as NumPy's C reader reads them; where it stumbles, say where and why.
+        """Return the columns as NumPy's C reader reads them; where it fails, say where and why.
 
         Where only missing cells of the ``gappy`` columns stopped it, these are read one by one.
         """
@@ -237,7 +237,7 @@ class TextTable:
                 self._check_width(line, row)  # quoted cells may hold separators
                 for name, place in zip(columns, places, strict=True):
                     if not is_timestamp(row[place]):
-                        what = f"{shown(row[place])} is no timestamp"
+                        what = f"{quoted(row[place])} is no timestamp"
                         raise column_error(f"{self.path}:{line}", name, what) from None
             raise RecordError(f"{self.path}: {error}") from None
         try:
@@ -247,7 +247,7 @@ class TextTable:
 
 
 def read_text_table(path: Path) -> TextTable:
-    """Return the table of a delimited text file; how it is written, its first lines tell.
+    """Return the table of a delimited text file, whose dialect is found in its first lines.
 
     Raises RecordError for a file that cannot be read, is no text, has no rows of numbers, or could
     be read in two ways.
@@ -255,8 +255,8 @@ def read_text_table(path: Path) -> TextTable:
     data = read_bytes(path)
     text = decoded(path, data)
     if not text.data or text.data.isspace():
-        raise RecordError(f"{path}: the file is empty: a row of column names belongs there")
-    dialect = find_dialect(path, [*islice(text.lines(), HEAD)])
+        raise RecordError(f"{path}: the file is empty")
+    dialect = find_dialect(path, [*islice(text.lines(), HEAD_LINES)])
     table = TextTable(path, hashlib.sha256(data).hexdigest(), text, dialect)
     if next(table.rows(), None) is None:
         raise RecordError(f"{path}: no samples below the column names")

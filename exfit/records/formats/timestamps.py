@@ -17,11 +17,13 @@ Cells = NDArray[np.bytes_]
 WIDEST = 40  # characters of a timestamp; one with all digits and a zone has 38
 WIDEST_OF_TWO = 28  # of a time of day alone, or a date
 MOST_DIGITS = 12  # of a second's fraction
-CHUNK = 1 << 16  # cells read at a time
+CELLS_AT_A_TIME = 1 << 16
 DAY = 86_400  # s
-HOURS = ", hours and minutes; minutes and seconds are read with their hours only"
+HOURS_NEEDED = ", hours and minutes; minutes and seconds need their hours"
 CENTURY = 2000  # of a year in two digits
+EITHER = "dmy or mdy"  # order of a date whose first two parts may be either
 TO_ZERO = np.array([ord("0") if chr(at).isdigit() and at < 128 else at for at in range(256)], "u1")
+MONTHS_A_YEAR = 12
 MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 FORM = re.compile(
     r"[ \t]*"
@@ -39,7 +41,7 @@ FORM = re.compile(
 
 
 class StampError(ValueError):
-    """What is wrong with the timestamps of a row, counted from 0."""
+    """A fault of the timestamps in a row, counted from 0."""
 
     def __init__(self, row: int, column: int, text: str) -> None:
         super().__init__(text)
@@ -51,7 +53,7 @@ class _Stamps:
     """Cells of one kind, each part (M,): a date as three numbers, seconds of the day, fraction."""
 
     date: NDArray[np.int32] | None  # (M, 3)
-    order: str  # ymd, dmy, or ??? where the first two may be either
+    order: str  # ymd, dmy, or EITHER
     second: Whole | None
     fraction: Whole  # in units of the last of MOST_DIGITS digits
     digits: int
@@ -69,16 +71,16 @@ def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
     be two instants.
     """
     stamps = [_read(cells, column) for column in range(cells.shape[1])]
-    one = stamps[0] if len(stamps) == 1 else _joined(cells[0], *stamps)
-    second = np.zeros(len(cells), np.int64) if one.second is None else one.second
+    whole = stamps[0] if len(stamps) == 1 else _joined(cells[0], *stamps)
+    second = np.zeros(len(cells), np.int64) if whole.second is None else whole.second
     second = second - second[0]
-    if one.date is not None:
-        days = _days(one, second)
+    if whole.date is not None:
+        days = _days(whole)
         second += (days - days[0]) * DAY
     else:
         _refuse_midnight(second)
-    unit = 10**one.digits
-    fraction = one.fraction // 10 ** (MOST_DIGITS - one.digits)
+    unit = 10**whole.digits
+    fraction = whole.fraction // 10 ** (MOST_DIGITS - whole.digits)
     if np.abs(second).max() > np.iinfo(np.int64).max // (2 * unit):
         row = int(np.abs(second).argmax())
         raise StampError(row, 0, f"{second[row] / DAY:.0f} days lie between it and the first")
@@ -97,15 +99,15 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
     digits = 0
     width = cells.itemsize
     letters = all_cells.view(np.uint8)[:, column * width : (column + 1) * width]
-    for start in range(0, len(cells), CHUNK):
-        part = letters[start : start + CHUNK]
+    for start in range(0, len(cells), CELLS_AT_A_TIME):
+        part = letters[start : start + CELLS_AT_A_TIME]
         shapes = TO_ZERO[part]
         todo = np.ones(len(part), bool)
         while todo.any():
             at = int(todo.argmax())
             form = _form(column, start + at, bytes(cells[start + at]))
             if _kind(form) != kind:
-                what = f"{_shown(cells[start + at])} has another form than {_shown(cells[0])}"
+                what = f"{_quoted(cells[start + at])} has another form than {_quoted(cells[0])}"
                 raise StampError(start + at, column, f"{what}, the first")
             same = np.flatnonzero(todo & (shapes == shapes[at]).all(axis=1))
             todo[same] = False
@@ -113,12 +115,12 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
             if date is not None:
                 date[rows] = _date(values, form)
             if second is not None:
-                found, wrong = _second(values, form)
+                seconds, wrong = _second(values, form)
                 if wrong.any():
                     row = int(rows[wrong.argmax()])
-                    what = f"{_shown(cells[row])} is no time of day"
-                    raise StampError(row, column, what + ("" if form["second"] else HOURS))
-                second[rows] = found
+                    what = f"{_quoted(cells[row])} is no time of day"
+                    raise StampError(row, column, what + ("" if form["second"] else HOURS_NEEDED))
+                second[rows] = seconds
                 own = len(form["fraction"] or "")
                 fraction[rows] = _number(values, form, "fraction") * 10 ** (MOST_DIGITS - own)
                 digits = max(digits, own)
@@ -126,19 +128,19 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
 
 
 def _form(column: int, row: int, cell: bytes) -> re.Match[str]:
-    found = FORM.fullmatch(cell.decode("latin-1")) if cell.strip() else None
-    if found is None:
-        what = f"{_shown(cell)} is no timestamp" if cell.strip() else "an empty cell"
+    form = FORM.fullmatch(cell.decode("latin-1")) if cell.strip() else None
+    if form is None:
+        what = f"{_quoted(cell)} is no timestamp" if cell.strip() else "an empty cell"
         raise StampError(row, column, what)
-    return found
+    return form
 
 
 def _kind(form: re.Match[str]) -> tuple[bool, str, bool, bool, bool]:
     """Return what all timestamps of a column have in common."""
     dated = any(form[part] is not None for part in ("year", "one", "named"))
-    # a month in letters tells the order, and is the second of the three
+    # a month in letters fixes the order, and is the second of the three
     ordered = form["mark"] == "." or form["named"] is not None
-    order = "ymd" if form["year"] else "dmy" if ordered else "???" if dated else ""
+    order = "ymd" if form["year"] else "dmy" if ordered else EITHER if dated else ""
     return dated, order, form["hour"] is not None, form["half"] is not None, bool(form["zone"])
 
 
@@ -165,7 +167,7 @@ def _date(values: NDArray[np.uint8], form: re.Match[str]) -> Whole:
 
 
 def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, NDArray[np.bool_]]:
-    """Return the seconds of the day at Greenwich where a zone is given; and which are none."""
+    """Return the seconds of the day, in UTC where a zone is given, and which are none."""
     hour, minute, second = (_number(values, form, part) for part in ("hour", "minute", "second"))
     wrong = (minute > 59) | (second > 59)
     if form["half"]:
@@ -180,31 +182,39 @@ def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, NDAr
 def _joined(first: Cells, date: _Stamps, time: _Stamps) -> _Stamps:
     """Return dates and times of day of two columns as timestamps."""
     if date.date is None or date.second is not None:
-        raise StampError(0, 0, f"{_shown(first[0])} is no date without a time of day")
+        raise StampError(0, 0, f"{_quoted(first[0])} is no date without a time of day")
     if time.second is None or time.date is not None:
-        raise StampError(0, 1, f"{_shown(first[1])} is no time of day without a date")
+        raise StampError(0, 1, f"{_quoted(first[1])} is no time of day without a date")
     return _Stamps(date.date, date.order, time.second, time.fraction, time.digits)
 
 
-def _days(stamps: _Stamps, second: Whole) -> Whole:
-    """Return the days (M,) since 1970; the order of day and month is told by the dates.
-
-    Where nothing tells it and the date changes, it is the order in which every change is to the
-    next day. ``second`` is that of the day, from the first.
-    """
+def _days(stamps: _Stamps) -> Whole:
+    """Return the days (M,) since 1970."""
     assert stamps.date is not None
     year, one, two = (part.astype(np.int64) for part in stamps.date.T)
-    if stamps.order == "ymd":
-        return _valid_days(year, one, two)
-    if stamps.order == "dmy":
-        return _valid_days(year, two, one)
-    late = [int(np.argmax(part > 12)) if (part > 12).any() else -1 for part in (one, two)]
-    if late[0] >= 0:
-        return _valid_days(year, two, one)
-    if late[1] >= 0:
-        return _valid_days(year, one, two)
-    changes = np.flatnonzero(np.any(np.diff(stamps.date, axis=0) != 0, axis=1))
+    day_first = _is_day_first(stamps.order, one, two)
+    if day_first is None:
+        return _daily(stamps.date)
+    return _valid_days(year, two, one) if day_first else _valid_days(year, one, two)
+
+
+def _is_day_first(order: str, one: Whole, two: Whole) -> bool | None:
+    """Tell whether the first of two parts of the dates is the day; None where it may be either."""
+    if order != EITHER:
+        return order == "dmy"
+    if (one > MONTHS_A_YEAR).any():
+        return True
+    return False if (two > MONTHS_A_YEAR).any() else None
+
+
+def _daily(date: NDArray[np.int32]) -> Whole:
+    """Return the days of dates (M, 3) in the order in which every change is to the next day.
+
+    Raises StampError where that holds for both orders, or for none.
+    """
+    year, one, two = (part.astype(np.int64) for part in date.T)
     readings = [_valid_days(year, two, one), _valid_days(year, one, two)]
+    changes = np.flatnonzero(np.any(np.diff(date, axis=0) != 0, axis=1))
     if not changes.size:
         return readings[0]
     daily = [days for days in readings if (np.diff(days)[changes] == 1).all()]
@@ -237,5 +247,5 @@ def _refuse_midnight(second: Whole) -> None:
         )
 
 
-def _shown(cell: bytes) -> str:
+def _quoted(cell: bytes) -> str:
     return repr(cell.decode("latin-1")[:WIDEST].strip())

@@ -263,7 +263,7 @@ def test_minus_one_is_missing_in_1991_only_where_the_range_leaves_it_out(write):
 
 def test_a_column_that_is_not_there_is_refused_with_those_that_are(write):
     table = read_comtrade(write(configuration(), samples("BINARY")))
-    refused(lambda: table.numbers(["Ugem"]), "bump.cfg", "'Ugem'", "is 'Ugen' meant", "'If'")
+    refused(lambda: table.numbers(["Ugem"]), "bump.cfg", "'Ugem'", "did you mean 'Ugen'?", "'If'")
 
 
 def test_a_name_of_two_channels_is_refused_when_it_is_asked_for(write):
@@ -385,7 +385,7 @@ def test_the_file_that_is_not_beside_it_is_named(write, given):
     path = write(configuration(), GOOD).with_suffix(given)
     other = ".dat" if given == ".cfg" else ".cfg"
     path.with_suffix(other).unlink()
-    refused(lambda: read_comtrade(path), f"bump{given}", f"bump{other} is not beside it")
+    refused(lambda: read_comtrade(path), f"bump{given}", f"bump{other} is missing beside it")
 
 
 def test_two_files_that_may_belong_to_it_are_both_named(write):

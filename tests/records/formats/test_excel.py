@@ -5,6 +5,7 @@ import sys
 import zipfile
 from contextlib import suppress
 from datetime import date, datetime, time, timedelta
+from functools import partial
 
 import numpy as np
 import pytest
@@ -120,6 +121,18 @@ def test_a_sheet_needs_no_name_where_only_one_holds_a_table(book):
 
 def instants(step=timedelta(milliseconds=5)):
     return [START + at * step for at in range(3)]
+
+
+@pytest.mark.parametrize("blank", [None, "", " "])
+def test_a_blank_cell_is_a_missing_sample_in_columns_of_every_kind(book, blank):
+    rows = [[at, at.time(), float(k)] for k, at in enumerate(instants())]
+    for column in range(3):
+        rows[column][column] = blank
+    table = read_excel(book(Data=[("Timestamp", "Time of day", "Ut"), *rows]))
+    numbers = table.numbers(["Ut"], frozenset({"Ut"}))["Ut"]
+    assert numbers.tolist() == pytest.approx([0.0, 1.0, np.nan], nan_ok=True)
+    for row, name in enumerate(["Timestamp", "Time of day"]):
+        refused(partial(table.instants, [name]), f"row {row + 2}", repr(name), "missing")
 
 
 def test_timestamps_count_from_the_first(book):

@@ -549,7 +549,7 @@ FAULTS = {
     "two separators are possible": (
         form("20.09.2015 10:51:42,5", "20.09.2015 10:51:43,5"),
         "t",
-        [":1", "commas or blanks", "'20.09.2015 10:51:42,5'"],
+        [":1", "commas or spaces", "'20.09.2015 10:51:42,5'"],
     ),
     "no timestamp": (
         STAMPED.replace("10:51:42.5", "soon"),
@@ -589,7 +589,7 @@ FAULTS = {
     "minutes and seconds": (
         form("t,vt", "51:42.5,1.0", "51:43.0,1.1"),
         "t",
-        [":2", "'t'", "'51:42.5' is not a number", "with their hours only, as 0:51:42.5"],
+        [":2", "'t'", "'51:42.5' is not a number", "need their hours, as in 0:51:42.5"],
     ),
     "minutes and whole seconds": (
         form("t,vt", "51:42,1.0", "51:43,1.1"),

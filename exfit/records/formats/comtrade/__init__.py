@@ -7,7 +7,7 @@ from exfit.records.formats.columns import Columns
 from exfit.records.formats.comtrade.channels import analog_of, status_of, time_of
 from exfit.records.formats.comtrade.configuration import config_of
 from exfit.records.formats.comtrade.data import ComtradeSamples, samples_of
-from exfit.records.formats.comtrade.files import ComtradeFiles, of_file
+from exfit.records.formats.comtrade.files import ComtradeFiles, files_of
 from exfit.records.formats.heads import stated
 from exfit.records.formats.table import Array, Table
 from exfit.records.units import unit_in
@@ -24,7 +24,7 @@ def read_comtrade(path: Path) -> Table:
     The columns are called by the channels' identifiers, after ``time`` in s, 0 at the first
     sample; the instant of the trigger, which the .cfg gives too, is no part of the table. The time
     follows the sampling rates, each the distance of a sample from the one before it, and the time
-    stamps only where the .cfg gives no rate, as the standard has it. Analog channels are
+    stamps only where the .cfg gives no rate, as the standard defines it. Analog channels are
     a * x + b in the unit of the .cfg, primary or secondary as it says (PS), without the skew
     between channels; status channels are 0 or 1; missing samples are nan.
 
@@ -34,7 +34,7 @@ def read_comtrade(path: Path) -> Table:
     Raises:
         RecordError: a file that is missing, damaged or truncated, or the package comtrade missing.
     """
-    parts = of_file(path)
+    parts = files_of(path)
     config = config_of(parts)
     return _table(parts, config, samples_of(parts, config))
 
@@ -53,7 +53,7 @@ def _table(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples) -> Col
     ids = [channel.name or f"A{at + 1}" for at, channel in enumerate(analog)]
     ids += [channel.name or f"D{at + 1}" for at, channel in enumerate(status)]
     units = {name: unit_in(name) for name in ids}
-    units |= {name: one.uu for name, one in zip(ids, analog, strict=False) if one.uu}
+    units |= {name: channel.uu for name, channel in zip(ids, analog, strict=False) if channel.uu}
     return Columns(
         path=parts.path,
         sha256=parts.sha256,
@@ -61,5 +61,5 @@ def _table(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples) -> Col
         units=stated(units) | {TIME: "s"},
         fetch=fetch,
         where=parts.sample,
-        said=(TIME,),
+        time_columns=(TIME,),
     )

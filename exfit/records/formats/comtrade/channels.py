@@ -46,7 +46,7 @@ def _stamped(parts: ComtradeFiles, config: "Cfg", stamp: NDArray[Any]) -> Array:
     if config.time_base == NANOSECONDS and config.rev_year in ("", "1991", "1999"):
         raise RecordError(
             f"{parts.cfg}: its dates have ns, but the revision {config.rev_year or '1991'} counts "
-            "time stamps in µs: which of them holds is not said"
+            "time stamps in µs: the two contradict each other"
         )
     ticks = stamp.astype(np.float64)
     return np.asarray((ticks - ticks[0]) * (config.time_base * config.timemult), np.float64)

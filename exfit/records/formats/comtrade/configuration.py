@@ -3,10 +3,11 @@
 import io
 import math
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from exfit.errors import RecordError
-from exfit.records.formats.columns import needed
+from exfit.records.formats.columns import missing_package
 from exfit.records.formats.comtrade.files import ComtradeFiles
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ REVISIONS = ("", "1991", "1999", "2001", "2013")  # none stands for 1991 (-1999,
 KINDS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")
 ANALOG_CELLS = (10, 13)  # 1991, and since
 STATUS_CELLS = (3, 5)
-SLOWEST = 1e-6  # Hz: less is no sampling rate
+SLOWEST_RATE = 1e-6  # Hz: less is no sampling rate
 TEXT_SHOWN = 60
 
 _COUNTS = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*[Aa]\s*,\s*(\d{1,6})\s*[Dd]\s*")
@@ -31,14 +32,14 @@ def config_of(parts: ComtradeFiles) -> "Cfg":
     try:
         from comtrade import Cfg
     except ImportError:
-        raise needed(parts.path, "comtrade", "comtrade") from None
+        raise missing_package(parts.path, "comtrade", "comtrade") from None
     _check_lines(parts)
     text = _NO_FRACTION.sub(r"\1.0", parts.text)  # the package fails where seconds have none
     stream = io.StringIO(text)
     config = Cfg(ignore_warnings=True)
     try:
         config.read(stream)
-    except Exception as error:  # a damaged line fails in the package in many ways
+    except Exception as error:  # damaged lines make the package fail in many ways
         at = text.count("\n", 0, max(stream.tell() - 1, 0))
         line = [*text.split("\n"), ""][at][:TEXT_SHOWN]
         raise RecordError(f"{parts.line(at)}: {line!r} cannot be read: {error}") from None
@@ -49,14 +50,39 @@ def config_of(parts: ComtradeFiles) -> "Cfg":
 def _check_lines(parts: ComtradeFiles) -> None:
     """Raise RecordError where a line has too many or too few cells, which the package fills."""
     lines = parts.text.rstrip().split("\n")
-    if not lines[0].strip():
+    _check_station(parts, lines[0])
+    analog, status = _channel_counts(parts, lines)
+    total = analog + status
+    if len(lines) < total + 2:
+        raise RecordError(
+            f"{parts.line(len(lines) - 1)}: it ends here: {total} channels, {len(lines) - 2} lines"
+        )
+    kinds = [("analog", ANALOG_CELLS)] * analog + [("status", STATUS_CELLS)] * status
+    for at, (kind, allowed) in enumerate(kinds, 2):
+        count = lines[at].count(",") + 1
+        if count not in allowed:
+            raise RecordError(
+                f"{parts.line(at)}: {count} cells of an {kind} channel, not "
+                f"{' or '.join(map(str, allowed))}"
+            )
+
+
+def _check_station(parts: ComtradeFiles, line: str) -> None:
+    """Raise RecordError where the first line is not station, device and a known revision."""
+    if not line.strip():
         raise RecordError(f"{parts.line(0)}: station, device and revision are missing")
-    cells = [cell.strip() for cell in lines[0].split(",")]
+    cells = [cell.strip() for cell in line.split(",")]
     if len(cells) not in (2, 3):
-        raise RecordError(f"{parts.line(0)}: {len(cells)} cells: station, device, revision")
+        raise RecordError(
+            f"{parts.line(0)}: {len(cells)} cells in place of station, device, revision"
+        )
     if len(cells) == 3 and cells[2] not in REVISIONS:
-        known = ", ".join(REVISIONS[1:])
-        raise RecordError(f"{parts.line(0)}: revision {cells[2]!r} is none of {known}")
+        supported = ", ".join(REVISIONS[1:])
+        raise RecordError(f"{parts.line(0)}: revision {cells[2]!r} is not one of {supported}")
+
+
+def _channel_counts(parts: ComtradeFiles, lines: Sequence[str]) -> tuple[int, int]:
+    """Return the numbers of analog and status channels in the second line."""
     counts = _COUNTS.fullmatch(lines[1]) if len(lines) > 1 else None
     if counts is None:
         raise RecordError(f"{parts.line(1)}: the numbers of channels are missing, as in 6,4A,2D")
@@ -65,18 +91,7 @@ def _check_lines(parts: ComtradeFiles) -> None:
         raise RecordError(
             f"{parts.line(1)}: {total} channels, but {analog} analog and {status} status channels"
         )
-    if len(lines) < total + 2:
-        raise RecordError(
-            f"{parts.line(len(lines) - 1)}: it ends here: {total} channels, {len(lines) - 2} lines"
-        )
-    for at in range(2, total + 2):
-        kind, allowed = ("analog", ANALOG_CELLS) if at < analog + 2 else ("status", STATUS_CELLS)
-        count = lines[at].count(",") + 1
-        if count not in allowed:
-            raise RecordError(
-                f"{parts.line(at)}: {count} cells of an {kind} channel, not "
-                f"{' or '.join(map(str, allowed))}"
-            )
+    return analog, status
 
 
 def _check_config(parts: ComtradeFiles, config: "Cfg") -> None:
@@ -86,22 +101,27 @@ def _check_config(parts: ComtradeFiles, config: "Cfg") -> None:
             raise RecordError(
                 f"{parts.line(at + 2)}: channel {channel.name!r}: a = {channel.a}, b = {channel.b}"
             )
-    first = config.analog_count + config.status_count + 4
-    if not config.sample_rates:
-        raise RecordError(f"{parts.line(first - 1)}: {config.nrates} sampling rates")
-    before = 0
-    for at, (rate, last) in enumerate(config.sample_rates):
-        if rate != 0.0 and not SLOWEST < rate < math.inf:
-            raise RecordError(f"{parts.line(first + at)}: a sampling rate of {rate} Hz")
-        if last <= before:
-            raise RecordError(
-                f"{parts.line(first + at)}: the rate ends at sample {last}, not behind {before}"
-            )
-        before = last
+    _check_rates(parts, config)
     multiplier = config.timemult
     if not (math.isfinite(multiplier) and multiplier > 0.0):
         raise RecordError(f"{parts.cfg}: a time multiplier of {multiplier}")
     if config.ft.upper() not in KINDS:
         raise RecordError(
-            f"{parts.cfg}: data of the kind {config.ft!r}, which is none of {', '.join(KINDS)}"
+            f"{parts.cfg}: data of the kind {config.ft!r}, not one of {', '.join(KINDS)}"
         )
+
+
+def _check_rates(parts: ComtradeFiles, config: "Cfg") -> None:
+    """Raise RecordError where a sampling rate, or the sample at which it ends, cannot be."""
+    first = config.analog_count + config.status_count + 4
+    if not config.sample_rates:
+        raise RecordError(f"{parts.line(first - 1)}: {config.nrates} sampling rates")
+    before = 0
+    for at, (rate, last) in enumerate(config.sample_rates):
+        if rate != 0.0 and not SLOWEST_RATE < rate < math.inf:
+            raise RecordError(f"{parts.line(first + at)}: a sampling rate of {rate} Hz")
+        if last <= before:
+            raise RecordError(
+                f"{parts.line(first + at)}: the rate ends at sample {last}, not after {before}"
+            )
+        before = last

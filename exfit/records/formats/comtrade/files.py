@@ -36,7 +36,7 @@ class ComtradeFiles:
         return f"{self.dat}: sample {row + 1}"
 
 
-def of_file(path: Path) -> ComtradeFiles:
+def files_of(path: Path) -> ComtradeFiles:
     """Return the parts of a record, by its .cfg, its .dat or its .cff file.
 
     Raises RecordError for a file of another kind, and where one is missing or cut off.
@@ -44,16 +44,16 @@ def of_file(path: Path) -> ComtradeFiles:
     kind = path.suffix.lower()
     if kind not in (".cfg", ".dat", ".cff"):
         raise RecordError(f"{path}: a COMTRADE record is a .cfg with its .dat, or a .cff")
-    return _of_one_file(path) if kind == ".cff" else _of_two_files(path)
+    return _one_file(path) if kind == ".cff" else _two_files(path)
 
 
-def _of_two_files(path: Path) -> ComtradeFiles:
-    found = read_bytes(path)
+def _two_files(path: Path) -> ComtradeFiles:
+    given = read_bytes(path)
     if path.suffix.lower() == ".cfg":
-        cfg, dat, text = path, _beside(path, ".dat"), found
+        cfg, dat, text = path, _beside(path, ".dat"), given
         data = read_bytes(dat)
     else:
-        cfg, dat, data = _beside(path, ".cfg"), path, found
+        cfg, dat, data = _beside(path, ".cfg"), path, given
         text = read_bytes(cfg)
     sha256 = hashlib.sha256(text + data).hexdigest()
     return ComtradeFiles(path, cfg, _decoded(cfg, text), 1, dat, data, sha256)
@@ -61,30 +61,30 @@ def _of_two_files(path: Path) -> ComtradeFiles:
 
 def _beside(path: Path, suffix: str) -> Path:
     """Return the file of the same name with another suffix, in capitals or not."""
-    found = siblings(path, suffix)
-    if not found:
-        raise RecordError(f"{path}: {path.stem}{suffix} is not beside it")
-    if len(found) > 1:
-        names = " and ".join(one.name for one in found)
+    files = siblings(path, suffix)
+    if not files:
+        raise RecordError(f"{path}: {path.stem}{suffix} is missing beside it")
+    if len(files) > 1:
+        names = " and ".join(file.name for file in files)
         raise RecordError(f"{path}: more than one file may belong to it: {names}")
-    return found[0]
+    return files[0]
 
 
-def _of_one_file(path: Path) -> ComtradeFiles:
+def _one_file(path: Path) -> ComtradeFiles:
     """Return the parts of a .cff file (IEEE Std C37.111-2013, clause 9)."""
     whole = read_bytes(path)
     sections = {}
-    for found in _SECTION.finditer(whole):
-        sections[found[1].upper().decode()] = found
-        if found[1].upper() == b"DAT":  # what follows may be binary
+    for section in _SECTION.finditer(whole):
+        sections[section[1].upper().decode()] = section
+        if section[1].upper() == b"DAT":  # what follows may be binary
             break
     for name in ("CFG", "DAT"):
         if name not in sections:
             raise RecordError(f"{path}: no line --- file type: {name} ---")
     cfg, dat = sections["CFG"], sections["DAT"]
-    ends = [found.start() for found in sections.values() if found.start() > cfg.start()]
+    ends = [start for section in sections.values() if (start := section.start()) > cfg.start()]
     if not ends:
-        raise RecordError(f"{path}: the data stand before the configuration")
+        raise RecordError(f"{path}: the data are before the configuration")
     data = whole[dat.end() :]
     if dat[3] is not None:
         data = _cut(path, data, int(dat[3]))
