@@ -12,8 +12,8 @@ from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.nuisance import prefix_of
 from exfit.records.record import Record
+from exfit.records.steps import INSTANT_WITHIN
 
-INSTANT_WITHIN = 0.25  # s: how far the instant may be from where a record shows the step
 SIZE_WITHIN = 0.5  # of the size that a record shows: how far the size may be from it
 
 

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 COARSE_SAMPLES = 20_000  # in which the steps of a longer record are first looked for
 COARSE_AROUND_STEP = 50  # of these, before and after a step, from which its instant is then taken
 SAME_STEP = 0.25  # s: channels may show one step this far apart, beside their standard errors
+INSTANT_WITHIN = 0.25  # s: how far the instant may be from where a record shows the step
 SAME_STEP_ERRORS = 3.0  # these standard errors
 # of a rise: its shape may move the instant by up to a tenth, equally likely each way
 SHAPE_ERROR = 0.1 * 3.0**-0.5
