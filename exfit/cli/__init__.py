@@ -1,4 +1,4 @@
-"""The command line: reads arguments, calls study, shows what comes back; it computes nothing.
+"""The command line: reads arguments, calls the workflows, shows their results; it computes nothing.
 
 Everything but click is imported in the command that needs it, so that help appears at once.
 """
@@ -12,12 +12,13 @@ import click
 from exfit.cli.catalogue import models, schema
 from exfit.cli.comparing import compare
 from exfit.cli.exchange import export, import_
-from exfit.cli.fitting import check, fit, simulate, validate
-from exfit.cli.knowing import identify, profile
+from exfit.cli.fitting import check, fit
 from exfit.cli.options import Interruption, Refusal
 from exfit.cli.records import inspect_, new
 from exfit.cli.reporting import report
+from exfit.cli.responses import simulate, validate
 from exfit.cli.streams import unfailing_output
+from exfit.cli.uncertainty import identify, profile
 from exfit.errors import ExfitError
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
@@ -52,7 +53,7 @@ class Commands(click.Group):
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="exfit")
 def main() -> None:
-    """Find the parameters of a generator's excitation system from a recorded bump test."""
+    """Identify the parameters of a generator's excitation system from a recorded bump test."""
 
 
 OF_RECORDS = (inspect_, new)

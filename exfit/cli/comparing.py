@@ -5,17 +5,15 @@ from pathlib import Path
 import click
 
 from exfit.cli.options import (
-    json_option,
-    output_option,
-    plots_option,
+    Output,
+    output_options,
     print_json,
-    quiet_option,
     warn,
 )
 from exfit.errors import ExfitError
 
 
-@click.command(short_help="Compare two responses, whatever program they are from.")
+@click.command(short_help="Compare two responses, from any program.")
 @click.argument("a", type=click.Path(path_type=Path))
 @click.argument("b", type=click.Path(path_type=Path))
 @click.argument("record", type=click.Path(path_type=Path), required=False)
@@ -30,10 +28,7 @@ from exfit.errors import ExfitError
     "--shift", type=float, default=0.0, metavar="S", help="Seconds added to the time of B."
 )
 @click.option("--step", "step_at", type=float, metavar="S", help="Instant of the step, s.")
-@output_option
-@plots_option
-@quiet_option
-@json_option
+@output_options
 def compare(
     a: Path,
     b: Path,
@@ -42,42 +37,38 @@ def compare(
     time: str | None,
     shift: float,
     step_at: float | None,
-    output: Path | None,
-    plots: bool,
-    quiet: bool,
-    as_json: bool,
+    output: Output,
 ) -> None:
     """Compare the responses A and B, and both with RECORD.
 
     Each is the folder or the result.json of a fit or a simulation, or a CSV file of any program.
-    Compared are vt, efd, ifd, p and q where A and B have them, over the time that both cover, on
-    the finer of their clocks. Writes compare.json, compare.csv and compare.png to runs/compare, or
+    The signals that A and B have are compared over the time that both cover, on the finer of their
+    clocks. Writes compare.json, compare.csv and compare.png to runs/compare, or
     to DIR.
     """
     from exfit.analysis.comparison import ColumnChoice
     from exfit.analysis.comparison import compare as compared
     from exfit.output import run_folder
 
-    folder = output or Path("runs") / "compare"
-    run_folder.refuse_unwritable(folder)
-    found = compared(a, b, record, ColumnChoice(_columns(columns), time), shift, step_at)
-    warn(run_folder.write_agreement(found, folder, plots))
-    if as_json:
-        print_json(found.as_json())
-    elif not quiet:
+    folder = output.folder("compare")
+    agreement = compared(a, b, record, ColumnChoice(_columns(columns), time), shift, step_at)
+    warn(run_folder.write_agreement(agreement, folder, output.figures))
+    if output.as_json:
+        print_json(agreement.as_json())
+    elif output.shown:
         from exfit.output import terminal
 
         console = terminal.console()
-        terminal.agreement(console, found)
+        terminal.agreement(console, agreement)
         terminal.written(console, folder)
 
 
 def _columns(texts: tuple[str, ...]) -> dict[str, str]:
     """Return the columns of --columns vt=VOLT by signal; raises ExfitError for other text."""
-    found = {}
+    columns = {}
     for text in texts:
         signal, given, column = (part.strip() for part in text.partition("="))
         if not (signal and given and column):
             raise ExfitError(f"--columns {text}: not of the form vt=VOLT")
-        found[signal] = column
-    return found
+        columns[signal] = column
+    return columns

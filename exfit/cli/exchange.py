@@ -9,7 +9,7 @@ from exfit.cli.options import file_option, force_option, refuse_existing, write_
 BUSES = click.IntRange(1, 999_999)
 
 
-@click.command("import", short_help="Make a case of a PSS/E dynamics file.")
+@click.command("import", short_help="Make a case from a PSS/E dynamics file.")
 @click.argument("unit", type=click.Path(path_type=Path))
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit.")
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
@@ -18,7 +18,7 @@ BUSES = click.IntRange(1, 999_999)
 def import_(
     unit: Path, bus: int | None, machine_id: str | None, output: Path | None, force: bool
 ) -> None:
-    """Make a case of the machine, exciter and stabiliser in UNIT, a PSS/E .dyr file.
+    """Make a case from the machine, exciter and stabiliser in UNIT, a PSS/E .dyr file.
 
     The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
     holds several units, --bus and --id choose one.
@@ -68,8 +68,8 @@ def export(
 ) -> None:
     """Write the machine, exciter and stabiliser of RESULT as PSS/E records.
 
-    RESULT is the result.json of a fit, or the folder that holds it. What a record cannot hold, or
-    what is not sure about it, is told.
+    RESULT is the result.json of a fit, or the folder that holds it. What a PSS/E record cannot
+    hold, and what is uncertain, is reported.
     """
     from exfit.exchange.psse.export import export as exported
 

@@ -1,7 +1,9 @@
 """What several commands share: their options, and small steps on the way."""
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,14 +17,6 @@ if TYPE_CHECKING:
 NOT_CONVERGED = 3
 
 case_argument = click.argument("case", type=click.Path(path_type=Path))
-output_option = click.option(
-    "-o", "--output", type=click.Path(path_type=Path), metavar="DIR", help="Folder for the files."
-)
-plots_option = click.option("--plots/--no-plots", default=True, help="Draw figures (default: yes).")
-quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else."
-)
 parameters_option = click.option(
     "--parameters",
     type=click.Path(path_type=Path),
@@ -37,6 +31,59 @@ file_option = click.option(
     help="File to write; without it, to the terminal.",
 )
 force_option = click.option("--force", is_flag=True, help="Write over a file that exists.")
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where a command leaves its files, and what it prints: tables, JSON or nothing."""
+
+    given: Path | None
+    figures: bool
+    quiet: bool
+    as_json: bool
+
+    @property
+    def shown(self) -> bool:
+        """Whether tables are printed."""
+        return not (self.quiet or self.as_json)
+
+    def folder(self, default: str) -> Path:
+        """Return the folder for the files, by default one in runs.
+
+        Raises ExfitError where it cannot be written: before a run is spent on it.
+        """
+        from exfit.output import run_folder
+
+        folder = self.given or Path("runs") / default
+        run_folder.refuse_unwritable(folder)
+        return folder
+
+
+def file_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command an ``output`` of -o, --plots and -q."""
+
+    @click.option(
+        "-o",
+        "--output",
+        type=click.Path(path_type=Path),
+        metavar="DIR",
+        help="Folder for the files.",
+    )
+    @click.option("--plots/--no-plots", default=True, help="Draw figures (default: yes).")
+    @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+    @wraps(command)
+    def with_output(
+        output: Path | None, plots: bool, quiet: bool, as_json: bool = False, **others: Any
+    ) -> None:
+        command(output=Output(output, plots, quiet, as_json), **others)
+
+    return with_output
+
+
+def output_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command an ``output`` of -o, --plots, -q and --json."""
+    text = "Print the result as JSON and nothing else."
+    return file_options(click.option("--json", "as_json", is_flag=True, help=text)(command))
 
 
 class Refusal(click.ClickException):
@@ -97,11 +144,6 @@ def warn(texts: Iterable[str]) -> None:
     """Write what went wrong beside a result to standard error."""
     for text in texts:
         click.echo(f"Warning: {text}", err=True)
-
-
-def folder_of(case: Path, command: str) -> Path:
-    """Return where a command leaves its files unless it is told."""
-    return Path("runs") / f"{case.stem}-{command}"
 
 
 def assignments(texts: tuple[str, ...], option: str) -> dict[str, float]:

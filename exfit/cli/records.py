@@ -7,13 +7,11 @@ import click
 
 from exfit.cli import completion
 from exfit.cli.options import (
+    Output,
     file_option,
     force_option,
-    json_option,
-    output_option,
-    plots_option,
+    output_options,
     print_json,
-    quiet_option,
     refuse_existing,
     warn,
     write_text,
@@ -27,62 +25,57 @@ time_option = click.option(
     "clock",
     multiple=True,
     metavar="COLUMN",
-    help="Column of the time; given twice, of date and time. Default: as the file tells.",
+    help="Column of the time; given twice, of date and time. Default: as the file shows.",
 )
 unit_option = click.option(
     "--time-unit",
     "unit",
     type=click.Choice(("s", "ms", "us", "min")),
-    help="Unit of the time's numbers. Default: as the file tells, else s.",
+    help="Unit of the time's numbers. Default: as the file says, else s.",
 )
 sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel file.")
 
 
-@click.command("inspect", short_help="Show what a recorder's file holds.")
+@click.command("inspect", short_help="Show the content of a recorder's file.")
 @click.argument("file", type=click.Path(path_type=Path))
 @time_option
 @unit_option
 @sheet_option
-@output_option
-@plots_option
-@quiet_option
-@json_option
+@output_options
 def inspect_(
     file: Path,
     clock: tuple[str, ...],
     unit: str | None,
     sheet: str | None,
-    output: Path | None,
-    plots: bool,
-    quiet: bool,
-    as_json: bool,
+    output: Output,
 ) -> None:
-    """Show what FILE, a record, holds: channels, sampling, gaps, noise, spikes, steps.
+    """Show the content of FILE, a record: channels, sampling, gaps, noise, spikes, steps.
 
-    Suggests the record and test sections of a case; what is guessed is marked. Writes inspect.json
+    Suggests the record and test sections of a case; guesses are marked. Writes inspect.json
     and inspect.png to runs/FILE-inspect, or to DIR.
     """
     from exfit.case.suggestion import bump_section, record_section
     from exfit.output import run_folder
 
     # files of one record in several formats have one stem
-    folder = output or Path("runs") / f"{file.name}-inspect"
-    run_folder.refuse_unwritable(folder)
-    found = _inspected(file, clock, unit, sheet)
-    warn(run_folder.write_inspection(found, folder, plots))
-    if as_json:
-        print_json(found.as_json())
-    elif not quiet:
+    folder = output.folder(f"{file.name}-inspect")
+    inspection = _inspected(file, clock, unit, sheet)
+    warn(run_folder.write_inspection(inspection, folder, output.figures))
+    if output.as_json:
+        print_json(inspection.as_json())
+    elif output.shown:
         from exfit.output import terminal
 
         console = terminal.console()
         terminal.inspection(
-            console, found, [*record_section(found, file.as_posix()), *bump_section(found)]
+            console,
+            inspection,
+            [*record_section(inspection, file.as_posix()), *bump_section(inspection)],
         )
         terminal.written(console, folder)
 
 
-@click.command(short_help="Make a case of a model and a record to start from.")
+@click.command(short_help="Make a case from a model and a record.")
 @click.option(
     "--model",
     required=True,
@@ -120,10 +113,10 @@ def new(
     output: Path | None,
     force: bool,
 ) -> None:
-    """Make a commented case of a model and a record: steps found, typical values as starts.
+    """Make a commented case from a model and a record: detected steps, typical values as starts.
 
-    Gains and time constants are free; see `exfit models NAME` for what is typical. What the record
-    does not tell is left to be filled in, and the case is refused until it is.
+    Gains and time constants are free; `exfit models NAME` shows the typical values. What the record
+    does not show is left to be filled in, and the case is refused until it is.
     """
     from exfit.case.starting_case import starting_case
     from exfit.case.suggestion import relative

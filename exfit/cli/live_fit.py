@@ -1,4 +1,4 @@
-"""Fits in sight: one, or one after the other as the files of a case change."""
+"""Fits shown while they run: one, or one after the other as the files of a case change."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from exfit.results.model import FitResult
 
 
-def fit_in_sight(
+def fit_live(
     case: "Case",
     folder: Path,
     strategy: str | None,
@@ -59,7 +59,7 @@ def fit_again_and_again(case: Path, folder: Path, strategy: str | None, plots: b
         while True:
             stamps = stamps_of(case)
             try:
-                before = fit_in_sight(load(case), folder, strategy, plots, before)
+                before = fit_live(load(case), folder, strategy, plots, before)
             except ExfitError as fault:
                 Refusal(str(fault)).show()
             if before is not None and before.interrupted:

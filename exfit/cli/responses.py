@@ -1,0 +1,108 @@
+"""The commands simulate and validate."""
+
+from pathlib import Path
+
+import click
+
+from exfit.cli import completion
+from exfit.cli.options import (
+    NOT_CONVERGED,
+    Output,
+    assignments,
+    case_argument,
+    file_options,
+    load,
+    output_options,
+    parameters_option,
+    print_json,
+    warn,
+)
+
+
+@click.command()
+@case_argument
+@click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="KA=400",
+    help="Value of a parameter.",
+    shell_complete=completion.assigned_parameters,
+)
+@parameters_option
+@file_options
+def simulate(
+    case: Path,
+    changes: tuple[str, ...],
+    parameters: Path | None,
+    output: Output,
+) -> None:
+    """Simulate CASE at its start values.
+
+    Writes response.csv (t, vref, vt, efd, ifd and the states) and figures to runs/CASE-simulate, or
+    to DIR. --set overrides --parameters, and both override the case; a parameter of the machine
+    is named as in --set machine.Tpd0=6.
+    """
+    from exfit import workflows
+    from exfit.fitting.overrides import changed_values, read_parameters
+    from exfit.output import run_folder
+
+    loaded = load(case)
+    folder = output.folder(f"{case.stem}-simulate")
+    values = read_parameters(loaded, parameters) if parameters else {}
+    values |= changed_values(loaded, assignments(changes, "--set"), "--set")
+    simulation = workflows.simulate(loaded, values)
+    warn(run_folder.write_simulation(simulation, case.stem, folder, output.figures))
+    if output.shown:
+        from exfit.output import terminal
+
+        console = terminal.console()
+        if simulation.comparison is not None:
+            terminal.comparisons(console, [simulation.comparison])
+        console.print(f"sub-steps: {simulation.response.substeps}")
+        terminal.notes(console, simulation.notes)
+        terminal.written(console, folder)
+
+
+@click.command(short_help="Compare fitted values with records that were not fitted.")
+@case_argument
+@parameters_option
+@click.option(
+    "--record",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Record in place of the first under validate.",
+)
+@output_options
+def validate(
+    case: Path,
+    parameters: Path | None,
+    record: Path | None,
+    output: Output,
+) -> None:
+    """Compare fitted values with the records of CASE that were not fitted.
+
+    The values are those of the last fit of the case, or of --parameters. Writes validation.json,
+    samples and overlays to runs/CASE-validate, or to DIR.
+    """
+    from exfit import workflows
+    from exfit.fitting.overrides import read_parameters
+    from exfit.output import run_folder
+
+    loaded = load(case)
+    folder = output.folder(f"{case.stem}-validate")
+    source = parameters or run_folder.last_fit(case)
+    comparisons = workflows.validate(loaded, read_parameters(loaded, source), record)
+    warn(run_folder.write_validation(comparisons, folder, output.figures))
+    if output.as_json:
+        print_json({"validation": [comparison.as_json() for comparison in comparisons]})
+    elif output.shown:
+        from exfit.output import terminal
+
+        console = terminal.console()
+        console.print(f"values of {parameters or 'the last fit'}", soft_wrap=True, markup=False)
+        terminal.comparisons(console, comparisons)
+        console.print()
+        terminal.written(console, folder)
+    if not all(comparison.accepted for comparison in comparisons):
+        raise SystemExit(NOT_CONVERGED)
