@@ -1,0 +1,61 @@
+"""Count what is left of a folder with a former fit when a signal meets the next one.
+
+Run it as ``python tests/studies/interrupts.py [INTERRUPTIONS [KILLS]]``. Each run fits
+configs/first_order.yaml, figures included, in a process of its own, into a copy of a folder that
+holds another fit; SIGINT or SIGKILL meets it at a random moment between its start and its end. A
+quarter as many meet it in the few milliseconds in which it writes its numbers. Where SIGKILL left
+temporary files, the next fit runs there to its end, and those that it leaves are counted.
+"""
+
+import random
+import signal
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+
+from interrupted_runs import CASE, TEMPORARY, fit, fit_before, met_by
+
+INTERRUPTIONS, KILLS, SEED = 200, 100, 2026
+WRITING = 0.06  # s: about how long the numbers take
+LATE = 1.1  # of the time of a fit: some signals come too late
+
+
+def study(number, count, while_writing, before, seconds, place):
+    """Send a signal to so many fits and print what they left."""
+    rng, counts = random.Random(f"{SEED} {number} {while_writing}"), Counter()
+    for run in range(count):
+        moment = rng.uniform(0.0, WRITING if while_writing else LATE * seconds)
+        folder = place / f"{number}-{while_writing}-{run}"
+        outcome = met_by(number, moment, before, folder, while_writing)
+        counts[f"result {outcome.result}"] += 1
+        counts[f"exit code {outcome.code}"] += 1
+        counts["numbers of two runs"] += not outcome.together
+        counts["with temporary files"] += outcome.temporary > 0
+        counts["tracebacks"] += "Traceback" in outcome.errors
+        if number == signal.SIGKILL and outcome.temporary:
+            fit(CASE, folder).communicate()
+            counts["with temporary files after the next fit"] += any(folder.glob(TEMPORARY))
+    where = "while the numbers are written" if while_writing else "at any moment"
+    print(f"{count} {signal.Signals(number).name} {where}")
+    for text, times in sorted(counts.items()):
+        print(f"  {times:4} {text}")
+    sys.stdout.flush()
+
+
+def main():
+    """Print what is left after interruptions and kills."""
+    given = [int(text) for text in sys.argv[1:]]
+    interruptions, kills = (*given, *(INTERRUPTIONS, KILLS)[len(given) :])
+    with tempfile.TemporaryDirectory() as place:
+        before, seconds = fit_before(Path(place))
+        print(f"a fit with figures takes {seconds:.2f} s")
+        for number, count in ((signal.SIGINT, interruptions), (signal.SIGKILL, kills)):
+            for while_writing, runs in ((False, count), (True, count // 4)):
+                study(number, runs, while_writing, before, seconds, Path(place))
+
+
+if __name__ == "__main__":
+    main()
