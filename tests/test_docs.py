@@ -20,6 +20,7 @@ from exfit.fitting.recordings import measured
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import run_folder
+from exfit.util.strategies import STRATEGIES
 
 DOCS = ROOT / "docs"
 PAGES = {
@@ -250,6 +251,11 @@ def test_a_fit_writes_the_files_of_the_table_and_no_others(tmp_path):
     assert {path.name for path in (tmp_path / "run").iterdir()} == {
         name.replace("NAME", validation.name) for name in names
     }
+
+
+def test_the_page_of_the_case_file_explains_each_strategy_as_the_help_does():
+    rows = [f"| `{name}` | {words} |" for name, words in STRATEGIES.items()]
+    assert "\n".join(rows) in PAGES["docs/case_file.md"]
 
 
 def test_the_tables_of_keys_are_those_of_the_schema():

@@ -17,13 +17,15 @@ from exfit.plants.parts import (
     state_of,
     symbols,
 )
-from exfit.plants.plant import PlantKind, present
+from exfit.plants.plant import PlantKind, compared, present
+
+OUTPUTS = ("vref", "vt")
 
 
 @cache
 def alone(model: Model) -> System:
     """Return a model without a plant: its output is ``vt``."""
-    refuse_taken(model, ("vref", "vt"))
+    refuse_taken(model, OUTPUTS)
 
     def rest(p: Signals) -> Rest:
         u = exciter_inputs(vt=p[VT0], ifd=0.0)
@@ -41,7 +43,7 @@ def alone(model: Model) -> System:
         setpoints=("vref", *model.setpoints),
         states=model.states,
         inputs=("vref",),
-        outputs=("vref", "vt", *model.states),
+        outputs=(*OUTPUTS, *model.states),
         time_constants=tuple(seconds("", model.sheet)),
         rest=rest,
         motion=equations,
@@ -53,7 +55,7 @@ ALONE = PlantKind(
     title="the model alone",
     needs=("exciter",),
     events=("vref",),
-    signals=("vt",),
+    signals=compared(OUTPUTS),
     build=lambda equipment: alone(present(equipment.exciter)),
     per_unit=False,
 )

@@ -8,12 +8,12 @@ PHASES: Mapping[str, str] = {
     "gn": "Gauss-Newton",
 }
 STRATEGIES: Mapping[str, str] = {
-    "gn": "Gauss-Newton, full steps only",
-    "dgn": "damped Gauss-Newton",
+    "gn": "Gauss-Newton with full steps only",
+    "dgn": "damped Gauss-Newton, each step shortened until Armijo's rule holds",
     "lm": "Levenberg-Marquardt",
-    "lm-then-dgn": "lm as far as the valley, dgn along it, lm again where a kink stalls that",
-    "auto": "dgn, and where that is not good enough lm-then-dgn from the start: the better one",
-    "robust": "gn as long as it works, then lm",
+    "lm-then-dgn": "lm to reach a better start, then dgn, and lm again where that stalls",
+    "auto": "dgn, and where its match is poor lm-then-dgn from the start, the better of both",
+    "robust": "gn while it makes progress, then lm",
 }
 DEFAULT_STRATEGY = "lm-then-dgn"
 EXPLAINED = "; ".join(f"{name}: {words}" for name, words in STRATEGIES.items())

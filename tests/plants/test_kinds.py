@@ -1,5 +1,7 @@
 """The table of plants, and that whoever uses it covers every kind."""
 
+from pathlib import Path
+
 import pytest
 from pydantic import TypeAdapter
 
@@ -64,3 +66,9 @@ def test_all_events_are_those_of_some_kind():
 
 def test_a_kind_has_words_for_a_report(kind):
     assert kind.title
+
+
+def test_the_page_of_the_plants_lists_each_kind_with_its_signals(kind):
+    page = (Path(__file__).parents[2] / "docs" / "plants.md").read_text(encoding="utf-8")
+    row = next(line for line in page.splitlines() if line.startswith(f"| `{kind.name}` |"))
+    assert row.endswith(f"| {', '.join(kind.compared)} |")
