@@ -145,7 +145,7 @@ DRAWN = (
 )  # fmt: skip
 
 
-class Still(terminal.Watch):
+class Still(terminal.LiveIterations):
     """Shows the iterations of a fit once, when it is done."""
 
     @contextmanager
@@ -190,7 +190,7 @@ def ran(run: Run) -> bytes:
     with ExitStack() as changes:
         changes.enter_context(patch.object(plots.style, "DPI", DPI))
         changes.enter_context(patch.object(terminal, "console", lambda: console))
-        changes.enter_context(patch.object(terminal, "Watch", Still))
+        changes.enter_context(patch.object(terminal, "LiveIterations", Still))
         changes.enter_context(patch.object(terminal, "fit", in_no_time(terminal.fit)))
         for name in DRAWN:
             if f"{name}.png" not in run.figures:

@@ -35,16 +35,16 @@ def free_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> 
     from exfit.case.peek import free_of
 
     given = ctx.params.get("parameters") or ()
-    found = () if (case := _case(ctx)) is None else free_of(case)
-    return _beginning((name for name in found if name not in given), incomplete)
+    free = () if (case := _case(ctx)) is None else free_of(case)
+    return _beginning((name for name in free if name not in given), incomplete)
 
 
 def assigned_parameters(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
     """Return the parameters that the case names, each ready for its value."""
     from exfit.case.peek import parameters_of
 
-    found = () if (case := _case(ctx)) is None else parameters_of(case)
-    return _beginning((f"{name}=" for name in found), incomplete)
+    names = () if (case := _case(ctx)) is None else parameters_of(case)
+    return _beginning((f"{name}=" for name in names), incomplete)
 
 
 def noises(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:

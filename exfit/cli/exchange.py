@@ -28,8 +28,8 @@ def import_(
 
     if output is not None:
         refuse_existing(output, force)
-    found = import_unit(unit, bus, machine_id)
-    write_text(case_text(found, unit.name), output, located(found.warnings, str(unit)))
+    imported = import_unit(unit, bus, machine_id)
+    write_text(case_text(imported, unit.name), output, located(imported.warnings, str(unit)))
     if output is not None:
         click.echo(f"written to {output}; next: exfit simulate {output}")
 
@@ -75,8 +75,8 @@ def export(
 
     if output is not None:
         refuse_existing(output, force)
-    found = exported(result, bus, machine_id, model)
-    write_text(found.text, output, found.warnings)
+    records = exported(result, bus, machine_id, model)
+    write_text(records.text, output, records.warnings)
     if output is not None:
         click.echo(f"written to {output}")
 

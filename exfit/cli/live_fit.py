@@ -26,12 +26,12 @@ def fit_live(
 
     console = terminal.console()
     if case.estimate.starts > 1:
-        with terminal.Bar(console).running() as progress:
+        with terminal.ProgressBar(console).running() as progress:
             result = workflows.fit(case, strategy, search_progress=progress)
     else:
         title, most = terminal.task(case, strategy), case.estimate.iterations
-        with terminal.Watch(console, title, most).running() as watch:
-            result = workflows.fit(case, strategy, watch, live=watch.look)
+        with terminal.LiveIterations(console, title, most).running() as shown:
+            result = workflows.fit(case, strategy, shown, live=shown.live)
     try:
         missing = run_folder.write_fit(result, folder, plots)
     finally:  # whatever becomes of the files

@@ -49,7 +49,7 @@ def profile(
         from exfit.output import terminal
 
         console = terminal.console()
-        with terminal.Bar(console).running() as progress:
+        with terminal.ProgressBar(console).running() as progress:
             profiles = workflows.profile(loaded, parameters, progress)
     warn(run_folder.write_profiles(profiles, folder, output.figures))
     if output.as_json:

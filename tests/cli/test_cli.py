@@ -578,12 +578,12 @@ import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 from exfit.cli import main
 from exfit.output import terminal
-show = terminal.Watch.__call__
+show = terminal.LiveIterations.__call__
 def interrupted(self, line):
     show(self, line)
     if line.number == 1:
         signal.raise_signal(signal.SIGINT)
-terminal.Watch.__call__ = interrupted
+terminal.LiveIterations.__call__ = interrupted
 main()
 """
 
@@ -640,7 +640,7 @@ def test_an_interruption_at_the_start_leaves_the_start_and_all_figures(run, monk
     def stop(self, line):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(terminal.Watch, "__call__", stop)
+    monkeypatch.setattr(terminal.LiveIterations, "__call__", stop)
     ran = run("fit", case_file())
     assert (ran.code, ran.err) == (3, "")
     stored = json.loads(Path("runs/case-fit/result.json").read_text())
@@ -788,7 +788,7 @@ def lines(count):
 def test_a_terminal_shows_the_last_iterations_whole(width):
     screen = StringIO()
     console = Console(file=screen, force_terminal=True, width=width, height=24, color_system=None)
-    with terminal.Watch(console, "case: AC1A").running() as watch:
+    with terminal.LiveIterations(console, "case: AC1A").running() as watch:
         for line in lines(30):
             watch(line)
     last = screen.getvalue().rpartition("earlier iterations)")[2]

@@ -38,10 +38,10 @@ def line(number):
 
 
 def watching(console, iterations=30, sketch=SKETCH):
-    watch = terminal.Watch(console, "case: AC1A", 100)
+    watch = terminal.LiveIterations(console, "case: AC1A", 100)
     watch.lines = [line(number) for number in range(iterations)]
     if sketch is not None:
-        watch.look(sketch)
+        watch.live(sketch)
     return watch
 
 
@@ -138,30 +138,30 @@ def test_no_column_of_the_history_is_cut_in_two():
 
 
 def test_a_file_and_a_terminal_without_such_characters_ask_for_no_plot():
-    assert terminal.Watch(Console(file=StringIO()), "case").look is None
-    assert terminal.Watch(screen(80, 24, "ascii"), "case").look is None
-    assert terminal.Watch(screen(80, 24), "case").look is not None
+    assert terminal.LiveIterations(Console(file=StringIO()), "case").live is None
+    assert terminal.LiveIterations(screen(80, 24, "ascii"), "case").live is None
+    assert terminal.LiveIterations(screen(80, 24), "case").live is not None
 
 
 def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):
     """A drawing takes 10 ms, an iteration 1 ms: all but 3 % is left to the fit."""
     now = {"at": 0.0, "drawn": 0.0}
     monkeypatch.setattr(progress.time, "perf_counter", lambda: now["at"])
-    whole = terminal.Watch.picture
+    whole = terminal.LiveIterations.picture
 
     def slow(self):
         now["at"] += 0.01
         now["drawn"] += 0.01
         return whole(self)
 
-    monkeypatch.setattr(terminal.Watch, "picture", slow)
-    with terminal.Watch(screen(80, 24), "case", 100).running() as watch:
+    monkeypatch.setattr(terminal.LiveIterations, "picture", slow)
+    with terminal.LiveIterations(screen(80, 24), "case", 100).running() as watch:
         for number in range(900):
             now["at"] += 0.001
             watch(line(number))
         within = now["drawn"]
     # the first drawing is not yet paid for by the time after it
-    assert within - 0.01 <= progress.SHARE * now["at"]
+    assert within - 0.01 <= progress.SHARE_OF_TIME * now["at"]
     assert within > 0.01
     assert "iteration 899" in watch.picture().plain
 

@@ -5,14 +5,14 @@ from exfit.output.terminal.catalogue import catalogue, machine, model
 from exfit.output.terminal.checks import check
 from exfit.output.terminal.comparisons import comparisons
 from exfit.output.terminal.fits import fit
-from exfit.output.terminal.progress import Bar, Watch, task
+from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
 from exfit.output.terminal.records import inspection
 from exfit.output.terminal.terminal import again, console, notes, waiting, written
 from exfit.output.terminal.uncertainty import design, profiles
 
 __all__ = [
-    "Bar",
-    "Watch",
+    "LiveIterations",
+    "ProgressBar",
     "again",
     "agreement",
     "catalogue",

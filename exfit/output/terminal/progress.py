@@ -16,19 +16,19 @@ from exfit.estimate import Progress
 from exfit.output.terminal.sketch import LEAST_HEIGHT, LEAST_WIDTH, sketched
 from exfit.results.model import Iteration
 
-LINES = 12  # of the history that stay in sight
-FEWEST = 4  # of them beside a plot
-TABLE = 63  # characters of the history
-GAP = 2  # columns between the history and a plot beside it
-AROUND = 5  # lines beside the history: title, what is hidden, names of columns, progress, cursor
-HIGHEST = (20, 14)  # lines of a plot beside the history and below it
-WIDEST = 100  # columns of a plot
-SHARE = 0.03  # of the time of a fit: so much may be spent on showing it
-FORMS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>5}", "{:>5}")
+MOST_ITERATIONS = 12  # shown at a time
+FEWEST_ITERATIONS = 4  # beside a plot
+HISTORY_WIDTH = 63  # characters of the history
+BETWEEN_COLUMNS = 2  # characters between the history and a plot beside it
+OTHER_LINES = 5  # beside the history: title, what is hidden, names of columns, progress, cursor
+PLOT_HEIGHTS = (20, 14)  # lines of a plot beside the history and below it
+PLOT_WIDTH = 100  # characters at most
+SHARE_OF_TIME = 0.03  # of the time of a fit: so much may be spent on showing it
+FORMATS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>5}", "{:>5}")
 HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "inner", "nfev")
 
 
-class Watch:
+class LiveIterations:
     """Shows the iterations of a fit as they come: a live table, or lines in a file or pipe.
 
     A terminal with room for it has a plot of the response beside the table or below it. ``most`` is
@@ -43,7 +43,7 @@ class Watch:
         self._next = 0.0  # when it may be drawn again
 
     @contextmanager
-    def running(self) -> Iterator["Watch"]:
+    def running(self) -> Iterator["LiveIterations"]:
         """Show the table for as long as the fit runs."""
         if not self.console.is_terminal:
             yield self
@@ -56,23 +56,23 @@ class Watch:
                     self._live.update(self.picture(), refresh=True)
 
     @property
-    def look(self) -> Callable[[LiveResponse], None] | None:
-        """What is to be told the responses; None where they would not be shown."""
+    def live(self) -> Callable[[LiveResponse], None] | None:
+        """What takes the responses; None where they would not be shown."""
         shows = self.console.is_terminal and not self.console.options.ascii_only
         return self._keep if shows else None
 
     def _keep(self, sketch: LiveResponse) -> None:
         self._sketch = sketch
 
-    def __call__(self, line: Iteration) -> None:
+    def __call__(self, iteration: Iteration) -> None:
         """Show one more iteration."""
-        self.lines.append(line)
+        self.lines.append(iteration)
         if len(self.lines) == 1:
             self.console.print(self.title, markup=False)
         if self._live is None:
             if len(self.lines) == 1:
                 self.console.print(_row(HISTORY), soft_wrap=True)
-            self.console.print(_row(_cells(line)), soft_wrap=True)
+            self.console.print(_row(_cells(iteration)), soft_wrap=True)
         else:
             self._draw(self._live)
 
@@ -83,27 +83,34 @@ class Watch:
             return
         live.update(self.picture(), refresh=True)
         ended = time.perf_counter()
-        self._next = ended + (ended - began) / SHARE
+        self._next = ended + (ended - began) / SHARE_OF_TIME
 
     def picture(self) -> Text:
         """Return the table, and the plot where there is room for it: beside or below."""
         width, height = self.console.size
-        free, beside, below = height - AROUND, width - TABLE - GAP, height - AROUND - FEWEST
+        free, beside, below = (
+            height - OTHER_LINES,
+            width - HISTORY_WIDTH - BETWEEN_COLUMNS,
+            height - OTHER_LINES - FEWEST_ITERATIONS,
+        )
         if self._sketch is not None and beside >= LEAST_WIDTH and free >= LEAST_HEIGHT:
-            plot = sketched(self._sketch, min(beside, WIDEST), min(free, HIGHEST[0]))
-            table = [Text(line.plain.ljust(TABLE + GAP), line.style) for line in self._table(free)]
-            blank = Text(" " * (TABLE + GAP))
+            plot = sketched(self._sketch, min(beside, PLOT_WIDTH), min(free, PLOT_HEIGHTS[0]))
+            table = [
+                Text(line.plain.ljust(HISTORY_WIDTH + BETWEEN_COLUMNS), line.style)
+                for line in self._table(free)
+            ]
+            blank = Text(" " * (HISTORY_WIDTH + BETWEEN_COLUMNS))
             both = zip_longest(table, plot)
             lines = [(left or blank) + (right or Text()) for left, right in both]
             return _joined([*lines, self._progress()])
         if self._sketch is not None and below >= LEAST_HEIGHT and width > LEAST_WIDTH:
-            plot = sketched(self._sketch, min(width - 1, WIDEST), min(below, HIGHEST[1]))
+            plot = sketched(self._sketch, min(width - 1, PLOT_WIDTH), min(below, PLOT_HEIGHTS[1]))
             return _joined([*self._table(free - len(plot)), self._progress(), *plot])
         return _joined([*self._table(max(free, 1)), self._progress()])
 
     def _table(self, room: int) -> list[Text]:
         """Return the last lines of the history, in no more than so many beside its head."""
-        rows, columns = min(room, LINES), _fitting(self.console.width)
+        rows, columns = min(room, MOST_ITERATIONS), _fitting(self.console.width)
         hidden = len(self.lines) - rows
         above = f"({hidden} earlier iterations)" if hidden > 0 else ""
         head = Text(_row(HISTORY[:columns]), style="bold")
@@ -124,14 +131,14 @@ class Watch:
 
 def _joined(lines: Iterable[Text]) -> Text:
     """Return lines below each other; what is wider than the terminal is cut off."""
-    found = Text("\n").join(lines)
-    found.no_wrap, found.overflow = True, "crop"
-    return found
+    text = Text("\n").join(lines)
+    text.no_wrap, text.overflow = True, "crop"
+    return text
 
 
 def _row(cells: Sequence[str]) -> str:
     """Return the first cells of a line of the history, each in its column."""
-    return " ".join(form.format(cell) for form, cell in zip(FORMS, cells, strict=False))
+    return " ".join(form.format(cell) for form, cell in zip(FORMATS, cells, strict=False))
 
 
 def _fitting(width: int) -> int:
@@ -158,7 +165,7 @@ def task(case: Case, strategy: str | None) -> str:
     return f"{case.path.stem}: {case.subject}, {strategy or case.estimate.strategy}; free {free}"
 
 
-class Bar:
+class ProgressBar:
     """Shows how far many searches are, with the time left; in a file or pipe a line at the end."""
 
     def __init__(self, console: Console) -> None:
@@ -166,7 +173,7 @@ class Bar:
 
     @contextmanager
     def running(self) -> Iterator[Callable[[Progress], None]]:
-        """Return what is to be told the progress."""
+        """Return what takes the progress."""
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
         from rich.progress import Progress as Bars
 
@@ -180,9 +187,9 @@ class Bar:
         with Bars(*columns, console=self.console) as bars:
             tasks: dict[str, TaskID] = {}
 
-            def tell(now: Progress) -> None:
+            def show(now: Progress) -> None:
                 if now.stage not in tasks:
                     tasks[now.stage] = bars.add_task(now.stage, total=now.total, best=now.best)
                 bars.update(tasks[now.stage], completed=now.done, best=now.best)
 
-            yield tell
+            yield show

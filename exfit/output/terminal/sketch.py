@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 Dots = NDArray[np.bool_]
 
 BRAILLE = 0x2800  # the cell without dots
-BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])  # by row and column
+DOT_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])  # by row and column
 MEASURED, SIMULATED = "cyan", "bold red"  # of the terminal's own, readable on dark and light
 LEAST_WIDTH, LEAST_HEIGHT = 45, 9  # characters: less is no plot
-AROUND = 3  # lines beside the canvas: heading, axis, times
-ROOM = 0.05  # of the range, above and below
-FLAT = 1e-6  # pu: a range that is smaller shows rounding errors alone
+OTHER_LINES = 3  # lines beside the canvas: heading, axis, times
+MARGIN = 0.05  # of the range, above and below
+SMALLEST_RANGE = 1e-6  # pu: a range that is smaller shows rounding errors alone
 
 
 def sketched(sketch: LiveResponse, width: int, height: int) -> list[Text]:
@@ -30,7 +30,7 @@ def sketched(sketch: LiveResponse, width: int, height: int) -> list[Text]:
 
     Where both lie in a character, it has the colour of the simulated one.
     """
-    rows = height - AROUND
+    rows = height - OTHER_LINES
     low, high = _range(sketch)
     labels = [_label(level, high - low) for level in (high, 0.5 * (low + high), low)]
     margin = max(map(len, labels))
@@ -46,7 +46,7 @@ def sketched(sketch: LiveResponse, width: int, height: int) -> list[Text]:
         if row not in places:
             line = Text(" " * margin + "│", style="dim", no_wrap=True)
         cell = zip(colours[row], codes[row], strict=True)
-        for style, group in groupby(cell, key=lambda one: one[0]):
+        for style, group in groupby(cell, key=lambda styled: styled[0]):
             # not the cell without dots: some fonts draw circles in their place
             text = "".join(chr(code) if code != BRAILLE else " " for _, code in group)
             line.append(text, style=style)
@@ -63,9 +63,9 @@ def scattered(
 ) -> Dots:
     """Return the dots (4 rows, 2 columns) of samples (M,), each by itself."""
     dots = np.zeros((4 * rows, 2 * columns), dtype=bool)
-    kept = np.isfinite(samples)
-    across = (time[kept] - time[0]) / (time[-1] - time[0]) * (2 * columns - 1)
-    dots[_down(samples[kept], limits, rows), np.rint(across).astype(int)] = True
+    finite = np.isfinite(samples)
+    across = (time[finite] - time[0]) / (time[-1] - time[0]) * (2 * columns - 1)
+    dots[_down(samples[finite], limits, rows), np.rint(across).astype(int)] = True
     return dots
 
 
@@ -74,11 +74,11 @@ def joined(
 ) -> Dots:
     """Return the dots (4 rows, 2 columns) of a line through samples (M,)."""
     dots = np.zeros((4 * rows, 2 * columns), dtype=bool)
-    kept = np.isfinite(samples)
-    if not kept.any():
+    finite = np.isfinite(samples)
+    if not finite.any():
         return dots
     instants = np.linspace(time[0], time[-1], 2 * columns)
-    down = _down(np.interp(instants, time[kept], samples[kept]), limits, rows)
+    down = _down(np.interp(instants, time[finite], samples[finite]), limits, rows)
     before = np.concatenate([down[:1], down[:-1]])
     # each column reaches to where the one before it ends, and leaves that dot to it
     top = np.where(before < down, before + 1, down)
@@ -91,13 +91,13 @@ def cells(dots: Dots) -> NDArray[np.int64]:
     """Return the characters (rows, columns), as numbers, of dots (4 rows, 2 columns)."""
     rows, columns = dots.shape[0] // 4, dots.shape[1] // 2
     parts = dots.reshape(rows, 4, columns, 2)
-    return np.asarray(BRAILLE + np.einsum("rick,ik->rc", parts.astype(np.int64), BITS))
+    return np.asarray(BRAILLE + np.einsum("rick,ik->rc", parts.astype(np.int64), DOT_BITS))
 
 
 def _styles(measured: Dots, simulated: Dots) -> list[list[str]]:
     """Return the colour of each character, (rows, columns)."""
-    fitted, seen = cells(simulated) != BRAILLE, cells(measured) != BRAILLE
-    styles = np.where(fitted, SIMULATED, np.where(seen, MEASURED, ""))
+    has_simulated, has_measured = cells(simulated) != BRAILLE, cells(measured) != BRAILLE
+    styles = np.where(has_simulated, SIMULATED, np.where(has_measured, MEASURED, ""))
     return [[str(style) for style in row] for row in styles]
 
 
@@ -113,12 +113,12 @@ def _range(sketch: LiveResponse) -> tuple[float, float]:
     both = np.concatenate([sketch.measured, sketch.simulated])
     finite = both[np.isfinite(both)]
     low, high = float(np.min(finite)), float(np.max(finite))
-    room = ROOM * max(high - low, FLAT)
+    room = MARGIN * max(high - low, SMALLEST_RANGE)
     return low - room, high + room
 
 
 def _label(level: float, span: float) -> str:
-    """Return a level in as many decimals as tell a hundredth of the span, at most six."""
+    """Return a level in as many decimals as show a hundredth of the span, at most six."""
     return f"{level:.{min(max(0, math.ceil(2.0 - math.log10(span))), 6)}f}"
 
 
