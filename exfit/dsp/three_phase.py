@@ -37,12 +37,12 @@ class PositiveSequence:
     """The positive sequence of three waveforms: RMS ``voltage`` (K,) at ``time`` (K,), in s.
 
     It is the mean over a ``window`` (s) about each instant, and shorter than the record by one
-    window: the samples ``kept`` of it. ``frequency`` (Hz) is the mean one.
+    window: the samples ``rows`` of it. ``frequency`` (Hz) is the mean one.
     """
 
     time: Array
     voltage: Array
-    kept: slice
+    rows: slice
     frequency: float
     window: float
 
@@ -141,9 +141,9 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PositiveSe
     positive = _windowed(vector, clock, frequency, cycles)
     negative = _windowed(vector.conj(), clock, frequency, cycles)
     half = (len(time) - len(positive)) // 2
-    kept = slice(half, len(time) - half)
+    rows = slice(half, len(time) - half)
     window = cycles / frequency
-    _check_balance(time[kept], np.abs(positive), np.abs(negative))
+    _check_balance(time[rows], np.abs(positive), np.abs(negative))
     drift = _drift(positive, step, round(0.5 * window / step))
     if np.max(np.abs(drift)) > MOST_DRIFT:
         raise ValueError(
@@ -151,7 +151,7 @@ def positive_sequence(time: Array, phases: Array, cycles: int = 1) -> PositiveSe
             f"{frequency:.5g} Hz; at most {MOST_DRIFT:g} Hz"
         )
     voltage = np.abs(positive) / np.sinc(drift * window)
-    return PositiveSequence(time[kept], voltage, kept, frequency, window)
+    return PositiveSequence(time[rows], voltage, rows, frequency, window)
 
 
 def _check_columns(phases: Array) -> None:

@@ -73,7 +73,7 @@ def in_seconds(
     units = [unit for unit in (stated, requested) if unit is not None]
     for unit in units:
         if usual(unit) not in SECONDS:
-            raise column_error(path, column, f"{unit} is no unit of time: {', '.join(SECONDS)}")
+            raise column_error(path, column, f"{unit} is not a unit of time: {', '.join(SECONDS)}")
     if stated is not None and requested is not None and not alike(stated, requested):
         raise column_error(path, column, f"in {stated} as the file says, not in {requested}")
     factor = SECONDS[usual(units[0])] if units else 1.0
@@ -96,6 +96,5 @@ def check_increasing(
     back = np.flatnonzero(steps < 0.0 if may_repeat else steps <= 0.0)
     if back.size:
         before, now = time[back[0]], time[back[0] + 1]
-        kind = "repeats" if now == before else "goes back behind"
-        what = f"{label}: time {now} s {kind} the {before} s before it"
-        raise RecordError(f"{place(int(back[0]) + 1)}: {what}")
+        fault = f"{now} s repeats" if now == before else f"goes back from {before} s to {now} s"
+        raise RecordError(f"{place(int(back[0]) + 1)}: {label}: time {fault}")

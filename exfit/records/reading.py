@@ -172,7 +172,7 @@ def _of_phases(
     except ValueError as fault:
         names = ", ".join(map(repr, channel.columns))
         raise RecordError(f"{path}: columns {names}: {fault}") from None
-    samples[rows[phasor.kept]] = phasor.voltage
+    samples[rows[phasor.rows]] = phasor.voltage
     return _PhaseVoltage(samples, phasor.window)
 
 

@@ -97,7 +97,7 @@ def test_the_window_is_centred(rate):
     time = clock(rate)
     ramp = 1.0 + 0.1 * time
     course = positive_sequence(time, waves(time, 49.2, ramp))
-    np.testing.assert_allclose(course.voltage, ramp[course.kept], rtol=0.0, atol=ROUNDING)
+    np.testing.assert_allclose(course.voltage, ramp[course.rows], rtol=0.0, atol=ROUNDING)
 
 
 @every_rate
@@ -105,7 +105,7 @@ def test_the_window_is_centred(rate):
 def test_what_lies_within_half_a_window_of_the_ends_is_left_out(rate, cycles):
     time = clock(rate)
     course = positive_sequence(time, waves(time), cycles)
-    assert np.array_equal(course.time, time[course.kept])
+    assert np.array_equal(course.time, time[course.rows])
     assert len(course.voltage) == len(course.time)
     # a window ends on a sample, or less than one before it
     for gone in (course.time[0] - time[0], time[-1] - course.time[-1]):
@@ -157,7 +157,7 @@ def test_a_simulation_averaged_alike_is_what_the_waveforms_show(name):
     alike = Filtering(course.time, everything, averaged=MovingAverage(course.window))
     # a moving voltage spreads the ripples' lines, and the window has zeros: some 1e-7 are left
     inner = slice(100, -100)  # half a window: beyond it the simulation goes on, here it ends
-    simulated = alike.as_recorded(vt[course.kept])
+    simulated = alike.as_recorded(vt[course.rows])
     np.testing.assert_allclose(simulated[inner], course.voltage[inner], rtol=0.0, atol=1e-6)
 
 
@@ -165,7 +165,7 @@ def test_a_simulation_that_is_not_averaged_errs_at_the_kink_as_the_mean_of_a_kin
     time, at, step, lag = clock(5000.0), 0.5, 0.05, 0.2
     vt = 1.0 - step * np.expm1(-np.maximum(time - at, 0.0) / lag)
     course = positive_sequence(time, waves(time, 50.0, vt))
-    worst = np.max(np.abs(vt[course.kept] - course.voltage))
+    worst = np.max(np.abs(vt[course.rows] - course.voltage))
     half = 0.5 * course.window
     # half a window of 1 - exp(-t / lag) lies beyond the kink; nearly (slope) x window / 8
     expected = step * (half + lag * np.expm1(-half / lag)) / course.window

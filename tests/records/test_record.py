@@ -429,7 +429,11 @@ UNUSABLE_ARRAYS = {
     "inf": ([0.0, 1.0], [np.inf, 1.0], "sample 0: vt: inf is not a finite"),
     "nan in time": ([0.0, np.nan], [1.0, 1.0], "sample 1: time: nan is not a finite"),
     "repeated time": ([0.0, 1.0, 1.0], [1.0, 1.0, 1.0], "sample 2: time: time 1.0 s repeats"),
-    "time going back": ([0.0, 2.0, 1.0], [1.0, 1.0, 1.0], "sample 2: time: time 1.0 s goes back"),
+    "time going back": (
+        [0.0, 2.0, 1.0],
+        [1.0, 1.0, 1.0],
+        "sample 2: time: time goes back from 2.0 s to 1.0 s",
+    ),
 }
 
 

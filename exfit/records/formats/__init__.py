@@ -24,7 +24,7 @@ def open_table(path: Path, sheet: str | None = None) -> Table:
 
         return read_excel(path, sheet)
     if sheet is not None:
-        raise RecordError(f"{path}: has no sheets such as {sheet!r}: a workbook has them")
+        raise RecordError(f"{path}: a sheet, {sheet!r}, is given, but only workbooks have sheets")
     if suffix in COMTRADE or (suffix in BESIDE_CFG and siblings(path, ".cfg")):
         from exfit.records.formats.comtrade import read_comtrade
 

@@ -87,7 +87,7 @@ class TextTable:
             numbers = self.numbers([name])[name]
             return in_seconds(self.path, name, numbers, self.units.get(name), unit)
         if unit is not None:
-            what = f"{quoted(first[places[0]])} is a timestamp, no number of {unit}"
+            what = f"{quoted(first[places[0]])} is a timestamp, not a number of {unit}"
             raise column_error(self.path, columns[0], what)
         return self._stamps(columns, places)
 
@@ -237,7 +237,7 @@ class TextTable:
                 self._check_width(line, row)  # quoted cells may hold separators
                 for name, place in zip(columns, places, strict=True):
                     if not is_timestamp(row[place]):
-                        what = f"{quoted(row[place])} is no timestamp"
+                        what = f"{quoted(row[place])} is not a timestamp"
                         raise column_error(f"{self.path}:{line}", name, what) from None
             raise RecordError(f"{self.path}: {error}") from None
         try:

@@ -28,10 +28,10 @@ MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", 
 FORM = re.compile(
     r"[ \t]*"
     r"(?:(?P<year>\d{4})(?P<iso>[-/.])(?P<month>\d{1,2})(?P=iso)(?P<day>\d{1,2})"
-    r"|(?P<one>\d{1,2})(?P<mark>[-/.])(?P<two>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2})"
+    r"|(?P<left>\d{1,2})(?P<mark>[-/.])(?P<middle>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2})"
     rf"|(?P<named>\d{{1,2}})(?P<dash>[- ])(?P<name>(?i:{'|'.join(MONTHS)}))"
     r"(?P=dash)(?P<full>\d{4}|\d{2}))?"
-    r"(?P<between>(?(year)(?:T|[ \t]+)|(?(one)[ \t]+|(?(named)[ \t]+|)))"
+    r"(?P<between>(?(year)(?:T|[ \t]+)|(?(left)[ \t]+|(?(named)[ \t]+|)))"
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
     r"(?:[ \t]*(?P<half>[AaPp])\.?[ \t]?[Mm]\.?)?"
     r"[ \t]*(?P<zone>Z|(?P<sign>[+-])(?P<zonehour>\d{2}):?(?P<zoneminute>\d{2}))?)?"
@@ -67,7 +67,7 @@ def is_timestamp(cell: str) -> bool:
 def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
     """Return the instants (M,) in s since the first, of cells (M, 1), or (M, 2) of date and time.
 
-    Raises StampError for a cell that is no timestamp, has another form than the first, or could
+    Raises StampError for a cell that is not a timestamp, has another form than the first, or could
     be two instants.
     """
     stamps = [_read(cells, column) for column in range(cells.shape[1])]
@@ -83,7 +83,9 @@ def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
     fraction = whole.fraction // 10 ** (MOST_DIGITS - whole.digits)
     if np.abs(second).max() > np.iinfo(np.int64).max // (2 * unit):
         row = int(np.abs(second).argmax())
-        raise StampError(row, 0, f"{second[row] / DAY:.0f} days lie between it and the first")
+        raise StampError(
+            row, 0, f"{second[row] / DAY:.0f} days from the first timestamp are too many"
+        )
     instants: NDArray[np.float64] = (second * unit + (fraction - fraction[0])) / unit
     return instants
 
@@ -118,7 +120,7 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
                 seconds, wrong = _second(values, form)
                 if wrong.any():
                     row = int(rows[wrong.argmax()])
-                    what = f"{_quoted(cells[row])} is no time of day"
+                    what = f"{_quoted(cells[row])} is not a time of day"
                     raise StampError(row, column, what + ("" if form["second"] else HOURS_NEEDED))
                 second[rows] = seconds
                 own = len(form["fraction"] or "")
@@ -130,14 +132,14 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
 def _form(column: int, row: int, cell: bytes) -> re.Match[str]:
     form = FORM.fullmatch(cell.decode("latin-1")) if cell.strip() else None
     if form is None:
-        what = f"{_quoted(cell)} is no timestamp" if cell.strip() else "an empty cell"
+        what = f"{_quoted(cell)} is not a timestamp" if cell.strip() else "an empty cell"
         raise StampError(row, column, what)
     return form
 
 
 def _kind(form: re.Match[str]) -> tuple[bool, str, bool, bool, bool]:
     """Return what all timestamps of a column have in common."""
-    dated = any(form[part] is not None for part in ("year", "one", "named"))
+    dated = any(form[part] is not None for part in ("year", "left", "named"))
     # a month in letters fixes the order, and is the second of the three
     ordered = form["mark"] == "." or form["named"] is not None
     order = "ymd" if form["year"] else "dmy" if ordered else EITHER if dated else ""
@@ -160,7 +162,7 @@ def _date(values: NDArray[np.uint8], form: re.Match[str]) -> Whole:
         month = MONTHS.index(form["name"].capitalize()) + 1
         parts = [year, day, np.full_like(day, month)]
     else:
-        parts = [_number(values, form, part) for part in ("last", "one", "two")]
+        parts = [_number(values, form, part) for part in ("last", "left", "middle")]
     if len(form["last"] or form["full"] or "") == 2:
         parts[0] += CENTURY
     return np.stack(parts, axis=1)
@@ -182,29 +184,29 @@ def _second(values: NDArray[np.uint8], form: re.Match[str]) -> tuple[Whole, NDAr
 def _joined(first: Cells, date: _Stamps, time: _Stamps) -> _Stamps:
     """Return dates and times of day of two columns as timestamps."""
     if date.date is None or date.second is not None:
-        raise StampError(0, 0, f"{_quoted(first[0])} is no date without a time of day")
+        raise StampError(0, 0, f"{_quoted(first[0])} is not a date alone")
     if time.second is None or time.date is not None:
-        raise StampError(0, 1, f"{_quoted(first[1])} is no time of day without a date")
+        raise StampError(0, 1, f"{_quoted(first[1])} is not a time of day alone")
     return _Stamps(date.date, date.order, time.second, time.fraction, time.digits)
 
 
 def _days(stamps: _Stamps) -> Whole:
     """Return the days (M,) since 1970."""
     assert stamps.date is not None
-    year, one, two = (part.astype(np.int64) for part in stamps.date.T)
-    day_first = _is_day_first(stamps.order, one, two)
+    year, left, middle = (part.astype(np.int64) for part in stamps.date.T)
+    day_first = _is_day_first(stamps.order, left, middle)
     if day_first is None:
         return _daily(stamps.date)
-    return _valid_days(year, two, one) if day_first else _valid_days(year, one, two)
+    return _valid_days(year, middle, left) if day_first else _valid_days(year, left, middle)
 
 
-def _is_day_first(order: str, one: Whole, two: Whole) -> bool | None:
+def _is_day_first(order: str, left: Whole, middle: Whole) -> bool | None:
     """Tell whether the first of two parts of the dates is the day; None where it may be either."""
     if order != EITHER:
         return order == "dmy"
-    if (one > MONTHS_A_YEAR).any():
+    if (left > MONTHS_A_YEAR).any():
         return True
-    return False if (two > MONTHS_A_YEAR).any() else None
+    return False if (middle > MONTHS_A_YEAR).any() else None
 
 
 def _daily(date: NDArray[np.int32]) -> Whole:
@@ -212,8 +214,8 @@ def _daily(date: NDArray[np.int32]) -> Whole:
 
     Raises StampError where that holds for both orders, or for none.
     """
-    year, one, two = (part.astype(np.int64) for part in date.T)
-    readings = [_valid_days(year, two, one), _valid_days(year, one, two)]
+    year, left, middle = (part.astype(np.int64) for part in date.T)
+    readings = [_valid_days(year, middle, left), _valid_days(year, left, middle)]
     changes = np.flatnonzero(np.any(np.diff(date, axis=0) != 0, axis=1))
     if not changes.size:
         return readings[0]
@@ -222,7 +224,9 @@ def _daily(date: NDArray[np.int32]) -> Whole:
         return daily[0]
     row = int(changes[0]) + 1
     raise StampError(
-        row, 0, f"{one[row]}, {two[row]} could be day and month, or month and day; write ISO dates"
+        row,
+        0,
+        f"{left[row]}, {middle[row]} could be day and month, or month and day; write ISO dates",
     )
 
 
@@ -234,7 +238,9 @@ def _valid_days(year: Whole, month: Whole, day: Whole) -> Whole:
     wrong |= day > length
     if wrong.any():
         row = int(wrong.argmax())
-        raise StampError(row, 0, f"year {year[row]}, month {month[row]}, day {day[row]} is no date")
+        raise StampError(
+            row, 0, f"year {year[row]}, month {month[row]}, day {day[row]} is not a date"
+        )
     return first + day - 1
 
 

@@ -301,7 +301,7 @@ FAULTS = {
     "unknown revision": (changed(1, "a,b,2031"), GOOD, ["bump.cfg:1", "'2031'", "2013"]),
     "no counts": (changed(2, "21,2,19"), GOOD, ["bump.cfg:2", "6,4A,2D"]),
     "counts that do not add up": (changed(2, "20,2A,19D"), GOOD, ["bump.cfg:2", "20", "2", "19"]),
-    "too few channel lines": (changed(9, None), GOOD, ["bump.cfg:8", "21 channels, 6 lines"]),
+    "too few channel lines": (changed(9, None), GOOD, ["bump.cfg:8", "21 channels, but 6 lines"]),
     "a comma in a name": (
         changed(3, "1,U,gen,A,G1,kV,1,0,0,-9,9,1,1,P"),
         GOOD,

@@ -554,7 +554,7 @@ FAULTS = {
     "no timestamp": (
         STAMPED.replace("10:51:42.5", "soon"),
         "Time",
-        [":4", "'Time'", "'20.09.2015 soon' is no timestamp"],
+        [":4", "'Time'", "'20.09.2015 soon' is not a timestamp"],
     ),
     "an empty timestamp": (
         STAMPED.replace("20.09.2015 10:51:42.5", ""),
@@ -564,27 +564,27 @@ FAULTS = {
     "no such day": (
         STAMPED.replace("20.09.2015 10:51:42", "31.09.2015 10:51:42"),
         "Time",
-        [":4", "'Time'", "month 9, day 31 is no date"],
+        [":4", "'Time'", "month 9, day 31 is not a date"],
     ),
     "no such time": (
         STAMPED.replace("10:51:42", "10:61:42"),
         "Time",
-        [":4", "'Time'", "'20.09.2015 10:61:42.5' is no time of day"],
+        [":4", "'Time'", "'20.09.2015 10:61:42.5' is not a time of day"],
     ),
     "no such hour before noon": (
         form("t,vt", "1:00:00 AM,1", "13:00:00 PM,2"),
         "t",
-        [":3", "'t'", "'13:00:00 PM' is no time of day"],
+        [":3", "'t'", "'13:00:00 PM' is not a time of day"],
     ),
     "a month of no name": (
         STAMPED.replace("20.09.2015", "20-Sep-2015").replace("20-Sep-2015 10:51:42", "20-Sop-2015"),
         "Time",
-        [":4", "'Time'", "'20-Sop-2015.5' is no timestamp"],
+        [":4", "'Time'", "'20-Sop-2015.5' is not a timestamp"],
     ),
     "no such day of a month in letters": (
         form("Time,U", "30-Sep-2015 10:00:00,1", "31-Sep-2015 10:00:01,2"),
         "Time",
-        [":3", "'Time'", "month 9, day 31 is no date"],
+        [":3", "'Time'", "month 9, day 31 is not a date"],
     ),
     "minutes and seconds": (
         form("t,vt", "51:42.5,1.0", "51:43.0,1.1"),
@@ -594,7 +594,7 @@ FAULTS = {
     "minutes and whole seconds": (
         form("t,vt", "51:42,1.0", "51:43,1.1"),
         "t",
-        [":2", "'t'", "'51:42' is no time of day", "minutes and seconds"],
+        [":2", "'t'", "'51:42' is not a time of day", "minutes and seconds"],
     ),
     "another form of timestamp": (
         STAMPED.replace("20.09.2015 10:51:42", "2015-09-20 10:51:42"),
@@ -624,17 +624,17 @@ FAULTS = {
     "a date where the time belongs": (
         TIMED,
         "Time+Date",
-        [":2", "'Time'", "'10:51:40.5' is no date"],
+        [":2", "'Time'", "'10:51:40.5' is not a date"],
     ),
     "two times": (
         TIMED.replace("2015-09-20,", "2015-09-20 10:00:00,"),
         "Date+Time",
-        [":2", "'Date'", "no date without a time of day"],
+        [":2", "'Date'", "not a date alone"],
     ),
     "a number among timestamps": (
         STAMPED.replace("20.09.2015 10:51:42.5", "3,5"),
         "Time",
-        [":4", "'Time'", "'3,5' is no timestamp"],
+        [":4", "'Time'", "'3,5' is not a timestamp"],
     ),
     "a ragged row beside timestamps": (
         STAMPED.replace("42.5;1,2", "42.5"),
@@ -665,7 +665,7 @@ def test_a_unit_is_refused_where_the_file_says_another_one_or_has_timestamps(fil
     path = file(form("t/ms,vt", "0,1", "5,2"))
     with pytest.raises(RecordError, match="in ms as the file says, not in s"):
         read_text_table(path).instants(["t/ms"], "s")
-    with pytest.raises(RecordError, match="is a timestamp, no number of ms"):
+    with pytest.raises(RecordError, match="is a timestamp, not a number of ms"):
         read_text_table(file(STAMPED)).instants(["Time"], "ms")
 
 
@@ -674,8 +674,8 @@ def test_a_place_is_the_line_also_behind_titles_blank_lines_and_comments(file):
     assert [table.place(row).rpartition(":")[2] for row in range(3)] == ["4", "7", "8"]
 
 
-def test_a_file_without_any_sheet_is_not_asked_for_one(file):
-    with pytest.raises(RecordError, match="has no sheets such as 'Data'"):
+def test_a_sheet_of_a_file_without_sheets_is_refused(file):
+    with pytest.raises(RecordError, match="'Data', is given, but only workbooks"):
         open_table(file(TWO), "Data")
 
 

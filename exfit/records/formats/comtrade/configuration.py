@@ -55,14 +55,15 @@ def _check_lines(parts: ComtradeFiles) -> None:
     total = analog + status
     if len(lines) < total + 2:
         raise RecordError(
-            f"{parts.line(len(lines) - 1)}: it ends here: {total} channels, {len(lines) - 2} lines"
+            f"{parts.line(len(lines) - 1)}: the file ends here: {total} channels, but "
+            f"{len(lines) - 2} lines"
         )
     kinds = [("analog", ANALOG_CELLS)] * analog + [("status", STATUS_CELLS)] * status
     for at, (kind, allowed) in enumerate(kinds, 2):
         count = lines[at].count(",") + 1
         if count not in allowed:
             raise RecordError(
-                f"{parts.line(at)}: {count} cells of an {kind} channel, not "
+                f"{parts.line(at)}: {count} cells for a channel ({kind}), not "
                 f"{' or '.join(map(str, allowed))}"
             )
 

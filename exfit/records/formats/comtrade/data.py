@@ -45,8 +45,8 @@ def samples_of(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     if jump.size:
         at = int(jump[0]) + 1
         raise RecordError(
-            f"{parts.sample(at)}: it is numbered {number[at]:.0f} and the one before "
-            f"{number[at - 1]:.0f}"
+            f"{parts.sample(at)}: its number is {number[at]:.0f}, that of the sample "
+            f"before {number[at - 1]:.0f}"
         )
     return samples
 
@@ -101,7 +101,7 @@ def _find_fault(parts: ComtradeFiles, data: bytes, width: int) -> None:
         cells = line.split(",")
         if line.strip() and len(cells) != width:
             raise RecordError(
-                f"{parts.dat}:{at + 1}: {len(cells)} cells, but {width} by {parts.cfg.name}"
+                f"{parts.dat}:{at + 1}: {len(cells)} cells, but {parts.cfg.name} has {width}"
             )
         for cell in cells if line.strip() else ():
             if not is_number(cell, comma=False):
