@@ -130,7 +130,7 @@ def test_a_profile_has_points_enough_for_a_figure_that_shows_the_crossings(index
         )
     assert np.max(one.costs) < one.cost + 1.7 * rise  # 1.3 in the root of the rise
     assert (np.diff(one.at) > 0.0).all()
-    assert one.xs[:, index] == pytest.approx(one.at, rel=1e-15)
+    assert one.xs[:, index] == pytest.approx(one.at, rel=1e-12)
 
 
 def test_the_costs_are_those_of_the_points():

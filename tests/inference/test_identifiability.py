@@ -309,7 +309,7 @@ def test_the_content_survives_json():
     (step,) = content["suggestion"]
     (errors,) = [one for name, one in step["errors"].items() if name != "c"]
     assert errors["before"] is None
-    assert step["errors"]["c"]["before"] == known.parameters["c"].relative_error
+    assert step["errors"]["c"]["before"] == pytest.approx(known.parameters["c"].relative_error)
 
 
 def test_a_fit_without_any_error_is_all_seen():

@@ -210,7 +210,7 @@ def test_the_package_reads_the_same_channels_and_times(write, form):
     columns = ours.numbers(ours.names)
     np.testing.assert_allclose(columns["time"], theirs.time, rtol=0, atol=1e-12)
     for at, name in enumerate(theirs.analog_channel_ids):
-        np.testing.assert_allclose(columns[name], theirs.analog[at], rtol=1e-15)
+        np.testing.assert_allclose(columns[name], theirs.analog[at], rtol=1e-13)
     for at, name in enumerate(theirs.status_channel_ids):
         assert np.array_equal(columns[name], theirs.status[at])
 

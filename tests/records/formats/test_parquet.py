@@ -98,7 +98,7 @@ def test_timestamps_count_from_the_first_to_their_last_digit(parquet, unit, zone
     ticks = np.array([0, 1, 4_800_000_001]) + 1_442_746_302_858 * (10**6 // step)
     column = pa.array(ticks, pa.timestamp(unit, zone))
     found = read_parquet(parquet({"ts": column})).instants(["ts"])
-    np.testing.assert_allclose(found, [0.0, step * 1e-9, 4_800_000_001 * step * 1e-9], rtol=1e-15)
+    np.testing.assert_allclose(found, [0.0, step * 1e-9, 4_800_000_001 * step * 1e-9], rtol=1e-13)
 
 
 @pytest.mark.parametrize("kind", [pa.time64("us"), pa.duration("us")], ids=str)

@@ -698,7 +698,7 @@ def test_timestamps_of_any_number_of_digits_are_read(file, digits):
     expected = 1.0 + (float(fraction) if digits else 0.0)
     assert read_text_table(path).instants(["t"]).tolist() == [
         0.0,
-        pytest.approx(expected, abs=1e-15),
+        pytest.approx(expected, abs=1e-14),
     ]
 
 
