@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from exfit.case.checks.model import contradictions
+from exfit.case.checks.content import contradictions
 from exfit.case.json_schema import json_schema
 from exfit.case.messages import form_faults
 from exfit.case.parts import Parts, parts_of, ties_of

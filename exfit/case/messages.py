@@ -89,7 +89,7 @@ def _offered(schema: Data, place: Place) -> str:
 
 
 def _unknown(key: str, known: list[str]) -> str:
-    return "does not go with this type" if key in known else f"unknown key; {near(key, known)}"
+    return "not allowed with this type" if key in known else f"unknown key; {near(key, known)}"
 
 
 def _wrong_choice(place: Place, value: Any, expected: str) -> Fault:

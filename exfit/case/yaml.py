@@ -163,7 +163,7 @@ class _Reader:
                 self.faults.append(Fault(here, "has no value", line))
             if key in entries:
                 first = entries[key].line
-                self.faults.append(Fault(here, f"stands twice, first on line {first}", line))
+                self.faults.append(Fault(here, f"duplicate key, first on line {first}", line))
             else:
                 entries[key] = YamlNode(found.value, line, found.entries)
         return YamlNode({key: node.value for key, node in entries.items()}, _line(start), entries)

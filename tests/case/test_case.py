@@ -389,7 +389,7 @@ FORM = {
         "validate[0].record",
         ["is missing"],
     ),
-    "key twice": ("time: t", "time: t\n  time: u", "record.time", ["stands twice", "line 12"]),
+    "key twice": ("time: t", "time: t\n  time: u", "record.time", ["duplicate key", "line 12"]),
     "strange tag": ("KE: 1.0", "KE: !!float 1.0", "parameters.fixed.KE", ["tag", "float"]),
 }
 
@@ -454,7 +454,7 @@ MEANING = {
         ["0.3", "Xpd = 0.3"],
     ),
     "machine saturation": ("S12: 0.4", "S12: 0.1", "plant.parameters.S12", ["0.1", "S10 = 0.12"]),
-    "step of nothing": ("step: 0.05", "step: 0", "test.vref[0].step", ["0 is no step"]),
+    "step of nothing": ("step: 0.05", "step: 0", "test.vref[0].step", ["0 is not a step"]),
     "steps out of order": (
         "{at: 1.0, step: 0.05}",
         "{at: 2, step: 1}, {at: 2, step: -1}",
@@ -608,7 +608,7 @@ validate:
         ("at: 0", "at: 5", ["test.vref[0].at", "5 s", "0 ... 5 s"]),
         ("at: 0", "at: -1", ["test.vref[0].at", "-1 s", "0 ... 5 s"]),
         ("duration: 5", "duration: 0", ["test.duration", "0 is not above 0"]),
-        ("none}", "none, machine: GENROU}", ["plant.machine", "does not go with this type"]),
+        ("none}", "none, machine: GENROU}", ["plant.machine", "not allowed with this type"]),
         ("FIRST_ORDER", "FIRST_ODER", ["model", "did you mean FIRST_ORDER?"]),
     ],
 )

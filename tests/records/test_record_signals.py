@@ -123,7 +123,11 @@ def test_a_recorder_that_averages_is_simulated_so(tmp_path):
 
 
 REFUSED = {
-    "of another signal": ({"efd": PHASES, "vt": "vt"}, {}, "channels.efd.phases: only of vt"),
+    "of another signal": (
+        {"efd": PHASES, "vt": "vt"},
+        {},
+        "channels.efd.phases: only allowed for vt",
+    ),
     "cycles of rms": (
         {"vt": {**PHASES, "kind": "rms", "cycles": 2}},
         {},
@@ -143,7 +147,7 @@ REFUSED = {
     "gaps": (
         {"vt": "vt"},
         {"gaps": "skip", "resample": 50.0},
-        "resample: does not go with gaps: skip",
+        "resample: not allowed with gaps: skip",
     ),
 }
 

@@ -1,0 +1,22 @@
+"""What contradicts itself in the bounds and the start of a value that a fit finds."""
+
+from collections.abc import Iterator
+
+from exfit.case.checks.node import Node
+from exfit.case.yaml import Fault
+from exfit.util.text import show
+
+
+def bound_faults(section: Node) -> Iterator[Fault]:
+    """Yield why ``start``, ``min`` and ``max`` of a section contradict each other."""
+    start, low, high = (section.at(key).number for key in ("start", "min", "max"))
+    if low is not None and high is not None and low >= high:
+        yield section.at("min").fault(f"{show(low)} is not below max = {show(high)}")
+    elif start is not None and _outside(start, low, high):
+        limits = " ... ".join("?" if limit is None else show(limit) for limit in (low, high))
+        yield section.at("start").fault(f"{show(start)} lies outside its bounds {limits}")
+
+
+def _outside(start: float, low: float | None, high: float | None) -> bool:
+    """Tell whether a start lies outside its bounds, as far as these are readable."""
+    return (low is not None and start < low) or (high is not None and start > high)

@@ -1,0 +1,99 @@
+"""What contradicts itself in a test: its steps and switchings."""
+
+from collections.abc import Iterator
+
+from exfit.case.checks.node import Node
+from exfit.case.yaml import Fault
+from exfit.plants import EVENTS, PlantKind
+from exfit.util.text import show
+
+
+def bump_test_faults(test: Node, network: Node, kind: PlantKind) -> Iterator[Fault]:
+    """Yield the faults of a test; ``network`` is that of its plant."""
+    for name in EVENTS:
+        yield from _step_faults(test, name)
+        if name in test and name not in kind.events:
+            yield test.at(name).fault(f"not allowed with plant {kind.name}")
+    for switch in test.at("network").entries:
+        if switch.at("E").number is not None and "E" not in network:
+            text = "only where plant.network gives E; test.E changes it by steps"
+            yield switch.at("E").fault(text)
+    if kind.plays_back:
+        yield from _playback_faults(test, kind)
+    elif test.content and not {*EVENTS} & test.content.keys():
+        yield test.fault(f"no step: give one of {', '.join(kind.events)}")
+    yield from _rest_faults(test)
+    if kind.per_unit:
+        yield from _voltage_faults(test.at("vt0"))
+
+
+def instants_of(test: Node) -> Iterator[tuple[Node, float]]:
+    """Yield the readable instants of all events of a test, with their places."""
+    for name in EVENTS:
+        for event in test.at(name).entries:
+            at = event.at("at").start
+            if at is not None:
+                yield event.at("at"), at
+
+
+def missing_without_record(test: Node) -> Iterator[Fault]:
+    """Yield what a test lacks that no record is there to give."""
+    if "begin" in test:
+        text = "only with a record; without one the time begins at 0"
+        yield test.at("begin").fault(text)
+    if test.content and "duration" not in test:
+        text = "is missing: without a record it says how long to simulate"
+        yield test.at("duration").fault(text)
+    if test.content and "vt0" not in test:
+        yield test.at("vt0").fault("is missing: without a record it says where to start")
+
+
+def _playback_faults(test: Node, kind: PlantKind) -> Iterator[Fault]:
+    """Yield what a test lacks, or has in vain, where a record drives the simulation."""
+    if "begin" in test:
+        text = f"not allowed with plant {kind.name}: the record drives the simulation"
+        yield test.at("begin").fault(text)
+    steady = test.at("steady_until")
+    if steady.number is None and not any(instants_of(test)):
+        yield steady.fault("is missing: until when is the record at rest?")
+
+
+def _rest_faults(test: Node) -> Iterator[Fault]:
+    """Yield a state of rest that lasts beyond the first step."""
+    first = min((at for _, at in instants_of(test)), default=None)
+    steady = test.at("steady_until")
+    if steady.number is not None and first is not None and steady.number > first:
+        text = f"{show(steady.number)} s is after the first step, at {show(first)} s"
+        yield steady.fault(text)
+
+
+def _voltage_faults(vt0: Node) -> Iterator[Fault]:
+    """Yield why the voltage before the first step is none of a machine."""
+    lowest = vt0.at("min")
+    if vt0.start is not None and vt0.start <= 0:
+        yield vt0.fault(f"{show(vt0.start)} is not above 0")
+    if lowest.number is not None and lowest.number <= 0:
+        yield lowest.fault(f"{show(lowest.number)} is not above 0")
+
+
+def _step_faults(test: Node, name: str) -> Iterator[Fault]:
+    """Yield steps that change nothing, are out of order, or outside the duration."""
+    before: float | None = None
+    for step in test.at(name).entries:
+        if step.at("step").start == 0:
+            yield step.at("step").fault("0 is not a step")
+        if name == "network" and step.is_section and not {"R", "X", "E"} & step.content.keys():
+            yield step.fault("changes nothing: give R, X or E")
+        at = step.at("at").start
+        if at is not None:
+            yield from _instant_faults(step.at("at"), at, before, test.at("duration").number)
+        before = at
+
+
+def _instant_faults(
+    place: Node, at: float, before: float | None, end: float | None
+) -> Iterator[Fault]:
+    if before is not None and at <= before:
+        yield place.fault(f"{show(at)} s is not after {show(before)} s, the step before")
+    if end is not None and not 0 <= at < end:
+        yield place.fault(f"{show(at)} s lies outside 0 ... {show(end)} s, the duration")

@@ -1,0 +1,81 @@
+"""What contradicts itself in a case though every single value has the right form."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
+from exfit.case.checks.model import parameter_faults
+from exfit.case.checks.node import Node
+from exfit.case.checks.nuisance import nuisance_faults
+from exfit.case.checks.plant import model_faults, plants_of_records_faults, stabiliser_faults
+from exfit.case.checks.record import channels_faults, noise_faults, record_faults, repeated_names
+from exfit.case.parts import Parts, kind_of
+from exfit.case.ties import Ties
+from exfit.case.yaml import Fault
+from exfit.plants import PlantKind
+
+
+def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[Fault]:
+    """Yield the faults of a case file's content beyond its form.
+
+    A value of the wrong form is left to the schema and skipped here.
+    """
+    content = Node((), plain)
+    kind = kind_of(content.at("plant").content)
+    several = [entry for key in ("records", "validate") for entry in content.at(key).entries]
+    yield from model_faults(content, kind)
+    yield from parameter_faults(content, parts, ties)
+    yield from stabiliser_faults(content, parts, kind)
+    yield from plants_of_records_faults(content, kind)
+    yield from _single_record_faults(content)
+    if "records" not in content:
+        yield from _recording_faults(content, content, kind)
+    for recording in several:
+        yield from _recording_faults(recording, content, kind)
+    yield from noise_faults([content, *several], kind)
+    yield from repeated_names(several)
+    yield from _estimate_faults(content)
+
+
+def _single_record_faults(content: Node) -> Iterator[Fault]:
+    """Yield a test that is missing, or stands beside several records."""
+    if "records" not in content:
+        if "test" not in content:
+            yield content.at("test").fault("is missing")
+        return
+    for key in ("test", "record"):
+        if key in content:
+            yield content.at(key).fault("not allowed with records: each of them has its own")
+
+
+def _recording_faults(recording: Node, content: Node, kind: PlantKind) -> Iterator[Fault]:
+    """Yield what contradicts itself in a test and its record; a single one is the whole content."""
+    plant = recording.at("plant")
+    kind = kind_of(plant.content) if "type" in plant else kind
+    network = plant.at("network") if plant.at("network").content else content.at("plant", "network")
+    test, record = recording.at("test"), recording.at("record")
+    has_record = "record" in recording
+    yield from bump_test_faults(test, network, kind)
+    yield from nuisance_faults(test, record, kind, has_record)
+    if has_record:
+        yield from record_faults(test, record)
+        yield from channels_faults(record.at("channels"), kind)
+    elif kind.plays_back:
+        yield record.fault(f"is missing: plant {kind.name} plays it back")
+    elif recording is content:
+        yield from missing_without_record(test)
+
+
+def _estimate_faults(content: Node) -> Iterator[Fault]:
+    """Yield settings that nothing uses."""
+    if "accept" in content and not content.at("validate").entries:
+        yield content.at("accept").fault("there is no validation to judge")
+    estimate = content.at("estimate")
+    starts = estimate.at("starts").number
+    if "refine" in estimate and (starts is None or starts <= 1.0):
+        yield estimate.at("refine").fault("only with more than one of estimate.starts")
+    if (
+        "loss_scale" in estimate
+        and estimate.content.get("loss", "least-squares") == "least-squares"
+    ):
+        yield estimate.at("loss_scale").fault("only with estimate.loss: huber or soft-l1")

@@ -1,0 +1,94 @@
+"""A place in the content of a case: read with care, as any value there may have the wrong form.
+
+The checks of a case read the content itself, not its sections: a section with one bad value does
+not exist, and would hide the faults of the others.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from exfit.case.yaml import Fault, Place
+
+
+@dataclass(frozen=True)
+class Node:
+    """A place of the content and what stands there; None where nothing does.
+
+    What is asked for in a form that the value does not have is None, or empty.
+    """
+
+    place: Place
+    value: Any
+
+    def at(self, *keys: str | int) -> "Node":
+        """Return the place under the keys and indices, one within the other."""
+        value = self.value
+        for key in keys:
+            inside = value.get(key) if isinstance(value, dict) else None
+            value = _entry(value, key) if isinstance(value, list) else inside
+        return Node((*self.place, *keys), value)
+
+    def __contains__(self, key: str) -> bool:
+        """Whether a mapping stands here that has the key."""
+        return key in self.content
+
+    @property
+    def content(self) -> Mapping[str, Any]:
+        """The mapping that stands here."""
+        return self.value if isinstance(self.value, dict) else {}
+
+    @property
+    def is_section(self) -> bool:
+        """Whether a mapping stands here."""
+        return isinstance(self.value, dict)
+
+    @property
+    def sections(self) -> Iterator[tuple[str, "Node"]]:
+        """The entries of the mapping that stands here, by key."""
+        return ((key, self.at(key)) for key in self.content)
+
+    @property
+    def entries(self) -> list["Node"]:
+        """The entries of the list that stands here."""
+        count = len(self.value) if isinstance(self.value, list) else 0
+        return [self.at(index) for index in range(count)]
+
+    @property
+    def number(self) -> float | None:
+        """The finite number that stands here."""
+        number = isinstance(self.value, int | float) and not isinstance(self.value, bool)
+        return float(self.value) if number and isfinite(self.value) else None
+
+    @property
+    def start(self) -> float | None:
+        """The number that stands here, or from which a fit starts that finds it."""
+        return self.at("start").number if self.is_section else self.number
+
+    @property
+    def text(self) -> str | None:
+        """The text that stands here."""
+        return self.value if isinstance(self.value, str) else None
+
+    @property
+    def pair(self) -> tuple[float, float] | None:
+        """The two numbers that stand here as a list."""
+        numbers = [entry.number for entry in self.entries]
+        if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
+            return None
+        return numbers[0], numbers[1]
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The entries of the mapping that are numbers."""
+        each = {key: node.number for key, node in self.sections}
+        return {key: number for key, number in each.items() if number is not None}
+
+    def fault(self, text: str) -> Fault:
+        """Return a fault of this place."""
+        return Fault(self.place, text)
+
+
+def _entry(values: list[Any], key: str | int) -> Any:
+    return values[key] if isinstance(key, int) and key < len(values) else None

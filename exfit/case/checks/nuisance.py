@@ -1,0 +1,71 @@
+"""What contradicts itself in the values of a record or its test that a fit is to find."""
+
+from collections.abc import Iterator
+
+from exfit.case.checks.bounds import bound_faults
+from exfit.case.checks.node import Node
+from exfit.case.yaml import Fault
+from exfit.plants import PlantKind
+from exfit.util.text import show
+
+AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
+
+
+def nuisance_faults(test: Node, record: Node, kind: PlantKind, has_record: bool) -> Iterator[Fault]:
+    """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
+    for value in _findable(test, record):
+        if not value.is_section:
+            continue
+        yield from _value_faults(value)
+        if kind.plays_back:
+            yield value.fault(f"not allowed with plant {kind.name}: the record drives it")
+        elif value.at("start").text == "auto":
+            yield from _automatic_faults(value.at("start"), record, has_record)
+    yield from _level_faults(test, record.at("channels", "vt"))
+    delay = record.at("delay")
+    if kind.plays_back and (delay.number or 0.0) != 0.0:
+        yield delay.fault(f"not allowed with plant {kind.name}")
+
+
+def _findable(test: Node, record: Node) -> Iterator[Node]:
+    """Yield the places at which a number or {start, min, max} may stand."""
+    yield test.at("vt0")
+    for name in ("vref", "vs"):
+        for step in test.at(name).entries:
+            yield step.at("at")
+            yield step.at("step")
+    yield record.at("delay")
+    for _, channel in record.at("channels").sections:
+        yield channel.at("scale")
+        yield channel.at("offset")
+
+
+def _automatic_faults(start: Node, record: Node, has_record: bool) -> Iterator[Fault]:
+    if not has_record:
+        yield start.fault("auto needs a record")
+    elif "vt" not in record.at("channels"):
+        yield start.fault("auto needs vt in the record")
+
+
+def _level_faults(test: Node, vt: Node) -> Iterator[Fault]:
+    """Yield the voltage that is missing where a fit finds scale or offset of the recorded one."""
+    unknown = [key for key in ("scale", "offset") if vt.at(key).is_section]
+    if test.content and unknown and "vt0" not in test:
+        text = f"is missing: the record does not show it where {unknown[0]} of vt is to be found"
+        yield test.at("vt0").fault(text)
+
+
+def _value_faults(value: Node) -> Iterator[Fault]:
+    """Yield the faults of one value that the fit shall find: its bounds and its start."""
+    key = value.place[-1]
+    automatic = value.at("start").text == "auto"
+    if automatic and not (key in AUTOMATIC and value.place[-3:-1] == ("vref", 0)):
+        text = "auto finds the first step of vref: its at and its step"
+        yield value.at("start").fault(text)
+    for bound in ("min", "max"):
+        if bound not in value and not automatic:
+            yield value.at(bound).fault("is missing")
+    yield from bound_faults(value)
+    low, high = value.at("min").number, value.at("max").number
+    if key in ("step", "scale") and low is not None and high is not None and low <= 0 <= high:
+        yield value.at("min").fault(f"{show(low)} ... {show(high)} contains 0")

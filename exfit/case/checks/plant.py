@@ -1,0 +1,60 @@
+"""What contradicts itself between the plant of a case, its model and its stabiliser."""
+
+from collections.abc import Iterator
+
+from exfit.case.checks.model import part_faults
+from exfit.case.checks.node import Node
+from exfit.case.parts import Parts, kind_of, network_part
+from exfit.case.yaml import Fault
+from exfit.plants import PlantKind
+
+
+def model_faults(content: Node, kind: PlantKind) -> Iterator[Fault]:
+    """Yield a model that is missing, or what describes one where there is none."""
+    if kind.has_exciter:
+        if "model" not in content:
+            yield content.at("model").fault("is missing")
+        return
+    for key in ("model", "saturation", "parameters", "stabiliser"):
+        if key in content:
+            text = f"not allowed with plant {kind.name}: the machine stands alone"
+            yield content.at(key).fault(text)
+
+
+def stabiliser_faults(content: Node, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
+    """Yield a stabiliser that does not act, and inputs of another number than its model's."""
+    section = content.at("stabiliser")
+    if not section.content:
+        return
+    if kind.has_exciter and not kind.has_machine:
+        yield section.fault(f"not allowed with plant {kind.name}: nothing feeds it")
+    kinds = (kind, *(kind_of(plant.content) for plant in plants_of_records(content)))
+    on_load = any(kind.on_load for kind in kinds)
+    if kind.closed_loop and not on_load and section.at("free").content:
+        yield section.at("free").fault("on open circuit a stabiliser does not act")
+    inputs = section.at("inputs")
+    if parts.stabiliser is not None and isinstance(inputs.value, list):
+        count = len(parts.stabiliser.inputs)
+        if len(inputs.value) != count:
+            text = f"{len(inputs.value)} given; {parts.stabiliser.name} takes {count}"
+            yield inputs.fault(text)
+
+
+def plants_of_records_faults(content: Node, kind: PlantKind) -> Iterator[Fault]:
+    """Yield the faults of the plants that records have in place of the case's."""
+    for plant in plants_of_records(content):
+        network = plant.at("network")
+        if not kind.closed_loop:
+            yield plant.fault(f"not allowed with plant {kind.name}")
+        elif kind_of(plant.content).on_load and network.is_section:
+            yield from part_faults(content, network_part(network.content, network.place), {}, {})
+
+
+def plants_of_records(content: Node) -> list[Node]:
+    """Return the plants that records have in place of the case's."""
+    return [
+        recording.at("plant")
+        for key in ("records", "validate")
+        for recording in content.at(key).entries
+        if "plant" in recording
+    ]
