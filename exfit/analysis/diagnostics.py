@@ -41,14 +41,14 @@ def notes(
             if change > max(COARSE * rmse, INVISIBLE):
                 yield (
                     f"halving the step of {case.simulation.step:g} s moves {signal} by "
-                    f"{change:.1e} pu, its error is {rmse:.1e} pu: give a smaller simulation.step"
+                    f"{change:.1e} pu, its error is {rmse:.1e} pu: reduce simulation.step"
                 )
         used = simulator.substeps(at)
         if comparison.substeps > 2 * used:
             step = case.simulation.step * used / comparison.substeps
             yield (
                 f"the response needs {comparison.substeps} sub-steps along its way, {used} were "
-                f"taken: give simulation.step = {step:.2g}"
+                f"taken: set simulation.step to {step:.2g}"
             )
 
 
@@ -77,9 +77,9 @@ def misfit_notes(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> Iter
         times = noise.estimated / (channel.weight * noise_of(channel))
         if channel.noise is None and times > MISFIT:
             yield (
-                f"the error of {noise.label} is {times:.2g} times what its record scatters from "
-                "sample to sample: the step, the model or the record is not as the case says, and "
-                "the intervals do not hold that error"
+                f"the error of {noise.label} is {times:.2g} times the scatter of its record from "
+                "sample to sample: the step, the model or the record differs from the case, and "
+                "the intervals do not include that error"
             )
 
 

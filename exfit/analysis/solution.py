@@ -125,7 +125,7 @@ def fit_notes(
 ) -> Iterator[str]:
     """Yield what must be known beside the numbers of a fit."""
     if not best.success:
-        yield "the search did not end at a minimum: errors and intervals would be those of one"
+        yield "the search did not end at a minimum: the errors and intervals assume that it did"
     yield from notes(case, residuals, best, comparisons)
     for setup, comparison in zip(setups, comparisons, strict=True):
         vt0 = setup.test.vt0 if setup.test.begin is None else None

@@ -239,10 +239,12 @@ def agreement_table(found: Agreement) -> str:
 
 
 def last_fit(case: Path) -> Path:
-    """Return the parameters of the last fit of a case; raises CaseError where none is known."""
+    """Return the parameters of the last fit of a case; raises CaseError where there is none."""
     kept = _kept(case)
     if not kept.is_file():
-        raise CaseError([f"{case}: no fit of this case is known; give --parameters FILE"])
+        raise CaseError(
+            [f"{case}: no earlier fit of this case; run exfit fit, or give --parameters FILE"]
+        )
     return kept
 
 

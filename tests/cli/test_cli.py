@@ -484,7 +484,7 @@ def test_the_parameters_of_a_fit_give_its_response_again(run, source):
 
 def test_a_validation_without_a_fit_says_what_to_give(run, workplace):
     case, before = case_file(), listing(workplace)
-    words = ["case.yaml", "no fit of this case is known", "--parameters"]
+    words = ["case.yaml", "no earlier fit of this case", "--parameters"]
     is_refused(run("validate", case), words, before, workplace)
 
 
