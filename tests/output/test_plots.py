@@ -138,7 +138,7 @@ def test_convergence_shows_cost_gradient_and_damping_of_every_phase(phases, iter
     assert damping.get_xlabel() == "iteration"
     used = phases if iterations > 1 else phases[:1]
     labels = [text.get_text() for text in cost.get_legend().get_texts()]
-    assert labels == [plots.search.PHASE_NAMES[phase] for phase in used]
+    assert labels == [plots.search.PHASES[phase] for phase in used]
 
 
 def test_a_vanished_gradient_has_no_place_on_a_logarithmic_axis_but_breaks_nothing():

@@ -11,41 +11,44 @@ from exfit.signals import label_of
 LINES = {"A": (START, "-"), "B": (SIMULATED, "--")}
 
 
-def agreement(found: Agreement) -> Figure:
+def agreement(compared: Agreement) -> Figure:
     """Return the signals of two responses, with a record where there is one, and the differences.
 
-    Of a record the differences from it are drawn too.
+    The differences from a record are drawn too.
     """
-    signals = [one.signal for one in found.between]
+    signals = [difference.signal for difference in compared.between]
     count = len(signals)
     figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * count), layout="constrained")
     axes = figure.subplots(
         2 * count, 1, sharex=True, height_ratios=[3.0, 1.3] * count, squeeze=False
     )[:, 0]
-    for k, signal in enumerate(signals):
-        own = [one for one in found.differences if one.signal == signal]
-        _curves(axes[2 * k], found.curves, signal, own[0])
+    for k, (signal, between) in enumerate(zip(signals, compared.between, strict=True)):
+        _curves(axes[2 * k], compared.curves, between)
+        own = [one for one in compared.differences if one.signal == signal]
         _differences(axes[2 * k + 1], own)
     axes[-1].set_xlabel("time (s)")
     figure.align_ylabels()
-    names = [f"{one.name}: {one.path.parent.name}/{one.path.name}" for one in found.curves]
+    names = [
+        f"{curve.name}: {curve.path.parent.name}/{curve.path.name}" for curve in compared.curves
+    ]
     figure.suptitle("\n".join(names), fontsize=10)
     return figure
 
 
-def _curves(axes: Axes, curves: tuple[Curve, ...], signal: str, between: Difference) -> None:
+def _curves(axes: Axes, curves: tuple[Curve, ...], between: Difference) -> None:
     begin, end = between.time[0], between.time[-1]
-    for one in sorted(curves, key=lambda one: one.name in LINES):  # the record below the lines
-        if signal not in one.signals:
+    # the record is drawn below the lines
+    for curve in sorted(curves, key=lambda curve: curve.name in LINES):
+        if between.signal not in curve.signals:
             continue
-        inside = (one.time >= begin) & (one.time <= end)
-        time, samples = one.time[inside], one.signals[signal][inside]
-        if one.name in LINES:
-            color, style = LINES[one.name]
-            axes.plot(*envelope(time, samples), style, color=color, linewidth=1.4, label=one.name)
+        inside = (curve.time >= begin) & (curve.time <= end)
+        points = envelope(curve.time[inside], curve.signals[between.signal][inside])
+        if curve.name in LINES:
+            color, style = LINES[curve.name]
+            axes.plot(*points, style, color=color, linewidth=1.4, label=curve.name)
         else:
-            axes.plot(*envelope(time, samples), ".", color=MEASURED, markersize=3, label=one.name)
-    axes.set_ylabel(label_of(signal))
+            axes.plot(*points, ".", color=MEASURED, markersize=3, label=curve.name)
+    axes.set_ylabel(label_of(between.signal))
     axes.legend(loc="best", frameon=False)
     value, at = between.largest
     text = f"B - A: rms {between.rms:.3g} pu, largest {value:.3g} pu at {at:.4g} s"
@@ -53,14 +56,18 @@ def _curves(axes: Axes, curves: tuple[Curve, ...], signal: str, between: Differe
     tidy(axes)
 
 
-def _differences(axes: Axes, own: list[Difference]) -> None:
+def _differences(axes: Axes, differences: list[Difference]) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
-    for one in own:
-        color = LINES[one.second][0] if one.first == "record" else "black"
-        width = 0.6 if one.first == "record" else 1.1
-        label = f"{one.second} - {one.first}"
-        axes.plot(*envelope(one.time, MILLI * one.error), color=color, linewidth=width, label=label)
-    axes.set_ylabel("difference\n(1e-3 pu)" if len(own) > 1 else "B - A\n(1e-3 pu)")
-    if len(own) > 1:
-        axes.legend(loc="best", frameon=False, ncols=len(own), fontsize=8)
+    for difference in differences:
+        of_record = difference.first == "record"
+        axes.plot(
+            *envelope(difference.time, MILLI * difference.error),
+            color=LINES[difference.second][0] if of_record else "black",
+            linewidth=0.6 if of_record else 1.1,
+            label=f"{difference.second} - {difference.first}",
+        )
+    several = len(differences) > 1
+    axes.set_ylabel("difference\n(1e-3 pu)" if several else "B - A\n(1e-3 pu)")
+    if several:
+        axes.legend(loc="best", frameon=False, ncols=len(differences), fontsize=8)
     tidy(axes)

@@ -17,61 +17,74 @@ from exfit.records.steps import RecordedStep
 Array = NDArray[np.float64]
 
 MOST_PANELS = 10  # of one figure that are still readable
-FEWEST = 50  # bins of a stretch between two gaps
-SMALL = 8  # points
-RINGED = 200  # spikes
-NAMED = 4  # channels that are not drawn
+FEWEST_BINS = 50  # of a stretch between two gaps
+SMALL = 8  # points, the size of letters
+MOST_SPIKES_RINGED = 200
+MOST_NAMES = 4  # of channels that are not drawn
+LONGEST_NAME = 20  # letters
 SHADE = "#d7dbe0"
 
 
-def inspection(found: Inspection, title: str) -> Figure:
+def inspection(inspected: Inspection, title: str) -> Figure:
     """Return each channel in a panel of its own: steps marked, gaps shaded, spikes ringed.
 
     Of many channels those with a signal come first, then those that show a step; the rest are
     named.
     """
-    shows = {name for step in found.steps for name in step.sizes}
-    order = sorted(
-        found.channels, key=lambda one: (one.signal is None, one.name not in shows, one.constant)
+    stepping = {name for step in inspected.steps for name in step.sizes}
+    ordered = sorted(
+        inspected.channels,
+        key=lambda channel: (
+            channel.signal is None,
+            channel.name not in stepping,
+            channel.constant,
+        ),
     )
-    shown = order[:MOST_PANELS]
-    left_out = [one.name for one in order[MOST_PANELS:]]
-    figure = Figure(figsize=(WIDTH, 1.2 + 1.5 * len(shown)), layout="constrained")
-    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, one in zip(panels, shown, strict=True):
-        _channel(axes, found, one)
-    _steps(panels[0], found.steps)
-    panels[-1].set_xlabel("time (s)" + _rest(left_out))
+    drawn = ordered[:MOST_PANELS]
+    left_out = [channel.name for channel in ordered[MOST_PANELS:]]
+    figure = Figure(figsize=(WIDTH, 1.2 + 1.5 * len(drawn)), layout="constrained")
+    panels = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, channel in zip(panels, drawn, strict=True):
+        _channel(axes, inspected, channel)
+    _instants(panels[0], inspected.steps)
+    panels[-1].set_xlabel("time (s)" + _not_drawn(left_out))
     figure.align_ylabels()
     figure.suptitle(title, fontsize=11)
     return figure
 
 
-def _channel(axes: Axes, found: Inspection, one: InspectedChannel) -> None:
-    time, column = found.time, found.samples[one.name]
-    for gap in found.sampling.gaps:
-        axes.axvspan(gap.start, gap.end, color=SHADE, linewidth=0.0)
-    broken = np.searchsorted(time, [gap.end for gap in found.sampling.gaps])
-    bins = max(PIXELS // (len(broken) + 1), FEWEST)
-    for t, y in zip(np.split(time, broken), np.split(column, broken), strict=True):
-        axes.plot(*envelope(t, y, bins), color=START, linewidth=0.9)
-    for first, last in one.stuck:
+def _channel(axes: Axes, inspected: Inspection, channel: InspectedChannel) -> None:
+    """Draw a channel with what was detected in it."""
+    _samples(axes, inspected, channel.name)
+    for first, last in channel.stuck:
         axes.axvspan(first, last, color=LIMIT, alpha=0.25, linewidth=0.0)
-    at = np.array(one.spikes_at[:RINGED])
-    if len(at):
-        places = np.searchsorted(time, at)
-        axes.plot(at, column[places], "o", color=SIMULATED, fillstyle="none", markersize=7)
-    for step in found.steps:
-        seen = one.name in step.sizes or one.name in step.seen_in
-        axes.axvline(step.at, color=SIMULATED, linewidth=1.0, linestyle="-" if seen else ":")
-    signal = f"\n{one.signal}" if one.signal and one.signal != one.name else ""
-    axes.set_ylabel(f"{_short(one.name)}{signal}\n({one.unit or 'unit?'})", fontsize=SMALL)
+    spikes = np.array(channel.spikes_at[:MOST_SPIKES_RINGED])
+    if len(spikes):
+        values = inspected.samples[channel.name][np.searchsorted(inspected.time, spikes)]
+        axes.plot(spikes, values, "o", color=SIMULATED, fillstyle="none", markersize=7)
+    for step in inspected.steps:
+        detected = channel.name in step.sizes or channel.name in step.seen_in
+        axes.axvline(step.at, color=SIMULATED, linewidth=1.0, linestyle="-" if detected else ":")
+    signal = f"\n{channel.signal}" if channel.signal not in (None, "", channel.name) else ""
+    unit = channel.unit or "unit?"
+    axes.set_ylabel(f"{_short(channel.name)}{signal}\n({unit})", fontsize=SMALL)
     axes.yaxis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=SMALL)
     tidy(axes)
 
 
-def _steps(axes: Axes, steps: Sequence[RecordedStep]) -> None:
+def _samples(axes: Axes, inspected: Inspection, name: str) -> None:
+    """Draw the samples of a channel, with the gaps of the clock shaded."""
+    time, gaps = inspected.time, inspected.sampling.gaps
+    for gap in gaps:
+        axes.axvspan(gap.start, gap.end, color=SHADE, linewidth=0.0)
+    ends = np.searchsorted(time, [gap.end for gap in gaps])
+    bins = max(PIXELS // (len(ends) + 1), FEWEST_BINS)
+    for t, y in zip(np.split(time, ends), np.split(inspected.samples[name], ends), strict=True):
+        axes.plot(*envelope(t, y, bins), color=START, linewidth=0.9)
+
+
+def _instants(axes: Axes, steps: Sequence[RecordedStep]) -> None:
     """Write the instants of the steps above the panels."""
     for step in steps:
         axes.annotate(
@@ -88,13 +101,13 @@ def _steps(axes: Axes, steps: Sequence[RecordedStep]) -> None:
 
 
 def _short(name: str) -> str:
-    return name if len(name) <= 20 else name[:19] + "…"
+    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "…"
 
 
-def _rest(names: Sequence[str]) -> str:
+def _not_drawn(names: Sequence[str]) -> str:
     """Return the names of what is not drawn, as many as fit."""
     if not names:
         return ""
-    text = ", ".join(map(_short, names[:NAMED]))
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    text = ", ".join(map(_short, names[:MOST_NAMES]))
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"\nnot drawn: {text}{more}"

@@ -1,62 +1,74 @@
 """Simulated responses without a record."""
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.output.plots.style import MEASURED, SIMULATED, START, WIDTH, tidy
 from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.simulator import Response
 
-WANTED_STATES = 12  # panels of states that are still readable
-SHOWN_OTHERWISE = ("dw",)  # as speed
+MOST_PANELS = 12  # of signals and states, that are still readable
+VOLTAGES = ("vref", "vt")  # drawn on one axis
+DRAWN_OTHERWISE = ("dw",)  # as speed
 
 
 def response(simulated: Response, title: str) -> Figure:
     """Return every signal of a simulation over time; vref and vt share an axis."""
-    together = [name for name in ("vref", "vt") if name in simulated.signals]
-    others = [name for name in simulated.signals if name not in (*together, *SHOWN_OTHERWISE)]
-    names = [name for name in others if np.ptp(simulated.signals[name]) > 0.0][:WANTED_STATES]
-    still = [name for name in others if np.ptp(simulated.signals[name]) == 0.0]
-    columns = 2 if len(names) > 2 else 1
-    rows = 1 + -(-len(names) // columns)
-    figure = Figure(figsize=(WIDTH, 2.6 + 1.6 * (rows - 1)), layout="constrained")
-    grid = figure.add_gridspec(rows, columns, height_ratios=[1.6, *[1.0] * (rows - 1)])
+    panels, at_rest = _others(simulated)
+    columns = 2 if len(panels) > 2 else 1
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(WIDTH, 2.6 + 1.6 * rows), layout="constrained")
+    grid = figure.add_gridspec(1 + rows, columns, height_ratios=[1.6, *[1.0] * rows])
     first = figure.add_subplot(grid[0, :])
-    time = simulated.time
-    for name in together:
-        color = SIMULATED if name == "vt" else MEASURED
-        first.plot(time, simulated.signals[name], color=color, linewidth=1.3, label=name)
-    first.set_ylabel(f"{', '.join(together)} (pu)")
-    first.legend(loc="best", frameon=False)
-    tidy(first)
-    for k, name in enumerate(names):
-        ax = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
-        ax.plot(time, simulated.signals[name], color=START, linewidth=1.1)
-        ax.set_ylabel(f"{name} ({unit_of_signal(name)})")
-        ax.tick_params(labelbottom=k + columns >= len(names))
-        tidy(ax)
+    _voltages(first, simulated)
+    for k, name in enumerate(panels):
+        axes = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
+        axes.plot(simulated.time, simulated.signals[name], color=START, linewidth=1.1)
+        axes.set_ylabel(f"{name} ({unit_of_signal(name)})")
+        axes.tick_params(labelbottom=k + columns >= len(panels))
+        tidy(axes)
     # one column lies on the same axis as the panels below it, two do not
-    first.tick_params(labelbottom=columns > 1 or not names)
+    first.tick_params(labelbottom=columns > 1 or not panels)
     figure.align_ylabels()
-    rest = f"   (unused or at rest: {', '.join(still)})" if still else ""
+    rest = f"   (unused or at rest: {', '.join(at_rest)})" if at_rest else ""
     figure.supxlabel(f"time (s){rest}", fontsize=10)
     figure.suptitle(title, fontsize=11)
     return figure
 
 
+def _others(simulated: Response) -> tuple[list[str], list[str]]:
+    """Return the other signals that change, each to have a panel, and those at rest."""
+    names = [name for name in simulated.signals if name not in (*VOLTAGES, *DRAWN_OTHERWISE)]
+    ranges = {name: np.ptp(simulated.signals[name]) for name in names}
+    changing = [name for name in names if ranges[name] > 0.0]
+    return changing[:MOST_PANELS], [name for name in names if ranges[name] == 0.0]
+
+
+def _voltages(axes: Axes, simulated: Response) -> None:
+    """Draw the reference and the voltage that follows it."""
+    names = [name for name in VOLTAGES if name in simulated.signals]
+    for name in names:
+        color = SIMULATED if name == "vt" else MEASURED
+        axes.plot(simulated.time, simulated.signals[name], color=color, linewidth=1.3, label=name)
+    axes.set_ylabel(f"{', '.join(names)} (pu)")
+    axes.legend(loc="best", frameon=False)
+    tidy(axes)
+
+
 def overview(title: str, drawing: str, simulated: Response) -> Figure:
     """Return a model on one page: its drawing, and what it does with its typical data."""
     lines = drawing.count("\n") + 1
-    shown = [name for name in ("vt", "efd") if name in simulated.signals]
-    text_height, height = 0.5 + 0.165 * lines, 2.2 * len(shown)
+    signals = [name for name in ("vt", "efd") if name in simulated.signals]
+    text_height, height = 0.5 + 0.165 * lines, 2.2 * len(signals)
     figure = Figure(figsize=(WIDTH, text_height + height), layout="constrained")
-    ratios = [text_height, *[2.2] * len(shown)]
+    ratios = [text_height, *[2.2] * len(signals)]
     panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
     panels[0].axis("off")
     panels[0].text(
         0.0, 1.0, drawing, family="monospace", fontsize=8.5, va="top", transform=panels[0].transAxes
     )
-    for axes, name in zip(panels[1:], shown, strict=True):
+    for axes, name in zip(panels[1:], signals, strict=True):
         axes.sharex(panels[-1])
         axes.tick_params(labelbottom=axes is panels[-1])
         axes.plot(simulated.time, simulated.signals[name], color=SIMULATED, linewidth=1.4)

@@ -1,4 +1,4 @@
-"""The way of a search: its iterations, its starts."""
+"""The course of a search: its iterations, its starts."""
 
 from collections.abc import Mapping, Sequence
 
@@ -43,10 +43,10 @@ def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: st
     numbers = [line.number for line in result.history]
     axes.plot(numbers, values, "-", color=MEASURED, linewidth=0.8)
     for phase in dict.fromkeys(line.phase for line in result.history):
-        chosen = [k for k, line in enumerate(result.history) if line.phase == phase]
+        places = [k for k, line in enumerate(result.history) if line.phase == phase]
         axes.plot(
-            [numbers[k] for k in chosen],
-            [values[k] for k in chosen],
+            [numbers[k] for k in places],
+            [values[k] for k in places],
             marker,
             color=COLOURS[phase],
             markersize=4,
@@ -63,14 +63,14 @@ def trajectories(result: FitResult) -> Figure:
     figure = Figure(figsize=(WIDTH, 1.0 + 2.0 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for ax, name in zip(grid.flat, names, strict=False):
-        one = result.parameters[name]
+        parameter = result.parameters[name]
         values = [line.values[name] for line in result.history]
         _by_phase(ax, result, values, "o")
-        for limit in (one.min, one.max):
+        for limit in (parameter.min, parameter.max):
             if min(values) <= limit <= max(values):
                 ax.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
-        bound = f" (on its {one.at_bound})" if one.at_bound else ""
-        ax.set_title(f"{name} = {one.value:.5g} {one.unit}{bound}", fontsize=9)
+        bound = f" (on its {parameter.at_bound})" if parameter.at_bound else ""
+        ax.set_title(f"{name} = {parameter.value:.5g} {parameter.unit}{bound}", fontsize=9)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         tidy(ax)
     for k, ax in enumerate(grid.flat):
@@ -82,30 +82,30 @@ def trajectories(result: FitResult) -> Figure:
     if len(phases) > 1:
         handles = grid[0, 0].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower right", ncols=len(phases), frameon=False)
-    figure.suptitle(f"{result.name}: the parameters on their way", fontsize=11)
+    figure.suptitle(f"{result.name}: the parameters after each iteration", fontsize=11)
     return figure
 
 
-def waterfall(found: Minima, title: str) -> Figure:
+def waterfall(search: Minima, title: str) -> Figure:
     """Return the costs that all starts led to, in rising order, with those they began at."""
     figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     axes = figure.subplots()
-    refined = np.flatnonzero(np.isfinite(found.end_costs))
-    order = refined[np.argsort(found.end_costs[refined], kind="stable")]
+    refined = np.flatnonzero(np.isfinite(search.end_costs))
+    order = refined[np.argsort(search.end_costs[refined], kind="stable")]
     ranks = np.arange(1, len(order) + 1)
-    axes.plot(ranks, found.start_costs[order], ".", color=MEASURED, markersize=3, label="start")
+    axes.plot(ranks, search.start_costs[order], ".", color=MEASURED, markersize=3, label="start")
     axes.step(
-        ranks, found.end_costs[order], where="mid", color=SIMULATED, linewidth=1.4, label="refined"
+        ranks, search.end_costs[order], where="mid", color=SIMULATED, linewidth=1.4, label="refined"
     )
     axes.set_yscale("log")
     axes.set_xlabel("start, by the cost that it led to")
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside lower right", ncols=2, frameon=False)
-    best = found.minima[0].starts
+    best = search.minima[0].starts
     axes.set_title(
         f"{best} of {len(order)} refined starts led to the lowest minimum", fontsize=9, loc="right"
     )
     tidy(axes)
-    figure.suptitle(f"{title}: the minima that {len(found.start_costs)} starts found", fontsize=11)
+    figure.suptitle(f"{title}: the minima that {len(search.start_costs)} starts found", fontsize=11)
     return figure
