@@ -1,14 +1,15 @@
 """How Sphinx builds the site: sphinx-build -W docs build/docs."""
 
 import sys
-from importlib.metadata import version as version_of
 from pathlib import Path
+
+from exfit import __version__
 
 sys.path.insert(0, str(Path(__file__).parent))  # generate.py
 
 project = "exfit"
 author = "the authors of exfit"
-release = version = version_of("exfit")
+release = version = __version__
 copyright = author
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "generate"]

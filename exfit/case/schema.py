@@ -110,10 +110,10 @@ class Section(BaseModel):
 
 
 class PriorSection(Section):
-    """What is known of a parameter beside the record: a value with its standard deviation."""
+    """Prior knowledge of a parameter: a value and its standard deviation."""
 
-    mean: Number = Field(description="Value, as a data sheet has it.")
-    std: Spread = Field(description="Standard deviation, a number or a share such as 20 %.")
+    mean: Number = Field(description="Expected value, for example from a data sheet.")
+    std: Spread = Field(description="Standard deviation: a number, or a percentage such as 20 %.")
 
     @property
     def sigma(self) -> float:
@@ -124,25 +124,25 @@ class PriorSection(Section):
 
 
 class FreeSection(Section):
-    """A parameter that the fit may change."""
+    """A parameter that is fitted."""
 
-    start: Number = Field(description="Value from which the fit starts.")
+    start: Number = Field(description="Start value.")
     min: Number = Field(description="Lower bound.")
     max: Number = Field(description="Upper bound.")
     scale: Literal["log", "linear"] = Field(
-        default="log", description="Scale on which the fit moves it; log needs min > 0."
+        default="log", description="Scale on which it is fitted; log requires min > 0."
     )
-    prior: PriorSection | None = Field(default=None, description="What is known of it beforehand.")
+    prior: PriorSection | None = Field(
+        default=None, description="Prior knowledge, which adds one residual."
+    )
 
 
 class Unknown(Section):
-    """A value of a record or its test that the fit finds, on a linear scale."""
+    """A value of a record or its test that is fitted, on a linear scale."""
 
-    start: Start = Field(
-        description="Value from which the fit starts; auto: as the record shows the first step."
-    )
-    min: Number | None = Field(default=None, description="Lower bound; auto needs none.")
-    max: Number | None = Field(default=None, description="Upper bound; auto needs none.")
+    start: Start = Field(description="Start value; auto: taken from the first step in the record.")
+    min: Number | None = Field(default=None, description="Lower bound; not required with auto.")
+    max: Number | None = Field(default=None, description="Upper bound; not required with auto.")
 
 
 Findable = Annotated[
@@ -159,16 +159,16 @@ def known(value: "float | Unknown | None") -> float | None:
 
 ABOUT = Field(
     default_factory=_nothing,
-    description="What identifies unit and test in a report, under names of your own, such as "
-    "Plant, Unit, Rated, Test date, Tested by.",
+    description="Facts about unit and test that the report shows, under any names, such as Plant, "
+    "Unit, Rated, Test date, Tested by.",
 )
 MACHINE = Field(description="Machine model: GENROU, GENROE, GENSAL, GENSAE or ONE_AXIS.")
 MACHINE_DATA = Field(
     default_factory=_nothing,
-    description="Machine data; what is missing takes its typical value.",
+    description="Machine data; a missing value is the typical one.",
 )
 MACHINE_FREE = Field(
-    default_factory=_nothing, description="Machine data that are fitted, as parameters.free."
+    default_factory=_nothing, description="Machine data that are fitted, as under parameters.free."
 )
 
 
@@ -177,14 +177,14 @@ class PlantSection(Section):
 
     @property
     def given(self) -> Mapping[str, float]:
-        """What is known of the plant beside the data of the machine, as the case gives it."""
+        """The values that the case gives of the plant, beside the data of the machine."""
         return {}
 
 
 class OpenCircuit(PlantSection):
-    """A machine whose breaker is open, at rated speed."""
+    """A machine with its breaker open, at rated speed."""
 
-    type: Literal["open-circuit"] = Field(description="What surrounds the exciter.")
+    type: Literal["open-circuit"] = Field(description="Kind of plant.")
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
@@ -193,13 +193,13 @@ class OpenCircuit(PlantSection):
 class InfiniteBus(PlantSection):
     """A machine behind R + jX to a source of constant voltage and frequency."""
 
-    type: Literal["infinite-bus"] = Field(description="What surrounds the exciter.")
+    type: Literal["infinite-bus"] = Field(description="Kind of plant.")
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
     network: Frozen[Number] = Field(
-        description="f0 (Hz); R and X to the source; P and Q, or P and E (the source's voltage) at "
-        "the start; Rc and Xc of the load compensation; pu on the machine's base."
+        description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
+        "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
     )
 
     @property
@@ -211,23 +211,22 @@ class InfiniteBus(PlantSection):
 class Playback(PlantSection):
     """Recorded signals drive the exciter; efd is compared."""
 
-    type: Literal["playback"] = Field(description="What surrounds the exciter: the record.")
+    type: Literal["playback"] = Field(description="Kind of plant.")
     vref: Number | None = Field(
         default=None,
-        description="The reference at the start, pu, where it is known; default: the one that "
-        "holds the recorded efd.",
+        description="Reference at the start, pu; default: the one that holds the recorded efd.",
     )
 
     @property
     def given(self) -> Mapping[str, float]:
-        """The reference, where it is known."""
+        """The reference, where it is given."""
         return {} if self.vref is None else {"vref": self.vref}
 
 
 class MachinePlayback(PlantSection):
     """A recorded field voltage drives the machine on open circuit; vt and ifd are compared."""
 
-    type: Literal["machine-playback"] = Field(description="The machine alone; there is no model.")
+    type: Literal["machine-playback"] = Field(description="Kind of plant; the case has no model.")
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
@@ -236,7 +235,7 @@ class MachinePlayback(PlantSection):
 class NoPlant(PlantSection):
     """The model alone: its output is vt."""
 
-    type: Literal["none"] = Field(description="What surrounds the model: nothing.")
+    type: Literal["none"] = Field(description="Kind of plant.")
 
 
 Plant = OpenCircuit | InfiniteBus | Playback | MachinePlayback | NoPlant
@@ -244,100 +243,101 @@ SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 
 class Stabiliser(Section):
-    """A power system stabiliser, which acts on load."""
+    """A power system stabiliser; it acts on load only."""
 
-    model: Text = Field(description="Stabiliser model of the catalogue.")
+    model: Text = Field(description="Name of the stabiliser model.")
     inputs: tuple[Heard, ...] | None = Field(
         default=None,
         min_length=1,
-        description="What it listens to, one or two of speed, p, vt; default: as its model says.",
+        description="Input signals, one or two of speed, p, vt; default: those of the model.",
     )
     parameters: Frozen[Given] = Field(
         default_factory=_nothing,
-        description="Its data; what is missing takes its typical value.",
+        description="Its data; a missing value is the typical one.",
     )
     free: Frozen[FreeSection] = Field(
-        default_factory=_nothing, description="Values that are fitted."
+        default_factory=_nothing, description="Parameters that are fitted."
     )
 
 
 class StepSection(Section):
     """A step of a signal."""
 
-    at: Number = Field(description="Instant, s.")
+    at: Number = Field(description="Time, s.")
     step: Number = Field(description="Change, pu; not zero.")
 
 
 class FindableStep(Section):
-    """A step of a signal, whose instant and size the fit may find."""
+    """A step of a signal, whose time and size may be fitted."""
 
-    at: Findable = Field(description="Instant, s; or {start, min, max}, and the fit finds it.")
-    step: Findable = Field(
-        description="Change, pu, not zero; or {start, min, max}, and the fit finds it."
-    )
+    at: Findable = Field(description="Time, s; or {start, min, max} to fit it.")
+    step: Findable = Field(description="Change, pu, not zero; or {start, min, max} to fit it.")
 
 
 class Switch(Section):
-    """A switching in the network: the values that it has from then on."""
+    """A switching in the network, with the values from then on."""
 
-    at: Number = Field(description="Instant, s.")
+    at: Number = Field(description="Time, s.")
     R: NotNegative | None = Field(default=None, description="Resistance to the source, pu.")
     X: NotNegative | None = Field(default=None, description="Reactance to the source, pu.")
     E: Positive | None = Field(
-        default=None, description="Voltage of the source, pu; only where plant.network gives E."
+        default=None, description="Voltage of the source, pu; only if plant.network gives E."
     )
 
 
 class BumpTest(Section):
-    """What was done to the unit."""
+    """The test: the steps that were made."""
 
     vt0: Findable | None = Field(
         default=None,
-        description="Voltage before the first step, pu; default: mean of the record there; or "
-        "{start, min, max}, and the fit finds it.",
+        description="Terminal voltage before the first step, pu, or {start, min, max} to fit it; "
+        "default: mean of the record there.",
     )
     begin: Number | None = Field(
         default=None,
-        description="Where the simulation starts at rest, s; default: with the record. Earlier "
-        "than the record, for steps that were made before it; then vt0 holds from here on.",
+        description="Time at which the simulation starts in steady state, s; default: the start of "
+        "the record. Give an earlier time if steps were made before the record; vt0 is then the "
+        "voltage from this time on.",
     )
     steady_until: Number | None = Field(
         default=None,
-        description="Until when the record is at rest, s; default: the first step.",
+        description="End of the steady state in the record, s; default: the first step.",
     )
     vref: tuple[FindableStep, ...] = Field(
-        default=(), min_length=1, description="Steps of the reference, in the order of time."
+        default=(), min_length=1, description="Steps of the reference, in order of time."
     )
     vs: tuple[FindableStep, ...] = Field(
-        default=(), min_length=1, description="Steps of the stabiliser's signal, in its place."
+        default=(), min_length=1, description="Steps of the stabiliser's signal, in order of time."
     )
     E: tuple[StepSection, ...] = Field(
-        default=(), min_length=1, description="Steps of the source's voltage; infinite-bus."
+        default=(),
+        min_length=1,
+        description="Steps of the voltage of the source; infinite-bus only.",
     )
     network: tuple[Switch, ...] = Field(
-        default=(), min_length=1, description="Switchings of R, X and E; infinite-bus."
+        default=(), min_length=1, description="Switchings of R, X and E; infinite-bus only."
     )
     duration: Positive | None = Field(
-        default=None, description="Length of the simulation, s; only where there is no record."
+        default=None, description="Length of the simulation, s; only if there is no record."
     )
 
     @property
     def instants(self) -> tuple[float, ...]:
-        """When something is done, as far as it is known, s, in the order of time."""
+        """The times of all events that are given as numbers, s, in order."""
         instants = {known(step.at) for step in (*self.vref, *self.vs)}
         instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
         return tuple(sorted(at for at in instants if at is not None))
 
     @property
     def steady(self) -> float | None:
-        """Until when the unit is at rest, s; None where nothing tells."""
+        """The end of the steady state, s; None where the case does not give it."""
         if self.steady_until is not None:
             return self.steady_until
         return self.instants[0] if self.instants else None
 
 
 class LowPassSection(Section):
-    """A low-pass filter, run forwards and backwards."""
+    """A low-pass filter, applied forwards and backwards, so without delay."""
 
     lowpass: Positive = Field(description="Cut-off frequency, Hz.")
 
@@ -345,7 +345,7 @@ class LowPassSection(Section):
 class MedianSection(Section):
     """A running median."""
 
-    median: Count = Field(description="Samples, an odd number.")
+    median: Count = Field(description="Number of samples, odd.")
 
 
 def _is_median(value: Any) -> str:
@@ -360,69 +360,69 @@ Filter = Annotated[
 
 
 class Compared(Section):
-    """How the record of a signal counts."""
+    """How a signal is compared with its record."""
 
-    weight: Positive = Field(default=1.0, description="Weight of the signal in the fit.")
+    weight: Positive = Field(default=1.0, description="Weight of the residuals of the signal.")
     noise: Positive | None = Field(
         default=None,
-        description="Standard deviation of its noise, pu, in place of a weight; all channels that "
-        "are compared, or none.",
+        description="Standard deviation of its noise, pu, in place of a weight; give it for all "
+        "compared channels or for none.",
     )
     filter: Filter | None = Field(
-        default=None, description="{lowpass: Hz} or {median: samples}; simulation and record alike."
+        default=None, description="{lowpass: Hz} or {median: samples}, for record and simulation."
     )
     outliers: Positive | None = Field(
         default=None,
-        description="Leave out samples farther from the running median than so many standard "
-        "deviations of the noise.",
+        description="Leaves out samples that are farther from the running median than this many "
+        "standard deviations of the noise.",
     )
     averaged: Positive | None = Field(
         default=None,
-        description="Over how long the recorder averages about each instant, s: the simulation is "
-        "averaged alike. A mean over the time before it is late by half of this: give that as "
-        "delay.",
+        description="Length over which the recorder averages around each sample, s; the simulation "
+        "is averaged in the same way. If it averages over the time before the sample, give half "
+        "of this length as delay.",
     )
 
 
 class ChannelSection(Compared):
-    """Where a signal stands and how it becomes per unit: column / base * scale + offset."""
+    """The column of a signal and its conversion to per unit: column / base * scale + offset."""
 
     column: Text = Field(description="Name of the column.")
     unit: Text | None = Field(
-        default=None, description="Unit of the column's numbers, such as kV, V, A, MW, pu or %."
+        default=None, description="Unit of the column, such as kV, V, A, MW, pu or %."
     )
     base: Positive | None = Field(
         default=None,
-        description="What 1 pu is, in that unit; of ifd the field current on the air-gap line at "
+        description="Value of 1 pu in that unit; for ifd the field current on the air-gap line at "
         "rated voltage.",
     )
     scale: Findable = Field(
         default=1.0,
-        description="Factor on the column's numbers; or {start, min, max}, and the fit finds it.",
+        description="Factor; or {start, min, max} to fit it.",
     )
     offset: Findable = Field(
         default=0.0,
-        description="What is added after scaling, pu; or {start, min, max}, and the fit finds it.",
+        description="Added after scaling, pu; or {start, min, max} to fit it.",
     )
 
 
 class PhasesSection(Compared):
-    """The terminal voltage from three phases: that of the positive sequence."""
+    """The terminal voltage from three phases: its positive sequence."""
 
     phases: tuple[Text, Text, Text] = Field(
-        description="Columns of the three phases, in their order."
+        description="Columns of the three phases, in phase order."
     )
     kind: Literal["waveform", "rms"] = Field(
-        description="waveform: instantaneous values, of which the positive sequence is taken; rms: "
-        "RMS values, of which the mean is taken."
+        description="waveform: instantaneous values, from which the positive sequence is computed; "
+        "rms: RMS values, which are averaged."
     )
     unit: Text = Field(description="Unit of the columns and of base, such as V or kV.")
     base: Positive = Field(description="Rated voltage, RMS, line to line, in that unit.")
     connection: Literal["phase-to-ground", "phase-to-phase"] = Field(
-        description="Between what the voltages are recorded: a factor of sqrt(3)."
+        description="Whether phase-to-ground or phase-to-phase voltages are recorded."
     )
     cycles: Count = Field(
-        default=1, description="Length of the window, in whole cycles; of waveforms."
+        default=1, description="Length of the window in whole cycles; waveforms only."
     )
 
 
@@ -464,8 +464,8 @@ class RecordFile(Section):
     file: Text = Field(description="Path, relative to the case file.")
     sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
     time: Time = Field(
-        description="Column with the time, s or as the file says; or [date, time of day], two "
-        "columns; or {column, unit}. Timestamps count from the first."
+        description="Column with the time, in s or in the unit that the file gives; or two "
+        "columns, [date, time of day]; or {column, unit}. Timestamps count from the first sample."
     )
     channels: Annotated[
         Mapping[
@@ -475,83 +475,87 @@ class RecordFile(Section):
         Field(min_length=1),
         AfterValidator(MappingProxyType),
         WrapSerializer(_thawed),
-    ] = Field(description="Measured signals, each a column or {column, scale, offset, weight}.")
+    ] = Field(description="Measured signals: the name of a column, or a mapping.")
     window: tuple[Number, Number] | None = Field(
-        default=None, description="First and last instant used, s; default: the whole record."
+        default=None,
+        description="Start and end of the part that is used, s; default: the whole record.",
     )
     mask: tuple[tuple[Number, Number], ...] = Field(
-        default=(), description="Stretches that are not compared, each its first and last instant."
+        default=(), description="Parts that are not compared: start and end of each, s."
     )
     gaps: Literal["refuse", "skip"] = Field(
-        default="refuse", description="What to do where a channel has no number."
+        default="refuse", description="Whether samples without a value are refused or left out."
     )
     resample: Positive | None = Field(
         default=None,
-        description="Rate of a slower, even clock that the record is put on through an anti-alias "
-        "filter, Hz; default: as recorded.",
+        description="Sampling rate to which the record is reduced through an anti-alias filter, "
+        "Hz; default: as recorded.",
     )
     delay: Findable = Field(
         default=0.0,
-        description="By how much the recorder is late, s; or {start, min, max}, and the fit finds "
-        "it.",
+        description="Delay of the recorder, s; or {start, min, max} to fit it.",
     )
 
 
 class Parameters(Section):
-    """The exciter's parameters; what is neither fixed nor free takes its typical value."""
+    """The parameters of the exciter; one that is neither fixed nor free has its typical value."""
 
     fixed: Frozen[Given] = Field(
         default_factory=_nothing,
-        description="Values that stay, or follow others: numbers, or arithmetic such as =-VAMAX.",
+        description="Values that are fixed or tied to others: numbers or formulas such as =-VAMAX.",
     )
     free: Frozen[FreeSection] = Field(
-        default_factory=_nothing, description="Values that are fitted."
+        default_factory=_nothing, description="Parameters that are fitted."
     )
 
 
 class Tolerance(Section):
-    """When the estimator stops as converged."""
+    """Limits at which the search has converged."""
 
     gradient: NotNegative = Field(default=1e-8, description="Limit on the scaled gradient.")
     step: NotNegative = Field(default=1e-10, description="Limit on the relative step.")
 
 
 class Limit(Section):
-    """A limit on how far simulated and measured signals may differ."""
+    """A limit on the difference between simulated and measured signals."""
 
     rmse: Positive = Field(description="Root mean square error, pu.")
 
 
 class Estimate(Section):
-    """How the free parameters are found."""
+    """How the free parameters are estimated."""
 
     strategy: Strategy = Field(
-        default=DEFAULT_STRATEGY, description=f"How the search goes. {EXPLAINED}."
+        default=DEFAULT_STRATEGY, description=f"Method of the search. {EXPLAINED}."
     )
     jacobian: Literal["exact", "central", "forward", "backward"] = Field(
         default="exact", description="Derivatives: exact, or by differences."
     )
     iterations: Count = Field(
-        default=100, description="Most iterations of each phase of the strategy."
+        default=100, description="Largest number of iterations in each phase of the strategy."
     )
-    tolerance: Tolerance = Field(default_factory=Tolerance, description="When to stop.")
+    tolerance: Tolerance = Field(
+        default_factory=Tolerance, description="Limits at which the search has converged."
+    )
     good_enough: Limit = Field(
         default_factory=lambda: Limit(rmse=2e-4),
-        description="What strategy auto calls a match; default: rmse 2e-4.",
+        description="Error below which strategy auto accepts a match; default: rmse 2e-4.",
     )
     loss: Literal["least-squares", "huber", "soft-l1"] = Field(
-        default="least-squares", description="What an error costs; huber and soft-l1 bear spikes."
+        default="least-squares",
+        description="Cost of a residual; huber and soft-l1 tolerate spikes.",
     )
     loss_scale: Positive = Field(
         default=1.345,
-        description="From how many standard deviations of the noise on an error costs less than "
-        "its square.",
+        description="Size of a residual, in standard deviations of the noise, from which huber and "
+        "soft-l1 count it less than its square.",
     )
     starts: Annotated[Count, Field(le=MOST_STARTS)] = Field(
-        default=1, description="Starts spread over the bounds, beside the case's own."
+        default=1,
+        description="Number of starts, distributed over the bounds; the first is that of the case.",
     )
     refine: Count | None = Field(
-        default=None, description="How many of the best starts are fitted; default: all."
+        default=None, description="Number of the best starts that are fitted; default: all."
     )
 
 
@@ -560,20 +564,20 @@ class SimulationSection(Section):
 
     step: Positive = Field(default=0.001, description="Step of the integration, s.")
     output_step: Positive = Field(
-        default=0.005, description="Spacing of the output where there is no record, s."
+        default=0.005, description="Spacing of the output if there is no record, s."
     )
 
 
 class OffLine(PlantSection):
-    """The case's machine with its breaker open."""
+    """The machine of the case with its breaker open."""
 
-    type: Literal["open-circuit"] = Field(description="What surrounds the exciter.")
+    type: Literal["open-circuit"] = Field(description="Kind of plant.")
 
 
 class OnLine(PlantSection):
-    """The case's machine behind R + jX to a source."""
+    """The machine of the case behind R + jX to a source."""
 
-    type: Literal["infinite-bus"] = Field(description="What surrounds the exciter.")
+    type: Literal["infinite-bus"] = Field(description="Kind of plant.")
     network: Frozen[Number] = Field(
         description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
     )
@@ -585,61 +589,65 @@ class OnLine(PlantSection):
 
 
 class Recording(Section):
-    """A test and what was measured at it."""
+    """A test and its record."""
 
     name: str = Field(
         pattern=FILE_NAME,
         max_length=100,
-        description="Name, of letters, digits, - _ and .; files are named after it.",
+        description="Name of letters, digits, - _ and .; files are named after it.",
     )
     plant: Annotated[OffLine | OnLine, Field(discriminator="type")] | None = Field(
-        default=None, description="What surrounds the exciter, where that is not the case's plant."
+        default=None, description="Plant of this record, if it differs from that of the case."
     )
-    test: BumpTest = Field(description="What was done to the unit.")
-    record: RecordFile = Field(description="What was measured.")
+    test: BumpTest = Field(description="The steps that were made.")
+    record: RecordFile = Field(description="The measured signals.")
 
 
 class CaseDocument(Section):
-    """A study of exfit: a model, its plant, a test, its record, and what is to be found."""
+    """A model, its plant, a test, its record, and the parameters to be fitted."""
 
     about: Frozen[Fact] = ABOUT
     model: Text | None = Field(
         default=None,
-        description="Model of the catalogue, in upper or lower case, or path of a .py file; none "
-        "with plant machine-playback.",
+        description="Name of a model, in upper or lower case, or path of a .py file; none with "
+        "plant machine-playback.",
     )
     saturation: SaturationName = Field(
         default="quadratic", description="Form of the exciter's saturation curve."
     )
     plant: Annotated[Plant, Field(discriminator="type")] = Field(
-        description="What surrounds the exciter."
+        description="The plant: what surrounds the exciter during the test."
     )
     stabiliser: Stabiliser | None = Field(
-        default=None, description="A power system stabiliser; on open circuit it does not act."
+        default=None, description="A power system stabiliser; it acts on load only."
     )
     test: BumpTest | None = Field(
-        default=None, description="What was done to the unit; each of the records has its own."
+        default=None,
+        description="The steps that were made; with records, each of them has its own.",
     )
     record: RecordFile | None = Field(
-        default=None, description="What was measured; a simulation does without."
+        default=None, description="The measured signals; not required by simulate."
     )
     records: tuple[Recording, ...] = Field(
         default=(),
         min_length=1,
-        description="In place of test and record: several tests with their records, fitted as one.",
+        description="In place of test and record: several tests with their records, in one fit.",
     )
     parameters: Parameters = Field(
-        default_factory=Parameters, description="What is known and what is to be found."
+        default_factory=Parameters, description="Fixed and free parameters of the exciter."
     )
     estimate: Estimate = Field(
-        default_factory=Estimate, description="How the free parameters are found."
+        default_factory=Estimate, description="How the free parameters are estimated."
     )
     simulation: SimulationSection = Field(
         default_factory=SimulationSection, description="The grid of the simulation."
     )
     validations: tuple[Recording, ...] = Field(
-        default=(), alias="validate", description="Records on which the result is tried."
+        default=(),
+        alias="validate",
+        description="Records on which the result is validated; they are not used in the fit.",
     )
     accept: Limit | None = Field(
-        default=None, description="What a validation must keep to; beyond it the exit code is 3."
+        default=None,
+        description="Limit of the error of a validation; beyond it the exit code is 3.",
     )

@@ -8,7 +8,7 @@ vc1 ►[  1  ]┘   │  [  sKF  ]                   │            │        �
      [1+sTR]    └──[1 + sTF]◄──────────────────┴─── VFE ◄───┘   KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD. The limits of the lag are non-windup; the clamp
-behind it is not: VA may stand beyond VRMAX. Not modelled: UEL and OEL gates.
+behind it is not: VA may exceed VRMAX. Not modelled: UEL and OEL gates.
 """
 
 from exfit.engine.trace import Signal

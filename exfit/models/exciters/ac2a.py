@@ -14,11 +14,11 @@ vc1 ►[  1  ]┘   │                        │   ┌─ VE ─┬─[  1  ]�
                 └─[1 + sTF]◄──────┐      └─[KH]◄───────────────────┤
                                   └────────────────────────────────┘
 
-VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX, that is
-(VFEMAX - KD IFD) / (KE + SE(VE)): the limit of the exciter's field current.
-The limits of the lag and of VE are non-windup; the clamp to VRMAX, VRMIN is
-not. KH closes a loop that shortens the exciter's time constant, so at rest
-VA = VFE / KB + KH VFE. UEL and OEL are gates, and do not act by themselves.
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX,
+(VFEMAX - KD IFD) / (KE + SE(VE)): the limit of the exciter's field current. The
+limits of the lag and of VE are non-windup; the clamp to VRMAX, VRMIN is not. KH
+closes a loop that shortens the exciter's time constant, so at rest
+VA = VFE / KB + KH VFE. The UEL and OEL gates do not act.
 """
 
 from exfit.engine.trace import Signal

@@ -8,16 +8,16 @@ vc1 ►[  1  ]┘                 │                   └─── VFE ◄─�
      [1+sTR]       [   s   ]  │                                KC IFD / VE │
                    [1 + sTF]──┘◄── VN ◄─[ KF to EFDN, then KN ]◄───────────┘
 
-VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. VN grows by KF
-per efd up to EFDN and by KN beyond it: the exciter supplies its regulator, so
-that the gain of both grows with efd. The limits of the lag and of VE are
-non-windup; the UEL gate does not act by itself.
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. VN has
+the slope KF up to EFDN and KN beyond it. The exciter supplies its regulator, so
+the gain of both grows with efd. The limits of the lag and of VE are non-windup;
+the UEL gate does not act.
 
 VF is subtracted behind the lead-lag, as in the models written after PSS/E's
 ESAC3A. Not modelled: the low voltage limiter (KLV, VLV) of the model of 1981,
 which IEEE Std 421.5 and ESAC3A replaced by VEMIN; an OEL, which is added to vs.
-VEMIN is 0.1 here; copies of the sample data that say 0 let VE end at 0 for
-good, where the regulator has no supply.
+VEMIN is 0.1 here; with 0, as in some copies of the sample data, VE stays at 0
+once it is there, since the regulator then has no supply.
 """
 
 from exfit.engine.trace import Signal

@@ -7,10 +7,10 @@ vref + vs ─►(+)─►[clip]─►[1 + sTC]─►HV─►[  KA  ]─► efd
 vc1 ►[  1  ]┘
      [1+sTR]
 
-The limits of the lag are non-windup, and only the upper one sinks with the
-field current; the UEL gate does not act by itself. The alternator's own
-regulator is left out, as in the standard, and so is an OEL, which is added to
-vs. PSS/E's older EXAC4 differs in its limits: it is a model of its own.
+The limits of the lag are non-windup, and only the upper one falls with the
+field current; the UEL gate does not act. The alternator's own regulator is left
+out, as in the standard, and so is an OEL, which is added to vs. PSS/E's older
+EXAC4 differs in its limits and is a separate model.
 """
 
 from exfit.engine.trace import Signal

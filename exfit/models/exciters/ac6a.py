@@ -13,10 +13,10 @@ vc1 ►[  1  ]┘                             │            │            │ 
 
 VFE = KE VE + VX(VE) + KD IFD. The field current limiter acts above VFELIM; at
 rest VA = VFE + KH (VFE - VFELIM) there. The limit of the second lead-lag is
-non-windup in the way of annex E: at the limit its state follows the limited
-output with the lag TC. The limit of VE is non-windup; the clamps of VR and of
-the limiter are not. TB = 0 bypasses TC with it, TA = 0 TK, TH = 0 TJ. Not
-modelled: UEL and OEL, which are added to vs.
+non-windup as in annex E: at the limit its state follows the limited output with
+the lag TC. The limit of VE is non-windup; the clamps of VR and of the limiter
+are not. TB = 0 bypasses TC with it, TA = 0 TK, TH = 0 TJ. Not modelled: UEL and
+OEL, which are added to vs.
 """
 
 from exfit.engine.trace import Signal

@@ -13,12 +13,12 @@ vc1 ►[  1  ]┘                │          │    VEMIN  │       FEX
      [1+sTR]                 └──────────┴─── VFE ◄──┘        ▲
                                                         KC IFD / VE
 
-VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. The limits of VE
-are non-windup; the integrals of the PID and of the PI are frozen while they
-would push their output further beyond its limit. KP VT is the supply of the
-amplifier, with VT the terminal voltage itself. The exciter integrates, 1/sTE:
-the 1/(1+sTE) in the figure of 2005 is a misprint. Not modelled: the UEL input
-of the first summing point.
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
+limits of VE are non-windup; the integrals of the PID and of the PI are frozen
+while they would drive their output further beyond its limit. KP VT is the
+supply of the amplifier, with VT the terminal voltage itself. The exciter
+integrates, 1/sTE: the 1/(1+sTE) in the figure of 2005 is a misprint. Not
+modelled: the UEL input of the first summing point.
 """
 
 from exfit.engine.trace import Signal

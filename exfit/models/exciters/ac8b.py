@@ -7,9 +7,10 @@ vref + vs ─►(+)─►[KPR + KIR/s   ]─►[  KA  ]─►(+)─►[  1  ]─
 vc1 ►[  1  ]┘                                 │           │        ▲
      [1+sTR]                                  └── VFE ◄───┘   KC IFD / VE
 
-VFE = KE VE + VX(VE) + KD IFD, and VEMAX is where VFE = VFEMAX. The limits of
-the lag and of VE are non-windup; the integral is frozen while the PID is at its
-limit. Not modelled: the UEL and OEL gates. PSS/E's ESAC8B is another model.
+VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
+limits of the lag and of VE are non-windup; the integral is frozen while the PID
+is at its limit. Not modelled: the UEL and OEL gates. PSS/E's ESAC8B is another
+model.
 """
 
 from exfit.engine.trace import Signal

@@ -20,7 +20,7 @@ VFE = KE EFD + VX(EFD). The limits of the lag and of EFD are non-windup;
 the integral is frozen while the PID is at its limit. The regulator is fed
 from the terminals: gain and limits are proportional to VT, as in the
 standard's drawing, OpenIPSL and InterPSS. The standard's sample data have
-KF = 0: the rate feedback stands in for a derivative.
+KF = 0: the rate feedback is an alternative to the derivative.
 KE = 0 is self-excited: KE is computed at the start so that VR starts at
 VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
 VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2

@@ -16,9 +16,9 @@ vc1 ►[  1  ]┘                 └─────────┴── VFE �
 VFE = KE VE + VX(VE) + KD IFD. The limits of the lag and of VE are non-windup;
 the clamp behind KB is not. The low value gate limits the exciter's field
 current, in the end to VFE = VLR KB KL / (1 + KB KL). A start beyond the gate is
-refused; some programs raise VLR in silence instead. The AC2A of 1992 and 2005
-is another model, with a ceiling of VE and no such gate. Not modelled: the UEL
-and OEL inputs, which some programs add at the first summing point.
+refused; some programs raise VLR without a message instead. The AC2A of 1992 and
+2005 is another model, with a ceiling of VE and no such gate. Not modelled: the
+UEL and OEL inputs, which some programs add at the first summing point.
 """
 
 from exfit.engine.trace import Signal

@@ -7,9 +7,9 @@ vref + vs ─►(+)─►[clip]─►[1 + sTC]─►[  KA  ]─►[clip]─► e
 vc1 ►[  1  ]┘
      [1+sTR]
 
-AC4A with other limits: the clamp stands behind the lag, which runs on beyond it
-(windup), and the field current lowers both sides of it. Two models written
-after PSS/E's EXAC4 have it so; a third has the same limits, but non-windup. Not
+AC4A with other limits: the clamp is behind the lag, which can run beyond it
+(windup), and the field current lowers both of its limits. Two models written
+after PSS/E's EXAC4 agree; a third has the same limits, but non-windup. Not
 modelled: UEL and OEL, which are added to vs.
 """
 

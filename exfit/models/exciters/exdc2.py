@@ -9,7 +9,7 @@ vc1 ►[  1  ]┘ │                        └── VFE ◄───┤
                      [1 + sTF1]
 
 VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
-The limits are proportional to VT: so the DC2 of 1981, Opal-RT and InterPSS
+The limits are proportional to VT, as in the DC2 of 1981, Opal-RT and InterPSS
 (ANDES and GridPACK hold them constant). InterPSS and ANDES multiply efd by the
 speed, Opal-RT does not: at rated speed, as here, it is the same.
 KE = 0 is self-excited: KE is computed at the start so that VR starts at

@@ -9,9 +9,9 @@ vc1 ►[  1  ]┘   └─────────[  sKF  ]◄── VA ──�
 
 No limit is non-windup: the output is clamped behind the lag, whose state VA
 runs on, and the rate feedback is taken before that clamp. The floor falls with
-KC IFD as the ceiling does: so in PSS/E, by its reimplementations in OpenIPSL
-and ANDES (ANDES leaves VT out); the floor of ST1A, VT VRMIN, is another. Not
-modelled: UEL and OEL, which here are added to the error.
+KC IFD as the ceiling does, as in PSS/E according to OpenIPSL and ANDES (ANDES
+leaves VT out); the floor of ST1A, VT VRMIN, is another. Not modelled: UEL and
+OEL, which here are added to the error.
 """
 
 from exfit.engine.trace import Signal

@@ -9,7 +9,7 @@ vc1 ►[  1  ]┘ │                        └── VFE ◄───┤
                      [1 + sTF1]
 
 VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
-The limits do not follow VT: so OpenIPSL and the DC1 of 1981 (ANDES has them
+The limits do not follow VT, as in OpenIPSL and the DC1 of 1981 (ANDES has them
 proportional to VT here, and not in EXDC2: the two are interchanged).
 KE = 0 is self-excited: KE is computed at the start so that VR starts at
 VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).

@@ -7,9 +7,9 @@ vc1 ────────┘                EMIN     │
                                       └─ VT where CSWITCH = 0, 1 where it is 1
 
 TA = TATB TB: the record gives the ratio TA/TB. The limits of the lag are
-non-windup. Not modelled: UEL and OEL at the summing point, and what a bridge
-does that carries no negative field current (rc/rfd > 0), where OpenIPSL and
-Dynawo disagree. A voltage step on open circuit hardly ever leads there.
+non-windup. Not modelled: UEL and OEL at the summing point, and a bridge that
+carries no negative field current (rc/rfd > 0), where OpenIPSL and Dynawo
+disagree; a voltage step on open circuit hardly ever reaches this state.
 """
 
 from exfit.engine.trace import Signal

@@ -10,12 +10,12 @@ vc1 ►[  1  ]             vs             VT VRMAX                  ▼
                                         VT VRMIN                  │
                                                                KC IFD
 
-The limit of the lag T1 is non-windup, and those of the lead-lags are so in the
-way of annex E: at a limit the state follows the limited output with the lag TC.
-Sources disagree on the chain. Followed are PowerWorld and InterPSS, whose
-order is that of the PSS/E record, with the limits on both; Dynawo takes TC2/TB2
-first and limits TC1/TB1 only. While no limit is met these are the same. A
-record of PSS/E, at its ceiling in a fault, leaves it 6 % of efd above this.
+The limit of the lag T1 is non-windup, and those of the lead-lags follow annex
+E: at a limit the state follows the limited output with the lag TC. Sources
+disagree on the chain. The model follows PowerWorld and InterPSS, whose order is
+that of the PSS/E record, with the limits on both; Dynawo takes TC2/TB2 first
+and limits TC1/TB1 only. While no limit is met these are the same. A PSS/E run
+at the ceiling during a fault leaves it 6 % of efd above this model.
 
 Not modelled: the lead-lags TUC, TUB and TOC, TOB that take over while a limiter
 has the gate; while none acts they have no effect.

@@ -14,15 +14,16 @@ The feedback adds: with KIA = 1 it makes a PI regulator, KPA (1 + 1/(sTIA)), and
 the two gates keep it from winding up. The limits are clamps, none non-windup.
 
 Sources disagree on the feedback. Dynawo (and InterPSS after it) subtracts VF;
-one version of InterPSS adds sKIA/(1+sTIA). Followed is the standard's text, by
-which the regulator is a PI (with TC > TB a PID); only so do its data, KPA = 40
-and KIA = 1, hold a voltage, and only so do the gates fit the clamp behind them.
+one version of InterPSS adds sKIA/(1+sTIA). The model follows the text of the
+standard, by which the regulator is a PI (with TC > TB a PID); only so do its
+data, KPA = 40 and KIA = 1, hold a voltage, and only so do the gates fit the
+clamp behind them.
 
 Not modelled: limiters at the reference (OEL, UEL = 1 or 2 in a PSS/E record),
 stator current limiter and droop. The gates are those of OEL, UEL = 3; without a
 limiter all are the same, and the record says 0, none. The standard's data for
-VMAX and VMIN are 1.1 and 0.9; typical here is a reference that is free in a
-test.
+VMAX and VMIN are 1.1 and 0.9; the typical data here leave the reference of a
+test unlimited.
 """
 
 from exfit.engine.trace import Signal

@@ -4,10 +4,10 @@
 vsi1 ─►[  1  ]─►[ sKST5 ]─►[1/(1+sA1+s²A2)]─►[1+sT1]─►[1+sT3]─►[clip]─► vs
        [1+sT6]  [1 + sT5]                    [1+sT2]  [1+sT4]  VSTMIN
 
-KST5 stands for KS T5. A1 and A2 make the low-pass filter that the standard
-draws for torsional modes: A2 = 0 leaves the lag A1, both 0 nothing. T6 = 0,
-T2 = 0 and T4 = 0 bypass their blocks. Not modelled: a switch-off at terminal
-voltages beyond VCU and VCL, which some programs add.
+KST5 is KS T5. A1 and A2 make the low-pass filter that the standard draws for
+torsional modes: A2 = 0 leaves the lag A1, both 0 nothing. T6, T2 or T4 = 0
+bypasses its block. Not modelled: a switch-off at terminal voltages beyond
+VCU and VCL, which some programs add.
 """
 
 from exfit.engine.trace import Signal
