@@ -32,5 +32,5 @@ def test_thinning_keeps_the_extremes_the_ends_and_the_gaps(seed):
 def test_the_extremes_of_several_signals_are_all_kept():
     signals = list(np.random.default_rng(1).standard_normal((3, 10_001)))
     rows = kept_rows(signals, 100)
-    for one in signals:
-        assert (one[rows].min(), one[rows].max()) == (one.min(), one.max())
+    for signal in signals:
+        assert (signal[rows].min(), signal[rows].max()) == (signal.min(), signal.max())

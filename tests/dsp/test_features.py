@@ -38,53 +38,53 @@ def read(time, signal):
 @given(a=st.floats(0.5, 20.0))
 def test_a_first_order_response_rises_in_ln9_over_a_without_overshoot(a):
     time = clock(20.0 / a)
-    found = read(time, stepped(time, first_order(a)))
-    assert found.rise_time == pytest.approx(log(9.0) / a, abs=SAMPLING)
+    response = read(time, stepped(time, first_order(a)))
+    assert response.rise_time == pytest.approx(log(9.0) / a, abs=SAMPLING)
     # the final value is a mean over the last twentieth: e^-19 short of 1
-    assert found.settling_time == pytest.approx(-log(BAND) / a, abs=2.0 * SAMPLING)
-    assert found.overshoot_percent == 0.0
-    assert found.peak_time is None
-    assert found.initial_value == 0.0
-    assert found.final_value == pytest.approx(1.0, abs=1e-7)
+    assert response.settling_time == pytest.approx(-log(BAND) / a, abs=2.0 * SAMPLING)
+    assert response.overshoot_percent == 0.0
+    assert response.peak_time is None
+    assert response.initial_value == 0.0
+    assert response.final_value == pytest.approx(1.0, abs=1e-7)
 
 
 def test_a_response_that_still_rises_when_the_record_ends_does_not_overshoot():
     time = clock(1.0)
-    found = read(time, stepped(time, first_order(1.0)))
-    assert found.overshoot_percent == 0.0
-    assert found.peak_time is None
+    response = read(time, stepped(time, first_order(1.0)))
+    assert response.overshoot_percent == 0.0
+    assert response.peak_time is None
 
 
 def test_a_response_outside_the_band_when_the_record_ends_has_not_settled():
     time = clock(pi)  # half a period beyond the last full one: at the bottom of the swing
-    found = read(time, stepped(time, lambda t: 1.0 - np.cos(10.0 * t) * np.exp(-0.1 * t)))
-    assert found.settling_time is None
-    assert found.peak_time is not None
+    response = read(time, stepped(time, lambda t: 1.0 - np.cos(10.0 * t) * np.exp(-0.1 * t)))
+    assert response.settling_time is None
+    assert response.peak_time is not None
 
 
 @given(zeta=st.floats(0.1, 0.8), w0=st.floats(2.0, 20.0))
 def test_overshoot_and_peak_time_are_those_of_an_underdamped_second_order(zeta, w0):
     time = clock(25.0 / (zeta * w0))
-    found = read(time, stepped(time, second_order(w0, zeta)))
+    response = read(time, stepped(time, second_order(w0, zeta)))
     wd = w0 * sqrt(1.0 - zeta**2)
     overshoot = 100.0 * exp(-pi * zeta / sqrt(1.0 - zeta**2))
     # a peak is flat: a sample beside it misses (w0 dt)^2 / 2 of the way at most
-    assert found.overshoot_percent == pytest.approx(overshoot, abs=100.0 * (w0 * SAMPLING) ** 2)
-    assert found.peak_time == pytest.approx(pi / wd, abs=2.0 * SAMPLING)
+    assert response.overshoot_percent == pytest.approx(overshoot, abs=100.0 * (w0 * SAMPLING) ** 2)
+    assert response.peak_time == pytest.approx(pi / wd, abs=2.0 * SAMPLING)
 
 
 @given(zeta=st.floats(0.1, 0.8), w0=st.floats(2.0, 20.0))
 def test_after_the_settling_time_the_response_stays_in_the_band(zeta, w0):
     time = clock(25.0 / (zeta * w0))
     signal = stepped(time, second_order(w0, zeta))
-    found = read(time, signal)
-    distance = np.abs(signal - found.final_value) / found.final_value
-    settled = STEP_AT + found.settling_time
+    response = read(time, signal)
+    distance = np.abs(signal - response.final_value) / response.final_value
+    settled = STEP_AT + response.settling_time
     assert np.all(distance[time > settled] <= BAND)
     assert distance[np.searchsorted(time, settled - SAMPLING / 2.0) - 1] > BAND
     # the envelope bounds it from above
     envelope = log(1.0 / (BAND * sqrt(1.0 - zeta**2))) / (zeta * w0)
-    assert found.settling_time <= envelope + 2.0 * SAMPLING
+    assert response.settling_time <= envelope + 2.0 * SAMPLING
 
 
 @given(
@@ -136,6 +136,6 @@ def test_only_the_response_until_the_next_step_counts():
 
 def test_a_record_that_begins_with_the_step_starts_from_its_first_sample():
     time = np.arange(0.0, 10.0, SAMPLING)
-    found = features(time, 2.0 + first_order(2.0)(time), 0.0, 10.0)
-    assert found.initial_value == 2.0
-    assert found.rise_time == pytest.approx(log(9.0) / 2.0, abs=SAMPLING)
+    response = features(time, 2.0 + first_order(2.0)(time), 0.0, 10.0)
+    assert response.initial_value == 2.0
+    assert response.rise_time == pytest.approx(log(9.0) / 2.0, abs=SAMPLING)

@@ -28,10 +28,10 @@ def white(size, seed=0, count=TIME.size):
 
 
 def test_without_a_filter_and_with_all_kept_the_samples_are_the_answer():
-    conditioning = Filtering(TIME, ALL)
+    filtering = Filtering(TIME, ALL)
     samples, slopes = RESPONSE, np.ones((TIME.size, 2))
-    assert conditioning.apply(samples) is samples
-    assert conditioning.tangents(samples, slopes) is slopes
+    assert filtering.apply(samples) is samples
+    assert filtering.tangents(samples, slopes) is slopes
 
 
 def test_without_a_filter_the_kept_samples_are_the_answer():
@@ -43,12 +43,12 @@ def test_without_a_filter_the_kept_samples_are_the_answer():
 @every_filter
 def test_what_stands_in_a_lost_sample_does_not_matter(filter):
     kept = some_lost()
-    conditioning = Filtering(TIME, kept, filter)
+    filtering = Filtering(TIME, kept, filter)
     signal = RESPONSE + white(1e-3)
-    expected = conditioning.apply(signal)
+    expected = filtering.apply(signal)
     assert expected.shape == (kept.sum(),)
     for lost in (np.nan, np.inf, 1e9):
-        assert np.array_equal(conditioning.apply(np.where(kept, signal, lost)), expected)
+        assert np.array_equal(filtering.apply(np.where(kept, signal, lost)), expected)
 
 
 @every_filter
@@ -56,16 +56,16 @@ def test_a_line_passes_whatever_is_lost_of_it(filter):
     kept = some_lost()
     kept[[0, -1]] = True  # beyond the ends a lost sample is the nearest one, not on the line
     line = 1.0 + 0.1 * TIME
-    got = Filtering(TIME, kept, filter).apply(np.where(kept, line, np.nan))
+    filtered = Filtering(TIME, kept, filter).apply(np.where(kept, line, np.nan))
     inner = slice(200, -200) if filter else slice(None)  # far from where a filter starts
-    assert got[inner] == pytest.approx(line[kept][inner], rel=1e-12)
+    assert filtered[inner] == pytest.approx(line[kept][inner], rel=1e-12)
 
 
 def test_lost_samples_are_bridged_in_time_not_in_number():
     time = np.array([0.0, 1.0, 5.0, 6.0, 8.0])
     kept = np.array([False, True, False, True, False])
-    conditioning = Filtering(time, kept, Median(1))
-    assert conditioning._bridged(np.array([9.0, 1.0, 9.0, 2.0, 9.0])).tolist() == [
+    filtering = Filtering(time, kept, Median(1))
+    assert filtering._bridged(np.array([9.0, 1.0, 9.0, 2.0, 9.0])).tolist() == [
         1.0,
         1.0,
         1.8,
@@ -77,8 +77,8 @@ def test_lost_samples_are_bridged_in_time_not_in_number():
 @every_filter
 def test_a_constant_passes_to_its_ends(filter):
     kept = some_lost()
-    got = Filtering(TIME, kept, filter).apply(np.where(kept, 1.05, np.nan))
-    assert got == pytest.approx(np.full(kept.sum(), 1.05), rel=1e-12)
+    filtered = Filtering(TIME, kept, filter).apply(np.where(kept, 1.05, np.nan))
+    assert filtered == pytest.approx(np.full(kept.sum(), 1.05), rel=1e-12)
 
 
 @pytest.mark.parametrize("frequency", [1.0, 2.0, 5.0, 10.0, 20.0])
@@ -86,11 +86,11 @@ def test_the_low_pass_is_a_butterworth_filter_twice_without_delay(frequency):
     cutoff = 5.0
     wave = np.exp(2j * np.pi * frequency * TIME)
     low = Filtering(TIME, ALL, LowPass(cutoff))
-    got = low.apply(wave.real) + 1j * low.apply(wave.imag)
+    filtered = low.apply(wave.real) + 1j * low.apply(wave.imag)
     # the analogue law at the frequencies that the bilinear transform puts in place of these
     warped = np.tan(np.pi * frequency / RATE) / np.tan(np.pi * cutoff / RATE)
     inner = slice(200, -200)  # far from the ends, where the filter starts
-    assert got[inner] / wave[inner] == pytest.approx(1.0 / (1.0 + warped**4), abs=1e-9)
+    assert filtered[inner] / wave[inner] == pytest.approx(1.0 / (1.0 + warped**4), abs=1e-9)
 
 
 def test_the_median_is_that_of_scipy():
@@ -103,34 +103,34 @@ def test_the_median_is_that_of_scipy():
 
 def test_a_median_wider_than_the_record_is_held_at_the_ends():
     few = np.array([1.0, 5.0, 2.0])
-    got = Filtering(np.arange(3.0), np.ones(3, bool), Median(9)).apply(few)
-    assert np.array_equal(got, median_filter(few, 9, mode="nearest"))
+    filtered = Filtering(np.arange(3.0), np.ones(3, bool), Median(9)).apply(few)
+    assert np.array_equal(filtered, median_filter(few, 9, mode="nearest"))
 
 
 @every_filter
 @pytest.mark.parametrize("kept", [ALL, some_lost()], ids=["all", "some"])
 def test_tangents_are_the_derivatives_of_apply(filter, kept):
-    conditioning = Filtering(TIME, kept, filter)
+    filtering = Filtering(TIME, kept, filter)
     slopes = np.stack([np.sin(TIME), np.cos(7 * TIME), TIME**2], axis=1)
     signal = RESPONSE + white(1e-3)
-    got = conditioning.tangents(signal, slopes)
-    assert got.shape == (kept.sum(), 3)
+    filtered = filtering.tangents(signal, slopes)
+    assert filtered.shape == (kept.sum(), 3)
     # so small that no median picks another sample; all is linear then, and only rounding is left
     step = 1e-9
     for k in range(3):
-        above = conditioning.apply(signal + step * slopes[:, k])
-        below = conditioning.apply(signal - step * slopes[:, k])
-        assert got[:, k] == pytest.approx((above - below) / (2 * step), abs=1e-5)
+        above = filtering.apply(signal + step * slopes[:, k])
+        below = filtering.apply(signal - step * slopes[:, k])
+        assert filtered[:, k] == pytest.approx((above - below) / (2 * step), abs=1e-5)
 
 
 @every_filter
 def test_tangents_do_not_see_lost_samples(filter):
     kept = some_lost()
-    conditioning = Filtering(TIME, kept, filter)
+    filtering = Filtering(TIME, kept, filter)
     slopes = np.stack([TIME, np.sin(TIME)], axis=1)
     lost = np.where(kept, RESPONSE, np.nan)
-    expected = conditioning.tangents(RESPONSE, slopes)
-    assert np.array_equal(conditioning.tangents(lost, slopes), expected)
+    expected = filtering.tangents(RESPONSE, slopes)
+    assert np.array_equal(filtering.tangents(lost, slopes), expected)
 
 
 def test_a_spike_that_is_not_kept_leaves_no_trace():
@@ -138,10 +138,10 @@ def test_a_spike_that_is_not_kept_leaves_no_trace():
     kept[[300, 301, 700]] = False
     spiky = RESPONSE + np.where(kept, 0.0, 0.05)
     for filter in FILTERS:
-        got = Filtering(TIME, kept, filter).apply(spiky)
+        filtered = Filtering(TIME, kept, filter).apply(spiky)
         clean = Filtering(TIME, ALL, filter).apply(RESPONSE)[kept]
         # a bridge of three steps of 0.01 s across a curvature of 0.05 * 3^2 pu/s^2
-        assert got == pytest.approx(clean, abs=1e-4)
+        assert filtered == pytest.approx(clean, abs=1e-4)
 
 
 def test_uneven_sampling_is_refused_to_a_low_pass_only():
@@ -173,10 +173,10 @@ def test_without_an_average_a_simulation_is_shown_as_it_is():
 def test_an_average_is_the_integral_of_the_line_through_the_samples(window):
     signal = np.random.default_rng(1).normal(1.0, 0.1, UNEVEN.size)
     line, half = make_interp_spline(UNEVEN, signal, k=1), window / 2
-    got = averaging(window).as_recorded(signal)
+    filtered = averaging(window).as_recorded(signal)
     inside = (UNEVEN - half >= UNEVEN[0]) & (UNEVEN + half <= UNEVEN[-1])
     expected = [line.integrate(t - half, t + half) / window for t in UNEVEN[inside]]
-    assert got[inside] == pytest.approx(np.array(expected, dtype=float), abs=1e-11)
+    assert filtered[inside] == pytest.approx(np.array(expected, dtype=float), abs=1e-11)
 
 
 @every_window
@@ -208,10 +208,10 @@ def test_a_record_is_not_averaged_once_more(filter):
 def test_a_kink_between_two_samples_errs_by_what_the_line_cuts_off():
     step, window, at = 0.005, 0.02, 1.0025
     time = np.arange(0.0, 2.0, step)
-    got = averaging(window, time).as_recorded(np.maximum(time - at, 0.0))
+    filtered = averaging(window, time).as_recorded(np.maximum(time - at, 0.0))
     expected = np.clip(time - at + window / 2, 0.0, window) ** 2 / (2.0 * window)
     expected += np.maximum(time - at - window / 2, 0.0)
-    assert np.abs(got - expected).max() == pytest.approx(step**2 / (8.0 * window), rel=1e-6)
+    assert np.abs(filtered - expected).max() == pytest.approx(step**2 / (8.0 * window), rel=1e-6)
 
 
 @pytest.mark.parametrize("window", [0.0, -0.02, np.nan, np.inf])
@@ -278,9 +278,9 @@ def test_every_spike_is_found_and_hardly_anything_else(course):
         rng = np.random.default_rng(seed)
         spiky = rng.random(TIME.size) < 0.01
         spikes = np.where(spiky, 0.05 * rng.choice([-1.0, 1.0], TIME.size), 0.0)
-        found = outliers(TIME, COURSES[course] + white(1e-4, seed) + spikes, 5.0)
-        assert found[spiky].all()
-        false += (found & ~spiky).sum()
+        outlying = outliers(TIME, COURSES[course] + white(1e-4, seed) + spikes, 5.0)
+        assert outlying[spiky].all()
+        false += (outlying & ~spiky).sum()
     assert false <= 0.001 * 10 * TIME.size
 
 

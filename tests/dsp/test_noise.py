@@ -22,18 +22,18 @@ def spikes(seed=0, share=0.01, count=TIME.size):
 
 @pytest.mark.parametrize("size", [1e-6, 1e-4, 1e-2, 10.0])
 def test_white_noise_is_found_without_bias(size):
-    found = [noise(white(size, seed)) for seed in range(50)]
+    estimates = [noise(white(size, seed)) for seed in range(50)]
     # one value is good to 5 % at 1000 samples, the mean of 50 to 0.7 %
-    assert np.mean(found) == pytest.approx(size, rel=0.02)
-    assert np.std(found) < 0.06 * size
+    assert np.mean(estimates) == pytest.approx(size, rel=0.02)
+    assert np.std(estimates) < 0.06 * size
 
 
 @pytest.mark.parametrize("size", [1e-4, 1e-3])
 def test_the_course_of_the_signal_and_rare_spikes_do_not_matter(size):
     alone = np.mean([noise(white(size, seed)) for seed in range(20)])
-    moved = [noise(RESPONSE + white(size, seed) + spikes(seed)) for seed in range(20)]
+    estimates = [noise(RESPONSE + white(size, seed) + spikes(seed)) for seed in range(20)]
     # 3 % of the second differences hold a spike and move their median by 3.5 %
-    assert np.mean(moved) == pytest.approx(alone, rel=0.06)
+    assert np.mean(estimates) == pytest.approx(alone, rel=0.06)
 
 
 @pytest.mark.parametrize(

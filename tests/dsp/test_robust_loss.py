@@ -51,14 +51,14 @@ def test_least_squares_of_the_residual_is_the_minimum_scipy_finds(name, scale):
 
 def test_what_lies_far_off_moves_a_robust_line_less():
     time, samples = contaminated_line()
-    found = {}
+    errors = {}
     for name, loss in LOSSES.items():
         fit = least_squares(
             lambda x, loss=loss: loss.residual(x[0] + x[1] * time - samples, 0.02), [0.0, 0.0]
         )
-        found[name] = np.abs(fit.x[0] + fit.x[1] * time - (1.0 + 0.3 * time)).max()
-    assert found["huber"] < found["least-squares"] / 5
-    assert found["soft-l1"] < found["least-squares"] / 5
+        errors[name] = np.abs(fit.x[0] + fit.x[1] * time - (1.0 + 0.3 * time)).max()
+    assert errors["huber"] < errors["least-squares"] / 5
+    assert errors["soft-l1"] < errors["least-squares"] / 5
 
 
 @every_loss

@@ -117,10 +117,10 @@ def test_what_a_recorder_does_moves_the_step_little(reference, dirt):
 
 @every_reference
 def test_the_spread_is_what_noise_leaves_open(reference):
-    found = [find_step(*recorded(reference, seed=seed, size=3e-4)) for seed in range(12)]
-    told = np.mean([onset.spread for onset in found])
+    onsets = [find_step(*recorded(reference, seed=seed, size=3e-4)) for seed in range(12)]
+    spread = np.mean([onset.spread for onset in onsets])
     # 12 values tell their own spread to a factor of 1.6 in 99 of 100 cases
-    assert np.std([onset.at for onset in found], ddof=1) == pytest.approx(told, rel=0.65)
+    assert np.std([onset.at for onset in onsets], ddof=1) == pytest.approx(spread, rel=0.65)
 
 
 @every_reference
@@ -174,10 +174,10 @@ def test_all_steps_are_found_in_their_order_and_no_others(reference, steps):
     instants = 3.0 + 10.0 * np.arange(len(steps))
     for step, at in zip(steps, instants, strict=True):
         vt = vt + response(time, reference, step, at)
-    found = find_steps(time, vt)
-    assert [onset.at for onset in found] == pytest.approx(instants, abs=0.04)
-    assert [onset.size for onset in found] == pytest.approx(steps, rel=0.03)
-    assert found[0] == find_step(time, vt)
+    onsets = find_steps(time, vt)
+    assert [onset.at for onset in onsets] == pytest.approx(instants, abs=0.04)
+    assert [onset.size for onset in onsets] == pytest.approx(steps, rel=0.03)
+    assert onsets[0] == find_step(time, vt)
 
 
 def test_a_slow_drift_before_the_step_is_not_the_step():

@@ -59,8 +59,8 @@ def moving_average_of_a_lag(time, window, at, step, lag):
 @pytest.mark.parametrize("cycles", [1, 2])
 def test_all_but_the_positive_sequence_cancels(rate, frequency, cycles):
     time = clock(rate)
-    seen = waves(time, frequency, 0.97, negative=0.03, zero=0.02, harmonics=HARMONICS) + OFFSETS
-    course = positive_sequence(time, seen, cycles)
+    phases = waves(time, frequency, 0.97, negative=0.03, zero=0.02, harmonics=HARMONICS) + OFFSETS
+    course = positive_sequence(time, phases, cycles)
     np.testing.assert_allclose(
         course.voltage, np.full(len(course.time), 0.97), rtol=0.0, atol=ROUNDING
     )
@@ -118,10 +118,10 @@ def test_the_window_hardly_adds_to_the_noise(samples):
     rng = np.random.default_rng(0)
     time = np.arange(20_000) / (50.0 * samples)
     noise = 0.01
-    seen = waves(time) + rng.normal(0.0, noise, (len(time), 3))
+    phases = waves(time) + rng.normal(0.0, noise, (len(time), 3))
     # of three phases' noise in one direction, over the RMS value, of the samples of a window
     expected = noise / sqrt(3.0) / sqrt(samples)
-    assert np.std(positive_sequence(time, seen).voltage) == pytest.approx(expected, rel=0.05)
+    assert np.std(positive_sequence(time, phases).voltage) == pytest.approx(expected, rel=0.05)
 
 
 def test_a_frequency_that_drifts_is_accounted_for():
@@ -151,8 +151,8 @@ def test_a_simulation_averaged_alike_is_what_the_waveforms_show(name):
     change = InputStep(0.5037, 0.5 if name == "FIRST_ORDER" else 0.05)
     simulator = Simulator(system_of(name), Inputs(0.0, 3.0, (change,)), time, 1e-3)
     vt = simulator.samples(values, ("vt",))[0][:, 0] + (1.0 if name == "FIRST_ORDER" else 0.0)
-    seen = waves(time, 49.2, vt, negative=0.01, harmonics=HARMONICS)
-    course = positive_sequence(time, seen)
+    phases = waves(time, 49.2, vt, negative=0.01, harmonics=HARMONICS)
+    course = positive_sequence(time, phases)
     everything = np.ones(len(course.time), dtype=bool)
     alike = Filtering(course.time, everything, averaged=MovingAverage(course.window))
     # a moving voltage spreads the ripples' lines, and the window has zeros: some 1e-7 are left
@@ -192,9 +192,9 @@ def test_voltages_to_ground_and_between_the_phases_tell_the_same():
     time = clock(2000.0)
     ground = waves(time, 49.2, 9.0, negative=0.4, zero=0.6)
     between = ground - np.roll(ground, -1, axis=1)
-    one = vt_of_waveforms(time, ground, 15.75, "phase-to-ground")
-    other = vt_of_waveforms(time, between, 15.75, "phase-to-phase")
-    np.testing.assert_allclose(one.voltage, other.voltage, rtol=0.0, atol=ROUNDING)
+    from_ground = vt_of_waveforms(time, ground, 15.75, "phase-to-ground")
+    from_lines = vt_of_waveforms(time, between, 15.75, "phase-to-phase")
+    np.testing.assert_allclose(from_ground.voltage, from_lines.voltage, rtol=0.0, atol=ROUNDING)
 
 
 # --- RMS values -----------------------------------------------------------------------------------
@@ -253,15 +253,15 @@ TIME = clock(2000.0)
 
 
 def lost_phase(from_on=0.0):
-    seen = waves(TIME)
-    seen[from_on <= TIME, 2] = 0.0
-    return seen
+    phases = waves(TIME)
+    phases[from_on <= TIME, 2] = 0.0
+    return phases
 
 
 def with_gap():
-    seen = waves(TIME)
-    seen[700, 1] = np.nan
-    return seen
+    phases = waves(TIME)
+    phases[700, 1] = np.nan
+    return phases
 
 
 def uneven():
@@ -291,11 +291,11 @@ REFUSED = {
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_waveforms_that_show_no_voltage_are_refused(what):
-    time, seen, message = REFUSED[what]
-    if seen is None:
-        seen = waves(time, 50.0 + 1.5 * np.sin(2.0 * pi * 0.5 * time))
+    time, phases, message = REFUSED[what]
+    if phases is None:
+        phases = waves(time, 50.0 + 1.5 * np.sin(2.0 * pi * 0.5 * time))
     with pytest.raises(ValueError, match=message):
-        positive_sequence(time, seen)
+        positive_sequence(time, phases)
 
 
 @pytest.mark.parametrize("cycles", [0, -1, 1.5])

@@ -70,60 +70,60 @@ RECORDS = sorted(path.stem for path in SAMPLES.glob("*.csv"))
 
 @pytest.mark.parametrize("record", RECORDS)
 def test_every_step_of_a_sample_record_is_found_in_time_and_size(record):
-    found = inspect(sample(SAMPLES / f"{record}.csv"))
-    voltage = found.channel_of("vt").name
-    told = [(step.at, step.sizes[voltage]) for step in found.steps]
+    inspection = inspect(sample(SAMPLES / f"{record}.csv"))
+    voltage = inspection.channel_of("vt").name
+    steps = [(step.at, step.sizes[voltage]) for step in inspection.steps]
     wanted = truth(record)
-    assert len(told) == len(wanted)
-    for (at, size), (made_at, change) in zip(told, wanted, strict=True):
+    assert len(steps) == len(wanted)
+    for (at, size), (made_at, change) in zip(steps, wanted, strict=True):
         assert at == pytest.approx(made_at, abs=WITHIN)
         assert size == pytest.approx(change, rel=SHARE)
 
 
 @pytest.mark.parametrize("name", ["reference_ac1a", "reference_ac8b_unit1", "reference_ac8b_unit2"])
 def test_a_recorded_reference_tells_its_steps_to_the_sample(name):
-    found = inspect(Columns(reference(f"{name}.csv")))
-    own = found.channel_of("vref").steps
-    assert [one.at for one in own] == pytest.approx([1.0, 11.0], abs=0.005)  # one sample
-    assert [one.size for one in own] == pytest.approx([0.05, -0.05], rel=1e-6)
-    assert [step.at for step in found.steps] == pytest.approx([1.0, 11.0], abs=0.005)
-    suggested = yaml.safe_load("\n".join(bump_section(found)))["test"]["vref"]
+    inspection = inspect(Columns(reference(f"{name}.csv")))
+    changes = inspection.channel_of("vref").steps
+    assert [change.at for change in changes] == pytest.approx([1.0, 11.0], abs=0.005)  # one sample
+    assert [change.size for change in changes] == pytest.approx([0.05, -0.05], rel=1e-6)
+    assert [step.at for step in inspection.steps] == pytest.approx([1.0, 11.0], abs=0.005)
+    suggested = yaml.safe_load("\n".join(bump_section(inspection)))["test"]["vref"]
     assert [step["step"] for step in suggested] == pytest.approx([0.05, -0.05], rel=1e-6)
 
 
 def test_a_trigger_is_no_step_of_the_reference():
     columns = dict(sample(SAMPLES / "ac1a_up.csv").content)
     columns["trigger"] = np.where(columns["t"] > 1.12, 1.0, 0.0)
-    found = inspect(Columns(columns))
-    (step,) = found.steps
+    inspection = inspect(Columns(columns))
+    (step,) = inspection.steps
     assert step.at == pytest.approx(1.0, abs=WITHIN)
     assert "trigger" not in step.seen_in
-    assert next(one for one in found.channels if one.name == "trigger").steps == ()
+    assert next(channel for channel in inspection.channels if channel.name == "trigger").steps == ()
 
 
 @pytest.mark.parametrize(
     "record", [name for name in RECORDS if not name.startswith(("first", FIELD))]
 )
 def test_the_channels_of_a_sample_record_are_recognised(record):
-    found = inspect(sample(SAMPLES / f"{record}.csv"))
-    assert {one.name: one.signal for one in found.channels} == {
-        one.name: one.name for one in found.channels
+    inspection = inspect(sample(SAMPLES / f"{record}.csv"))
+    assert {channel.name: channel.signal for channel in inspection.channels} == {
+        channel.name: channel.name for channel in inspection.channels
     }
-    assert found.sampling.even
-    assert found.sampling.step == pytest.approx(0.01)
-    assert found.findings == ()
+    assert inspection.sampling.even
+    assert inspection.sampling.step == pytest.approx(0.01)
+    assert inspection.findings == ()
 
 
 def test_the_field_record_is_told_as_it_was_made():
     """sample_data/README.md says what was put into it, and where."""
-    found = inspect(sample(SAMPLES / f"{FIELD}.csv"))
-    assert found.clock.columns == ("Date", "Time")
-    assert not found.sampling.even
-    (gap,) = found.sampling.gaps
+    inspection = inspect(sample(SAMPLES / f"{FIELD}.csv"))
+    assert inspection.clock.columns == ("Date", "Time")
+    assert not inspection.sampling.even
+    (gap,) = inspection.sampling.gaps
     assert (gap.start, gap.end) == pytest.approx(
         (9.0, 9.04), abs=0.005
     )  # a sample before and after
-    vt, ifd = found.channel_of("vt"), found.channel_of("ifd")
+    vt, ifd = inspection.channel_of("vt"), inspection.channel_of("ifd")
     assert (vt.name, vt.unit, ifd.name, ifd.unit) == ("Ugen", "kV", "If", "A")
     assert vt.spikes_at == pytest.approx((1.3, 5.61, 7.94), abs=0.005)
     assert ifd.spikes_at == pytest.approx((6.72,), abs=0.005)
@@ -150,29 +150,29 @@ def dirty():
     vt[[500, 2900]] += [0.4, -0.3]
     ifd[1500:1600] = ifd[1500]
     efd[[5, 700, 701]] = np.nan
-    kept = np.ones(COUNT, bool)
-    kept[1000:1100] = False
+    recorded = np.ones(COUNT, bool)
+    recorded[1000:1100] = False
     columns = {"t": time, "Ugen": vt, "Ifd [A]": ifd, "Field voltage (V)": efd}
-    content = {name: column[kept] for name, column in columns.items()}
-    content["Temp"] = np.full(kept.sum(), 40.0)
+    content = {name: column[recorded] for name, column in columns.items()}
+    content["Temp"] = np.full(recorded.sum(), 40.0)
     return Columns({**content, "state": "closed"}, units={"Ugen": "kV"})
 
 
 DIRTY = dirty()
-FOUND = inspect(DIRTY)
+INSPECTED = inspect(DIRTY)
 
 
 def test_the_clock_of_a_record_is_told():
-    (gap,) = FOUND.sampling.gaps
+    (gap,) = INSPECTED.sampling.gaps
     assert (gap.start, gap.end) == pytest.approx((999 * 0.0048, 1100 * 0.0048), abs=2e-4)
     assert gap.lost == 100
-    assert not FOUND.sampling.even
-    assert FOUND.sampling.rate == pytest.approx(1.0 / 0.0048, rel=0.005)
-    assert 0.0046 <= FOUND.sampling.smallest < FOUND.sampling.largest <= 0.005
+    assert not INSPECTED.sampling.even
+    assert INSPECTED.sampling.rate == pytest.approx(1.0 / 0.0048, rel=0.005)
+    assert 0.0046 <= INSPECTED.sampling.smallest < INSPECTED.sampling.largest <= 0.005
 
 
 def test_what_is_wrong_with_a_channel_is_told_where_it_is():
-    vt, ifd, efd = (FOUND.channel_of(name) for name in ("vt", "ifd", "efd"))
+    vt, ifd, efd = (INSPECTED.channel_of(name) for name in ("vt", "ifd", "efd"))
     assert vt.spikes == 2
     assert vt.spikes_at == pytest.approx((500 * 0.0048, 2900 * 0.0048), abs=2e-4)
     assert (ifd.spikes, efd.spikes) == (0, 0)
@@ -181,29 +181,33 @@ def test_what_is_wrong_with_a_channel_is_told_where_it_is():
     assert (vt.stuck, efd.stuck) == ((), ())
     assert (vt.missing, ifd.missing, efd.missing) == (0, 0, 3)
     assert ifd.quantum == pytest.approx(0.1)
-    for one in (vt, ifd, efd):
-        assert one.noise == pytest.approx(NOISE[one.signal], rel=0.1)
-    assert [one.name for one in FOUND.channels if one.constant] == ["Temp"]
-    assert list(FOUND.unreadable) == ["state"]
-    text = " | ".join(FOUND.findings)
+    for channel in (vt, ifd, efd):
+        assert channel.noise == pytest.approx(NOISE[channel.signal], rel=0.1)
+    assert [channel.name for channel in INSPECTED.channels if channel.constant] == ["Temp"]
+    assert list(INSPECTED.unreadable) == ["state"]
+    text = " | ".join(INSPECTED.findings)
     for words in ("clock jumps", "2 spikes", "stands still", "3 samples", "never changes", "state"):
         assert words in text
 
 
 def test_units_come_from_the_file_first_and_from_the_name_else():
-    told = {one.signal: (one.unit, one.unit_from) for one in FOUND.channels if one.signal}
-    assert told == {"vt": ("kV", "file"), "ifd": ("A", "name"), "efd": ("V", "name")}
+    units = {
+        channel.signal: (channel.unit, channel.unit_from)
+        for channel in INSPECTED.channels
+        if channel.signal
+    }
+    assert units == {"vt": ("kV", "file"), "ifd": ("A", "name"), "efd": ("V", "name")}
 
 
 def test_the_steps_of_a_record_in_engineering_units_are_those_of_the_reference():
-    assert [step.at for step in FOUND.steps] == pytest.approx([1.0, 11.0], abs=WITHIN)
-    for step, sign in zip(FOUND.steps, (1, -1), strict=True):
+    assert [step.at for step in INSPECTED.steps] == pytest.approx([1.0, 11.0], abs=WITHIN)
+    for step, sign in zip(INSPECTED.steps, (1, -1), strict=True):
         assert step.sizes["Ugen"] == pytest.approx(sign * 15.75 * 0.04946, rel=0.01)
         assert abs(step.at - round(step.at)) < 4.0 * step.error + 0.005
 
 
 def test_a_suggested_case_holds_no_base_that_nobody_gave():
-    section = yaml.safe_load("\n".join(record_section(FOUND, "dirty.csv")))["record"]
+    section = yaml.safe_load("\n".join(record_section(INSPECTED, "dirty.csv")))["record"]
     assert section["time"] == "t"
     assert section["gaps"] == "skip"
     assert section["channels"] == {
@@ -211,26 +215,26 @@ def test_a_suggested_case_holds_no_base_that_nobody_gave():
         "ifd": {"column": "Ifd [A]", "unit": "A", "base": "?"},
         "efd": {"column": "Field voltage (V)", "unit": "V", "base": "?"},
     }
-    (up, down) = yaml.safe_load("\n".join(bump_section(FOUND)))["test"]["vref"]
+    (up, down) = yaml.safe_load("\n".join(bump_section(INSPECTED)))["test"]["vref"]
     assert up["at"]["min"] < 1.0 < up["at"]["max"]
     assert (up["step"], down["step"]) == ("?", "?")
-    shown = re.findall(r"vt changed by (\S+)", "\n".join(bump_section(FOUND)))
-    assert list(map(float, shown)) == pytest.approx([0.0495, -0.0471], rel=0.06)
+    sizes = re.findall(r"vt changed by (\S+)", "\n".join(bump_section(INSPECTED)))
+    assert list(map(float, sizes)) == pytest.approx([0.0495, -0.0471], rel=0.06)
 
 
 def test_every_suggestion_fits_a_terminal_of_80_columns_but_for_names():
-    lines = [*record_section(FOUND, "dirty.csv"), *bump_section(FOUND)]
+    lines = [*record_section(INSPECTED, "dirty.csv"), *bump_section(INSPECTED)]
     assert max(map(len, lines)) <= 80
 
 
 def test_time_that_repeats_or_goes_back_is_told_by_place_and_left_out():
     time = 0.01 * np.arange(200)
     time[50], time[120] = time[49], 0.3
-    found = inspect(Columns({"t": time, "vt": RNG.normal(1.0, 1e-4, 200)}))
-    assert found.backward_at == ("record.csv:52", "record.csv:122")
-    assert len(found.time) == 198
-    assert np.all(np.diff(found.time) > 0.0)
-    assert any("record.csv:52, record.csv:122" in text for text in found.findings)
+    inspection = inspect(Columns({"t": time, "vt": RNG.normal(1.0, 1e-4, 200)}))
+    assert inspection.backward_at == ("record.csv:52", "record.csv:122")
+    assert len(inspection.time) == 198
+    assert np.all(np.diff(inspection.time) > 0.0)
+    assert any("record.csv:52, record.csv:122" in text for text in inspection.findings)
 
 
 @pytest.fixture(autouse=True)
@@ -249,10 +253,10 @@ def test_the_unit_of_a_channel_and_the_origin_of_time_do_not_matter(scale, origi
     plain = inspect(Columns({"t": columns["t"], "x": columns["vt"]}))
     other = inspect(Columns({"t": columns["t"] + origin, "x": scale * columns["vt"]}))
     assert len(plain.steps) == len(other.steps) == 2
-    for one, same in zip(plain.steps, other.steps, strict=True):
+    for step, scaled in zip(plain.steps, other.steps, strict=True):
         # a minimum is flat: its place rounds at the root of what samples and clock round at
-        assert same.at - origin == pytest.approx(one.at, abs=1e-4)
-        assert same.sizes["x"] == pytest.approx(scale * one.sizes["x"], rel=1e-9)
+        assert scaled.at - origin == pytest.approx(step.at, abs=1e-4)
+        assert scaled.sizes["x"] == pytest.approx(scale * step.sizes["x"], rel=1e-9)
 
 
 @pytest.mark.parametrize("count", [30_000, 300_000])
@@ -261,11 +265,11 @@ def test_a_long_record_tells_its_steps_as_well_as_a_short_one(count):
     time = np.linspace(0.0, 300.0, count)
     vt = np.interp(time - 100.0, clean["t"], clean["vt"]) + RNG.normal(0.0, 1e-4, count)
     vt[count // 2] += 0.1
-    found = inspect(Columns({"t": time, "vt": vt}))
-    assert [step.at for step in found.steps] == pytest.approx([101.0, 111.0], abs=WITHIN)
-    (one,) = found.channels
-    assert one.spikes == 1
-    assert one.noise == pytest.approx(1e-4, rel=0.05)
+    inspection = inspect(Columns({"t": time, "vt": vt}))
+    assert [step.at for step in inspection.steps] == pytest.approx([101.0, 111.0], abs=WITHIN)
+    (channel,) = inspection.channels
+    assert channel.spikes == 1
+    assert channel.noise == pytest.approx(1e-4, rel=0.05)
 
 
 @pytest.mark.parametrize("step", [1e-5, 5.5e-5, 0.1, 2.0])
@@ -299,12 +303,12 @@ def test_white_noise_has_no_spikes_and_each_spike_is_found_at_its_place():
 
 def test_gaps_are_told_against_the_median_step():
     time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(1.5, 2.0, 0.01)])
-    told = sampling_of(time)
-    assert [(gap.start, gap.end, gap.lost) for gap in told.gaps] == [
+    sampling = sampling_of(time)
+    assert [(gap.start, gap.end, gap.lost) for gap in sampling.gaps] == [
         (pytest.approx(0.99), pytest.approx(1.5), 50)
     ]
-    assert told.even
-    assert (told.smallest, told.largest) == pytest.approx((0.01, 0.01))
+    assert sampling.even
+    assert (sampling.smallest, sampling.largest) == pytest.approx((0.01, 0.01))
 
 
 # ---- names, units, phases
@@ -336,13 +340,13 @@ NAMES = {
 )
 def test_a_name_tells_its_signal(name, signal):
     units = {name: unit} if (unit := unit_in(name)) else {}
-    found = guess_signals([name], units)
-    assert (found[name].signal if found else None) == signal
+    guesses = guess_signals([name], units)
+    assert (guesses[name].signal if guesses else None) == signal
 
 
 def test_each_signal_goes_to_the_surest_name_once():
-    found = guess_signals(["U", "Ugen", "V"], {})
-    assert {name: guess.signal for name, guess in found.items()} == {"Ugen": "vt"}
+    guesses = guess_signals(["U", "Ugen", "V"], {})
+    assert {name: guess.signal for name, guess in guesses.items()} == {"Ugen": "vt"}
     assert guess_signals(["channel 7"], {"channel 7": "MW"})["channel 7"].signal == "p"
 
 
@@ -375,14 +379,16 @@ def test_waveforms_of_three_phases_are_one_voltage_whose_step_is_found(frequency
     waves = crest[:, None] * np.cos(turns) + RNG.normal(0.0, 1e-3, (time.size, 3))
     phases = {f"UL{k + 1}": waves[:, k] for k in range(3)}
     units = dict.fromkeys(phases, "kV")
-    found = inspect(Columns({"t": time, **phases}, units=units))
-    (group,) = found.phases
+    inspection = inspect(Columns({"t": time, **phases}, units=units))
+    (group,) = inspection.phases
     assert (group.columns, group.kind) == (("UL1", "UL2", "UL3"), "waveform")
-    assert [one.frequency for one in found.channels] == pytest.approx([frequency] * 3, rel=1e-3)
-    (step,) = found.steps
+    assert [channel.frequency for channel in inspection.channels] == pytest.approx(
+        [frequency] * 3, rel=1e-3
+    )
+    (step,) = inspection.steps
     assert step.at == pytest.approx(1.0, abs=WITHIN)
     assert step.sizes[group.name] / group.level == pytest.approx(0.0495, rel=0.02)
-    text = "\n".join(record_section(found, "w.csv"))
+    text = "\n".join(record_section(inspection, "w.csv"))
     assert yaml.safe_load(text)["record"]["channels"]["vt"] == {
         "phases": ["UL1", "UL2", "UL3"], "kind": "waveform", "connection": "phase-to-ground",
         "unit": "kV", "base": "?"
@@ -411,9 +417,9 @@ def test_what_is_no_record_is_refused_with_its_place(table, text):
 
 def test_a_column_of_another_length_than_the_time_is_left_out():
     table = Columns({"t": np.arange(6.0), "vt": np.ones(6), "slow": np.ones(3)})
-    found = inspect(table)
-    assert [one.name for one in found.channels] == ["vt"]
-    assert "'t' has 6 samples, 'slow' has 3" in found.unreadable["slow"]
+    inspection = inspect(table)
+    assert [channel.name for channel in inspection.channels] == ["vt"]
+    assert "'t' has 6 samples, 'slow' has 3" in inspection.unreadable["slow"]
 
 
 @settings(derandomize=True)
@@ -430,11 +436,11 @@ def test_whatever_was_recorded_is_told_as_valid_json_and_yaml(content):
     names = ("Ua", "Ub", "Uc") if columns[0, 0] == 1.0 else ("vt", "vref", "If [A]")
     table = Columns({"t": np.cumsum(steps), **dict(zip(names, columns.T, strict=True))})
     try:
-        found = inspect(table)
+        inspection = inspect(table)
     except RecordError:
         return
-    json.dumps(found.as_json())
-    text = "\n".join([*record_section(found, "a: b.csv"), *bump_section(found)])
+    json.dumps(inspection.as_json())
+    text = "\n".join([*record_section(inspection, "a: b.csv"), *bump_section(inspection)])
     assert set(yaml.safe_load(text)) == {"record", "test"}
 
 
@@ -442,8 +448,8 @@ def test_whatever_was_recorded_is_told_as_valid_json_and_yaml(content):
 def test_the_figure_has_a_panel_for_each_of_a_sensible_number_of_channels(count):
     columns = {f"channel {k}": RNG.normal(k, 0.1, 600) for k in range(count)}
     columns["channel 0"][:] = np.nan
-    found = inspect(Columns({"t": 0.01 * np.arange(600), **columns}))
-    figure = plots.inspection(found, "title")
+    inspection = inspect(Columns({"t": 0.01 * np.arange(600), **columns}))
+    figure = plots.inspection(inspection, "title")
     assert len(figure.axes) == min(count, 10)
     assert all("channel" in axes.get_ylabel() for axes in figure.axes)
     assert ("not drawn" in figure.axes[-1].get_xlabel()) == (count > 10)
@@ -451,9 +457,9 @@ def test_the_figure_has_a_panel_for_each_of_a_sensible_number_of_channels(count)
 
 
 def test_the_figure_marks_steps_gaps_and_spikes():
-    figure = plots.inspection(FOUND, "dirty")
+    figure = plots.inspection(INSPECTED, "dirty")
     first = figure.axes[0]
-    assert [text.get_text() for text in first.texts] == [f"{s.at:.4g} s" for s in FOUND.steps]
+    assert [text.get_text() for text in first.texts] == [f"{s.at:.4g} s" for s in INSPECTED.steps]
     assert len(first.patches) == 1  # the gap
     rings = [line for line in first.lines if line.get_marker() == "o"]
     assert [len(line.get_xdata()) for line in rings] == [2]
@@ -462,11 +468,14 @@ def test_the_figure_marks_steps_gaps_and_spikes():
 
 
 def test_one_step_in_several_channels_is_told_by_the_mean_of_least_variance():
-    shown = {"a": (LevelChange(1.0, 0.001, 0.1, 0.0),), "b": (LevelChange(1.002, 0.002, 0.2, 0.0),)}
-    (step,) = combined_steps(shown)
+    changes = {
+        "a": (LevelChange(1.0, 0.001, 0.1, 0.0),),
+        "b": (LevelChange(1.002, 0.002, 0.2, 0.0),),
+    }
+    (step,) = combined_steps(changes)
     assert step.at == pytest.approx((4.0 * 1.0 + 1.002) / 5.0)
     assert step.error == pytest.approx(0.002 / 5.0**0.5)  # they scatter less than they err
-    (alone,) = combined_steps({**shown, "ref": (LevelChange(1.01, 0.005, 0.1, 0.0, jumps=True),)})
+    (alone,) = combined_steps({**changes, "ref": (LevelChange(1.01, 0.005, 0.1, 0.0, jumps=True),)})
     assert (alone.at, alone.error) == (1.01, 0.005)
     assert alone.seen_in == ("a", "b", "ref")
     far = {"a": (LevelChange(1.0, 0.001, 0.1, 0.0), LevelChange(1.1, 0.001, 0.1, 0.0))}

@@ -149,10 +149,10 @@ def test_a_unit_that_the_file_contradicts_is_refused(csv):
     [("kV", "unit: kV and base"), ("MVA", "unit: MVA and base"), ("%", "scale: 0.01"),
      ("A", "unit: A and base")],
 )  # fmt: skip
-def test_what_is_taken_for_per_unit_must_not_be_in_another_unit(csv, unit, told):
+def test_what_is_taken_for_per_unit_must_not_be_in_another_unit(csv, unit, advice):
     path = csv(f"t,x [{unit}]\n0,15.75\n1,15.76\n")
     channels = {"vt": Channel(f"x [{unit}]")}
-    named = ("bump.csv", f"column 'x [{unit}]'", f"in {unit} as", "give vt", told)
+    named = ("bump.csv", f"column 'x [{unit}]'", f"in {unit} as", "give vt", advice)
     refused(lambda: read_record(path, T, channels, per_unit=frozenset({"vt"})), *named)
     assert read_record(path, T, channels).signals["vt"].tolist() == [15.75, 15.76]
 

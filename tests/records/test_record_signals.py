@@ -49,36 +49,36 @@ def test_a_voltage_that_is_not_there_outside_the_window_does_not_matter(tmp_path
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     whole = waves(vt) if kind == "waveform" else np.outer(vt, np.full(3, RATED / np.sqrt(3.0)))
     dead = np.where((TIME > 0.5)[:, None], whole, [0.0, 0.001, 0.01])
-    seen = []
+    records = []
     for phases in (whole, dead):
         columns = {"t": TIME, **dict(zip(PHASES["phases"], phases.T, strict=True))}
         case = case_with(tmp_path, {"vt": {**PHASES, "kind": kind}}, columns, window=[0.6, 3.9])
-        seen.append(trial(case).record)
-    np.testing.assert_array_equal(seen[0].time, seen[1].time)
-    np.testing.assert_array_equal(seen[0].signals["vt"], seen[1].signals["vt"])
-    assert seen[0].time[0] == pytest.approx(0.6, abs=1.0 / FREQUENCY)
+        records.append(trial(case).record)
+    np.testing.assert_array_equal(records[0].time, records[1].time)
+    np.testing.assert_array_equal(records[0].signals["vt"], records[1].signals["vt"])
+    assert records[0].time[0] == pytest.approx(0.6, abs=1.0 / FREQUENCY)
 
 
 def test_waveforms_become_the_voltage_that_the_simulation_shows_averaged(tmp_path):
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     columns = {"t": TIME, **dict(zip(PHASES["phases"], waves(vt).T, strict=True))}
-    seen = trial(case_with(tmp_path, {"vt": PHASES}, columns))
-    errors, _ = seen.experiment.errors(
-        seen.with_start_values(UNIT | load_case(tmp_path / "case.yaml").values())
+    setup = trial(case_with(tmp_path, {"vt": PHASES}, columns))
+    errors, _ = setup.experiment.errors(
+        setup.with_start_values(UNIT | load_case(tmp_path / "case.yaml").values())
     )
-    assert seen.record.averaged["vt"] == pytest.approx(1.0 / FREQUENCY, rel=1e-6)
+    assert setup.record.averaged["vt"] == pytest.approx(1.0 / FREQUENCY, rel=1e-6)
     assert np.max(np.abs(errors)) < NEAR
     # half a window is lost at either end
-    lost = (len(TIME) - len(seen.record.time)) / RATE
-    assert lost == pytest.approx(seen.record.averaged["vt"], abs=2.0 / RATE)
+    lost = (len(TIME) - len(setup.record.time)) / RATE
+    assert lost == pytest.approx(setup.record.averaged["vt"], abs=2.0 / RATE)
 
 
 def test_other_channels_lose_the_same_ends(tmp_path):
-    known = synthetic(tmp_path, TEST, TIME, noise=0.0, signals=("vt", "efd"))
-    columns = {"t": TIME, "efd": known["efd"]}
-    columns |= dict(zip(PHASES["phases"], waves(known["vt"]).T, strict=True))
+    simulated = synthetic(tmp_path, TEST, TIME, noise=0.0, signals=("vt", "efd"))
+    columns = {"t": TIME, "efd": simulated["efd"]}
+    columns |= dict(zip(PHASES["phases"], waves(simulated["vt"]).T, strict=True))
     record = trial(case_with(tmp_path, {"vt": PHASES, "efd": "efd"}, columns)).record
-    assert np.allclose(record.signals["efd"], np.interp(record.time, TIME, known["efd"]))
+    assert np.allclose(record.signals["efd"], np.interp(record.time, TIME, simulated["efd"]))
 
 
 @pytest.mark.parametrize(
@@ -110,15 +110,15 @@ def test_a_recorder_that_averages_is_simulated_so(tmp_path):
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     half = round(0.5 * window * RATE)
     kernel = np.r_[0.5, np.ones(2 * half - 1), 0.5] / (2 * half)
-    shown = np.convolve(vt, kernel, "valid")
-    columns = {"t": TIME[half:-half], "vt": shown}
-    seen, plain = (
+    averages = np.convolve(vt, kernel, "valid")
+    columns = {"t": TIME[half:-half], "vt": averages}
+    setup, plain = (
         trial(case_with(tmp_path, {"vt": entry}, columns))
         for entry in ({"column": "vt", "averaged": window}, "vt")
     )
-    values = seen.with_start_values(load_case(tmp_path / "case.yaml").values())
+    values = setup.with_start_values(load_case(tmp_path / "case.yaml").values())
     inner = slice(half, -half)
-    assert np.max(np.abs(seen.experiment.errors(values)[0][inner])) < NEAR
+    assert np.max(np.abs(setup.experiment.errors(values)[0][inner])) < NEAR
     assert np.max(np.abs(plain.experiment.errors(values)[0][inner])) > 100 * NEAR
 
 
@@ -198,18 +198,18 @@ def test_a_voltage_off_by_the_connection_is_noted(tmp_path, connection):
     columns = {"t": TIME, **dict.fromkeys(PHASES["phases"], RATED / np.sqrt(3.0) * vt)}
     entry = {**PHASES, "kind": "rms", "connection": connection}
     write(tmp_path / "record.csv", **columns)
-    found = fit(case_of(one({"vref": TEST["vref"]}, {"vt": entry}, ["KA"]), tmp_path))
-    told = any("vt starts from 0.577" in note and "connection" in note for note in found.notes)
-    assert told == (connection == "phase-to-phase")
+    result = fit(case_of(one({"vref": TEST["vref"]}, {"vt": entry}, ["KA"]), tmp_path))
+    noted = any("vt starts from 0.577" in note and "connection" in note for note in result.notes)
+    assert noted == (connection == "phase-to-phase")
 
 
 def test_noise_that_waveforms_smooth_is_neither_a_drift_nor_a_misfit(tmp_path):
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     noise = 5e-3 * np.random.default_rng(3).standard_normal((len(TIME), 3))
     columns = {"t": TIME, **dict(zip(PHASES["phases"], (waves(vt) + noise).T, strict=True))}
-    found = fit(case_with(tmp_path, {"vt": PHASES}, columns, ["KA", "TE", "TF"]))
-    assert found.success
-    assert not [one for one in found.notes if "scatters from" in one or "at rest" in one]
+    result = fit(case_with(tmp_path, {"vt": PHASES}, columns, ["KA", "TE", "TF"]))
+    assert result.success
+    assert not [one for one in result.notes if "scatters from" in one or "at rest" in one]
 
 
 def test_a_start_that_is_not_filled_in_and_a_missing_connection_say_what_is_wanted(tmp_path):
@@ -218,23 +218,23 @@ def test_a_start_that_is_not_filled_in_and_a_missing_connection_say_what_is_want
         ({"column": "u", "unit": "kV", "base": "?"}, "vt.base: '?' is to be filled in"),
         (entry, "vt.connection: is missing: phase-to-ground or phase-to-phase?"),
     ):
-        with pytest.raises(CaseError) as told:
+        with pytest.raises(CaseError) as noted:
             case_of(one(TEST, {"vt": channel}), tmp_path)
-        assert wanted in str(told.value)
+        assert wanted in str(noted.value)
 
 
 def test_a_coarse_step_is_held_against_the_error_of_the_signal_that_it_moves(tmp_path):
     """At 20 ms it moves efd by 3e-5 pu: a third of the noise of vt, nothing beside that of efd."""
     clock = np.arange(0.0, 6.0, 0.01)
-    known = synthetic(tmp_path, TEST, clock, signals=("vt", "efd"))
-    for noise, told in ((5e-3, False), (1e-4, True)):
-        efd = known["efd"] + noise * np.random.default_rng(1).standard_normal(len(clock))
-        write(tmp_path / "record.csv", t=clock, vt=known["vt"], efd=efd)
+    simulated = synthetic(tmp_path, TEST, clock, signals=("vt", "efd"))
+    for noise, noted in ((5e-3, False), (1e-4, True)):
+        efd = simulated["efd"] + noise * np.random.default_rng(1).standard_normal(len(clock))
+        write(tmp_path / "record.csv", t=clock, vt=simulated["vt"], efd=efd)
         channels = {
             "vt": {"column": "vt", "noise": 1e-4},
             "efd": {"column": "efd", "noise": noise},
         }
         content = {**one(TEST, channels, ["KA"]), "simulation": {"step": 0.02}}
         notes = [one for one in fit(case_of(content, tmp_path)).notes if "halving" in one]
-        assert any("moves efd by" in one for one in notes) == told
+        assert any("moves efd by" in one for one in notes) == noted
         assert not any("moves vt by" in one for one in notes)

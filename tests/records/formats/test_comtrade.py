@@ -70,8 +70,8 @@ def ticks(per_second=1e6, multiplier=MULTIPLIER, first=0):
 
 
 def raw(form, scales=None):
-    found = [(x - b) / a for x, (a, b) in zip((VT, IF), scales or SCALES[form], strict=True)]
-    return [x if form == "FLOAT32" else np.rint(x).astype(int) for x in found]
+    samples = [(x - b) / a for x, (a, b) in zip((VT, IF), scales or SCALES[form], strict=True)]
+    return [x if form == "FLOAT32" else np.rint(x).astype(int) for x in samples]
 
 
 def samples(form, stamps=None, analog=None):
@@ -157,11 +157,11 @@ def test_the_standard_of_1991_has_fewer_cells(write, form):
 )
 def test_either_file_may_be_named_whatever_its_capitals(write, suffixes):
     cfg = write(configuration(), samples("BINARY"), suffixes=suffixes)
-    one, other = read_comtrade(cfg), read_comtrade(cfg.with_suffix(suffixes[1]))
-    assert_the_record(one, "BINARY")
-    assert_the_record(other, "BINARY")
+    by_cfg, by_other = read_comtrade(cfg), read_comtrade(cfg.with_suffix(suffixes[1]))
+    assert_the_record(by_cfg, "BINARY")
+    assert_the_record(by_other, "BINARY")
     both = text(configuration()) + samples("BINARY")
-    assert one.sha256 == other.sha256 == hashlib.sha256(both).hexdigest()
+    assert by_cfg.sha256 == by_other.sha256 == hashlib.sha256(both).hexdigest()
 
 
 def test_a_name_that_is_not_utf_8_is_read(write):
@@ -242,8 +242,8 @@ def test_a_missing_sample_is_nan_where_it_may_be_missing(write, form, revision):
     mark = MARKS[form, revision]
     analog[0][7] = np.finfo(np.float32).min if form == "FLOAT32" else mark
     table = read_comtrade(write(configuration(form, revision), samples(form, analog=analog)))
-    found = table.numbers(["Ugen", "If"], frozenset(["Ugen"]))["Ugen"]
-    assert np.flatnonzero(np.isnan(found)).tolist() == [7]
+    vt = table.numbers(["Ugen", "If"], frozenset(["Ugen"]))["Ugen"]
+    assert np.flatnonzero(np.isnan(vt)).tolist() == [7]
     refused(lambda: table.numbers(["Ugen"]), "bump.dat: sample 8", "'Ugen'", "missing")
     assert table.place(7).endswith("bump.dat: sample 8")
 

@@ -151,7 +151,7 @@ def test_date_and_time_stand_in_two_columns(book):
 
 
 def test_timestamps_are_the_time_also_behind_a_count(book):
-    rows = [(at, one, 1.0) for at, one in enumerate(instants())]
+    rows = [(at, instant, 1.0) for at, instant in enumerate(instants())]
     assert read_excel(book(Data=[("N", "When", "Ut"), *rows])).clock == ("When",)
     assert read_excel(book(Data=[("N", "Ut"), (1, 2.0), (2, 1.0)])).clock == ("N",)
 
@@ -175,17 +175,17 @@ def with_cell(cell):
 @pytest.mark.parametrize("cell", [None, "", "=1/0"], ids=str)
 def test_a_blank_cell_is_a_missing_sample(book, cell):
     table = read_excel(book(Data=with_cell(cell)))
-    found = table.numbers(["Ut"], frozenset(["Ut"]))["Ut"]
-    assert np.isnan(found).tolist() == [False, True, False]
+    vt = table.numbers(["Ut"], frozenset(["Ut"]))["Ut"]
+    assert np.isnan(vt).tolist() == [False, True, False]
     refused(lambda: table.numbers(["Ut"]), "bump.xlsx: row 9: column 'Ut'", "missing")
 
 
 @pytest.mark.parametrize("cell", ["15,8", "15.8", "over", datetime(2015, 9, 20)], ids=str)
 def test_a_cell_that_is_no_number_is_refused_by_row_and_column(book, cell):
     table = read_excel(book(Data=with_cell(cell)))
-    shown = repr(cell) if isinstance(cell, str) else "2015-09-20"
+    quoted = repr(cell) if isinstance(cell, str) else "2015-09-20"
     refused(
-        lambda: table.numbers(["Ut"]), "bump.xlsx: row 9: column 'Ut'", shown, "is not a number"
+        lambda: table.numbers(["Ut"]), "bump.xlsx: row 9: column 'Ut'", quoted, "is not a number"
     )
     assert table.numbers(["If"])["If"].tolist() == [700, 701, 702]
 

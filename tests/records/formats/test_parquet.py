@@ -97,22 +97,26 @@ def test_timestamps_count_from_the_first_to_their_last_digit(parquet, unit, zone
     step = {"ms": 10**6, "us": 10**3, "ns": 1}[unit]
     ticks = np.array([0, 1, 4_800_000_001]) + 1_442_746_302_858 * (10**6 // step)
     column = pa.array(ticks, pa.timestamp(unit, zone))
-    found = read_parquet(parquet({"ts": column})).instants(["ts"])
-    np.testing.assert_allclose(found, [0.0, step * 1e-9, 4_800_000_001 * step * 1e-9], rtol=1e-13)
+    time = read_parquet(parquet({"ts": column})).instants(["ts"])
+    np.testing.assert_allclose(time, [0.0, step * 1e-9, 4_800_000_001 * step * 1e-9], rtol=1e-13)
 
 
 @pytest.mark.parametrize("kind", [pa.time64("us"), pa.duration("us")], ids=str)
 def test_date_and_time_stand_in_two_columns(parquet, kind):
     since = [timedelta(seconds=86399, microseconds=999_000), timedelta(), timedelta(seconds=2)]
-    of_day = [(datetime.min + one).time() for one in since] if pa.types.is_time(kind) else since
+    of_day = (
+        [(datetime.min + duration).time() for duration in since]
+        if pa.types.is_time(kind)
+        else since
+    )
     days = [date(2015, 9, 20), date(2015, 9, 21), date(2015, 9, 21)]
     table = read_parquet(parquet({"Date": days, "Time": pa.array(of_day, kind)}))
     np.testing.assert_allclose(table.instants(table.clock), [0, 0.001, 2.001], rtol=0, atol=1e-9)
 
 
 def test_timestamps_are_the_time_also_behind_a_count(parquet):
-    found = read_parquet(parquet({"N": [1, 2, 3], "When": INSTANTS, "Ut": UT}))
-    assert found.clock == ("When",)
+    table = read_parquet(parquet({"N": [1, 2, 3], "When": INSTANTS, "Ut": UT}))
+    assert table.clock == ("When",)
     assert read_parquet(parquet({"N": [1, 2, 3], "Ut": UT[::-1]})).clock == ("N",)
 
 

@@ -431,14 +431,14 @@ def file(tmp_path):
 
 @pytest.mark.parametrize("dialect", FILES)
 def test_a_file_as_found_in_the_field_is_read_to_the_numbers_in_it(file, dialect):
-    seen = FILES[dialect]
-    table = read_text_table(file(seen.text))
-    assert table.instants(seen.clock, seen.asked).tolist() == seen.time
-    columns = table.numbers(seen.columns)
-    assert {name: column.tolist() for name, column in columns.items()} == seen.columns
-    assert dict(table.units) == seen.units
-    assert table.clock == seen.clock
-    assert {*seen.clock, *seen.columns} <= {*table.names}
+    expected = FILES[dialect]
+    table = read_text_table(file(expected.text))
+    assert table.instants(expected.clock, expected.asked).tolist() == expected.time
+    columns = table.numbers(expected.columns)
+    assert {name: column.tolist() for name, column in columns.items()} == expected.columns
+    assert dict(table.units) == expected.units
+    assert table.clock == expected.clock
+    assert {*expected.clock, *expected.columns} <= {*table.names}
 
 
 # how a recorder writes that a sample is missing
