@@ -60,14 +60,17 @@ def module_name(path):
 MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py"))}
 
 
+TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
+
+
 def package(name):
     """Return the room of a module: what follows exfit in its name, "" for exfit itself."""
     return ([*name.split("."), ""])[1]
 
 
-def imports(path, everywhere=True):
-    """Yield the modules a file imports; only those at its top unless ``everywhere``."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+def imports(name, everywhere=True):
+    """Yield the modules a module imports; only those at its top unless ``everywhere``."""
+    tree = TREES[name]
     for node in ast.walk(tree) if everywhere else at_the_top(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -93,8 +96,8 @@ def test_every_package_has_a_row_in_the_table():
 def test_a_package_imports_only_what_its_row_allows():
     faults = [
         f"{name} imports {target}"
-        for name, path in MODULES.items()
-        for target in imports(path)
+        for name in MODULES
+        for target in imports(name)
         if package(name) and target.split(".")[0] == "exfit" and package(target)
         if package(target) not in MAY_IMPORT[package(name)] | BASE | {package(name)}
         if (name, target) not in EXCEPTIONS
@@ -105,8 +108,8 @@ def test_a_package_imports_only_what_its_row_allows():
 def test_no_package_imports_itself_in_a_circle():
     """A name that a package hands on counts as its own file; a circle has no first module."""
     left = {
-        name: {target for target in imports(path, everywhere=False) if target in MODULES} - {name}
-        for name, path in MODULES.items()
+        name: {target for target in imports(name, everywhere=False) if target in MODULES} - {name}
+        for name in MODULES
     }
     while left:
         free = {name for name, targets in left.items() if not targets & left.keys()}
@@ -117,8 +120,8 @@ def test_no_package_imports_itself_in_a_circle():
 def test_libraries_stand_only_where_the_table_says():
     faults = [
         f"{name} imports {target}"
-        for name, path in MODULES.items()
-        for target in imports(path)
+        for name in MODULES
+        for target in imports(name)
         if (library := target.split(".")[0]) in ONLY_IN
         if package(name) not in ONLY_IN[library]
     ]
@@ -126,7 +129,7 @@ def test_libraries_stand_only_where_the_table_says():
 
 
 def test_no_module_waits_for_scipy_while_it_is_imported():
-    waiting = [n for n, path in MODULES.items() for t in imports(path, False) if "scipy" in t]
+    waiting = [n for n in MODULES for t in imports(n, False) if "scipy" in t]
     assert waiting == []
 
 
@@ -142,6 +145,42 @@ def test_no_folder_of_the_package_has_more_than_25_entries():
     assert crowded.keys() <= {"exciters"}
 
 
+CHANGING = {
+    "add", "append", "clear", "discard", "extend", "insert", "pop", "popitem", "remove",
+    "setdefault", "update",
+}  # fmt: skip
+
+
+# what a module may remember, and why stands there
+REMEMBERED = {"exfit.engine.kernel": {"_alive"}}
+
+
+def changes(function, names):
+    """Yield where a function changes what stands at the top of its module under some names."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Global):
+            yield node
+        elif isinstance(node, ast.Subscript | ast.Attribute) and isinstance(node.value, ast.Name):
+            stored = not isinstance(node.ctx, ast.Load)
+            called = isinstance(node, ast.Attribute) and node.attr in CHANGING
+            if node.value.id in names and (stored or called):
+                yield node
+
+
+def test_no_module_remembers_what_it_did():
+    """State lies in values that are handed on; what stands at the top of a module is a table."""
+    faults = []
+    for name, tree in TREES.items():
+        assigned = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
+        targets = [t for node in assigned for t in getattr(node, "targets", None) or [node.target]]
+        names = {target.id for target in targets if isinstance(target, ast.Name)}
+        names -= REMEMBERED.get(name, set())
+        functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+        places = {node.lineno for function in functions for node in changes(function, names)}
+        faults += [f"{name}:{line}" for line in sorted(places)]
+    assert faults == []
+
+
 def test_the_command_starts_without_the_heavy_packages():
     code = "import exfit.cli, sys; print(*{name.partition('.')[0] for name in sys.modules})"
     environment = {**os.environ, "PYTHONPATH": str(ROOT.parent)}
@@ -153,6 +192,6 @@ def test_the_command_starts_without_the_heavy_packages():
 
 @pytest.mark.parametrize("room", ["estimate", "inference"])
 def test_the_estimator_and_the_inference_can_be_used_without_the_rest(room):
-    own = {target for name, path in MODULES.items() for target in imports(path)
+    own = {target for name in MODULES for target in imports(name)
            if package(name) == room and target.split(".")[0] == "exfit"}  # fmt: skip
     assert {package(target) for target in own} <= {room, "util"}

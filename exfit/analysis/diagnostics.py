@@ -13,7 +13,7 @@ from exfit.fitting.system import system_of
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.records.record import Record
 from exfit.results.model import Comparison
-from exfit.simulation.simulator import parameters_used
+from exfit.simulation.kernels import parameters_used
 
 Array = NDArray[np.float64]
 

@@ -30,7 +30,9 @@ DIRECTIONS = 8  # of differentiation in one run
 DIGEST = hashlib.sha256().digest_size
 
 _lock = threading.Lock()
-_alive: list[Any] = []  # code must outlive the functions that point into it
+# code must outlive the functions that point into it; and the engines share one description of the
+# processor, which the first of them to go would take along
+_alive: list[Any] = []
 
 
 class Start(NamedTuple):

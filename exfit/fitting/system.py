@@ -20,7 +20,7 @@ from exfit.plants import (
     initial,
     playback,
 )
-from exfit.simulation.simulator import parameters_used
+from exfit.simulation.kernels import parameters_used
 
 Values = Mapping[str, float]
 

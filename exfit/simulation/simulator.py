@@ -4,19 +4,19 @@ import math
 from collections.abc import Container, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, LinearKernel, Span, Start, TangentKernel
-from exfit.engine.system import System, trace
-from exfit.engine.trace import in_order
+from exfit.engine.kernel import SIDE_BY_SIDE, Span, Start, TangentKernel
+from exfit.engine.system import System
 from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.simulation.grid import ON_GRID, GridSegment
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import Interpolation, WholeRun, joined
+from exfit.simulation.kernels import kernel, linear_kernel, parameters_used, tangent_kernel
 from exfit.simulation.limits import limits_passed
 from exfit.util.threads import in_threads
 
@@ -49,36 +49,6 @@ class Response:
     time: Array
     signals: Mapping[str, Array]
     substeps: int
-
-
-@cache
-def kernel(system: System, outputs: tuple[str, ...], lanes: int) -> Kernel:
-    """Return the machine code that simulates a system."""
-    return Kernel(system, outputs, lanes)
-
-
-@cache
-def tangent_kernel(
-    system: System, outputs: tuple[str, ...], free: tuple[str, ...], moving: tuple[str, ...]
-) -> TangentKernel:
-    """Return the machine code that simulates a system with its derivatives."""
-    return TangentKernel(system, outputs, free, moving)
-
-
-@cache
-def linear_kernel(system: System) -> LinearKernel:
-    """Return the machine code that linearises a system."""
-    return LinearKernel(system)
-
-
-@cache
-def parameters_used(system: System) -> frozenset[str]:
-    """Return the parameters that a response of the system can depend on."""
-    traced = trace(system, system.outputs)
-    targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
-    reached = {node.index for node in in_order(targets)}
-    pairs = zip(system.parameters, traced.p, strict=True)
-    return frozenset(name for name, node in pairs if node.index in reached)
 
 
 class Simulator:

@@ -25,7 +25,7 @@ from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.output import terminal
 from exfit.results.model import Iteration
-from exfit.simulation.simulator import kernel, linear_kernel, tangent_kernel
+from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel
 
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 COMMANDS = ("fit", "simulate", "validate", "check")

@@ -42,7 +42,8 @@ from exfit.plants import (
     open_circuit,
 )
 from exfit.simulation.inputs import Inputs, InputStep
-from exfit.simulation.simulator import Simulator, parameters_used
+from exfit.simulation.kernels import parameters_used
+from exfit.simulation.simulator import Simulator
 
 SHEETS = {**{n: m.sheet for n, m in MODELS.items()}, **{n: m.sheet for n, m in MACHINES.items()}}
 FILES = Path(models.__file__).parent

@@ -18,7 +18,8 @@ from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import MACHINE, NETWORK, STABILISER, VT0, Stabilised, infinite_bus, open_circuit
 from exfit.simulation.inputs import Inputs, InputStep, each
-from exfit.simulation.simulator import Simulator, parameters_used
+from exfit.simulation.kernels import parameters_used
+from exfit.simulation.simulator import Simulator
 
 CLOCK = np.linspace(0.0, 4.0, 401)
 

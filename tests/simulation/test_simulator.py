@@ -31,7 +31,8 @@ from exfit.simulation.inputs import (
     grid_segments,
 )
 from exfit.simulation.interpolation import Interpolation
-from exfit.simulation.simulator import MOST_SUBSTEPS, Simulator, parameters_used
+from exfit.simulation.kernels import parameters_used
+from exfit.simulation.simulator import MOST_SUBSTEPS, Simulator
 
 UP = Inputs(0.0, 2.0, (InputStep(0.5, 3e-4),))  # off the limits
 AT_REST = Inputs(0.0, 2.0, ())

@@ -14,7 +14,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Parameter, typical
 from exfit.plants import MACHINE, SATURATION, VT0, alone, open_circuit
-from exfit.simulation.simulator import parameters_used
+from exfit.simulation.kernels import parameters_used
 
 WITHOUT_PLANT = ("FIRST_ORDER",)
 EXCITERS = tuple(name for name in MODELS if name not in WITHOUT_PLANT)

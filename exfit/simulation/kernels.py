@@ -1,0 +1,37 @@
+"""The machine code of systems, made once in a process, and what their equations depend on."""
+
+from functools import cache
+
+from exfit.engine.kernel import Kernel, LinearKernel, TangentKernel
+from exfit.engine.system import System, trace
+from exfit.engine.trace import in_order
+
+
+@cache
+def kernel(system: System, outputs: tuple[str, ...], lanes: int) -> Kernel:
+    """Return the machine code that simulates a system."""
+    return Kernel(system, outputs, lanes)
+
+
+@cache
+def tangent_kernel(
+    system: System, outputs: tuple[str, ...], free: tuple[str, ...], moving: tuple[str, ...]
+) -> TangentKernel:
+    """Return the machine code that simulates a system with its derivatives."""
+    return TangentKernel(system, outputs, free, moving)
+
+
+@cache
+def linear_kernel(system: System) -> LinearKernel:
+    """Return the machine code that linearises a system."""
+    return LinearKernel(system)
+
+
+@cache
+def parameters_used(system: System) -> frozenset[str]:
+    """Return the parameters that a response of the system can depend on."""
+    traced = trace(system, system.outputs)
+    targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
+    reached = {node.index for node in in_order(targets)}
+    pairs = zip(system.parameters, traced.p, strict=True)
+    return frozenset(name for name, node in pairs if node.index in reached)
