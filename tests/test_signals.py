@@ -1,14 +1,18 @@
 """The table of signals, and that whoever uses it covers every row."""
 
+import ast
+from pathlib import Path
+
 import pytest
 from on_load import ALL_INPUTS, system
 
+import exfit
 from exfit.case.schema import RecordFile
 from exfit.cli.completion import noises
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import DRIVING, SATURATION, alone, machine_playback, open_circuit, playback
-from exfit.records.channel_recognition import guessed
+from exfit.records.channel_recognition import guess_signals
 from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
 
 MACHINE, EXCITER, QUADRATIC = MACHINES["GENROU"], MODELS["AC8B"], SATURATION["quadratic"]
@@ -47,14 +51,14 @@ def test_what_is_compared_can_be_recorded():
 @pytest.mark.parametrize("signal", RECORDED)
 def test_each_word_of_a_signal_identifies_it(signal):
     for word in SIGNALS[signal].words:
-        guess = guessed((word,), {})
+        guess = guess_signals((word,), {})
         assert guess[word].signal == signal, word
 
 
 def test_no_signal_takes_the_column_of_another():
     """All signals side by side, each under the word that identifies it best."""
     columns = {SIGNALS[one].words[0]: one for one in RECORDED}
-    guesses = guessed(tuple(columns), {})
+    guesses = guess_signals(tuple(columns), {})
     assert {name: guess.signal for name, guess in guesses.items()} == columns
 
 
@@ -70,6 +74,21 @@ def test_a_case_may_name_each_signal_that_can_be_recorded():
 
 def test_the_shell_completes_each_signal_that_is_compared():
     assert noises(None, None, "") == [f"{signal}=" for signal in COMPARED]
+
+
+def test_no_other_room_has_a_table_of_signals():
+    """Three signals side by side are a table, unless they are those of a plant."""
+    root = Path(exfit.__file__).parent
+    tables = [
+        f"{path.relative_to(root)}:{node.lineno}"
+        for path in root.rglob("*.py")
+        if path != root / "signals.py" and path.parent != root / "plants"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Tuple | ast.List | ast.Set | ast.Dict)
+        for entries in [node.keys if isinstance(node, ast.Dict) else node.elts]
+        if len({*COMPARED} & {one.value for one in entries if isinstance(one, ast.Constant)}) > 2
+    ]
+    assert tables == []
 
 
 def test_a_label_names_symbol_and_unit():

@@ -14,7 +14,16 @@ from exfit.models import STABILISERS, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
-from exfit.plants import EVENTS, KINDS, MACHINE, NETWORK, STABILISER, PlantKind, flow_sheet
+from exfit.plants import (
+    EVENTS,
+    KINDS,
+    MACHINE,
+    NETWORK,
+    OPEN_CIRCUIT,
+    STABILISER,
+    PlantKind,
+    flow_sheet,
+)
 from exfit.signals import RECORDED
 from exfit.util.text import near
 
@@ -22,7 +31,7 @@ Data = Mapping[str, Any]
 Contradictions = Iterator[tuple[str, str]]
 
 # in place of a kind that does not exist, which is a fault of its own
-ANY_PLANT = replace(KINDS["open-circuit"], events=EVENTS, signals=RECORDED)
+ANY_PLANT = replace(OPEN_CIRCUIT, events=EVENTS, signals=RECORDED)
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 

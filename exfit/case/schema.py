@@ -21,6 +21,7 @@ from pydantic import (
 
 from exfit.case.messages import FILE_NAME, PERCENT
 from exfit.case.ties import is_tie
+from exfit.models import MACHINE_NAMES
 from exfit.plants import HEARD
 from exfit.signals import RECORDED
 from exfit.util.strategies import DEFAULT_STRATEGY, EXPLAINED, STRATEGIES
@@ -162,7 +163,7 @@ ABOUT = Field(
     description="Facts about unit and test that the report shows, under any names, such as Plant, "
     "Unit, Rated, Test date, Tested by.",
 )
-MACHINE = Field(description="Machine model: GENROU, GENROE, GENSAL, GENSAE or ONE_AXIS.")
+MACHINE = Field(description=f"Machine model: {', '.join(MACHINE_NAMES)}.")
 MACHINE_DATA = Field(
     default_factory=_nothing,
     description="Machine data; a missing value is the typical one.",

@@ -4,7 +4,7 @@ from exfit.plants.alone import alone
 from exfit.plants.infinite_bus import HEARD, Given, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.machine_playback import machine_playback
-from exfit.plants.open_circuit import open_circuit
+from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
 from exfit.plants.parts import (
     MACHINE,
     MEASURED,
@@ -29,6 +29,7 @@ __all__ = [
     "MACHINE",
     "MEASURED",
     "NETWORK",
+    "OPEN_CIRCUIT",
     "SATURATION",
     "STABILISER",
     "VREF0",

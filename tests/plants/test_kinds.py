@@ -1,10 +1,12 @@
 """The table of plants, and that whoever uses it covers every kind."""
 
+import ast
 from pathlib import Path
 
 import pytest
 from pydantic import TypeAdapter
 
+import exfit
 from exfit.case import schema
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
@@ -58,6 +60,19 @@ def test_a_record_may_hold_what_drives_and_what_is_compared(kind):
     assert {*kind.driving, *kind.required, *kind.levels} <= {*kind.signals} <= {*RECORDED}
     assert kind.compared
     assert {*kind.required_if_used} <= {*kind.driving}
+
+
+def test_no_room_but_that_of_the_plants_and_the_schema_knows_a_plant_by_its_name():
+    names = KINDS.keys() - {"none"}  # which is a word of other things too
+    root = Path(exfit.__file__).parent
+    knowing = {
+        path.relative_to(root).as_posix()
+        for path in root.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value in names
+    }
+    rest = {path for path in knowing if not path.startswith("plants/")}
+    assert rest == {"case/schema.py"}
 
 
 def test_all_events_are_those_of_some_kind():
