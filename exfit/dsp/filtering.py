@@ -60,7 +60,7 @@ class Filtering:
     """How a signal (M,) on the clock ``time`` (s) is filtered, and which samples are ``kept``.
 
     Samples that are not kept, which may be nan, are bridged in a line between their kept
-    neighbours before the filter, so that they do not smear, and dropped behind it. Where the record
+    neighbours before the filter, so that they do not smear, and dropped after it. Where the record
     holds averages already, the simulation is ``averaged`` alike before all that.
 
     Raises:

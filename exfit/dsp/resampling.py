@@ -40,7 +40,7 @@ def resampled(
     White noise keeps 0.88 rate / old rate of its variance; neighbours are then correlated by 0.13,
     the next by -0.12, so that second differences give 0.88 of its standard deviation.
 
-    The clock's rate is the one asked for within 0.01 %, so that a recorder whose own is not quite
+    The clock's rate is the requested one within 0.01 %, so that a recorder whose own is not quite
     the nominal one needs no curve between its samples. Uneven samples are first put on an even
     clock of twice their mean rate or finer by a cubic spline, which weakens a wave of frequency f
     by (f / (mean rate - f))**4: 0.02 % at a tenth of the mean rate, 0.4 % at a fifth.

@@ -1,4 +1,4 @@
-"""The clock of a record: how evenly it runs, where it jumps, where it stands or goes back."""
+"""The clock of a record: how evenly it runs, where it jumps, repeats or goes back."""
 
 from dataclasses import dataclass
 

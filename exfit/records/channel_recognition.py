@@ -64,7 +64,7 @@ def three_phases(names: Sequence[str], units: Mapping[str, str]) -> tuple[tuple[
 
 
 def connection_of(columns: Sequence[str]) -> str:
-    """Return between what three voltages seem to be recorded, by their names: U12, Uab, URS ..."""
+    """Return the connection of three recorded voltages, by their names: U12, Uab, URS ..."""
     lowered = [column.lower() for column in columns]
     for marks in LINE_TO_LINE:
         if all(mark in name for mark, name in zip(marks, lowered, strict=True)):

@@ -1,4 +1,4 @@
-"""The clock of a record: which columns seem to hold the time, its unit, and what a time must be."""
+"""The clock of a record: the columns that hold the time, its unit, and its validity."""
 
 import re
 from collections.abc import Callable, Sequence

@@ -144,7 +144,7 @@ def inspect(
 
 
 def _find_clock(table: Table, columns: Sequence[str] | None, unit: str | None) -> Clock:
-    """Return where the time stands; raises RecordError where nothing shows it."""
+    """Return the clock of a file; raises RecordError where no column seems to hold the time."""
     columns = tuple(columns or table.clock)
     if not columns:
         raise RecordError(
@@ -154,7 +154,7 @@ def _find_clock(table: Table, columns: Sequence[str] | None, unit: str | None) -
 
 
 def _stamps(table: Table, clock: Clock) -> Array:
-    """Return the time (M,) in s, in which samples may stand in any order."""
+    """Return the time (M,) in s, which need not increase."""
     stamps = table.instants(clock.columns, clock.unit)
     if len(stamps) < FEWEST_SAMPLES:
         raise RecordError(

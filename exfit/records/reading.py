@@ -24,7 +24,7 @@ PERCENT = "%"
 
 
 class ChannelLike(Protocol):
-    """Where a signal stands in a file and how it becomes per unit."""
+    """The column of a signal in a file and its conversion to per unit."""
 
     @property
     def column(self) -> str:
@@ -44,11 +44,11 @@ class ChannelLike(Protocol):
 
     @property
     def base(self) -> float | None:
-        """What 1 pu is in that unit; None: the numbers are taken as they stand."""
+        """What 1 pu is in that unit; None: the numbers are not divided."""
 
 
 class ThreePhases(NamedTuple):
-    """Where the three phases of the terminal voltage stand, and how they become one, per unit.
+    """The columns of the three phases of the terminal voltage, and their conversion to per unit.
 
     ``base`` is the rated line-to-line RMS voltage in ``unit``, ``cycles`` the window of waveforms.
     """
@@ -85,7 +85,7 @@ def read_record(
 
     Args:
         path: a recorder's file of any kind that ``open_table`` knows.
-        clock: where the time stands; timestamps become s since the first of them.
+        clock: the columns of the time; timestamps become s since the first of them.
         channels: signal name -> column, its unit and base, scale and offset, or three phases. The
             base of a field current is that of the air-gap line: what gives 1 pu voltage without
             saturation.

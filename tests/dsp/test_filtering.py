@@ -41,7 +41,7 @@ def test_without_a_filter_the_kept_samples_are_the_answer():
 
 
 @every_filter
-def test_what_stands_in_a_lost_sample_does_not_matter(filter):
+def test_the_value_of_a_lost_sample_does_not_matter(filter):
     kept = some_lost()
     filtering = Filtering(TIME, kept, filter)
     signal = RESPONSE + white(1e-3)
@@ -165,7 +165,7 @@ def averaging(window, time=UNEVEN, kept=None, filter=None):
     return Filtering(time, kept, filter, MovingAverage(window))
 
 
-def test_without_an_average_a_simulation_is_shown_as_it_is():
+def test_without_an_average_a_simulation_stays_as_it_is():
     assert Filtering(TIME, some_lost(), LowPass(5.0)).as_recorded(RESPONSE) is RESPONSE
 
 
@@ -285,7 +285,7 @@ def test_every_spike_is_found_and_hardly_anything_else(course):
 
 
 @pytest.mark.parametrize("at", [0, 1, 3, 50, 996, 999])
-def test_a_lone_spike_on_a_constant_is_found_wherever_it_stands(at):
+def test_a_lone_spike_on_a_constant_is_found_wherever_it_is(at):
     samples = np.ones(TIME.size)
     samples[at] += 0.05
     assert np.flatnonzero(outliers(TIME, samples, 5.0)).tolist() == [at]

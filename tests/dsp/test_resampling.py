@@ -46,7 +46,7 @@ def jittery(seed=0, end=4.0):
 
 
 @every_clock
-def test_the_clock_is_even_of_the_rate_asked_for_and_spans_the_record(own, rate):
+def test_the_clock_is_even_of_the_rate_requested_and_spans_the_record(own, rate):
     time = clock(own)
     slower, _ = one(time, time, rate)
     steps = np.diff(slower)

@@ -1,4 +1,4 @@
-"""Inspection: what a record holds is told as it was put there, and its steps are found."""
+"""Inspection: what a record holds is reported as it was put there, and its steps are found."""
 
 import json
 import re
@@ -81,7 +81,7 @@ def test_every_step_of_a_sample_record_is_found_in_time_and_size(record):
 
 
 @pytest.mark.parametrize("name", ["reference_ac1a", "reference_ac8b_unit1", "reference_ac8b_unit2"])
-def test_a_recorded_reference_tells_its_steps_to_the_sample(name):
+def test_a_recorded_reference_shows_its_steps_to_the_sample(name):
     inspection = inspect(Columns(reference(f"{name}.csv")))
     changes = inspection.channel_of("vref").steps
     assert [change.at for change in changes] == pytest.approx([1.0, 11.0], abs=0.005)  # one sample
@@ -114,7 +114,7 @@ def test_the_channels_of_a_sample_record_are_recognised(record):
     assert inspection.findings == ()
 
 
-def test_the_field_record_is_told_as_it_was_made():
+def test_the_field_record_is_described_as_it_was_made():
     """sample_data/README.md says what was put into it, and where."""
     inspection = inspect(sample(SAMPLES / f"{FIELD}.csv"))
     assert inspection.clock.columns == ("Date", "Time")
@@ -162,7 +162,7 @@ DIRTY = dirty()
 INSPECTED = inspect(DIRTY)
 
 
-def test_the_clock_of_a_record_is_told():
+def test_the_clock_of_a_record_is_described():
     (gap,) = INSPECTED.sampling.gaps
     assert (gap.start, gap.end) == pytest.approx((999 * 0.0048, 1100 * 0.0048), abs=2e-4)
     assert gap.lost == 100
@@ -171,7 +171,7 @@ def test_the_clock_of_a_record_is_told():
     assert 0.0046 <= INSPECTED.sampling.smallest < INSPECTED.sampling.largest <= 0.005
 
 
-def test_what_is_wrong_with_a_channel_is_told_where_it_is():
+def test_what_is_wrong_with_a_channel_is_reported_with_its_place():
     vt, ifd, efd = (INSPECTED.channel_of(name) for name in ("vt", "ifd", "efd"))
     assert vt.spikes == 2
     assert vt.spikes_at == pytest.approx((500 * 0.0048, 2900 * 0.0048), abs=2e-4)
@@ -227,7 +227,7 @@ def test_every_suggestion_fits_a_terminal_of_80_columns_but_for_names():
     assert max(map(len, lines)) <= 80
 
 
-def test_time_that_repeats_or_goes_back_is_told_by_place_and_left_out():
+def test_time_that_repeats_or_goes_back_is_reported_by_place_and_left_out():
     time = 0.01 * np.arange(200)
     time[50], time[120] = time[49], 0.3
     inspection = inspect(Columns({"t": time, "vt": RNG.normal(1.0, 1e-4, 200)}))
@@ -260,7 +260,7 @@ def test_the_unit_of_a_channel_and_the_origin_of_time_do_not_matter(scale, origi
 
 
 @pytest.mark.parametrize("count", [30_000, 300_000])
-def test_a_long_record_tells_its_steps_as_well_as_a_short_one(count):
+def test_a_long_record_shows_its_steps_as_well_as_a_short_one(count):
     clean = reference("reference_ac1a.csv")
     time = np.linspace(0.0, 300.0, count)
     vt = np.interp(time - 100.0, clean["t"], clean["vt"]) + RNG.normal(0.0, 1e-4, count)
@@ -301,7 +301,7 @@ def test_white_noise_has_no_spikes_and_each_spike_is_found_at_its_place():
     assert set(places) <= set(spikes(time, noisy, 1.0, SPIKE_LIMIT))
 
 
-def test_gaps_are_told_against_the_median_step():
+def test_gaps_are_judged_against_the_median_step():
     time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(1.5, 2.0, 0.01)])
     sampling = sampling_of(time)
     assert [(gap.start, gap.end, gap.lost) for gap in sampling.gaps] == [
@@ -338,7 +338,7 @@ NAMES = {
 @pytest.mark.parametrize(
     ("name", "signal"), [(name, signal) for signal, names in NAMES.items() for name in names]
 )
-def test_a_name_tells_its_signal(name, signal):
+def test_a_signal_is_recognised_by_its_name(name, signal):
     units = {name: unit} if (unit := unit_in(name)) else {}
     guesses = guess_signals([name], units)
     assert (guesses[name].signal if guesses else None) == signal
@@ -364,7 +364,7 @@ def test_three_phases_of_a_voltage_are_recognised(names, grouped):
 
 
 @pytest.mark.parametrize("names", ["U12 U23 U31", "Uab Ubc Uca", "U_RS U_ST U_TR"])
-def test_voltages_between_phases_are_told_from_those_to_ground(names):
+def test_voltages_between_phases_are_distinguished_from_those_to_ground(names):
     assert connection_of(names.split()) == "phase-to-phase"
     assert connection_of(["Ua", "Ub", "Uc"]) == connection_of(["UL1", "UL2", "UL3"])
     assert connection_of(["Ua", "Ub", "Uc"]) == "phase-to-ground"
@@ -431,7 +431,7 @@ def test_a_column_of_another_length_than_the_time_is_left_out():
         )
     )
 )
-def test_whatever_was_recorded_is_told_as_valid_json_and_yaml(content):
+def test_whatever_was_recorded_is_reported_as_valid_json_and_yaml(content):
     steps, columns = content
     names = ("Ua", "Ub", "Uc") if columns[0, 0] == 1.0 else ("vt", "vref", "If [A]")
     table = Columns({"t": np.cumsum(steps), **dict(zip(names, columns.T, strict=True))})
@@ -467,7 +467,7 @@ def test_the_figure_marks_steps_gaps_and_spikes():
     plots.png(figure)
 
 
-def test_one_step_in_several_channels_is_told_by_the_mean_of_least_variance():
+def test_one_step_in_several_channels_is_placed_by_the_mean_of_least_variance():
     changes = {
         "a": (LevelChange(1.0, 0.001, 0.1, 0.0),),
         "b": (LevelChange(1.002, 0.002, 0.2, 0.0),),

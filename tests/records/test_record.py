@@ -1,4 +1,4 @@
-"""Records: what is read is what stands in the file, and what cannot be used is refused by name."""
+"""Records: what is read is what the file holds, and what cannot be used is refused by name."""
 
 import hashlib
 from dataclasses import FrozenInstanceError, dataclass

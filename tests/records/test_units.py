@@ -92,7 +92,7 @@ BARE = {
 
 
 @pytest.mark.parametrize("name", BARE)
-def test_the_bare_name_is_what_stands_before_the_unit(name):
+def test_the_bare_name_is_what_comes_before_the_unit(name):
     assert bare(name) == BARE[name]
 
 

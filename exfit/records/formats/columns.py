@@ -50,7 +50,7 @@ class Columns:
         return self.time_columns or find_clock(self.names, self.stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
-        """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
+        """Return columns (M,) unconverted, nan where a sample is missing in a ``gappy`` one.
 
         Raises RecordError for a column that is missing or there twice, that holds no numbers or
         lacks one, and for columns that are not equally long.
@@ -60,7 +60,7 @@ class Columns:
         return columns
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s: numbers as they stand, timestamps since the first of them.
+        """Return the time (M,) in s; of timestamps, since the first of them.
 
         ``columns`` are one, or a date and a time of day; ``unit`` is that of numbers: s, ms, us or
         min. Raises RecordError where it contradicts the file, and where a sample is missing.
@@ -76,7 +76,7 @@ class Columns:
         return np.asarray((ticks - ticks[0]) / SECOND, np.float64)
 
     def place(self, row: int) -> str:
-        """Return where a sample stands, counted from 0, as messages name it."""
+        """Return the place of a sample, counted from 0, as messages name it."""
         return self.where(row)
 
     def _numbers(self, name: str, gappy: bool) -> Array:

@@ -57,7 +57,7 @@ def decoded(path: Path, data: bytes) -> Text:
 
 
 def _marked(path: Path, data: bytes, encoding: str) -> Text:
-    """Return the text behind a byte order mark."""
+    """Return the text after a byte order mark."""
     if encoding == "utf-8" and _is_utf8(data):
         return _text(path, data, encoding)
     try:

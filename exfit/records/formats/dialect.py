@@ -1,4 +1,4 @@
-"""How a delimited text is written: separator, decimal mark, where the names, units and rows stand.
+"""The dialect of a delimited text: separator, decimal mark, rows of names, units and numbers.
 
 Without a row of names the columns are called 1, 2, 3 ... What could be read in two ways is refused.
 """
@@ -17,7 +17,7 @@ from exfit.records.formats.cells import CELL_SHOWN, INFINITE, NUMBER, is_missing
 from exfit.records.formats.heads import is_units, names_of, units_of
 from exfit.records.formats.timestamps import is_timestamp
 
-HEAD_LINES = 300  # in which the first row of numbers must stand
+HEAD_LINES = 300  # within which the first row of numbers must be
 SEPARATORS: Mapping[str | None, str] = {
     ";": "semicolons", "\t": "tabs", ",": "commas", None: "spaces"
 }  # fmt: skip

@@ -30,7 +30,7 @@ WORKBOOK = "an Excel workbook"
 
 @dataclass(frozen=True)
 class _Sheet:
-    """A table on a sheet: the column names by place, their units, and where its samples stand."""
+    """A table on a sheet: the column names by place, their units, and the rows of its samples."""
 
     name: str
     rows: Sequence[Row]
@@ -43,7 +43,7 @@ class _Sheet:
 def read_excel(path: Path, sheet: str | None = None) -> Table:
     """Return the table on a sheet of an Excel workbook (.xlsx, .xlsm, .xlsb, .xls) or an .ods.
 
-    Above the samples stands a row of names, between them perhaps a row of units; what stands
+    Above the samples is a row of names, between them perhaps a row of units; what is
     higher, as titles do, is left out, and so are blank rows and columns. Timestamps
     are good to 1 ms, as Excel shows them. A cell with an error, as #DIV/0!, is a missing sample.
 
@@ -194,7 +194,7 @@ def _of_day(cell: time | timedelta) -> timedelta:
     )
 
 
-# kind of the cells -> what converts one, what stands for a missing one, and the type of the array
+# kind of the cells -> what converts one, what replaces a missing one, and the type of the array
 ARRAYS: dict[str, tuple[Callable[[Any], Any], Any, str]] = {
     "number": (float, np.nan, "float64"),
     "timestamp": (lambda stamp: stamp, None, "datetime64[ns]"),

@@ -40,20 +40,20 @@ class Table(Protocol):
         """The column that holds the time, or those of date and time; empty where none seems to."""
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
-        """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
+        """Return columns (M,) unconverted, nan where a sample is missing in a ``gappy`` one.
 
         Raises RecordError for a column that is not there, and a cell that is no number.
         """
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s: numbers as they stand, timestamps since the first of them.
+        """Return the time (M,) in s; of timestamps, since the first of them.
 
         ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
         RecordError where it contradicts the file, or a cell is neither number nor timestamp.
         """
 
     def place(self, row: int) -> str:
-        """Return where a sample stands, counted from 0, as messages name it: record.csv:17."""
+        """Return the place of a sample, counted from 0, as messages name it: record.csv:17."""
 
 
 def position(path: Path, names: Sequence[str], name: str) -> int:

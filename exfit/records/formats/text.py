@@ -63,7 +63,7 @@ class TextTable:
         return find_clock(self.names, stamps, partial(increases, self))
 
     def numbers(self, names: Iterable[str], gappy: frozenset[str] = NONE) -> dict[str, Array]:
-        """Return columns (M,) as they stand, nan where a sample is missing in a ``gappy`` one.
+        """Return columns (M,) unconverted, nan where a sample is missing in a ``gappy`` one.
 
         Raises RecordError for a column that is not there, and a cell that is no number.
         """
@@ -74,7 +74,7 @@ class TextTable:
         return {name: data[:, at] for at, name in enumerate(places)}
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s: numbers as they stand, timestamps since the first of them.
+        """Return the time (M,) in s; of timestamps, since the first of them.
 
         ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
         RecordError where it contradicts the file, or a cell is neither number nor timestamp.
@@ -92,7 +92,7 @@ class TextTable:
         return self._stamps(columns, places)
 
     def place(self, row: int) -> str:
-        """Return where a sample stands, counted from 0: file and line."""
+        """Return the place of a sample, counted from 0: file and line."""
         line, _ = next(islice(self.rows(), row, None))
         return f"{self.path}:{line}"
 

@@ -147,7 +147,7 @@ def _kind(form: re.Match[str]) -> tuple[bool, str, bool, bool, bool]:
 
 
 def _number(values: NDArray[np.uint8], form: re.Match[str], part: str) -> Whole:
-    """Return the whole numbers (M,) that stand in a part of the form, 0 where it has none."""
+    """Return the whole numbers (M,) in a part of the form, 0 where it has none."""
     start, end = form.span(part)
     powers = 10 ** np.arange(end - start - 1, -1, -1, dtype=np.int64)
     return values[:, max(start, 0) : max(end, 0)].astype(np.int64) @ powers

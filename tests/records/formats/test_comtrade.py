@@ -266,7 +266,7 @@ def test_a_column_that_is_not_there_is_refused_with_those_that_are(write):
     refused(lambda: table.numbers(["Ugem"]), "bump.cfg", "'Ugem'", "did you mean 'Ugen'?", "'If'")
 
 
-def test_a_name_of_two_channels_is_refused_when_it_is_asked_for(write):
+def test_a_name_of_two_channels_is_refused_when_it_is_requested(write):
     lines = [line.replace(",If,", ",Ugen,") for line in configuration()]
     table = read_comtrade(write(lines, samples("BINARY")))
     assert table.numbers(["CB1"])["CB1"].size == SAMPLES

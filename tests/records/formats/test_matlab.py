@@ -104,7 +104,7 @@ def test_units_stand_in_the_names(mat):
     assert read_mat(mat({"t": T, "P_MW": UT})).units == {"P_MW": "MW"}
 
 
-def test_milliseconds_are_asked_for_by_their_unit(mat):
+def test_milliseconds_are_requested_by_their_unit(mat):
     table = read_mat(mat({"t": T * 1e3}))
     np.testing.assert_allclose(table.instants(["t"], "ms"), T, rtol=1e-13)
 
@@ -124,7 +124,7 @@ def test_nan_is_a_missing_sample(mat):
 @pytest.mark.parametrize(
     ("values", "kind"), [(UT + 1j, "complex"), (np.array([["a"], ["b"]]), "text")], ids=["j", "abc"]
 )
-def test_what_is_no_number_is_refused_when_it_is_asked_for(mat, values, kind):
+def test_what_is_no_number_is_refused_when_it_is_requested(mat, values, kind):
     table = read_mat(mat({"t": T, "x": values}))
     name = next(name for name in table.names if name != "t")
     refused(lambda: table.numbers([name]), "bump.mat", repr(name), kind)

@@ -134,7 +134,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("kind", OTHERS)
-def test_what_is_no_number_is_refused_when_it_is_asked_for(parquet, kind):
+def test_what_is_no_number_is_refused_when_it_is_requested(parquet, kind):
     table = read_parquet(parquet({"t": [0.0, 1.0], "x": OTHERS[kind]}))
     assert table.numbers(["t"])["t"].tolist() == [0.0, 1.0]
     refused(lambda: table.numbers(["x"]), "bump.parquet", "'x'", "not numbers")
@@ -151,12 +151,12 @@ def test_a_year_beyond_nanoseconds_is_refused(parquet):
     refused(lambda: table.instants(["ts"]), "bump.parquet", "'ts'", "out of bounds")
 
 
-def test_a_name_of_two_columns_is_refused_when_it_is_asked_for(parquet):
+def test_a_name_of_two_columns_is_refused_when_it_is_requested(parquet):
     path = parquet(pa.table([T, UT, UT], names=["t", "x", "x"]))
     refused(lambda: read_parquet(path).numbers(["x"]), "'x'", "2 and 3")
 
 
-def test_only_the_columns_asked_for_are_read(parquet):
+def test_only_the_columns_requested_are_read(parquet):
     path = parquet({"t": T, "Ut": UT}, compression="none", use_dictionary=False)
     data = path.read_bytes()
     at = data.index(np.array(UT).tobytes())

@@ -13,7 +13,7 @@ from exfit.records.formats.comtrade.files import ComtradeFiles
 if TYPE_CHECKING:
     from comtrade import Cfg
 
-REVISIONS = ("", "1991", "1999", "2001", "2013")  # none stands for 1991 (-1999, 5.3.1)
+REVISIONS = ("", "1991", "1999", "2001", "2013")  # without one it is 1991 (-1999, 5.3.1)
 KINDS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")
 ANALOG_CELLS = (10, 13)  # 1991, and since
 STATUS_CELLS = (3, 5)

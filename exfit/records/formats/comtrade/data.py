@@ -1,4 +1,4 @@
-"""The data of a COMTRADE record, its .dat: text or binary, as it stands."""
+"""The data of a COMTRADE record, its .dat: text or binary, unconverted."""
 
 import io
 import re
@@ -25,7 +25,7 @@ _BLANK_CELL = re.compile(rb"(?<=,)[ \t]*(?=,|\r|\n|\Z)")
 
 @dataclass(frozen=True)
 class ComtradeSamples:
-    """The data part as it stands: each (M,), (M, analog) or (M, words or channels)."""
+    """The data part, unconverted: each (M,), (M, analog) or (M, words or channels)."""
 
     number: NDArray[Any]
     stamp: NDArray[Any]
