@@ -24,7 +24,16 @@ if TYPE_CHECKING:
     from exfit.case.case import Case
     from exfit.records.record import Record
     from exfit.results.model import FitResult
-    from exfit.workflows import check, fit, identify, load_case, profile, simulate, validate
+    from exfit.workflows import (
+        check,
+        fit,
+        identify,
+        load_case,
+        profile,
+        read_record,
+        simulate,
+        validate,
+    )
 
 __version__ = "0.1.0"
 
@@ -45,6 +54,7 @@ __all__ = [
     "identify",
     "load_case",
     "profile",
+    "read_record",
     "simulate",
     "validate",
 ]
@@ -58,6 +68,7 @@ _MODULES = {
     "identify": "exfit.workflows",
     "load_case": "exfit.workflows",
     "profile": "exfit.workflows",
+    "read_record": "exfit.workflows",
     "simulate": "exfit.workflows",
     "validate": "exfit.workflows",
 }

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,14 +35,17 @@ from exfit.analysis.solution import (
 )
 from exfit.case import load
 from exfit.case.case import Case
+from exfit.case.record_section import record_section
 from exfit.case.schema import SINGLE, Recording
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
+from exfit.fitting.recordings import read_section
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.fitting.system import values_of
 from exfit.records.reading import file_hash
+from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import (
     Comparison,
@@ -161,6 +165,47 @@ def load_case(path: str | PathLike[str]) -> Case:
     Raises CaseError with all faults of the file, each as ``file:line: place: what is wrong``.
     """
     return load.load_case(Path(path))
+
+
+def read_record(
+    path: str | PathLike[str],
+    time: str | Sequence[str] | Mapping[str, str],
+    channels: Mapping[str, str | Mapping[str, Any]],
+    window: tuple[float, float] | None = None,
+    missing: bool = False,
+    sheet: str | None = None,
+    resample: float | None = None,
+) -> Record:
+    """Return the record of a recorder's file of any supported format, per unit.
+
+    Args:
+        path: the file.
+        time: column with the time, or the two of date and time of day, or {column, unit}.
+        channels: column of each signal, or the mapping that a case has there: {column, unit, base,
+            scale, offset} or {phases, kind, unit, base, connection}.
+        window: first and last instant kept, s.
+        missing: whether a sample may be missing: it becomes nan.
+        sheet: of a workbook.
+        resample: rate of a slower, even clock, Hz.
+
+    Raises CaseError for columns and units that are not given rightly, RecordError for a file that
+    cannot be read.
+
+    Example:
+        >>> volts = {"column": "Ugen", "unit": "kV", "base": 15.75}
+        >>> record = exfit.read_record("bump.csv", ["Date", "Time"], {"vt": volts})
+    """
+    section = {
+        "file": Path(path),
+        "time": time,
+        "channels": channels,
+        "window": window,
+        "gaps": "skip" if missing else "refuse",
+        "sheet": sheet,
+        "resample": resample,
+    }
+    given = {key: value for key, value in section.items() if value is not None}
+    return read_section(record_section(given), Path(), per_unit=True)
 
 
 def loaded(case: CaseOrPath) -> Case:

@@ -181,3 +181,38 @@ def test_a_record_that_does_not_hold_the_step_is_refused(arrays):
     late = exfit.Record.from_arrays(arrays.time + 5.0, arrays.signals)
     with pytest.raises(exfit.RecordError, match=r"arrays: holds 5 ... 15 s, but case has a step"):
         exfit.fit(exfit.Case.from_dict(SEXS, late))
+
+
+def test_a_file_is_read_as_the_section_of_its_case_says():
+    """The record of a case, its columns given by hand: in kV and A, with gaps of the recorder."""
+    case = exfit.load_case(ROOT / "configs" / "field_record.yaml")
+    section = case.record
+    channels = {
+        signal: channel.model_dump(include={"column", "unit", "base"})
+        for signal, channel in section.channels.items()
+    }
+    own = record_of(case, case.recordings[0])
+    read = exfit.read_record(case.folder / section.file, section.time, channels, section.window)
+    assert read.sha256 == own.sha256
+    assert np.array_equal(read.time, own.time)
+    for signal, samples in own.signals.items():
+        assert np.array_equal(read.signals[signal], samples)
+
+
+@pytest.mark.parametrize(
+    ("channels", "fault"),
+    [
+        ({"vt": {"colum": "v"}}, r"channels\.vt\.colum: unknown key; did you mean column\?"),
+        ({"vt": {"column": "v", "unit": "kV"}}, r"channels\.vt\.base: is missing: what is 1 pu"),
+        ({"vx": "v"}, r"channels.*vx"),
+        ({}, r"channels: "),
+    ],
+)
+def test_columns_that_are_not_given_rightly_are_refused_with_their_place(channels, fault):
+    with pytest.raises(exfit.CaseError, match=r"bump\.csv: " + fault):
+        exfit.read_record("bump.csv", "t", channels)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(exfit.RecordError, match="cannot be read"):
+        exfit.read_record(tmp_path / "bump.csv", "t", {"vt": "v"})

@@ -69,9 +69,19 @@ def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
 
     Raises RecordError where it cannot be read, or where the steps of the test lie outside it.
     """
-    path = case.folder / file.file
-    record = read_record(
-        path,
+    record = read_section(file, case.folder, case.kind.per_unit)
+    _refuse_steps_outside(case, test, record, record.source)
+    return record
+
+
+def read_section(file: RecordFile, folder: Path, per_unit: bool) -> Record:
+    """Return the record that a section describes, its file relative to a folder.
+
+    ``per_unit``: numbers that the section takes as they stand must not be in another unit by the
+    file. Raises RecordError where it cannot be read.
+    """
+    return read_record(
+        folder / file.file,
         clock_of(file),
         {signal: source_of(channel) for signal, channel in file.channels.items()},
         file.window,
@@ -81,11 +91,9 @@ def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
         frozenset(
             signal
             for signal, channel in file.channels.items()
-            if case.kind.per_unit and _as_it_stands(channel)
+            if per_unit and _as_it_stands(channel)
         ),
     )
-    _refuse_steps_outside(case, test, record, path)
-    return record
 
 
 def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path) -> None:

@@ -404,7 +404,7 @@ def test_an_error_far_above_the_noise_is_noted(tmp_path, at, step, drift, told):
     write(tmp_path / "record.csv", t=TIME, vt=shown + drift * TIME)
     test = {"vt0": 1.0, "vref": [{"at": at, "step": step}]}
     found = fit(case_of(one(test, free=["KA", "TE", "TA"]), tmp_path))
-    assert any("scatters from sample to sample" in note for note in found.notes) == told
+    assert any("times the scatter" in note for note in found.notes) == told
 
 
 def test_spikes_that_a_robust_loss_bears_are_no_misfit(tmp_path):
@@ -414,7 +414,7 @@ def test_spikes_that_a_robust_loss_bears_are_no_misfit(tmp_path):
     plain = one(TEST, free=["KA", "TE"])
     for content, told in ((plain, True), ({**plain, "estimate": {"loss": "huber"}}, False)):
         found = fit(case_of(content, tmp_path))
-        assert any("scatters from sample to sample" in note for note in found.notes) == told
+        assert any("times the scatter" in note for note in found.notes) == told
 
 
 def test_how_many_samples_are_left_out_as_outliers_is_noted(tmp_path):

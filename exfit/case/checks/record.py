@@ -82,9 +82,7 @@ def channels_faults(channels: Node, kind: PlantKind) -> Iterator[Fault]:
             yield channel.fault(f"not allowed with plant {kind.name}, which has {signals}")
         if signal in kind.driving:
             yield from _driving_faults(channel)
-        yield from _scale_faults(channel)
-        yield from _unit_faults(channel, kind)
-        yield from _phase_faults(channel, signal)
+        yield from channel_faults(signal, channel, kind.per_unit)
     if not channels.content:
         return
     for signal in kind.required:
@@ -93,6 +91,13 @@ def channels_faults(channels: Node, kind: PlantKind) -> Iterator[Fault]:
     if not {*kind.compared} & {*channels.content, *kind.required}:
         lacking = f"neither {' nor '.join(kind.compared)}"
         yield channels.fault(f"{lacking}: there is nothing to compare")
+
+
+def channel_faults(signal: str, channel: Node, per_unit: bool) -> Iterator[Fault]:
+    """Yield what contradicts itself in a channel, whose signal may have to be ``per_unit``."""
+    yield from _scale_faults(channel)
+    yield from _unit_faults(channel, per_unit)
+    yield from _phase_faults(channel, signal)
 
 
 def _driving_faults(channel: Node) -> Iterator[Fault]:
@@ -110,14 +115,14 @@ def _scale_faults(channel: Node) -> Iterator[Fault]:
         yield channel.at("scale").fault("must not be 0")
 
 
-def _unit_faults(channel: Node, kind: PlantKind) -> Iterator[Fault]:
+def _unit_faults(channel: Node, per_unit: bool) -> Iterator[Fault]:
     """Yield a base of no unit, and a unit that nothing makes per unit, as a machine's must be."""
     unit = channel.at("unit").text
     if "base" in channel and "unit" not in channel:
         yield channel.at("unit").fault("is missing: in which unit is base?")
     if "base" in channel or "scale" in channel or not unit:
         return
-    if kind.per_unit and needs_base(unit):
+    if per_unit and needs_base(unit):
         yield channel.at("base").fault(f"is missing: what is 1 pu in {unit}?")
 
 
