@@ -12,7 +12,7 @@ from exfit.plants.parts import SaturationForm
 from exfit.signals import COMPARED
 
 Component = TypeVar("Component", Model, Machine)
-Part = Literal["exciter", "machine", "network"]
+Requirement = Literal["exciter", "machine", "network"]
 
 
 class Stabilised(NamedTuple):
@@ -51,7 +51,7 @@ class PlantKind:
 
     name: str
     title: str
-    needs: tuple[Part, ...]
+    needs: tuple[Requirement, ...]
     events: tuple[str, ...]
     signals: tuple[str, ...]
     build: Callable[[Equipment], System]
