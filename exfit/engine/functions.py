@@ -75,7 +75,7 @@ def _without(w: Writer, shape: Shape, x: str, count: str, unit: Sequence[float])
 
 def _polynomial(w: Writer, shape: Shape, x: str, coefficients: Sequence[float]) -> str:
     """Write a polynomial in Estrin's form, whose chain of operations is short."""
-    terms = [shape.number(one) for one in coefficients]
+    terms = [shape.number(coefficient) for coefficient in coefficients]
     while len(terms) > 1:
         pairs = [terms[k : k + 2] for k in range(0, len(terms), 2)]
         terms = [p[0] if len(p) == 1 else w.add_product(shape, p[0], p[1], x) for p in pairs]

@@ -159,7 +159,7 @@ class Writer:
         return result
 
     def held(self, shape: Shape, x: str, comparison: str, limit: str) -> str:
-        """Write x, or the limit where x compares with it as told."""
+        """Write x, or the limit where the comparison of x with it holds."""
         outside = self.let(f"fcmp {comparison} {shape.type} {x}, {limit}")
         return self.let(
             f"select {shape.of('i1')} {outside}, {shape.type} {limit}, {shape.type} {x}"

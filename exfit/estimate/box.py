@@ -1,4 +1,4 @@
-"""Where a search may go, in what units, and whether it can start where it is told to."""
+"""Where a search may go, in what units, and whether it can start at a given point."""
 
 from dataclasses import dataclass
 

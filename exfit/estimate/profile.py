@@ -190,7 +190,7 @@ def profiles(
     an interval at the level of which q is the quantile of chi^2 with one degree of freedom, or
     that of t squared.
 
-    Where a cost lower than at x turns up, all begin anew from the minimum there. watch is told the
+    Where a cost lower than at x turns up, all begin anew from the minimum there. watch gets the
     Progress, in sides; KeyboardInterrupt, raised there or anywhere, ends it with what is done.
 
     Raises ValueError for bounds that cross, x outside them, residuals not finite there, rise <= 0.

@@ -39,7 +39,7 @@ def least_squares(
     x_scale      what counts as one unit of each variable; None takes it from the columns of J.
                  Use 1 for logarithms
     good_enough  root mean square of residuals that counts as a match (auto); None: convergence
-    callback     is told every Iteration; KeyboardInterrupt, raised anywhere, ends the search
+    callback     gets every Iteration; KeyboardInterrupt, raised anywhere, ends the search
                  with the best point seen
 
     It stops when (GRADIENT) the projected gradient is below gtol times its norm at x0 and either

@@ -82,12 +82,12 @@ def multistart(
 
     The starts are x0, if there is one, and points of a scrambled Sobol sequence. The ``refine``
     best of them (all by default), x0 always among them, are refined by `least_squares`, whose
-    method and tolerances these are (the cost's is wider: to tell minima apart needs less), in
+    method and tolerances these are (the cost's is wider: to distinguish minima needs less), in
     ``workers`` threads (as many as there are processors by default); fun and jac must bear being
     called from several at a time.
 
     screen  gives the costs (K,) of many points (K, N) at once; without it fun is called for each
-    watch   is told every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
+    watch   gets every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
             with what is done
 
     Two ends are one minimum where half a standard error, in cost f / 4 (M - N), exceeds both the
