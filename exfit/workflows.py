@@ -13,9 +13,16 @@ from numpy.typing import NDArray
 
 from exfit import __version__, estimate
 from exfit.analysis import experiment_design, model_check, profiles
-from exfit.analysis.diagnostics import (
-    typical_notes,
+from exfit.analysis.behaviour import behaviour_of
+from exfit.analysis.case_description import (
+    fixed_values,
+    input_hashes,
+    input_names,
+    parts_of,
+    tests_of,
+    values_by_part,
 )
+from exfit.analysis.diagnostics import typical_notes
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.iteration_responses import (
     LiveResponse,
@@ -24,6 +31,7 @@ from exfit.analysis.iteration_responses import (
 from exfit.analysis.model_check import Check
 from exfit.analysis.profiles import Profiles
 from exfit.analysis.solution import (
+    aligned,
     comparisons_of,
     fit_notes,
     fitted_parameters,
@@ -42,17 +50,12 @@ from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
-from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
+from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.system import values_of
-from exfit.records.reading import file_hash
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
-from exfit.results.model import (
-    Comparison,
-    FitResult,
-    Iteration,
-    PartOf,
-)
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FitResult, Iteration
 from exfit.simulation.simulator import Response
 
 Array = NDArray[np.float64]
@@ -113,27 +116,38 @@ def fit(
     best, search_result = search(case, problem, method, announce, search_progress, counter)
     values = residuals.values(best.x)
     interrupted = best.stop is estimate.Stop.INTERRUPTED
-    comparisons = comparisons_of(setups, residuals, values, history)
-    uncertainty, validation, unfinished = None, list[Comparison](), list[str]()
+    fine = [setup.with_enough_substeps(values) for setup in setups]
+    comparisons = comparisons_of(fine, residuals, values, history)
+    uncertainty, behaviour = None, None
+    validation, unfinished = list[Comparison](), list[str]()
     try:
         if not interrupted:
             uncertainty = uncertainty_of_solution(problem, best.x, setups)
-        for setup in unseen:
-            validation.append(validation_of(case, setup, values))
+        validated = [aligned(case, setup, values) for setup in unseen]
+        validation += [validation_of(case, *pair) for pair in validated]
+        behaviour = behaviour_of(fine, values, validated)
     except KeyboardInterrupt:  # what the search came to stays
         interrupted, unfinished = True, [INTERRUPTED_AFTERWARDS]
-    free = case.free()
+    why = "the search was interrupted" if interrupted else "no finite derivatives"
+    used = [*setups, *unseen]
+    own_values = values_by_part(case, values)
+    models = {part.kind: part.name for part in case.parts.all}
     return FitResult(
         case=case.path,
-        name=case.path.stem,
+        about=case.about,
         model=case.subject,
         strategy=method,
         saturation=case.saturation,
-        parameters=fitted_parameters(case, residuals, values),
-        fixed={name: values[name] for name in start if name not in free},
+        parameters=fitted_parameters(case, residuals, values, uncertainty, why),
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
         typical=case.typical(),
-        parts=tuple(PartOf(part.kind, part.name, part.prefix) for part in case.parts.all),
+        fixed=fixed_values(case, values),
+        machine=own_values.get("machine", {}),
+        machine_model=models.get("machine"),
+        network=own_values.get("network", {}),
+        network_model=models.get("network"),
+        stabiliser=own_values.get("stabiliser", {}),
+        stabiliser_model=models.get("stabiliser"),
         cost=best.cost,
         comparisons=comparisons,
         knowledge=uncertainty,
@@ -154,8 +168,13 @@ def fit(
         ),
         validation=tuple(validation),
         versions=versions(),
-        inputs=inputs(case, *setups, *unseen),
-        about=case.about,
+        inputs=input_hashes(case, used),
+        strategy_given=method != case.estimate.strategy,
+        parts=tuple(parts_of(case)),
+        tests=tuple(tests_of(case, used)),
+        behaviour=behaviour,
+        files=input_names(case, used),
+        case_text=case.path.read_text(encoding="utf-8-sig") if case.from_file else "",
     )
 
 
@@ -222,16 +241,6 @@ def versions() -> dict[str, str]:
         "python": ".".join(map(str, sys.version_info[:3])),
         **{name: version(name) for name in LIBRARIES},
     }
-
-
-def inputs(case: Case, *setups: ExperimentSetup) -> dict[str, str]:
-    """Return the SHA-256 of every file that went into a result."""
-    files = {"case": file_hash(case.path)} if case.from_file else {}
-    if case.model is not None and case.model.endswith(".py"):
-        files["model"] = file_hash(case.folder / case.model)
-    fitted = [f"records.{recording.name}" for recording in case.records] or ["record"]
-    labels = [*fitted, *(f"validate.{recording.name}" for recording in case.validations)]
-    return files | {label: setup.record.sha256 for label, setup in zip(labels, setups, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -315,7 +324,7 @@ def validate(
     others = [build_experiment(case, recording, values) for recording in unseen]
     return [
         *(compare_with_record(setup, setup.name, values) for setup in setups),
-        *(validation_of(case, setup, values) for setup in others),
+        *(validation_of(case, *aligned(case, setup, values)) for setup in others),
     ]
 
 

@@ -30,7 +30,7 @@ MAY_IMPORT = {
         "case", "simulation", "plants", "models", "engine", "records", "dsp", "estimate",
         "inference", "signals",
     },
-    "results": {"fitting", "dsp", "signals", "inference"},
+    "results": {"fitting", "simulation", "dsp", "signals", "inference"},
 }  # fmt: skip
 MAY_IMPORT["analysis"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["exchange"] = {"results", "case", "models"}

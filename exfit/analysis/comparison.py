@@ -15,7 +15,7 @@ from exfit.records.clock import Clock, check_finite, check_increasing
 from exfit.records.formats import Table, open_table
 from exfit.records.formats.table import listed, refuse_uneven
 from exfit.records.units import needs_base
-from exfit.results.model import judged_of
+from exfit.results.comparisons import judged_of
 from exfit.signals import COMPARED
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from exfit.fitting.residuals import Residuals, noise_of
 from exfit.fitting.system import system_of
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.records.record import Record
-from exfit.results.model import Comparison
+from exfit.results.comparisons import Comparison
 from exfit.simulation.kernels import parameters_used
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:
             "the response matches the record no better than a constant would: "
             "check the step's sign, size and instant, and the units of the record"
         )
-    measured, simulated = fitted.measured, fitted.simulated
+    measured, simulated = fitted.features.measured, fitted.features.simulated
     if measured is not None and simulated is not None:
         way = measured.final_value - measured.initial_value
         if way * (simulated.final_value - simulated.initial_value) < 0.0:
@@ -112,7 +112,7 @@ def validation_notes(
 
 def voltage_notes(fitted: Comparison) -> Iterator[str]:
     """Yield a voltage that no machine is tested at, yet some might rest with."""
-    measured = fitted.measured
+    measured = fitted.features.measured
     if measured is not None and abs(measured.initial_value - 1.0) > FAR_FROM_RATED:
         yield (
             f"vt starts from {measured.initial_value:.4g} pu: check its unit, its base and, of "

@@ -29,6 +29,7 @@ from exfit.inference import Confidence
 from exfit.signals import NOISE
 from exfit.simulation.simulator import Simulator
 from exfit.util.text import near
+from exfit.util.typed import plain
 
 Array = NDArray[np.float64]
 
@@ -66,8 +67,8 @@ class Design:
         """Return the figures."""
         return {
             "noise": dict(self.noise),
-            **self.own.as_json(),
-            "plans": {plan.label: plan.confidence.as_json() for plan in self.plans},
+            **plain(self.own),
+            "plans": {plan.label: plain(plan.confidence) for plan in self.plans},
         }
 
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from exfit.fitting.residuals import UNREACHABLE, Residuals
 from exfit.fitting.setup import ExperimentSetup, compared
-from exfit.results.model import Comparison, Iteration, IterationResponses, judged_of
+from exfit.results.comparisons import Comparison, IterationResponses, judged_of
+from exfit.results.model import Iteration
 from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -86,9 +87,14 @@ def with_iteration_responses(
     ]
     if not numbered:
         return comparison
-    numbers = tuple(number for number, _ in numbered)
-    samples = np.stack([response for _, response in numbered])
-    return replace(comparison, iteration_responses=IterationResponses(signal, numbers, samples))
+    responses_kept = IterationResponses(
+        signal=signal,
+        numbers=tuple(number for number, _ in numbered),
+        time=comparison.time,
+        measured=comparison.overlays[signal].measured,
+        samples=np.stack([response for _, response in numbered]),
+    )
+    return replace(comparison, iteration_responses=responses_kept)
 
 
 def iteration_response(
@@ -108,7 +114,7 @@ def iteration_response(
 def skipped_response_notes(comparisons: Sequence[Comparison]) -> list[str]:
     """Say of which records the iterations are not kept for their size."""
     return [
-        f"{comparison.record.name}: {len(comparison.time)} samples: the response after each "
+        f"{comparison.record}: {len(comparison.time)} samples: the response after each "
         f"iteration is kept of records up to {MOST_SAMPLES}"
         for comparison in comparisons
         if len(comparison.time) > MOST_SAMPLES

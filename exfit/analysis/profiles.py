@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.fitting.nuisance import unit_of
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
@@ -202,9 +201,14 @@ def _profile(
     parameter = residuals.free[cost_profile.index]
     low, high = cost_profile.low, cost_profile.high
     below, above = cost_profile.ends
+    units = {
+        nuisance.name: nuisance.unit
+        for experiment in residuals.experiments
+        for nuisance in experiment.nuisances
+    }
     return Profile(
         name=parameter.name,
-        unit=case.units().get(parameter.name, unit_of(parameter.name)),
+        unit={**units, **case.units()}.get(parameter.name, ""),
         value=parameter.value(float(cost_profile.x[cost_profile.index])),
         at=np.array([parameter.value(float(x)) for x in cost_profile.at]),
         costs=cost_profile.costs,

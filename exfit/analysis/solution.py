@@ -22,36 +22,63 @@ from exfit.case.case import Case
 from exfit.case.schema import Unknown
 from exfit.errors import SimulationError
 from exfit.fitting.nonlinearity import nonlinear_parameters
-from exfit.fitting.nuisance import unit_of
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
+from exfit.inference import Uncertainty
 from exfit.results.compare_with_record import compare_with_record
-from exfit.results.model import Comparison, FittedParameter, Iteration, Minima, Minimum
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FittedParameter, Iteration, Minima, Minimum
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 
 def fitted_parameters(
-    case: Case, residuals: Residuals, values: Values
+    case: Case,
+    residuals: Residuals,
+    values: Values,
+    uncertainty: UncertaintyAnalysis | None,
+    why: str,
 ) -> dict[str, FittedParameter]:
-    """Return the free parameters with their fitted values, in the parameters' own units."""
-    units, shared = case.units(), case.free()
-    return {
-        parameter.name: FittedParameter(
-            value=values[parameter.name],
+    """Return the free parameters with their fitted values, in the parameters' own units.
+
+    ``why`` is the reason where there is no ``uncertainty``.
+    """
+    rows = {
+        part.prefix + row.symbol: (row.unit, row.meaning)
+        for part in case.parts.all
+        for row in part.sheet
+    }
+    of_records = {
+        nuisance.name: (nuisance.unit, nuisance.meaning)
+        for experiment in residuals.experiments
+        for nuisance in experiment.nuisances
+    }
+
+    def fitted(parameter: FreeParameter) -> FittedParameter:
+        name = parameter.name
+        unit, meaning = (of_records | rows).get(name, ("", "used by ties"))
+        unknown = Uncertainty(None, None, None, why)
+        own = unknown if uncertainty is None else uncertainty.confidence.parameters[name]
+        return FittedParameter(
+            value=values[name],
             start=parameter.start,
             min=parameter.low,
             max=parameter.high,
-            at_bound=parameter.bound(values[parameter.name]),
-            unit=units.get(parameter.name, unit_of(parameter.name)),
-            of_record=parameter.name not in shared,
+            at_bound=parameter.bound(values[name]),
+            of_record=name in of_records,
+            std_error=own.std_error,
+            interval=own.interval,
+            why=own.why,
+            unit=unit,
+            meaning=meaning,
         )
-        for parameter in residuals.free
-    }
+
+    return {parameter.name: fitted(parameter) for parameter in residuals.free}
 
 
 def iteration_of(line: estimate.SolverIteration, residuals: Residuals) -> Iteration:
@@ -70,23 +97,25 @@ def uncertainty_of_solution(
     None where the derivatives there are not finite.
     """
     try:
-        uncertainty = uncertainty_at(problem, theta, names_of_records(setups))
+        of_records = names_of_records(setups)
+        uncertainty = uncertainty_at(problem, theta, of_records)
     except SimulationError:
         return None
-    return replace(
-        uncertainty, nonlinear=nonlinear_parameters(problem.compressed, theta, uncertainty)
-    )
+    nonlinear = nonlinear_parameters(problem.compressed, theta, uncertainty, of_records)
+    return replace(uncertainty, nonlinear=nonlinear)
 
 
 def comparisons_of(
-    setups: Iterable[ExperimentSetup],
+    fine: Iterable[ExperimentSetup],
     residuals: Residuals,
     values: Values,
     history: Sequence[Iteration],
 ) -> tuple[Comparison, ...]:
-    """Return the fitted response beside each record, with the iterations that led to it."""
+    """Return the fitted response beside each record, with the iterations that led to it.
+
+    The tests, ``fine``, have sub-steps enough for it.
+    """
     start = residuals.values(residuals.start)
-    fine = [setup.with_enough_substeps(values) for setup in setups]
     return tuple(
         with_iteration_responses(
             compare_with_record(setup, setup.name, values, start), setup, residuals, history
@@ -141,20 +170,18 @@ def fit_notes(
     yield from skipped_response_notes(comparisons)
 
 
-def validation_of(
-    case: Case, setup: ExperimentSetup, values: Values, name: str | None = None
-) -> Comparison:
-    """Return how fitted values do on a record that the fit never saw.
+def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[ExperimentSetup, Values]:
+    """Return a test that the fit never saw, and the values with what is found about its record.
 
     What that record leaves open about itself (its instants, its levels) is fitted to it, with the
-    parameters of the unit as they are. Raises KeyboardInterrupt at an interruption.
+    parameters of the unit as they are. The test has sub-steps enough. Raises KeyboardInterrupt at
+    an interruption.
     """
-    limit = None if case.accept is None else case.accept.rmse
     fine = setup.with_enough_substeps(values)
     if setup.free:
         robust = robust_of(case)
         residuals = Residuals([fine.experiment], setup.free, values, robust=robust)
-        aligned = estimate.least_squares(
+        best = estimate.least_squares(
             residuals,
             residuals.start,
             jac=residuals.exact,
@@ -162,10 +189,17 @@ def validation_of(
             method="lm-then-dgn",
             x_scale=UNIT,
         )
-        if aligned.stop is estimate.Stop.INTERRUPTED:
+        if best.stop is estimate.Stop.INTERRUPTED:
             raise KeyboardInterrupt
-        values = residuals.values(aligned.x)
-    return compare_with_record(fine, name or setup.name, values, None, limit)
+        values = residuals.values(best.x)
+    return fine, values
+
+
+def validation_of(case: Case, setup: ExperimentSetup, values: Values) -> Comparison:
+    """Return how `aligned` values do on a record that the fit never saw."""
+    limit = None if case.accept is None else case.accept.rmse
+    of_record = {parameter.name: values[parameter.name] for parameter in setup.free}
+    return compare_with_record(setup, setup.name, values, None, limit, of_record)
 
 
 def record_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from exfit.cli.options import file_option, force_option, refuse_existing, write_text
+from exfit.errors import ExfitError
 
 BUSES = click.IntRange(1, 999_999)
 
@@ -72,11 +73,17 @@ def export(
     hold, and what is uncertain, is reported.
     """
     from exfit.exchange.psse.export import export as exported
+    from exfit.results.io import load_result, result_file
 
     if output is not None:
         refuse_existing(output, force)
-    records = exported(result, bus, machine_id, model)
-    write_text(records.text, output, records.warnings)
+    source = result_file(result)
+    fit = load_result(source)
+    try:
+        records = exported(fit, bus, machine_id, model)
+    except ExfitError as fault:
+        raise ExfitError(f"{source}: {fault}") from None
+    write_text(records.text, output, [f"{source}: {text}" for text in records.warnings])
     if output is not None:
         click.echo(f"written to {output}")
 

@@ -69,7 +69,7 @@ def _fit(case: "Case", folder: Path, strategy: str | None, output: Output) -> "F
         warn(run_folder.write_fit(result, folder, output.figures))
     finally:  # whatever becomes of the files
         if output.as_json:
-            print_json(result.as_json())
+            print_json(result.to_dict())
     return result
 
 

@@ -16,20 +16,13 @@ from exfit.cli.options import force_option
     metavar="FILE",
     help="File to write (default: report.html beside the result).",
 )
-@click.option(
-    "--case",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="The case, where it is not where the result says.",
-)
 @force_option
-def report(result: Path, output: Path | None, case: Path | None, force: bool) -> None:
+def report(result: Path, output: Path | None, force: bool) -> None:
     """Make a verification report of RESULT: one HTML file, to be read, printed and handed in.
 
-    RESULT is the result.json of a fit, or the folder that holds it. The case and its records must
-    be those of the fit; what the folder does not hold is simulated again. A former report is
-    replaced, another file only with --force.
+    RESULT is the result.json of a fit, or the folder that holds it: nothing else is read, and
+    nothing is run. A former report is replaced, another file only with --force.
     """
     from exfit.output.report import write_report
 
-    click.echo(f"written to {write_report(result, output, case, force)}")
+    click.echo(f"written to {write_report(result, output, force)}")

@@ -88,6 +88,7 @@ def validate(
     from exfit import workflows
     from exfit.fitting.overrides import read_parameters
     from exfit.output import run_folder
+    from exfit.util.typed import plain
 
     loaded = load(case)
     folder = output.folder(f"{case.stem}-validate")
@@ -95,7 +96,7 @@ def validate(
     comparisons = workflows.validate(loaded, read_parameters(loaded, source), record)
     warn(run_folder.write_validation(comparisons, folder, output.figures))
     if output.as_json:
-        print_json({"validation": [comparison.as_json() for comparison in comparisons]})
+        print_json({"validation": [plain(comparison) for comparison in comparisons]})
     elif output.shown:
         from exfit.output import terminal
 

@@ -1,6 +1,8 @@
 """What an engineer reads off a step response: rise, overshoot, peak, settling, final value."""
 
 from dataclasses import dataclass
+from math import nan
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +31,10 @@ class Features:
     A time that the record is too short to show is None.
     """
 
-    initial_value: float
-    final_value: float
+    initial_value: Annotated[float, nan]
+    final_value: Annotated[float, nan]
     rise_time: float | None
-    overshoot_percent: float
+    overshoot_percent: Annotated[float, nan]
     peak_time: float | None
     settling_time: float | None
 

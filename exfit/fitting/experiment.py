@@ -17,6 +17,19 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 
+NuisanceKind = Literal["at", "shift", "step", "vt0", "delay", "scale", "offset"]
+
+NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
+    "at": ("s", "instant of a step"),
+    "shift": ("s", "instant of a step"),
+    "step": ("pu", "size of a step"),
+    "vt0": ("pu", "voltage before the first step"),
+    "delay": ("s", "delay of the recorder"),
+    "scale": ("", "factor of a channel"),
+    "offset": ("pu", "offset of a channel"),
+}  # unit and meaning of each kind
+
+
 @dataclass(frozen=True)
 class Nuisance:
     """What a fit finds about a record, under ``name``: it is no parameter of the unit.
@@ -27,9 +40,19 @@ class Nuisance:
     """
 
     name: str
-    kind: Literal["at", "shift", "step", "vt0", "delay", "scale", "offset"]
+    kind: NuisanceKind
     step: int = 0
     signal: str = ""
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+        return NUISANCES[self.kind][0]
+
+    @property
+    def meaning(self) -> str:
+        """What it is, in words."""
+        return NUISANCES[self.kind][1]
 
 
 @dataclass(frozen=True, eq=False)

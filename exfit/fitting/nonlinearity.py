@@ -1,6 +1,6 @@
 """Whether the intervals of the linear theory hold: what the cost itself is at their ends."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,24 +15,23 @@ BENT = 2.0  # times the rise that the theory tells: there an end may be 30 % off
 
 
 def nonlinear_parameters(
-    residuals: Residuals, theta: Array, known: UncertaintyAnalysis
+    residuals: Residuals, theta: Array, known: UncertaintyAnalysis, of_record: Sequence[str]
 ) -> tuple[str, ...]:
     """Return the parameters over whose intervals the response is not linear.
 
     Each end of an interval is visited along the linear trace, on which the other parameters follow,
-    and the rise of the cost is compared with what the linear theory tells. ``theta`` (N,) is the
-    solution; what belongs to a record is left out.
+    and the rise of the cost is compared with what the linear theory predicts. ``theta`` (N,) is the
+    solution; what belongs to a record, ``of_record``, is left out.
 
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
-    least, rises, linear = half_square(residuals(theta)), known.rises, known.linear
+    least, rises = half_square(residuals(theta)), known.rises
     found = [
         name
         for name, end in _ends(residuals, theta, known)
         if not 1.0 / BENT <= (half_square(residuals(end)) - least) / rises[name] <= BENT
     ]
-    of_record = dict(zip(linear.names, linear.nuisances, strict=True))
-    return tuple(name for name in dict.fromkeys(found) if not of_record[name])
+    return tuple(name for name in dict.fromkeys(found) if name not in of_record)
 
 
 def _ends(

@@ -1,6 +1,6 @@
 """What a fit finds about a record beside the parameters of the unit: instants, sizes, levels."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
@@ -80,12 +80,3 @@ def _free(name: str, value: Unknown) -> FreeParameter:
     if value.start == "auto" or value.min is None or value.max is None:
         raise TypeError(f"{name} has no start or bounds")
     return FreeParameter(name, value.start, value.min, value.max, logarithmic=False)
-
-
-UNITS: Mapping[str, str] = {"at": "s", "step": "pu", "vt0": "pu", "delay": "s", "offset": "pu"}
-
-
-def unit_of(name: str) -> str:
-    """Return the unit of a value that no data sheet has: what is found about a record."""
-    kind = name.rpartition(".")[2]
-    return UNITS.get(kind, "")

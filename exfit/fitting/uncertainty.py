@@ -1,9 +1,9 @@
 """What the records of a fit tell of its parameters, and what they leave open."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,48 +22,39 @@ from exfit.inference import (
     rises,
 )
 from exfit.inference.wording import listed
+from exfit.util.typed import IN_FILE, KEY
 
 Array = NDArray[np.float64]
 
 
 class Sensitivity(NamedTuple):
-    """By how much a signal moves over ``time`` (S,) in s for 100 % of each parameter: (S, N), pu.
+    """By how much a signal moves over ``time`` (S,) in s for 100 % of each parameter: (S,), pu.
 
-    What counts as 100 % says `Linearisation.size`: the value, for most.
+    What counts as 100 % says `Linearisation.size`: the value, for most. What belongs to a record
+    is not among the parameters.
     """
 
     label: str
     time: Array
-    moved: Array
+    moved: Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
 class UncertaintyAnalysis:
-    """Confidence and identifiability at the solution, with the linearisation that they are of.
+    """Confidence and identifiability at the solution.
 
-    ``sensitivity`` is one course for each channel. ``bent`` names the parameters over whose
-    intervals the response is not linear.
+    ``nonlinear`` names the parameters over whose intervals the response is not linear;
+    ``sensitivity`` is that of each channel; ``rises`` is by how much the cost rises from its
+    minimum to the ends of each profile's interval, empty where that is not stored.
     """
 
-    linear: Linearisation
+    DERIVED: ClassVar = {"sentences": "sentences"}
+
     confidence: Confidence
     identifiability: Identifiability
-    sensitivity: tuple[Sensitivity, ...]
-    nonlinear: tuple[str, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the figures, without the samples."""
-        return {
-            "confidence": self.confidence.as_json(),
-            "identifiability": self.identifiability.as_json(),
-            "not_linear": list(self.nonlinear),
-            "sentences": list(self.sentences),
-        }
-
-    @property
-    def rises(self) -> dict[str, float]:
-        """By how much the cost rises from its minimum to the ends of each profile's interval."""
-        return rises(self.linear, self.confidence)
+    nonlinear: tuple[str, ...] = field(default=(), metadata={KEY: "not_linear"})
+    sensitivity: tuple[Sensitivity, ...] = field(default=(), metadata=IN_FILE)
+    rises: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
 
     @property
     def open(self) -> tuple[str, ...]:
@@ -100,8 +91,13 @@ def uncertainty_at(
 
 def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> UncertaintyAnalysis:
     """Return the uncertainty that a linearisation at theta (N,) shows."""
-    intervals, courses = confidence(linear), tuple(sensitivity(problem, theta, linear))
-    return UncertaintyAnalysis(linear, intervals, identifiability(linear, intervals), courses)
+    intervals = confidence(linear)
+    return UncertaintyAnalysis(
+        confidence=intervals,
+        identifiability=identifiability(linear, intervals),
+        sensitivity=tuple(sensitivity(problem, theta, linear)),
+        rises=rises(linear, intervals),
+    )
 
 
 def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:
@@ -110,13 +106,16 @@ def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Ite
     values, moves = residuals.values(theta), residuals.moves(theta)
     size = linear.size / slopes_of(residuals, theta)
     labels = iter(linear.channels)
+    own = [n for n, of_record in enumerate(linear.nuisances) if not of_record]
     pairs = zip(problem.compressed.experiments, residuals.experiments, strict=True)
     for experiment, whole in pairs:
         _, slopes = experiment.response_with_derivatives(values, moves)
         simulator = experiment.simulator
         delay = 0.0 if experiment is whole else simulator.delay  # the grid is the simulation's
         for k in range(len(experiment.channels)):
-            yield Sensitivity(next(labels).label, simulator.times + delay, slopes[:, k] * size)
+            moved = slopes[:, k] * size
+            by_name = {linear.names[n]: moved[:, n] for n in own}
+            yield Sensitivity(next(labels).label, simulator.times + delay, by_name)
 
 
 def slopes_of(residuals: Residuals, theta: Array) -> Array:

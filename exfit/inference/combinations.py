@@ -1,9 +1,9 @@
 """Combinations of parameters that a record sees weakly, or not at all."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from math import inf, sqrt
-from typing import Any
+from dataclasses import dataclass
+from math import inf, nan, sqrt
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from exfit.inference.factors import Factors, factored, tall_svd
 from exfit.inference.linear import Array, Linearisation
 from exfit.inference.noise import Noise
-from exfit.inference.wording import digits, finite, listed, move
+from exfit.inference.wording import digits, listed, move
 
 Indices = NDArray[np.intp]
 
@@ -26,8 +26,8 @@ class SignalChange:
     """By how much a signal moves: root mean square, in pu and in standard deviations of noise."""
 
     signal: str
-    rms: float
-    noises: float
+    rms: Annotated[float, nan]
+    noises: Annotated[float, nan]
 
 
 @dataclass(frozen=True)
@@ -44,19 +44,6 @@ class Combination:
     error: float | None
     exact: bool
     sentence: str
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the content as JSON takes it: None for what is not a finite number."""
-        return {
-            "moves": dict(self.moves),
-            "changes": [
-                {name: finite(value) for name, value in asdict(change).items()}
-                for change in self.changes
-            ],
-            "error": self.error,
-            "exact": self.exact,
-            "sentence": self.sentence,
-        }
 
 
 def seen_directions(factors: Factors, noise: Sequence[Noise]) -> tuple[Array, Array]:

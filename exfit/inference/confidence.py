@@ -1,16 +1,17 @@
 """How well a fit knows each of its parameters."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from math import exp, inf, isfinite
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
 from exfit.inference.factors import Factors, factored
 from exfit.inference.linear import Array, Linearisation
 from exfit.inference.noise import Noise, noise_of
-from exfit.inference.wording import error, finite, listed
+from exfit.inference.wording import error, listed
+from exfit.util.typed import IN_FILE
 
 LEVEL = 0.95
 UNDETERMINED = 0.3  # relative standard error: the response is no longer linear over the interval
@@ -33,39 +34,34 @@ class Uncertainty:
 
 
 @dataclass(frozen=True, eq=False)
+class Correlation:
+    """The correlations (N, N) of the estimates of N parameters; nan without a standard error."""
+
+    names: tuple[str, ...]
+    matrix: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Confidence:
     """What linear theory says of all parameters together.
 
-    covariance   (N, N) in their own units, correlation (N, N): nan without a standard error
     dof          degrees of freedom behind the noise; infinite if all of it was given
     sentences    what is remarkable about the noise
+    covariance   (N, N) in their own units, nan without a standard error; empty where not stored
     """
 
-    names: tuple[str, ...]
+    level: float
+    dof: Annotated[float, inf]
     parameters: Mapping[str, Uncertainty]
-    covariance: Array
-    correlation: Array
+    correlation: Correlation
     noise: tuple[Noise, ...]
     sentences: tuple[str, ...]
-    dof: float
-    level: float = LEVEL
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)), metadata=IN_FILE)
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the content as JSON takes it: None for what is not a finite number."""
-        return {
-            "level": self.level,
-            "dof": finite(self.dof),
-            "parameters": {name: asdict(entry) for name, entry in self.parameters.items()},
-            "correlation": {
-                "names": list(self.names),
-                "matrix": [[finite(x) for x in row] for row in self.correlation.tolist()],
-            },
-            "noise": [
-                {name: finite(value) for name, value in asdict(entry).items()}
-                for entry in self.noise
-            ],
-            "sentences": list(self.sentences),
-        }
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters."""
+        return self.correlation.names
 
 
 def confidence(lin: Linearisation) -> Confidence:
@@ -89,17 +85,17 @@ def confidence(lin: Linearisation) -> Confidence:
     with np.errstate(invalid="ignore"):
         correlation = relative / np.outer(errors, errors)  # nan for errors of 0
     return Confidence(
-        names=lin.names,
+        level=LEVEL,
+        dof=dof,
         parameters={
             name: uncertainty(factors, k, float(errors[k]), dof) for k, name in enumerate(lin.names)
         },
-        covariance=relative * np.outer(lin.size, lin.size),
-        correlation=correlation,
+        correlation=Correlation(lin.names, correlation),
         noise=noise,
         sentences=tuple(
             text for channel_noise in noise for text in channel_noise.sentences(len(noise) == 1)
         ),
-        dof=dof,
+        covariance=relative * np.outer(lin.size, lin.size),
     )
 
 
@@ -120,7 +116,8 @@ def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
         np.average(squares, weights=[channel_noise.samples for channel_noise in intervals.noise])
     )
     plain = np.diag(factored(lin, lin.free).inverse) * lin.size**2
-    ratios = np.diag(intervals.covariance) / plain
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratios = np.diag(intervals.covariance) / plain
     ratios = np.where(np.isfinite(ratios), ratios, mean)
     return dict(zip(lin.names, (half * ratios).tolist(), strict=True))
 

@@ -1,9 +1,9 @@
 """Which parameters to fix, so that a record tells of the others."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, isfinite
-from typing import Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -11,9 +11,17 @@ from exfit.inference.combinations import TIED, WEAK, Indices, seen_directions
 from exfit.inference.factors import Factors, factored
 from exfit.inference.linear import Array, Linearisation, Mask
 from exfit.inference.noise import Noise
-from exfit.inference.wording import error, finite, listed
+from exfit.inference.wording import error, listed
+from exfit.util.typed import KEY
 
 BETTER = 0.5  # of the error before: an improvement that is worth its words
+
+
+class FixingErrors(NamedTuple):
+    """The relative standard error with nothing fixed, and now; infinite: not determined."""
+
+    before: Annotated[float, inf]
+    after: Annotated[float, inf]
 
 
 @dataclass(frozen=True)
@@ -23,20 +31,9 @@ class Fixing:
     errors: name to relative standard error with nothing fixed and now; infinite: not determined.
     """
 
-    names: tuple[str, ...]
-    errors: Mapping[str, tuple[float, float]]
+    names: tuple[str, ...] = field(metadata={KEY: "fix"})
+    errors: Mapping[str, FixingErrors]
     sentence: str
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the content as JSON takes it: None for what is not a finite number."""
-        return {
-            "fix": list(self.names),
-            "errors": {
-                name: {"before": finite(before), "after": finite(after)}
-                for name, (before, after) in self.errors.items()
-            },
-            "sentence": self.sentence,
-        }
 
 
 def fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
@@ -60,7 +57,7 @@ def fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
         others = np.flatnonzero(factors.has_effect & model)
         yield Fixing(
             tuple(lin.names[k] for k in fixed),
-            {lin.names[k]: (float(before[k]), float(now[k])) for k in others},
+            {lin.names[k]: FixingErrors(float(before[k]), float(now[k])) for k in others},
             fixing_sentence(lin, fixed, others, before, now),
         )
 

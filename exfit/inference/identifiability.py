@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import inf
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from exfit.inference.confidence import Confidence
 from exfit.inference.factors import factored
 from exfit.inference.fixings import Fixing, fixings
 from exfit.inference.linear import Array, Linearisation
-from exfit.inference.wording import finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class Identifiability:
     names: tuple[str, ...]
     singular_values: Array
     directions: Array
-    condition: float
+    condition: Annotated[float, inf]
     correlation: Array
     unseen: tuple[Combination, ...]
     suggestion: tuple[Fixing, ...]
@@ -44,18 +43,6 @@ class Identifiability:
             *(one.sentence for one in self.unseen),
             *(one.sentence for one in self.suggestion),
         )
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the content as JSON takes it: None for what is not a finite number."""
-        return {
-            "names": list(self.names),
-            "singular_values": self.singular_values.tolist(),
-            "directions": self.directions.tolist(),
-            "condition": finite(self.condition),
-            "correlation": [[finite(x) for x in row] for row in self.correlation.tolist()],
-            "unseen": [entry.as_json() for entry in self.unseen],
-            "suggestion": [entry.as_json() for entry in self.suggestion],
-        }
 
 
 def identifiability(lin: Linearisation, intervals: Confidence) -> Identifiability:
@@ -74,7 +61,7 @@ def identifiability(lin: Linearisation, intervals: Confidence) -> Identifiabilit
         singular_values=singular,
         directions=directions,
         condition=float(singular[0]) / smallest if smallest > 0.0 and len(kept) else inf,
-        correlation=intervals.correlation[np.ix_(kept, kept)],
+        correlation=intervals.correlation.matrix[np.ix_(kept, kept)],
         unseen=(
             *exact_combinations(lin, intervals.noise),
             *weak_combinations(lin, intervals.noise, kept, singular, directions),

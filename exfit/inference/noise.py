@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import nan, sqrt
+from typing import Annotated
 
 import numpy as np
 
@@ -31,13 +32,13 @@ class Noise:
 
     label: str
     samples: int
-    std: float
-    estimated: float
+    std: Annotated[float, nan]
+    estimated: Annotated[float, nan]
     given: float | None
     accepted: bool | None
     p_value: float | None
-    effective: float
-    inflation: float
+    effective: Annotated[float, nan]
+    inflation: Annotated[float, nan]
 
     @property
     def spread(self) -> float:

@@ -1,8 +1,7 @@
 """Numbers and lists as the sentences about a fit print them."""
 
 from collections.abc import Sequence
-from math import exp, isfinite
-from typing import Any
+from math import exp
 
 from exfit.inference.linear import Linearisation
 
@@ -41,8 +40,3 @@ def _factor(logarithm: float) -> str:
     if abs(logarithm) > MOST:
         return "by orders of magnitude"
     return f"times {digits(exp(logarithm))}"
-
-
-def finite(value: Any) -> Any:
-    """Return a value, None for a number that is not finite."""
-    return None if isinstance(value, float) and not isfinite(value) else value

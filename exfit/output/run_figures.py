@@ -13,7 +13,8 @@ from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.records.inspection import Inspection
-from exfit.results.model import Comparison, FitResult
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FitResult
 from exfit.workflows import SimulationResult
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def of_fit(result: FitResult) -> Drawings:
     drawings: dict[str, Callable[[], Figure]] = {}
     single = result.comparison.name == SINGLE
     if single:
-        title = f"{result.name}: {result.model} fitted to {result.comparison.record.name}"
+        title = f"{result.name}: {result.model} fitted to {result.comparison.record}"
         drawings["overlay.png"] = partial(plots.overlay, result.comparison, title)
     if any(match.iteration_responses is not None for match in result.comparisons):
         drawings["iterations.png"] = partial(plots.iterations, result)
@@ -59,7 +60,7 @@ def of_comparisons(comparisons: Sequence[Comparison]) -> Drawings:
 
     return {
         f"{match.name}.png": partial(
-            plots.overlay, match, f"{match.name}: simulated and {match.record.name}"
+            plots.overlay, match, f"{match.name}: simulated and {match.record}"
         )
         for match in comparisons
     }
@@ -90,7 +91,7 @@ def of_simulation(simulation: SimulationResult, name: str) -> Drawings:
 
     drawings = {"response.png": partial(plots.response, simulation.response, name)}
     if simulation.comparison is not None:
-        title = f"{name}: simulated and {simulation.comparison.record.name}"
+        title = f"{name}: simulated and {simulation.comparison.record}"
         drawings["overlay.png"] = partial(plots.overlay, simulation.comparison, title)
     return drawings
 

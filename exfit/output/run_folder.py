@@ -5,7 +5,6 @@ import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -19,8 +18,9 @@ from exfit.case.schema import SINGLE
 from exfit.errors import CaseError, ExfitError
 from exfit.output import run_figures
 from exfit.records.inspection import Inspection
-from exfit.results.io import WHOLE_FIT
-from exfit.results.model import Comparison, FitResult
+from exfit.results.comparisons import Comparison
+from exfit.results.io import WHOLE_FIT, result_text
+from exfit.results.model import FitResult
 from exfit.results.tables import (
     DIGITS,
     comparison_table,
@@ -33,6 +33,7 @@ from exfit.util.cache import cache_folder
 from exfit.util.files import write, write_together
 from exfit.util.interrupts import deferred_interrupts
 from exfit.util.text import to_json
+from exfit.util.typed import plain
 from exfit.workflows import SimulationResult
 
 Array = NDArray[np.float64]
@@ -94,9 +95,8 @@ def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
     for match in result.comparisons:
         if match.iteration_responses is not None:
             name = ITERATIONS if match.name == SINGLE else f"{match.name}-{ITERATIONS}"
-            yield name, iteration_responses_table(match.time, match.iteration_responses)
-    history = [asdict(line) for line in result.history]
-    yield WHOLE_FIT, to_json({**result.as_json(), "history": history})
+            yield name, iteration_responses_table(match.iteration_responses)
+    yield WHOLE_FIT, result_text(result)
 
 
 def _tables(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, str]]:
@@ -168,7 +168,7 @@ def write_validation(
     As every function here: raises ExfitError where the folder cannot be written.
     """
     main = folder / VALIDATION
-    content = {"validation": [match.as_json() for match in comparisons]}
+    content = {"validation": [plain(match) for match in comparisons]}
     with deferred_interrupts():
         numbers = {**dict(_tables(comparisons)), VALIDATION: to_json(content)}
         write_together(folder, numbers, _of_records(main))

@@ -7,7 +7,13 @@ from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
 from exfit.fitting.setup import ExperimentSetup, compared
-from exfit.results.model import Comparison, Overlay
+from exfit.results.comparisons import (
+    Comparison,
+    Overlay,
+    StepFeatures,
+    judged_of,
+    match_of,
+)
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -19,10 +25,12 @@ def compare_with_record(
     values: Values,
     start: Values | None = None,
     limit: float | None = None,
+    of_record: Values | None = None,
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
-    The trial has sub-steps enough for both; ``limit`` is the largest rmse to be accepted, in pu.
+    The trial has sub-steps enough for both; ``limit`` is the largest rmse to be accepted, in pu;
+    ``of_record`` what was found about the record itself.
     """
     at = trial.with_start_values(values)
     samples, substeps = trial.experiment.samples(at)
@@ -36,18 +44,24 @@ def compare_with_record(
         for k, channel in enumerate(trial.channels)
     }
     errors = trial.experiment.compared(samples, at)
+    channels = {signal: match_of(overlay) for signal, overlay in overlays.items()}
     vt = overlays.get("vt")
     return Comparison(
         name=name,
-        time=trial.record.time,
-        overlays=overlays,
+        record=trial.record.source.name,
         cost=0.5 * float(errors @ errors),
-        measured=None if vt is None else _features(trial, vt.measured, at),
-        simulated=None if vt is None else _features(trial, vt.simulated, at),
-        record=trial.record.source,
+        accepted=limit is None or channels[judged_of(channels)].rmse <= limit,
+        channels=channels,
+        features=StepFeatures(
+            measured=None if vt is None else _features(trial, vt.measured, at),
+            simulated=None if vt is None else _features(trial, vt.simulated, at),
+        ),
+        limit=limit,
+        of_record={} if of_record is None else of_record,
         sha256=trial.record.sha256,
         substeps=substeps,
-        rmse_limit=limit,
+        time=trial.record.time,
+        overlays=overlays,
     )
 
 

@@ -1,113 +1,76 @@
-"""A fit read back: its result.json, whose parts are checked when they are asked for."""
+"""The file of a fit, result.json: written and read by the description that its classes are."""
 
 import json
 from collections.abc import Mapping
-from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from exfit.errors import ExfitError
-from exfit.util.text import show_value
-
-Data = Mapping[str, Any]
+from exfit.results.description import PartDescription
+from exfit.results.model import PARTS, FitResult
+from exfit.results.thinning import thinned
+from exfit.util.text import show_value, to_json
+from exfit.util.typed import FormError, Reader, plain
 
 WHOLE_FIT = "result.json"
+VERSION = 2  # of the file; a file without a version is of the first
 
 
-class Saved:
-    """The content of a result.json."""
-
-    def __init__(self, path: Path, content: Data) -> None:
-        self.path, self.content = path, content
-
-    def at(self, *place: str | int) -> Any:
-        """Return what stands at a place; raises ExfitError where nothing does."""
-        found: Any = self.content
-        for depth, key in enumerate(place):
-            try:
-                found = found[key]
-            except (LookupError, TypeError):
-                missing = _dotted(place[: depth + 1])
-                raise ExfitError(f"{self.path}: {missing}: missing; fit again") from None
-        return found
-
-    def number(self, *place: str | int) -> float:
-        """Return the number at a place; raises ExfitError where there is none."""
-        return self._number(_dotted(place), self.at(*place))
-
-    def number_or_none(self, *place: str | int) -> float | None:
-        """Return the number at a place, None for null; raises ExfitError where it is neither."""
-        value = self.at(*place)
-        return None if value is None else self._number(_dotted(place), value)
-
-    def texts(self, *place: str | int) -> tuple[str, ...]:
-        """Return the list of texts at a place; raises ExfitError where there is none."""
-        found = self.at(*place)
-        if not isinstance(found, list):
-            raise ExfitError(f"{self.path}: {_dotted(place)}: {show_value(found)} is not a list")
-        return tuple(str(one) for one in found)
-
-    def text(self, key: str) -> str | None:
-        """Return a text, None where there is none."""
-        found = self.content.get(key)
-        return found if isinstance(found, str) else None
-
-    def mapping(self, key: str) -> Data:
-        """Return a mapping, an empty one where there is none."""
-        found = self.content.get(key)
-        return found if isinstance(found, dict) else {}
-
-    def entries(self, key: str) -> list[Any]:
-        """Return a list, an empty one where there is none."""
-        found = self.content.get(key)
-        return found if isinstance(found, list) else []
-
-    def fitted(self) -> dict[str, float]:
-        """Return the fitted values under the names of the fit."""
-        found = self.mapping("parameters")
-        return {
-            name: self._number(f"parameters.{name}.value", one.get("value"))
-            for name, one in found.items()
-            if isinstance(one, dict)
-        }
-
-    def values(self, key: str, prefix: str) -> dict[str, float]:
-        """Return the values of a part: those that stayed, and over them those that were fitted."""
-        kept = {
-            name: self._number(f"{key}.{name}", value) for name, value in self.mapping(key).items()
-        }
-        return {**kept, **self.fitted_of(prefix)}
-
-    def fitted_of(self, prefix: str) -> dict[str, float]:
-        """Return the fitted values of a part; its prefix is empty for the exciter."""
-        return {
-            name.removeprefix(prefix): value
-            for name, value in self.fitted().items()
-            if name.startswith(prefix) and "." not in name.removeprefix(prefix)
-        }
-
-    def _number(self, place: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise ExfitError(f"{self.path}: {place}: {show_value(value)} is not a number")
-        return float(value)
+def result_text(result: FitResult) -> str:
+    """Return the text of result.json: all of a fit, long samples thinned to their extremes."""
+    return to_json({"version": VERSION, **plain(thinned(result), whole=True)})
 
 
-def read_saved(path: Path) -> Saved:
+def load_result(path: Path) -> FitResult:
     """Return a fit, given its result.json or the folder that holds it.
 
-    Raises ExfitError where the file cannot be read or is no result of a fit.
+    A file of the version before is read as far as it goes. Raises ExfitError where the file cannot
+    be read, or is no result of a fit: with the place in it, and what is wrong there.
     """
-    source = path / WHOLE_FIT if path.is_dir() else path
+    source = result_file(path)
+    content = _content(source)
+    version = content.get("version", 1)
+    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+        raise ExfitError(f"{source}: version: {show_value(version)} is not a version of results")
+    if version > VERSION:
+        raise ExfitError(
+            f"{source}: version {version}: written by a later exfit; this one reads up to {VERSION}"
+        )
+    whole = {**content, "parts": _parts_of(content)} if version == 1 else content
     try:
-        content = json.loads(source.read_bytes())
+        found: FitResult = Reader(complete=version == VERSION).read(FitResult, whole)
+    except FormError as fault:
+        raise ExfitError(f"{source}: {fault}; fit again") from None
+    if not found.comparisons:
+        raise ExfitError(f"{source}: records: empty; fit again")
+    return found
+
+
+def result_file(path: Path) -> Path:
+    """Return the file of a fit, given it or the folder that holds it."""
+    return path / WHOLE_FIT if path.is_dir() else path
+
+
+def _content(source: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(source.read_bytes(), parse_constant=_refuse_constant)
     except OSError as error:
         raise ExfitError(f"{source}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
         raise ExfitError(f"{source}: not JSON: {error}") from None
     if not isinstance(content, dict) or not {"model", "parameters", "fixed"} <= content.keys():
         raise ExfitError(f"{source}: not the result of a fit: model, parameters or fixed missing")
-    return Saved(source, content)
+    return content
 
 
-def _dotted(place: tuple[str | int, ...]) -> str:
-    return ".".join(map(str, place))
+def _refuse_constant(text: str) -> NoReturn:
+    raise ValueError(f"{text} is not a number of JSON")
+
+
+def _parts_of(content: Mapping[str, Any]) -> list[Any]:
+    """Return the parts that a file of the first version names: without drawings and data sheets."""
+    names = {kind: content.get(f"{kind}_model") for kind in PARTS}
+    parts = [PartDescription(kind, str(name), f"{kind}.") for kind, name in names.items() if name]
+    if content["model"] != names["machine"]:
+        parts.insert(0, PartDescription("exciter", str(content["model"]), ""))
+    return [plain(part, whole=True) for part in parts]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import kept_rows
-from exfit.results.model import Comparison, FitResult, IterationResponses
+from exfit.results.comparisons import Comparison, IterationResponses
+from exfit.results.model import FitResult
 from exfit.util.text import yaml_number
 
 Array = NDArray[np.float64]
@@ -63,10 +64,10 @@ def comparison_table(comparison: Comparison) -> str:
     return table(header, columns)
 
 
-def iteration_responses_table(time: Array, courses: IterationResponses) -> str:
+def iteration_responses_table(responses: IterationResponses) -> str:
     """Return the response after each iteration that is kept, on the record's clock, as CSV."""
-    header = ["t", *(f"{courses.signal}_{number}" for number in courses.numbers)]
-    return table(header, [time, *courses.samples])
+    header = ["t", *(f"{responses.signal}_{number}" for number in responses.numbers)]
+    return table(header, [responses.time, *responses.samples])
 
 
 def history_table(result: FitResult) -> str:
@@ -105,7 +106,7 @@ def history_table(result: FitResult) -> str:
 def parameter_file(result: FitResult) -> str:
     """Return the values as YAML, to be read back by simulate and validate."""
     state = "interrupted" if result.interrupted else result.message
-    matches = (f"{one.record.name}: rmse {one.rmse:.4g} pu" for one in result.comparisons)
+    matches = (f"{one.record}: rmse {one.rmse:.4g} pu" for one in result.comparisons)
     lines = [
         f"# {result.model} fitted to {', '.join(matches)}; {state}",
         f"model: {result.model}",

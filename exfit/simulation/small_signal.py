@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import inf, log10, pi, sqrt
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,7 +91,7 @@ class SmallSignal:
     open: Bode | None
     margins: Margins | None
     bandwidth: float | None
-    peak: float
+    peak: Annotated[float, -inf]
     path: tuple[str, str]
 
 

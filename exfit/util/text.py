@@ -1,14 +1,40 @@
 """Words and numbers as messages and files have them."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from math import isfinite
+from types import NoneType
 from typing import Any
 
 
 def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
-    """Return JSON that every reader takes: numbers that are not finite become null."""
-    return json.dumps(_finite(content), indent=2, ensure_ascii=ascii_only) + "\n"
+    """Return JSON that every reader takes: numbers that are not finite become null.
+
+    A list of numbers stands in one line.
+    """
+    return "".join(_json(_finite(content), ascii_only, "\n")) + "\n"
+
+
+def _json(content: Any, ascii_only: bool, line: str) -> Iterator[str]:
+    """Yield the pieces of a text of JSON; ``line`` begins one at this depth."""
+    inner = line + "  "
+    if isinstance(content, dict) and content:
+        begin = "{"
+        for key, value in content.items():
+            yield f"{begin}{inner}{json.dumps(str(key), ensure_ascii=ascii_only)}: "
+            yield from _json(value, ascii_only, inner)
+            begin = ","
+        yield line + "}"
+    elif isinstance(content, list) and not all(isinstance(x, NUMBER) for x in content):
+        for k, value in enumerate(content):
+            yield ("," if k else "[") + inner
+            yield from _json(value, ascii_only, inner)
+        yield line + "]"
+    else:
+        yield json.dumps(content, ensure_ascii=ascii_only)
+
+
+NUMBER = (int, float, NoneType)  # and the truth values, which are of type int
 
 
 def _finite(content: Any) -> Any:

@@ -14,7 +14,6 @@ from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.output import plots, run_folder
-from exfit.results.model import IterationResponses
 from exfit.results.tables import DIGITS
 
 CASE = ROOT / "configs" / "first_order.yaml"
@@ -37,23 +36,28 @@ def columns(path):
     return dict(zip(header, np.array(rows, float).T, strict=True))
 
 
+def judged(comparison):
+    """Return the samples of the signal that a match is judged by."""
+    return comparison.overlays[comparison.judged_by]
+
+
 def with_many(result, count):
     """Return a fit that took so many iterations more than it did."""
     kept = result.comparison.iteration_responses
     numbers = tuple(range(count))
-    many = IterationResponses(kept.signal, numbers, np.tile(kept.samples[:1], (count, 1)))
+    many = replace(kept, numbers=numbers, samples=np.tile(kept.samples[:1], (count, 1)))
     return replace(result, comparisons=(replace(result.comparison, iteration_responses=many),))
 
 
 def test_the_first_course_is_the_start_and_the_last_the_fit(fitted):
-    found, overlay = fitted.comparison.iteration_responses, fitted.comparison.judged
+    found, overlay = fitted.comparison.iteration_responses, judged(fitted.comparison)
     np.testing.assert_array_equal(found.samples[0], overlay.start)
     # the last line of the history holds the fitted values themselves
     np.testing.assert_array_equal(found.samples[-1], overlay.simulated)
 
 
 def test_every_course_costs_what_its_iteration_did(fitted):
-    found, measured = fitted.comparison.iteration_responses, fitted.comparison.judged.measured
+    found, measured = fitted.comparison.iteration_responses, judged(fitted.comparison).measured
     costs = 0.5 * np.sum((found.samples - measured) ** 2, axis=1)
     lines = {line.number: line.cost for line in fitted.history}
     # the sub-steps are those of the fitted values: what they move is far below a thousandth
@@ -66,7 +70,7 @@ def test_every_record_has_its_own_courses(tmp_path):
     run_folder.write_fit(result, tmp_path / "run", figures=False)
     for one in result.comparisons:
         table = columns(tmp_path / "run" / f"{one.name}-iterations.csv")
-        assert table["vt_0"] == pytest.approx(one.judged.start, rel=10.0 ** (1 - DIGITS))
+        assert table["vt_0"] == pytest.approx(judged(one).start, rel=10.0 ** (1 - DIGITS))
     assert not (tmp_path / "run" / "iterations.csv").exists()
 
 
@@ -75,7 +79,7 @@ def test_what_is_found_about_a_record_moves_with_the_iterations(tmp_path):
     content = config("ac1a_typical")
     content["test"]["vref"][0]["at"] = {"start": 1.1, "min": 0.9, "max": 1.2}
     result = workflows.fit(case_of(content, tmp_path))
-    found, overlay = result.comparison.iteration_responses, result.comparison.judged
+    found, overlay = result.comparison.iteration_responses, judged(result.comparison)
     np.testing.assert_array_equal(found.samples[0], overlay.start)
     np.testing.assert_array_equal(found.samples[-1], overlay.simulated)
 

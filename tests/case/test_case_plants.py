@@ -146,7 +146,7 @@ def test_data_of_exciter_machine_and_stabiliser_are_found_together(found):
     _, result = found
     truth = {"K": 50.0, "machine.H": 4.0, "stabiliser.KS": 0.5}
     assert {n: one.value for n, one in result.parameters.items()} == pytest.approx(truth, rel=2e-3)
-    told = result.as_json()
+    told = result.to_dict()
     assert told["machine_model"] == "GENROU"
     assert told["stabiliser_model"] == "PSS1A"
     assert told["machine"]["H"] == result.parameters["machine.H"].value

@@ -203,7 +203,7 @@ def test_a_stabiliser_goes_into_the_case_with_its_model_and_parameters(run, pssx
 
 
 def test_a_fitted_stabiliser_is_written_behind_its_exciter(run, fitted, pssx):
-    parameters = {**result_of(fitted)["parameters"], "stabiliser.k": {"value": 7.0}}
+    parameters = {**result_of(fitted)["parameters"], "stabiliser.k": of_value(7.0)}
     changes = {"stabiliser_model": "PSSX", "stabiliser": {"k": 5.0, "a": 3.0}}
     named(fitted, parameters=parameters, **changes)
     code, out, _ = run("export", fitted)
@@ -254,6 +254,13 @@ def fitted_ac8b(results):
     return Path("run8")
 
 
+def of_value(value):
+    """Return an entry of a fitted parameter."""
+    others = {"at_bound": None, "of_record": False, "std_error": None, "interval": None}
+    texts = {"why": None, "unit": "", "meaning": ""}
+    return {"value": value, "start": 1.0, "min": 0.0, "max": 1e9, **others, **texts}
+
+
 def named(folder, **changes):
     """Put values into a result."""
     path = Path(folder) / "result.json"
@@ -292,7 +299,7 @@ def test_a_result_or_its_folder_gives_the_same_on_the_terminal(run, fitted):
 
 
 def test_fitted_values_of_the_machine_go_over_those_of_the_case(run, fitted):
-    parameters = {**result_of(fitted)["parameters"], "machine.Tpd0": {"value": 5.5}}
+    parameters = {**result_of(fitted)["parameters"], "machine.Tpd0": of_value(5.5)}
     named(fitted, parameters=parameters)
     _, out, _ = run("export", fitted)
     assert read_unit(out, "out.dyr").machine.values["Tpd0"] == 5.5
@@ -350,10 +357,10 @@ def test_what_another_record_cannot_hold_is_named_with_its_value(run, fitted_ac8
         ({"model": "OWN"}, "OWN is not a model of the catalogue: it has no PSS/E record"),
         ({"model": "FIRST_ORDER"}, "FIRST_ORDER has no PSS/E record"),
         ({"inputs": {"model": "0" * 64}}, "AC1A is not a model of the catalogue"),
-        ({"fixed": {}}, "fixed: missing: TR, TB, TC, VAMAX"),
-        ({"machine": {}}, "machine: missing: Tpd0"),
-        ({"parameters": {"KA": {"value": None}}}, "parameters.KA.value: None is not a number"),
-        ({"parameters": {"KA": {"value": "1"}}}, "parameters.KA.value: '1' is not a number"),
+        ({"fixed": {}}, "ESAC1A: no value of TR, TB, TC, VAMAX"),
+        ({"machine": {}}, "GENROU: no value of machine.Tpd0"),
+        ({"parameters": {"KA": of_value(None)}}, "parameters.KA.value: None is not a number"),
+        ({"parameters": {"KA": of_value("1")}}, "parameters.KA.value: '1' is not a number"),
     ],
 )
 def test_a_result_that_cannot_be_written_is_told(run, fitted, workplace, changes, words):
@@ -388,7 +395,7 @@ def test_a_file_that_is_no_result_is_told(run, content, words):
 def test_a_record_that_the_model_is_not_written_as_is_told_with_those_it_is(run, fitted):
     code, _, err = run("export", fitted, "--model", "ESAC1")
     assert code == 1
-    assert "--model ESAC1: AC1A is not written so; did you mean ESAC1A?" in err
+    assert "--model ESAC1: not a record of AC1A; did you mean ESAC1A?" in err
 
 
 def test_a_fit_of_a_user_s_own_model_has_no_record(run):

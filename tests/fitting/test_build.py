@@ -139,6 +139,6 @@ def test_a_fit_that_ends_where_the_response_has_no_slope_tells_what_it_found(loa
     found = fit(case)
     assert (found.success, found.values["c"]) == (False, 0.0)
     assert found.knowledge is None
-    assert found.as_json()["parameters"]["a"]["why"] == "no finite derivatives"
+    assert found.to_dict()["parameters"]["a"]["why"] == "no finite derivatives"
     with pytest.raises(SimulationError, match=r"the derivatives are not finite at .*c = 0"):
         profile(case)

@@ -129,11 +129,11 @@ def test_sensitivities_are_at_the_instants_of_the_record(tmp_path):
     (every, _) = uncertainty_at(FitProblem(whole, whole), theta, ()).sensitivity
     assert len(ours.time) < len(every.time)
     later = ours.time <= every.time[-1]
-    for k in range(len(theta)):
-        line = np.interp(ours.time[later], every.time, every.moved[:, k])
+    for name, moved in ours.moved.items():
+        line = np.interp(ours.time[later], every.time, every.moved[name])
         # which lies between samples up to a millisecond apart
         most = 1e-3 * np.max(np.abs(line))
-        np.testing.assert_allclose(ours.moved[later, k], line, rtol=0.0, atol=most)
+        np.testing.assert_allclose(moved[later], line, rtol=0.0, atol=most)
 
 
 def filtered(filter_):

@@ -60,7 +60,7 @@ def test_how_far_a_signal_moves_in_per_unit_does_not_depend_on_its_weight(tmp_pa
     for weight in (1.0, WEIGHT):
         residuals = open_case(tmp_path, weight)
         courses = uncertainty_at(problem_of(residuals), residuals.start, ()).sensitivity
-        moved.append(np.concatenate([one.moved for one in courses]))
+        moved.append(np.concatenate([line for one in courses for line in one.moved.values()]))
     assert np.ptp(moved[0]) > 0.1
     assert moved[1] == pytest.approx(moved[0], rel=1e-9, abs=1e-12)
 

@@ -417,7 +417,7 @@ def test_what_is_masked_can_be_anything(tmp_path):
         assert found.values == ends[0].values
         assert found.cost == ends[0].cost
         assert found.notes == ends[0].notes
-        assert found.comparison.measured == ends[0].comparison.measured
+        assert found.comparison.features.measured == ends[0].comparison.features.measured
     (overlay,) = ends[0].comparison.overlays.values()
     assert np.array_equal(np.isnan(overlay.error), hidden)
 
@@ -484,7 +484,7 @@ def test_a_stretch_masked_from_the_beginning_is_no_fault_where_the_level_is_give
     content = single(mask=[[0.0, 1.2]])
     found, whole = fit(case_of(content, tmp_path)), fit(case_of(single(), tmp_path))
     assert unit(found) == pytest.approx(unit(whole), rel=2e-2)
-    assert found.comparison.measured is None
+    assert found.comparison.features.measured is None
 
 
 def test_a_signal_that_drives_must_have_no_gap(tmp_path):

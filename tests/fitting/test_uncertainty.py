@@ -257,7 +257,7 @@ def test_an_interrupted_fit_claims_no_intervals():
     found = fit(case_of("first_order"), None, interrupt)
     assert found.interrupted
     assert found.knowledge is None
-    assert found.as_json()["parameters"]["k"]["interval"] is None
+    assert found.to_dict()["parameters"]["k"]["interval"] is None
 
 
 def test_several_parameters_that_are_not_determined_stand_in_one_sentence():

@@ -12,6 +12,7 @@ from scipy.stats import t as student
 
 from exfit.inference import PriorRow, ResidualBlock, confidence, rises
 from exfit.inference.noise import LAGS, effective_samples, whiteness
+from exfit.util import typed
 
 # NIST Statistical Reference Datasets: certified standard deviations of the estimates
 CERTIFIED_STD = {
@@ -307,7 +308,7 @@ def test_what_is_exactly_redundant_has_no_standard_error_and_spoils_no_other():
     assert known.parameters["b"].why == "cannot be distinguished from a"
     assert known.parameters["c"].interval == pytest.approx(held.parameters["c"].interval)
     assert known.dof == len(T) - 2 == pytest.approx(held.dof)
-    assert np.isnan(known.correlation[0]).all()
+    assert np.isnan(known.correlation.matrix[0]).all()
     assert response == pytest.approx(rows[:, 0] * 2.0)
 
 
@@ -469,13 +470,13 @@ def test_units_and_weights_do_not_change_what_is_known(seed):
     plain = confidence(linearised(x, fun(x), jac(x)))
     other = confidence(linearised(1e3 * x, 7.0 * fun(x), 7.0 * jac(x) / 1e3))
     assert std_errors(other) == pytest.approx(1e3 * std_errors(plain), rel=1e-9)
-    assert other.correlation == pytest.approx(plain.correlation, abs=1e-9)
+    assert other.correlation.matrix == pytest.approx(plain.correlation.matrix, abs=1e-9)
 
 
 def test_the_content_survives_json():
     fun, jac, x, _ = random_problem(0)
     known = confidence(linearised(x, fun(x), jac(x), held=("min", None, None, None)))
-    content = json.loads(json.dumps(known.as_json(), allow_nan=False))
+    content = json.loads(json.dumps(typed.plain(known), allow_nan=False))
     assert content["parameters"]["a"]["std_error"] is None
     assert content["parameters"]["b"]["std_error"] == known.parameters["b"].std_error
     assert content["correlation"]["matrix"][0] == [None] * 4

@@ -9,6 +9,7 @@ from linearised import autoregressive, decay, linearised, std_errors
 
 from exfit.inference import WEAK, PriorRow, ResidualBlock, confidence, identifiability
 from exfit.inference.wording import digits, listed, move
+from exfit.util.typed import plain
 
 SAMPLES = 300
 T = np.linspace(0.0, 2.0, SAMPLES)
@@ -303,7 +304,7 @@ def test_lists_end_with_and():
 
 def test_the_content_survives_json():
     known, found = analysed(product())
-    content = json.loads(json.dumps(found.as_json(), allow_nan=False))
+    content = json.loads(json.dumps(plain(found), allow_nan=False))
     assert content["condition"] is None
     assert content["unseen"][0]["exact"] is True
     (step,) = content["suggestion"]

@@ -7,8 +7,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from exfit.output import plots
-from exfit.results.model import Comparison, FitResult, FittedParameter, Iteration, Overlay
+from exfit.results.comparisons import Comparison, Overlay, StepFeatures, match_of
+from exfit.results.model import FitResult, FittedParameter, Iteration
 from exfit.simulation.simulator import Response
+from exfit.util.strategies import PHASES
 
 TIME = np.linspace(0.0, 2.0, 41)
 RISE = np.where(TIME < 1.0, 1.0, 1.05)
@@ -22,16 +24,16 @@ def coarse(monkeypatch):
 
 
 def comparison(signals=("vt",), start=None):
+    overlays = {name: Overlay(RISE, RISE + 1e-4 * np.sin(TIME), start) for name in signals}
     return Comparison(
         name="fit",
-        time=TIME,
-        overlays={name: Overlay(RISE, RISE + 1e-4 * np.sin(TIME), start) for name in signals},
+        record="bump.csv",
         cost=1e-6,
-        measured=None,
-        simulated=None,
-        record=Path("bump.csv"),
-        sha256="",
-        substeps=1,
+        accepted=True,
+        channels={name: match_of(overlay) for name, overlay in overlays.items()},
+        features=StepFeatures(None, None),
+        time=TIME,
+        overlays=overlays,
     )
 
 
@@ -60,17 +62,22 @@ def result(free=2, iterations=4, phases=("lm", "dgn"), at_bound=None):
     end = history[-1].values
     return FitResult(
         case=Path("bump.yaml"),
-        name="bump",
+        about={},
         model="AC1A",
         strategy="lm-then-dgn",
         saturation="quadratic",
         parameters={
-            name: FittedParameter(end[name], 1.0, 0.1, 10.0, at_bound, "pu") for name in names
+            name: FittedParameter(end[name], 1.0, 0.1, 10.0, at_bound, unit="pu") for name in names
         },
         fixed={},
         ties={},
         typical=(),
-        parts=(),
+        machine={},
+        machine_model=None,
+        network={},
+        network_model=None,
+        stabiliser={},
+        stabiliser_model=None,
         cost=1.0,
         comparisons=(comparison(start=RISE),),
         knowledge=None,
@@ -138,7 +145,7 @@ def test_convergence_shows_cost_gradient_and_damping_of_every_phase(phases, iter
     assert damping.get_xlabel() == "iteration"
     used = phases if iterations > 1 else phases[:1]
     labels = [text.get_text() for text in cost.get_legend().get_texts()]
-    assert labels == [plots.search.PHASES[phase] for phase in used]
+    assert labels == [PHASES[phase] for phase in used]
 
 
 def test_a_vanished_gradient_has_no_place_on_a_logarithmic_axis_but_breaks_nothing():

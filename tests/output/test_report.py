@@ -9,6 +9,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 from pages import Page
+from places import ROOT
 from records import TEST, config, found_in, recording, several, synthetic, write
 from records import TIME as OF_UNIT
 from records import one as ac1a
@@ -18,9 +19,11 @@ from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.exchange.psse.export import export
 from exfit.output import run_folder
-from exfit.output.report import html, report_of, write_report
+from exfit.output.report import html, write_report
 from exfit.output.report.charts import Axis, Chart, Panel, Series, drawing, ticks
-from exfit.output.report.figures import data, figures
+from exfit.output.report.sections.matches import fitted_matches, live_data
+from exfit.output.report.verdict import verdict
+from exfit.results.io import load_result, result_file
 
 MOST = 3_000_000  # bytes of a page
 ABOUT = {"Plant": "Höllental", "Unit": 2, "Rated": "120 MVA, 13.8 kV", "Tested by": "A & B"}
@@ -62,6 +65,11 @@ def first_order(folder, **sections):
         **sections,
     }
     return made(folder, {key: value for key, value in content.items() if value is not None})
+
+
+def page_of(run):
+    """Return the page of the fit in a folder."""
+    return html(load_result(run), result_file(run).parent)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +118,7 @@ def pages(fits):
 
     def page(name):
         if name not in known:
-            known[name] = Page(html(report_of(fits(name))))
+            known[name] = Page(page_of(fits(name)))
         return known[name]
 
     return page
@@ -219,7 +227,7 @@ def test_the_base_of_each_signal_is_told_and_a_step_that_the_fit_found(tmp_path)
     write(tmp_path / "record.csv", t=OF_UNIT, u=15.75 * vt)
     test = {**TEST, "vref": [{"at": found_in(1.02, 0.9, 1.1), "step": 0.05}]}
     content = ac1a(test, {"vt": {"column": "u", "unit": "kV", "base": 15.75}}, ["KA"])
-    words = Page(html(report_of(made(tmp_path, content)))).text
+    words = Page(page_of(made(tmp_path, content))).text
     assert "vt, 1 pu = 15.75 kV" in words
     assert "vref +0.05 pu at about 1.02 s (found by the fit)" in words
 
@@ -230,8 +238,8 @@ def test_a_signal_with_a_wrong_base_stands_in_the_verdict(tmp_path):
     for base, told in ((550.0, False), (0.55, True)):
         ifd = {"column": "i", "unit": "A", "base": base, "weight": 1e-9}
         content = ac1a(TEST, {"vt": "vt", "ifd": ifd}, ["KA"])
-        verdict = report_of(made(tmp_path, content)).verdict.sentence
-        assert ("no better than by a constant matched: ifd" in verdict) == told
+        sentence = verdict(load_result(made(tmp_path, content))).sentence
+        assert ("no better than by a constant matched: ifd" in sentence) == told
 
 
 def test_hashes_versions_case_and_commands_are_told(fits, pages):
@@ -254,10 +262,10 @@ def test_findings_and_notes_are_told_word_by_word(fits, pages):
 
 
 def test_the_dynamics_record_is_told_with_its_warnings_or_why_there_is_none(fits, pages):
-    found = export(fits("ac8b"), 1, "1")
+    found = export(load_result(fits("ac8b")), 1, "1")
     assert " ".join(found.text.split()) in pages("ac8b").text
     for warning in found.warnings:
-        assert warning.partition(": ")[2] in pages("ac8b").text
+        assert warning in pages("ac8b").text
     assert "FIRST_ORDER has no PSS/E record" in pages("first order").text
 
 
@@ -287,28 +295,27 @@ def test_a_pole_of_the_first_order_system_is_what_was_fitted(fits, pages):
 def test_the_verdict_is_that_of_the_validation(tmp_path, accept, down, word):
     sections = {"accept": None if accept is None else {"rmse": accept}}
     run = first_order(tmp_path / "case", **sections, **({} if down else {"validate": None}))
-    report = report_of(run)
-    assert report.verdict.word == word
-    assert report.verdict.good is (None if accept is None else word == "Accepted")
-    assert "every parameter determined" in report.verdict.sentence
+    judged = verdict(load_result(run))
+    assert judged.word == word
+    assert judged.good is (None if accept is None else word == "Accepted")
+    assert "every parameter determined" in judged.sentence
     if not down:
-        assert "no record for a validation" in Page(html(report)).text
+        assert "no record for a validation" in Page(page_of(run)).text
 
 
 def test_the_iterations_begin_with_the_start_and_end_with_the_fit_as_they_are_compared(tmp_path):
     """The recorder's average is in them, and what is left out of the comparison is missing."""
     channel = {"column": "v", "averaged": 0.3, "filter": {"median": 3}}
     record = {"file": "up.csv", "time": "t", "channels": {"vt": channel}, "mask": [[1.0, 1.2]]}
-    report = report_of(first_order(tmp_path / "case", record=record))
-    (found,), fitted = report.simulated.iteration_responses, report.fits[0].samples.overlays["vt"]
+    match = load_result(first_order(tmp_path / "case", record=record)).comparison
+    found, fitted = match.iteration_responses, match.overlays["vt"]
     assert np.isnan(fitted.measured).any()
-    last = max(found.simulated)
     for ours, theirs in (
         (found.measured, fitted.measured),
-        (found.simulated[0], fitted.start),
-        (found.simulated[last], fitted.simulated),
+        (found.samples[0], fitted.start),
+        (found.samples[-1], fitted.simulated),
     ):
-        # the table of the fit has nine digits
+        # the file has nine digits
         np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
 
 
@@ -322,10 +329,9 @@ def test_an_interrupted_fit_is_no_converged_one(tmp_path):
             raise KeyboardInterrupt
 
     run = made(tmp_path / "case", config("ac1a_typical"), watch=stop)
-    report = report_of(run)
-    page = Page(html(report))
-    assert report.verdict.word == "Interrupted"
-    assert report.verdict.good is False
+    page, judged = Page(page_of(run)), verdict(load_result(run))
+    assert judged.word == "Interrupted"
+    assert judged.good is False
     for row in page.tables["Fitted parameters"][1:]:
         assert row[3] == "the search was interrupted"
     assert "Not known: the search did not end at a minimum" in page.text
@@ -333,64 +339,91 @@ def test_an_interrupted_fit_is_no_converged_one(tmp_path):
 
 def test_a_search_that_ended_early_is_not_converged(own):
     change(own, success=False, message="no more iterations")
-    assert report_of(own).verdict.word == "Not converged"
+    assert verdict(load_result(own)).word == "Not converged"
 
 
 def test_text_from_outside_stays_text(tmp_path):
     run = first_order(tmp_path / "<b>case", about={HOSTILE: HOSTILE, "Unit": HOSTILE})
-    page = Page(html(report_of(run)))
-    plain = Page(html(report_of(first_order(tmp_path / "plain", about={"Unit": "1"}))))
+    page = Page(page_of(run))
+    plain = Page(page_of(first_order(tmp_path / "plain", about={"Unit": "1"})))
     assert page.count("script") == plain.count("script")
     assert page.count("img") == page.count("b") == 0
     assert HOSTILE in page.text
     assert json.loads(page.scripts[0])
 
 
-def test_a_missing_table_of_samples_is_told(own):
-    (own / "response.csv").unlink()
-    page = Page(html(report_of(own)))
-    assert "No overlay: the table of its samples is not beside the result" in page.text
-    assert [one["key"] for one in json.loads(page.scripts[0])] == ["overlay-1-vt"]
+HOSTILE_MODEL = """
+from pathlib import Path
+
+Path(__file__).with_name("executed").touch()
+raise SystemExit("executed")
+"""
 
 
-def test_a_damaged_table_of_samples_is_refused(own):
-    (own / "response.csv").write_text("t,vt_measured\n1,x\n")
-    with pytest.raises(ExfitError, match=r"response\.csv: not the samples of a fit"):
-        report_of(own)
+@pytest.fixture
+def of_own_model(tmp_path):
+    """The folder of a fit of a user's own model, with its case and record beside it."""
+    folder = tmp_path / "stranger"
+    folder.mkdir()
+    shutil.copy(ROOT / "exfit" / "models" / "exciters" / "first_order.py", folder / "mine.py")
+    return first_order(folder, model="mine.py")
 
 
-@pytest.mark.parametrize("file", ["up.csv", "down.csv", "case.yaml"])
-def test_what_was_changed_since_the_fit_is_refused_with_both_files_named(own, file):
-    path = own.parent / file
-    path.write_text(path.read_text(encoding="utf-8") + ("# \n" if file == "case.yaml" else "9,0\n"))
-    with pytest.raises(ExfitError) as refused:
-        report_of(own)
-    assert str(path) in str(refused.value)
-    assert str(own / "result.json") in str(refused.value)
+def test_a_page_needs_the_result_alone(of_own_model, capsys):
+    """Without case, records, tables and model, and with a hostile model in its place."""
+    page = page_of(of_own_model)
+    folder = of_own_model.parent
+    for path in folder.rglob("*"):
+        if path.is_file() and path.name != "result.json":
+            path.unlink()
+    assert page_of(of_own_model) == page
+    (folder / "mine.py").write_text(HOSTILE_MODEL)
+    write_report(of_own_model)
+    assert (of_own_model / "report.html").read_text(encoding="utf-8") == page
+    for command in (["export"], ["report"]):
+        with pytest.raises(SystemExit):
+            cli.main([*command, str(of_own_model)], prog_name="exfit")
+    assert "executed" not in capsys.readouterr().err
+    assert not (folder / "executed").exists()
 
 
-def test_the_case_is_looked_for_from_the_working_folder_and_beside_the_result(own, monkeypatch):
-    monkeypatch.chdir(own.parent)
-    change(own, case="case.yaml")
-    assert report_of(own).verdict.word == "Converged"
-    monkeypatch.chdir(own.parent.parent)
-    with pytest.raises(ExfitError, match="give --case FILE"):
-        report_of(own)
-    assert report_of(own, own.parent / "case.yaml").verdict.word == "Converged"
-    change(own, case="../case.yaml")
-    assert report_of(own).verdict.word == "Converged"
+def test_what_was_changed_since_the_fit_leaves_the_page_as_it_was(own):
+    page = page_of(own)
+    for file in ("up.csv", "down.csv", "case.yaml"):
+        (own.parent / file).write_text("changed")
+    assert page_of(own) == page
 
 
-@pytest.mark.parametrize("key", ["message", "history", "knowledge", "parameters", "inputs"])
-def test_a_result_with_a_hole_is_refused_with_its_place_or_read_without(own, key):
+@pytest.mark.parametrize("key", ["message", "history", "knowledge", "parameters", "behaviour"])
+def test_a_result_with_a_hole_is_refused_with_its_place(own, key):
     saved = saved_of(own)
     del saved[key]
     (own / "result.json").write_text(json.dumps(saved))
-    if key == "history":
-        assert "The result holds no history" in Page(html(report_of(own))).text
-    else:
-        with pytest.raises(ExfitError, match=key):
-            report_of(own)
+    with pytest.raises(ExfitError, match=key):
+        write_report(own)
+
+
+def test_a_result_of_the_version_before_is_reported_as_far_as_it_goes(own):
+    """It holds no samples, and nothing that would have to be simulated."""
+    page, saved = Page(page_of(own)), saved_of(own)
+    known = {"std_error", "interval", "why", "value", "start", "min", "max", "at_bound"}
+    parameters = {
+        name: {key: one[key] for key in (*known, "of_record")}
+        for name, one in saved["parameters"].items()
+    }
+    figures = load_result(own).to_dict()
+    history = saved["history"]
+    for match in (*figures["records"], *figures["validation"]):
+        del match["limit"]
+    before = {**figures, "parameters": parameters, "history": history}
+    (own / "result.json").write_text(json.dumps(before))
+    old = Page(page_of(own))
+    assert "No overlay: the result holds no samples." in old.text
+    assert "an earlier version of exfit wrote it" in old.text
+    for caption in ("Iterations; line 0 is the start", "Correlation of the estimates"):
+        assert old.tables[caption] == page.tables[caption]
+    ours, theirs = (each.tables["Fitted parameters"][1:] for each in (old, page))
+    assert [row[1:6] for row in ours] == [row[1:6] for row in theirs]
 
 
 def test_a_report_is_replaced_and_another_file_is_not(own):
@@ -431,7 +464,7 @@ def test_a_long_record_makes_no_long_page(tmp_path):
     )
     record = {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}
     run = made(folder, {**FIRST_ORDER, "record": record})
-    assert len(html(report_of(run)).encode()) < MOST
+    assert len(page_of(run).encode()) < MOST
 
 
 @pytest.mark.parametrize("low", [-3.0, 0.0, 0.99997, 1e4])
@@ -460,13 +493,12 @@ def test_a_clock_that_began_long_ago_is_drawn_as_finely(tmp_path):
     record = {"file": "../ago.csv", "time": "t", "channels": {"vt": "v"}}
     test = {"vt0": 0.0, "vref": [{"at": ago + 0.5, "step": 1.0}]}
     run = first_order(tmp_path / "case", record=record, test=test, validate=None)
-    report = report_of(run)
-    shown = report.fits[0].samples.time
+    (match,) = fitted_matches(load_result(run))
+    shown = match.comparison.time
     np.testing.assert_allclose(np.diff(shown), np.diff(TIME), atol=1e-6)  # a double is that fine
-    page = figures(report)
-    (sent,) = data(page.overlays)
+    (sent,) = live_data(match.overlays)
     np.testing.assert_allclose(np.diff(sent["time"]), np.diff(TIME), atol=1e-6)
-    labels = [tick.label for tick in drawing(page.overlays[0].chart).x_ticks]
+    labels = [tick.label for tick in drawing(match.overlays[0].chart).x_ticks]
     assert len(set(labels)) == len(labels) > 2
 
 

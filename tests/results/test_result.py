@@ -11,11 +11,12 @@ from places import ROOT
 
 from exfit import workflows
 from exfit.case.load import load_case
-from exfit.results.model import FitResult, Overlay
+from exfit.results.comparisons import Overlay
+from exfit.results.model import FitResult
 from exfit.results.tables import table
+from exfit.util.typed import IN_FILE, plain
 
-INSIDE = {"comparisons": "records", "parts": "machine_model"}  # under another name
-ELSEWHERE = {"name", "history"}  # in the name of the folder and in the history
+INSIDE = {"comparisons": "records"}  # under another name
 
 laws = settings(deadline=None, derandomize=True, max_examples=25)
 
@@ -39,15 +40,16 @@ def test_the_fit_percentage_is_what_is_left_of_the_spread(seed, share):
 
 
 def test_the_json_of_a_fit_has_every_field_with_its_value(fitted):
-    told = fitted.as_json()
-    names = {one.name for one in fields(FitResult)} - ELSEWHERE
+    told = fitted.to_dict()
+    names = {one.name for one in fields(FitResult) if one.metadata != IN_FILE}
     assert {INSIDE.get(name, name) for name in names} <= told.keys()
     for name in names:
         value = getattr(fitted, name)
         if isinstance(value, bool | int | float | str):
             assert told[name] == value, name
+    assert "history" not in told
     assert tuple(told["typical"]) == fitted.typical
-    assert told["fit"] == fitted.comparison.as_json() == told["records"][0]
+    assert told["fit"] == plain(fitted.comparison) == told["records"][0]
 
 
 def test_a_long_table_keeps_the_extremes_of_every_column(monkeypatch):

@@ -1,16 +1,16 @@
-"""The PSS/E records of a fit: its result.json, read back and written as a dynamics file."""
+"""The PSS/E records of a fit, as a dynamics file."""
 
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from math import isfinite
 
 from exfit import __version__
 from exfit.errors import ExfitError
 from exfit.exchange.psse import Definition, alternatives, definitions, record_text
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
-from exfit.results.io import Saved, read_saved
+from exfit.results.model import FitResult
 from exfit.util.text import near, show
 
 WIDTH = 80  # columns
@@ -27,7 +27,7 @@ class Exported:
 
 @dataclass(frozen=True)
 class Written:
-    """A record with its values; ``fitted`` and ``typical`` name those that are it."""
+    """A record with its values; ``fitted`` and ``typical`` are the names of those."""
 
     definition: Definition
     values: Mapping[str, float]
@@ -35,14 +35,12 @@ class Written:
     typical: tuple[str, ...]
 
 
-def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Exported:
-    """Return the PSS/E records of a fit, given its result.json or the folder that holds it.
+def export(result: FitResult, bus: int, machine_id: str, name: str | None = None) -> Exported:
+    """Return the PSS/E records of a fit.
 
     ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
-    file is no result of a fit, or its model has no record.
+    model has no record.
     """
-    result = read_saved(path)
-    source = result.path
     warnings = [*_of_fit(result)]
     written = [
         *_machine(result, warnings),
@@ -50,80 +48,74 @@ def export(path: Path, bus: int, machine_id: str, name: str | None = None) -> Ex
         *_stabiliser(result, warnings),
     ]
     if not written:
-        raise ExfitError(f"{source}: {result.text('model')} has no PSS/E record")
-    for one in written:
-        warnings += _warnings(one)
+        raise ExfitError(f"{result.model} has no PSS/E record")
+    for record in written:
+        warnings += _warnings(record)
     comments = [*_origin(result), *(f"{text}." for text in _of_fit(result))]
-    comments += [text for one in written for text in _comments(one)]
+    comments += [text for record in written for text in _comments(record)]
     lines = [line for text in comments for line in _wrapped(text)]
     lines += [record_text(one.definition, one.values, bus, machine_id) for one in written]
-    return Exported("\n".join(lines) + "\n", tuple(f"{source}: {text}" for text in warnings))
+    return Exported("\n".join(lines) + "\n", tuple(warnings))
 
 
-def _of_fit(result: Saved) -> Iterator[str]:
+def _of_fit(result: FitResult) -> Iterator[str]:
     """Yield what of the fit itself must be known."""
-    if result.content.get("success") is False:
-        yield f"the fit did not converge: {result.text('message')}"
-    form = result.text("saturation") or "quadratic"
-    if form != "quadratic":
-        yield f"fitted with saturation: {form}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
+    if not result.success:
+        yield f"the fit did not converge: {result.message}"
+    if result.saturation != "quadratic":
+        yield f"fitted with saturation: {result.saturation}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
 
 
-def _exciter(result: Saved, name: str | None) -> Iterator[Written]:
-    model_name = result.text("model") or ""
-    if model_name == result.text("machine_model"):  # it stood alone
+def _exciter(result: FitResult, name: str | None) -> Iterator[Written]:
+    if result.model == result.machine_model:  # it stood alone
         if name is not None:
-            raise ExfitError(f"--model {name}: the fit is of {model_name}, without an exciter")
+            raise ExfitError(f"--model {name}: the fit is of {result.model}, without an exciter")
         return
-    model = MODELS.get(model_name)
-    if model is None or "model" in result.mapping("inputs"):
-        raise ExfitError(
-            f"{result.path}: {model_name} is not a model of the catalogue: it has no PSS/E record"
-        )
+    model = MODELS.get(result.model)
+    if model is None or "model" in result.inputs:
+        raise ExfitError(f"{result.model} is not a model of the catalogue: it has no PSS/E record")
     known = {one.record.name: one for one in alternatives(model)}
     if not known:
-        raise ExfitError(f"{result.path}: {model_name} has no PSS/E record")
+        raise ExfitError(f"{result.model} has no PSS/E record")
     wanted = next(iter(known)) if name is None else name.upper()
     if wanted not in known:
-        raise ExfitError(f"--model {name}: {model_name} is not written so; {near(wanted, known)}")
-    yield _written(result, known[wanted], "fixed", "")
+        raise ExfitError(f"--model {name}: not a record of {result.model}; {near(wanted, known)}")
+    yield _written(result, known[wanted], "")
 
 
-def _machine(result: Saved, warnings: list[str]) -> Iterator[Written]:
-    name = result.text("machine_model")
+def _machine(result: FitResult, warnings: list[str]) -> Iterator[Written]:
+    name = result.machine_model
     known = alternatives(MACHINES[name]) if name in MACHINES else []
     if not known:
         what = "no machine is named" if name is None else f"machine {name} has no PSS/E record"
         warnings.append(f"{what}: only the exciter is written")
         return
-    yield _written(result, known[0], "machine", "machine.")
+    yield _written(result, known[0], "machine.")
 
 
-def _stabiliser(result: Saved, warnings: list[str]) -> Iterator[Written]:
-    name = result.text("stabiliser_model")
+def _stabiliser(result: FitResult, warnings: list[str]) -> Iterator[Written]:
+    name = result.stabiliser_model
     if name is None:
         return
     known = [one for one in definitions() if one.kind == "stabiliser" and one.model.name == name]
     if not known:
         warnings.append(f"stabiliser {name} has no PSS/E record: it is left out")
         return
-    yield _written(result, known[0], "stabiliser", "stabiliser.")
+    yield _written(result, known[0], "stabiliser.")
 
 
-def _written(result: Saved, definition: Definition, key: str, prefix: str) -> Written:
+def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
     """Return a record with the values of a result; raises ExfitError where one is missing."""
-    values, fitted = result.values(key, prefix), result.fitted_of(prefix)
+    values = result.values_of(prefix)
     missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
     if missing:
-        raise ExfitError(f"{result.path}: {key}: missing: {', '.join(missing)}")
-    told = result.content.get("typical")
-    assumed = told if isinstance(told, list) else []
-    in_record = definition.names
+        names = ", ".join(prefix + symbol for symbol in missing)
+        raise ExfitError(f"{definition.record.name}: no value of {names} in the result")
     return Written(
         definition,
         values,
-        tuple(name for name in in_record if name in fitted),
-        tuple(name for name in in_record if prefix + name in assumed),
+        tuple(name for name in definition.names if prefix + name in result.parameters),
+        tuple(name for name in definition.names if prefix + name in result.typical),
     )
 
 
@@ -150,14 +142,10 @@ def _matters(symbol: str, value: float) -> bool:
     return value != 0.0
 
 
-def _origin(result: Saved) -> Iterator[str]:
-    record = result.mapping("fit").get("record")
-    rmse = result.content.get("rmse")
-    to = f" to {record}" if isinstance(record, str) else ""
-    error = f", rmse {rmse:.3g} pu" if isinstance(rmse, float) else ""
-    yield f"exfit {__version__}: {result.text('model')} fitted{to}{error}."
-    if (case := result.text("case")) is not None:
-        yield f"Case: {case}."
+def _origin(result: FitResult) -> Iterator[str]:
+    error = f", rmse {result.rmse:.3g} pu" if isfinite(result.rmse) else ""
+    yield f"exfit {__version__}: {result.model} fitted to {result.comparison.record}{error}."
+    yield f"Case: {result.case}."
 
 
 def _comments(one: Written) -> Iterator[str]:

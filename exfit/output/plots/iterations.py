@@ -9,7 +9,8 @@ from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
-from exfit.results.model import Comparison, FitResult, IterationResponses
+from exfit.results.comparisons import IterationResponses
+from exfit.results.model import FitResult
 from exfit.signals import label_of
 
 FADING = LinearSegmentedColormap.from_list("fading", ["#b9d2ee", START, "#5b2a86", SIMULATED])
@@ -38,10 +39,10 @@ def iterations(result: FitResult) -> Figure:
         upper, lower = axes[2 * k], axes[2 * k + 1]
         lower.sharex(upper)
         upper.tick_params(labelbottom=False)
-        _responses(upper, comparison, courses)
-        _errors(lower, comparison, courses)
+        _responses(upper, courses)
+        _errors(lower, courses)
         if count > 1:
-            upper.set_title(f"{comparison.name}: {comparison.record.name}", fontsize=9, loc="left")
+            upper.set_title(f"{comparison.name}: {comparison.record}", fontsize=9, loc="left")
     axes[-1].set_xlabel("time (s)")
     figure.align_ylabels()
     numbers = sorted({number for _, courses in shown for number in courses.numbers})
@@ -55,8 +56,8 @@ def _colours(numbers: Sequence[int]) -> list[tuple[float, float, float, float]]:
     return [FADING(place) for place in places[: len(numbers)]]
 
 
-def _responses(axes: Axes, comparison: Comparison, courses: IterationResponses) -> None:
-    time, measured = comparison.time, comparison.judged.measured
+def _responses(axes: Axes, courses: IterationResponses) -> None:
+    time, measured = courses.time, courses.measured
     axes.plot(time, measured, ".", color=MEASURED, markersize=3, label="measured")
     last = len(courses.numbers) - 1
     labels = {0: "start" if courses.numbers[0] == 0 else f"iteration {courses.numbers[0]}"}
@@ -70,11 +71,11 @@ def _responses(axes: Axes, comparison: Comparison, courses: IterationResponses) 
     tidy(axes)
 
 
-def _errors(axes: Axes, comparison: Comparison, courses: IterationResponses) -> None:
+def _errors(axes: Axes, courses: IterationResponses) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
     for samples, colour in zip(courses.samples, _colours(courses.numbers), strict=True):
-        error = MILLI * (samples - comparison.judged.measured)
-        axes.plot(comparison.time, error, color=colour, linewidth=0.8)
+        error = MILLI * (samples - courses.measured)
+        axes.plot(courses.time, error, color=colour, linewidth=0.8)
     axes.set_ylabel("simulated\n- measured\n(1e-3 pu)")
     tidy(axes)
 

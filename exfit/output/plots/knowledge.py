@@ -19,18 +19,17 @@ def sensitivity(known: UncertaintyAnalysis, title: str) -> Figure:
 
     What belongs to a record is left out.
     """
-    linear, courses = known.linear, known.sensitivity
-    shown = [k for k, of_record in enumerate(linear.nuisances) if not of_record]
+    courses = known.sensitivity
     figure = Figure(figsize=(WIDTH, 1.2 + 3.0 * len(courses)), layout="constrained")
     panels = figure.subplots(len(courses), 1, squeeze=False)[:, 0]
     for axes, course in zip(panels, courses, strict=True):
-        for place, k in enumerate(shown):
+        for place, (name, moved) in enumerate(course.moved.items()):
             axes.plot(
-                *envelope(course.time, PERCENT * MILLI * course.moved[:, k]),
+                *envelope(course.time, PERCENT * MILLI * moved),
                 STYLES[place // len(COLORS) % len(STYLES)],
                 color=COLORS[place % len(COLORS)],
                 linewidth=1.3,
-                label=linear.names[k],
+                label=name,
             )
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_ylabel(f"change of {course.label}\nfor +1 % (1e-3 pu)")
@@ -43,7 +42,7 @@ def sensitivity(known: UncertaintyAnalysis, title: str) -> Figure:
 
 def correlation(known: UncertaintyAnalysis, title: str) -> Figure:
     """Return the correlations of the estimates as a map; what has none is left blank."""
-    names, values = known.linear.names, known.confidence.correlation
+    names, values = known.confidence.names, known.confidence.correlation.matrix
     side = max(4.2, 1.6 + 0.62 * len(names))
     figure = Figure(figsize=(side + 1.2, side), layout="constrained")
     axes = figure.subplots()

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from exfit.dsp.decimation import envelope
 from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
-from exfit.results.model import Comparison, Overlay
+from exfit.results.comparisons import Comparison, Overlay
 from exfit.signals import label_of
 
 
@@ -36,7 +36,8 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> No
     axes.plot(*envelope(time, one.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
     axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
-    text = f"rmse {one.rmse:.3g} pu, fit {one.fit_percent:.2f} %"
+    match = comparison.channels[signal]
+    text = f"rmse {match.rmse:.3g} pu, fit {match.fit_percent:.2f} %"
     axes.set_title(text, fontsize=9, loc="right")
     tidy(axes)
 

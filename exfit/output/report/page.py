@@ -1,16 +1,21 @@
 """The page of a report: one HTML file that needs nothing beside it."""
 
+import shlex
+from collections.abc import Iterable
 from functools import cache
 from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from exfit import __version__
 from exfit.dsp.features import LABELS
 from exfit.errors import ExfitError
 from exfit.output.report.charts import drawing
-from exfit.output.report.content import Report
-from exfit.output.report.figures import data, figures
+from exfit.output.report.sections import SECTIONS
+from exfit.output.report.sections.matches import MatchView, OverlayChart, live_data
+from exfit.output.report.verdict import verdict
+from exfit.results.model import FitResult
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -22,19 +27,18 @@ GENERATOR = '<meta name="generator" content="exfit '
 HEAD = 2000  # characters at the beginning of a page, among which it says what made it
 
 
-def html(report: Report) -> str:
-    """Return the page of a report."""
-    charts = figures(report)
+def html(result: FitResult, folder: Path) -> str:
+    """Return the page of a fit; ``folder`` is where the fit lies, for the commands on the page."""
+    sections = [(section, section.content(result)) for section in SECTIONS]
     page: str = (
         _environment()
         .get_template("report.html.jinja")
         .render(
-            report=report,
-            charts=charts,
-            data=data(charts.overlays),
-            features=LABELS,
-            long=LONG,
-            version=__version__,
+            title=f"{result.model}: {result.name}",
+            verdict=verdict(result),
+            sections=sections,
+            folder=str(folder),
+            data=list(live_data(_overlays(content for _, content in sections))),
             css=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
             scripts=[*library(), (TEMPLATES / "report.js").read_text(encoding="utf-8")],
         )
@@ -60,6 +64,18 @@ def library() -> list[str]:
     return [(folder / name).read_text(encoding="utf-8") for name in LIBRARY]
 
 
+def _overlays(contents: Iterable[Any]) -> list[OverlayChart]:
+    """Return the overlays of all sections that have some."""
+    return [
+        overlay
+        for content in contents
+        if isinstance(content, tuple)
+        for view in content
+        if isinstance(view, MatchView)
+        for overlay in view.overlays
+    ]
+
+
 @cache
 def _environment() -> "Environment":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -71,10 +87,16 @@ def _environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": _number, "drawing": drawing}
+    environment.filters |= {"number": _number, "drawing": drawing, "command": shlex.join}
+    environment.tests |= {"finite": _is_finite}
+    environment.globals |= {"version": __version__, "features": LABELS, "long": LONG}
     return environment
 
 
+def _is_finite(value: float | None) -> bool:
+    return value is not None and isfinite(value)
+
+
 def _number(value: float | None, digits: int = 5) -> str:
-    """Return a number in a few digits, a dash for None."""
-    return "–" if value is None else f"{value:.{digits}g}"
+    """Return a number in a few digits, a dash where there is none."""
+    return "–" if value is None or not isfinite(value) else f"{value:.{digits}g}"

@@ -7,7 +7,7 @@ from rich.table import Table
 
 from exfit.dsp.features import LABELS, Features
 from exfit.output.terminal.terminal import number, plain_table
-from exfit.results.model import Comparison
+from exfit.results.comparisons import Comparison
 
 BETWEEN_COLUMNS = 2  # characters
 LABEL_WIDTH = 25  # characters that the names and units of the features take
@@ -18,14 +18,16 @@ def comparisons(console: Console, all_of_them: Sequence[Comparison]) -> None:
     for beside in _beside_each_other(console, all_of_them):
         console.print()
         console.print(_error_table(beside))
-        if any(comparison.measured or comparison.simulated for comparison in beside):
+        if any(
+            comparison.features.measured or comparison.features.simulated for comparison in beside
+        ):
             console.print()
             console.print(_feature_table(beside))
     for comparison in all_of_them:
         if not comparison.accepted:
             console.print(
                 f"[bold red]not accepted[/] {comparison.name}: rmse {comparison.rmse:.3e} exceeds "
-                f"{comparison.rmse_limit:.3e}"
+                f"{comparison.limit:.3e}"
             )
 
 
@@ -50,7 +52,7 @@ def _error_table(comparisons: Sequence[Comparison]) -> Table:
     names = [comparison.name for comparison in comparisons]
     table = _folding(plain_table("", "unit", *names, numbers=names))
     table.add_row("cost", "pu²", *(f"{comparison.cost:.4e}" for comparison in comparisons))
-    signals = list(dict.fromkeys(signal for one in comparisons for signal in one.overlays))
+    signals = list(dict.fromkeys(signal for one in comparisons for signal in one.channels))
     for signal in signals:
         label = "rmse" if len(signals) == 1 else f"rmse {signal}"
         table.add_row(label, "pu", *(_rmse(comparison, signal) for comparison in comparisons))
@@ -60,8 +62,8 @@ def _error_table(comparisons: Sequence[Comparison]) -> Table:
 
 
 def _rmse(comparison: Comparison, signal: str) -> str:
-    overlay = comparison.overlays.get(signal)
-    return "-" if overlay is None else f"{overlay.rmse:.3e}"
+    match = comparison.channels.get(signal)
+    return "-" if match is None else f"{match.rmse:.3e}"
 
 
 def _feature_table(comparisons: Sequence[Comparison]) -> Table:
@@ -72,7 +74,7 @@ def _feature_table(comparisons: Sequence[Comparison]) -> Table:
         cells = [
             _feature(features, key)
             for comparison in comparisons
-            for features in (comparison.measured, comparison.simulated)
+            for features in (comparison.features.measured, comparison.features.simulated)
         ]
         table.add_row(label, unit, *cells)
     return table

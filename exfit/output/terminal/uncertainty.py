@@ -41,7 +41,7 @@ def design(console: Console, result: Design) -> None:
     heads = ["this test", *(plan.label for plan in result.plans)]
     table = plain_table("parameter", *heads, numbers=heads)
     tests = [result.own.confidence, *(plan.confidence for plan in result.plans)]
-    for name in result.own.linear.names:
+    for name in result.own.confidence.names:
         table.add_row(name, *(error_of(confidence.parameters[name]) for confidence in tests))
     console.print(table)
     console.print()

@@ -1,0 +1,67 @@
+"""What fitted values do: without a step, near the state of rest, at the limits."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from exfit.analysis.model_check import FLAT_DRIFT, flat_drift
+from exfit.errors import SimulationError
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.setup import ExperimentSetup
+from exfit.results.description import Behaviour, FlatRun, HitLimits, SmallSignalView
+from exfit.simulation.limit_hits import limits_hit
+from exfit.simulation.small_signal import small_signal
+
+Values = Mapping[str, float]
+
+
+def behaviour_of(
+    setups: Sequence[ExperimentSetup],
+    values: Values,
+    validations: Iterable[tuple[ExperimentSetup, Values]],
+) -> Behaviour:
+    """Return what the values do in the fitted tests, and which limits the validations met.
+
+    The tests have sub-steps enough; each validation has its own values, with what was found about
+    its record.
+    """
+    experiments = [setup.experiment for setup in setups]
+    every = [*((setup, values) for setup in setups), *validations]
+    return Behaviour(
+        flat_runs=tuple(_flat_run(experiment, values) for experiment in experiments),
+        small_signal=tuple(_small_signal(experiments, values)),
+        limits=tuple(_limits(setup, own) for setup, own in every),
+    )
+
+
+def _flat_run(experiment: Experiment, values: Values) -> FlatRun:
+    simulator, parameters = experiment.with_inputs(values), experiment.parameters(values)
+    try:
+        drift = flat_drift(simulator, parameters, experiment.signals)
+    except SimulationError:
+        drift = float("nan")
+    return FlatRun(experiment.name, drift, drift <= FLAT_DRIFT)
+
+
+def _small_signal(experiments: Sequence[Experiment], values: Values) -> Iterator[SmallSignalView]:
+    """Yield the small-signal view of each state of rest that the tests start from."""
+    alike: dict[object, list[Experiment]] = {}
+    for experiment in experiments:
+        parameters = experiment.parameters(values)
+        key = (experiment.simulator.system, tuple(sorted(parameters.items())))
+        alike.setdefault(key, []).append(experiment)
+    for same in alike.values():
+        names, first = tuple(experiment.name for experiment in same), same[0]
+        if "vref" not in first.simulator.system.inputs:
+            why = "the recorded signals drive the machine: there is no loop"
+            yield SmallSignalView(names, None, why)
+            continue
+        try:
+            view = small_signal(first.simulator.system, first.parameters(values))
+            yield SmallSignalView(names, view)
+        except SimulationError as fault:
+            yield SmallSignalView(names, None, str(fault))
+
+
+def _limits(setup: ExperimentSetup, values: Values) -> HitLimits:
+    at = setup.with_start_values(values)
+    simulator, parameters = setup.experiment.with_inputs(at), setup.experiment.parameters(at)
+    return HitLimits(setup.name, limits_hit(simulator, parameters))

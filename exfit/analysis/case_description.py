@@ -1,0 +1,139 @@
+"""A case in words and tables, as its report shows it: its models, its tests, its files."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from exfit.case.case import Case
+from exfit.case.parts import Part
+from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, Unknown, known
+from exfit.fitting.setup import ExperimentSetup
+from exfit.plants import NETWORK
+from exfit.records.reading import file_hash
+from exfit.results.description import (
+    NetworkParameter,
+    PartDescription,
+    RecordedTest,
+    SheetRow,
+)
+
+
+def labelled_records(case: Case) -> list[str]:
+    """Return the labels of the records of a case: of those fitted, then of the validations."""
+    fitted = [f"records.{recording.name}" for recording in case.records] or ["record"]
+    return [*fitted, *(f"validate.{recording.name}" for recording in case.validations)]
+
+
+def input_hashes(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]:
+    """Return the SHA-256 of every file that goes into a result, by its label.
+
+    ``setups`` are those of the fitted records, then of the validations.
+    """
+    hashes = {"case": file_hash(case.path)} if case.from_file else {}
+    if case.model is not None and case.model.endswith(".py"):
+        hashes["model"] = file_hash(case.folder / case.model)
+    records = (setup.record.sha256 for setup in setups)
+    return hashes | dict(zip(labelled_records(case), records, strict=True))
+
+
+def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]:
+    """Return the name of every file that goes into a result, by its label."""
+    records = (setup.record.source.name for setup in setups)
+    return {
+        "case": case.path.name,
+        "model": (case.folder / (case.model or "")).name,
+        **dict(zip(labelled_records(case), records, strict=True)),
+    }
+
+
+def values_by_part(case: Case, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """Return the values of each part, by its kind and their symbols."""
+    return {
+        part.kind: {symbol: values[part.prefix + symbol] for symbol in part.symbols}
+        for part in case.parts.all
+    }
+
+
+def fixed_values(case: Case, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values of the exciter, and of helpers of ties, that are not free."""
+    others = tuple(part.prefix for part in case.parts.all if part.prefix)
+    free = case.free()
+    return {
+        name: values[name]
+        for name in case.values()
+        if name not in free and not name.startswith(others)
+    }
+
+
+def parts_of(case: Case) -> Iterator[PartDescription]:
+    """Yield the parts of a case with their data sheets and drawings."""
+    parts = case.parts
+    models = {"exciter": parts.exciter, "stabiliser": parts.stabiliser}
+    for part in parts.all:
+        model = models.get(part.kind)
+        machine = parts.machine if part.kind == "machine" else None
+        yield PartDescription(
+            kind=part.kind,
+            name=part.name,
+            prefix=part.prefix,
+            title=machine.title if machine else model.title if model else "",
+            drawing=model.drawing if model else "",
+            sheet={row.symbol: SheetRow(row.unit, row.meaning) for row in part.sheet},
+        )
+
+
+def tests_of(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[RecordedTest]:
+    """Yield the tests of a case with their records; ``setups`` as for `input_hashes`."""
+    roles = [*("fitted" for _ in case.recordings), *("validation" for _ in case.validations)]
+    recordings = (*case.recordings, *case.validations)
+    for role, recording, setup in zip(roles, recordings, setups, strict=True):
+        time = setup.record.time
+        view = case.seen_from(recording)
+        yield RecordedTest(
+            name=recording.name,
+            role=role,
+            file=recording.record.file,
+            plant=view.kind.title,
+            done="; ".join(_events(recording.test)) or "no step of its own",
+            channels="; ".join(_channel(*entry) for entry in recording.record.channels.items()),
+            samples=len(time),
+            first=float(time[0]),
+            last=float(time[-1]),
+            spacing=float(time[-1] - time[0]) / (len(time) - 1),
+            network={} if view is case else _network(view),
+        )
+
+
+def _network(view: Case) -> dict[str, NetworkParameter]:
+    values = view.values()
+    networks: Iterator[Part] = (part for part in view.parts.all if part.kind == "network")
+    return {
+        row.symbol: NetworkParameter(values[NETWORK + row.symbol], row.unit, row.meaning)
+        for part in networks
+        for row in part.sheet
+    }
+
+
+def _events(test: BumpTest) -> Iterator[str]:
+    """Yield what was done to the unit, in words."""
+    if test.vt0 is not None:
+        yield f"vt0 {_given(test.vt0, 'g', 'pu')}"
+    for signal in ("vref", "vs", "E"):
+        for step in getattr(test, signal):
+            yield f"{signal} {_given(step.step, '+g', 'pu')} at {_given(step.at, 'g', 's')}"
+    for switch in test.network:
+        values = {name: getattr(switch, name) for name in ("R", "X", "E")}
+        changes = (f"{name} {value:g} pu" for name, value in values.items() if value is not None)
+        yield f"network switched at {switch.at:g} s: {', '.join(changes)}"
+
+
+def _channel(signal: str, entry: ChannelSection | PhasesSection) -> str:
+    """Return a signal with what 1 pu of it is."""
+    return signal if entry.base is None else f"{signal}, 1 pu = {entry.base:g} {entry.unit}"
+
+
+def _given(value: float | Unknown, form: str, unit: str) -> str:
+    """Return a value of a test; one that the fit identified stands among the parameters."""
+    if not isinstance(value, Unknown):
+        return f"{value:{form}} {unit}"
+    start = known(value)
+    about = "" if start is None else f"about {start:{form}} {unit} "
+    return f"{about}(found by the fit)"

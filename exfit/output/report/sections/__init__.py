@@ -1,0 +1,47 @@
+"""The sections of a report in their order: a module with what it says, a template, a row here."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from exfit.output.report.sections.dynamics import dynamics
+from exfit.output.report.sections.findings import findings
+from exfit.output.report.sections.flat_run import flat_runs
+from exfit.output.report.sections.identifiability import identifiability
+from exfit.output.report.sections.limits import limits
+from exfit.output.report.sections.matches import fitted_matches, validation_matches
+from exfit.output.report.sections.model import model
+from exfit.output.report.sections.parameters import parameters
+from exfit.output.report.sections.reproduction import reproduction
+from exfit.output.report.sections.search import search
+from exfit.output.report.sections.small_signal import small_signal
+from exfit.output.report.sections.unit_and_test import unit_and_test
+from exfit.results.model import FitResult
+
+
+class Section(NamedTuple):
+    """A section of a report: its id, its heading, what it says; its template is named after it."""
+
+    key: str
+    heading: str
+    content: Callable[[FitResult], Any]
+    template: str
+
+
+SECTIONS = (
+    Section("test", "Unit and test", unit_and_test, "unit_and_test"),
+    Section("model", "Model", model, "model"),
+    Section("parameters", "Parameters", parameters, "parameters"),
+    Section("findings", "Notes and unresolved findings", findings, "findings"),
+    Section("fit", "Fitted records", fitted_matches, "fit"),
+    Section(
+        "validation", "Validation on records that the fit never saw", validation_matches,
+        "validation",
+    ),
+    Section("search", "Search", search, "search"),
+    Section("identifiability", "Identifiability", identifiability, "identifiability"),
+    Section("flat", "Flat run", flat_runs, "flat_run"),
+    Section("small", "Small-signal view", small_signal, "small_signal"),
+    Section("limits", "Limits that were hit", limits, "limits"),
+    Section("dyr", "PSS/E dynamics records", dynamics, "dynamics"),
+    Section("reproduction", "Reproduction", reproduction, "reproduction"),
+)  # fmt: skip

@@ -1,0 +1,19 @@
+"""What a reader must know beside the numbers."""
+
+from dataclasses import dataclass
+
+from exfit.results.model import FitResult
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the records leave unresolved, and the notes of the fit."""
+
+    unresolved: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def findings(result: FitResult) -> Findings:
+    """Return the findings of a fit."""
+    known = result.knowledge
+    return Findings(() if known is None else known.sentences, result.notes)

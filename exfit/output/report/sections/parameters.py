@@ -1,0 +1,89 @@
+"""The parameters of a fit: those that were fitted, and where all others come from."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from exfit.results.description import PartDescription, SheetRow
+from exfit.results.model import FitResult, FittedParameter
+
+NO_ROW = SheetRow()  # of a result that holds no data sheet
+
+
+@dataclass(frozen=True)
+class FixedParameter:
+    """A parameter that the fit did not move, and where its value is from."""
+
+    name: str
+    unit: str
+    meaning: str
+    value: float
+    source: str
+
+
+@dataclass(frozen=True)
+class FixedGroup:
+    """The parameters of a part that the fit did not move."""
+
+    title: str
+    rows: tuple[FixedParameter, ...]
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The fitted parameters, then the others, part by part."""
+
+    fitted: Mapping[str, FittedParameter]
+    fixed: tuple[FixedGroup, ...]
+
+
+def parameters(result: FitResult) -> Parameters:
+    """Return all parameters of a fit."""
+    groups = (*_of_parts(result), *_helpers(result), *_networks_of_records(result))
+    return Parameters(result.parameters, tuple(group for group in groups if group.rows))
+
+
+def _of_parts(result: FitResult) -> Iterator[FixedGroup]:
+    for part in result.parts:
+        values = result.values_of(part.prefix)
+        rows = (
+            _fixed(result, part.prefix, symbol, values[symbol], row)
+            for symbol, row in _sheet(result, part).items()
+            if symbol in values and part.prefix + symbol not in result.parameters
+        )
+        yield FixedGroup(part.heading, tuple(rows))
+
+
+def _sheet(result: FitResult, part: PartDescription) -> Mapping[str, SheetRow]:
+    """Return the data sheet of a part: where the result holds none, its symbols alone."""
+    if part.sheet is not None:
+        return part.sheet
+    return dict.fromkeys(result.values_of(part.prefix), NO_ROW)
+
+
+def _helpers(result: FitResult) -> Iterator[FixedGroup]:
+    """Yield what stands among the exciter's parameters and is none of them."""
+    own = {symbol for part in result.parts if not part.prefix for symbol in _sheet(result, part)}
+    row = SheetRow(meaning="used by ties")
+    rows = (
+        _fixed(result, "", name, value, row)
+        for name, value in result.fixed.items()
+        if name not in own
+    )
+    yield FixedGroup("Helpers", tuple(rows))
+
+
+def _networks_of_records(result: FitResult) -> Iterator[FixedGroup]:
+    for test in result.tests:
+        rows = (
+            _fixed(result, "network.", symbol, row.value, SheetRow(row.unit, row.meaning))
+            for symbol, row in test.network.items()
+            if f"network.{symbol}" not in result.parameters
+        )
+        yield FixedGroup(f"Network of {test.name}", tuple(rows))
+
+
+def _fixed(
+    result: FitResult, prefix: str, symbol: str, value: float, row: SheetRow
+) -> FixedParameter:
+    source = result.source_of(prefix + symbol)
+    return FixedParameter(symbol, row.unit, row.meaning, value, source)

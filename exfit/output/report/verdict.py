@@ -1,0 +1,79 @@
+"""What a fit comes to: a word, a sentence, and whether it is good."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from exfit.inference.wording import listed
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FitResult
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the fit comes to: a word, a sentence, and whether it is good; None where none judges."""
+
+    word: str
+    sentence: str
+    good: bool | None
+
+
+def verdict(result: FitResult) -> Verdict:
+    """Return what a fit comes to."""
+    word, text, good = _judged(result)
+    rmse = ", ".join(
+        f"{match.rmse:.2e} pu ({match.name})" for match in (*result.comparisons, *result.validation)
+    )
+    sentence = f"{text[:1].upper()}{text[1:]}{_missed(result)}; rmse {rmse}; {_determined(result)}."
+    return Verdict(word, sentence, good)
+
+
+def _determined(result: FitResult) -> str:
+    own = {name: one for name, one in result.parameters.items() if not one.of_record}
+    vague = [name for name, parameter in own.items() if parameter.interval is None]
+    if not vague:
+        return "every parameter determined"
+    return f"{len(vague)} of {len(own)} parameters not determined: {listed(vague)}"
+
+
+def _missed(result: FitResult) -> str:
+    """Return the signals that are matched no better than by a constant.
+
+    None is judged by them, but a wrong base of one shows nowhere else at a glance.
+    """
+    others = [
+        f"{signal} of {comparison.name}"
+        for comparison in result.comparisons
+        for signal, match in comparison.channels.items()
+        if signal != comparison.judged_by and not match.describes
+    ]
+    return f"; no better than by a constant matched: {listed(others)}" if others else ""
+
+
+def _judged(result: FitResult) -> tuple[str, str, bool | None]:
+    if result.interrupted:
+        return "Interrupted", "the values are the best until the search was interrupted", False
+    if not result.success:
+        return "Not converged", f"the search ended before a minimum: {result.message}", False
+    missed = [match.name for match in result.comparisons if not match.judged.describes]
+    if missed:
+        names = listed(missed)
+        return "No match", f"the response matches {names} no better than a constant would", False
+    return _validated(result.validation)
+
+
+def _validated(validation: Sequence[Comparison]) -> tuple[str, str, bool | None]:
+    beyond = [match.name for match in validation if not match.accepted]
+    limits = [match.limit for match in validation if match.limit is not None]
+    limit = f" {limits[0]:g} pu" if limits else ""
+    if beyond:
+        of = limit or " of the case"
+        return "Not accepted", f"beyond rmse{of} on {listed(beyond)}", False
+    if not validation:
+        return "Converged", "no record was kept for a validation", None
+    if not limits:
+        return "Converged", "the case sets no limit for its validations", None
+    return (
+        "Accepted",
+        f"the search converged, and every validation is within rmse{limit}",
+        True,
+    )

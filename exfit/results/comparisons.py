@@ -1,0 +1,155 @@
+"""A simulated response beside a record: its samples, and how well they match."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from math import nan
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.features import Features
+from exfit.util.typed import IN_FILE
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """Measured and simulated samples (M,) of one signal, per unit; ``start`` after a fit.
+
+    What is left out of the comparison is nan.
+    """
+
+    measured: Array
+    simulated: Array
+    start: Array | None = None
+
+    @property
+    def error(self) -> Array:
+        """Simulated minus measured."""
+        return self.simulated - self.measured
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of the error, per unit."""
+        return float(np.sqrt(np.nanmean(self.error**2)))
+
+    @property
+    def max_error(self) -> float:
+        """Largest magnitude of the error, per unit."""
+        return float(np.nanmax(np.abs(self.error)))
+
+    @property
+    def fit_percent(self) -> float:
+        """100 (1 - |error| / |measured - its mean|), norms of the whole signal: 100 is perfect."""
+        kept = np.isfinite(self.error)
+        measured, error = self.measured[kept], self.error[kept]
+        spread = float(np.linalg.norm(measured - np.mean(measured)))
+        return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread else float("nan")
+
+
+@dataclass(frozen=True)
+class Match:
+    """How well a signal matches its record: errors per unit, and the fit percentage."""
+
+    rmse: Annotated[float, nan]
+    max_error: Annotated[float, nan]
+    fit_percent: Annotated[float, nan]
+
+    @property
+    def describes(self) -> bool:
+        """Whether the response matches better than a constant would."""
+        return self.fit_percent > 0.0
+
+
+def match_of(overlay: Overlay) -> Match:
+    """Return how well the samples of an overlay match."""
+    return Match(overlay.rmse, overlay.max_error, overlay.fit_percent)
+
+
+def judged_of(signals: Iterable[str]) -> str:
+    """Return the signal that a match is judged by: vt, or the first where there is no vt."""
+    names = tuple(signals)
+    return "vt" if "vt" in names else names[0]
+
+
+@dataclass(frozen=True, eq=False)
+class IterationResponses:
+    """A signal, measured and after some iterations of a fit, per unit, at ``time`` (M,) in s.
+
+    ``numbers`` (K,) are those of the iterations, in rising order; 0 is the start. ``measured`` is
+    (M,), ``samples`` (K, M). What is left out of the comparison is nan.
+    """
+
+    signal: str
+    numbers: tuple[int, ...]
+    time: Array
+    measured: Array
+    samples: Array
+
+
+@dataclass(frozen=True)
+class StepFeatures:
+    """Features of vt after the first step, None where the record does not have it."""
+
+    measured: Features | None
+    simulated: Features | None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A simulated response beside a record.
+
+    ``record`` is the name of its file, ``cost`` that of the weighted residuals of all signals.
+    ``channels`` says how well each signal matches, ``overlays`` holds its samples at ``time`` (M,)
+    in s: of a result that is read back they are thinned, and missing in files of an earlier
+    version. ``limit`` is the largest rmse (pu) that the case accepts, ``of_record`` what a
+    validation found about its own record. ``rmse``, ``max_error`` and ``fit_percent`` are those of
+    vt, or of the first signal where there is no vt.
+    """
+
+    DERIVED: ClassVar = {
+        "rmse": "rmse",
+        "max_error": "max_error",
+        "fit_percent": "fit_percent",
+    }
+
+    name: str
+    record: str
+    cost: float
+    accepted: bool
+    channels: Mapping[str, Match]
+    features: StepFeatures
+    limit: float | None = None
+    of_record: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
+    sha256: str = field(default="", metadata=IN_FILE)
+    substeps: int = field(default=0, metadata=IN_FILE)
+    time: Array = field(default_factory=lambda: np.zeros(0), metadata=IN_FILE)
+    overlays: Mapping[str, Overlay] = field(default_factory=dict, metadata=IN_FILE)
+    iteration_responses: IterationResponses | None = field(default=None, metadata=IN_FILE)
+
+    @property
+    def judged_by(self) -> str:
+        """The name of the signal that the match is judged by."""
+        return judged_of(self.channels)
+
+    @property
+    def judged(self) -> Match:
+        """How well the signal matches that the match is judged by."""
+        return self.channels[self.judged_by]
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square of its error, per unit."""
+        return self.judged.rmse
+
+    @property
+    def max_error(self) -> float:
+        """Largest magnitude of its error, per unit."""
+        return self.judged.max_error
+
+    @property
+    def fit_percent(self) -> float:
+        """Its fit percentage; not above zero where a constant would match as well."""
+        return self.judged.fit_percent

@@ -1,0 +1,103 @@
+"""What was fitted to what: the tests, the models with their data sheets; what the fit does."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import nan
+from typing import Annotated, NamedTuple
+
+from exfit.simulation.limit_hits import LimitHit
+from exfit.simulation.small_signal import SmallSignal
+
+
+class SheetRow(NamedTuple):
+    """What a data sheet says of a parameter."""
+
+    unit: str = ""
+    meaning: str = ""
+
+
+class NetworkParameter(NamedTuple):
+    """A parameter of the network of one record."""
+
+    value: float
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class PartDescription:
+    """A part of what was fitted: its kind, its model, how its parameters' names begin.
+
+    ``sheet`` is by symbol; ``drawing`` is empty where there is none.
+    """
+
+    kind: str
+    name: str
+    prefix: str
+    title: str = ""
+    drawing: str = ""
+    sheet: Mapping[str, SheetRow] | None = None
+
+    @property
+    def heading(self) -> str:
+        """Its kind and name, as a heading of a table has them."""
+        return "Network" if self.kind == "network" else f"{self.kind.capitalize()} {self.name}"
+
+
+@dataclass(frozen=True)
+class RecordedTest:
+    """A test and its record: what was done, in which condition of the unit, what was measured.
+
+    ``first``, ``last`` and ``spacing`` of its samples are in s; ``network`` is by symbol, where the
+    test has one of its own.
+    """
+
+    name: str
+    role: str
+    file: str
+    plant: str
+    done: str
+    channels: str
+    samples: int
+    first: float
+    last: float
+    spacing: float
+    network: Mapping[str, NetworkParameter]
+
+
+@dataclass(frozen=True)
+class FlatRun:
+    """How far (pu) the signals of a test stray from rest without a step; nan without a rest."""
+
+    test: str
+    drift: Annotated[float, nan]
+    rests: bool
+
+
+@dataclass(frozen=True)
+class SmallSignalView:
+    """The small-signal view of tests whose system and state of rest are the same.
+
+    ``view`` is None for the reason ``why``.
+    """
+
+    tests: tuple[str, ...]
+    view: SmallSignal | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class HitLimits:
+    """The limits that the response of a test was on."""
+
+    test: str
+    hits: tuple[LimitHit, ...]
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """What the fitted values do: without a step, near rest, at the limits."""
+
+    flat_runs: tuple[FlatRun, ...]
+    small_signal: tuple[SmallSignalView, ...]
+    limits: tuple[HitLimits, ...]

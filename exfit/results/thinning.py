@@ -1,0 +1,129 @@
+"""What of a fit's samples a file holds: of long ones their extremes, in nine digits."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.decimation import kept_rows
+from exfit.fitting.uncertainty import Sensitivity, UncertaintyAnalysis
+from exfit.results.comparisons import Comparison, IterationResponses, Overlay
+from exfit.results.description import Behaviour, SmallSignalView
+from exfit.results.model import FitResult
+from exfit.results.tables import DIGITS, clock_digits
+from exfit.simulation.small_signal import Bode, SmallSignal
+
+Array = NDArray[np.float64]
+
+MOST_ROWS = 20_000  # of the samples of a comparison
+MOST_NUMBERS = 100_000  # of the iterations' responses, and of the sensitivities of a signal
+MOST_RESPONSES = 12  # of iterations in one figure that can be told apart
+
+
+def thinned(result: FitResult) -> FitResult:
+    """Return a fit with its samples as a file holds them."""
+    count = len(result.history)
+    return replace(
+        result,
+        comparisons=tuple(_comparison(one, count) for one in result.comparisons),
+        validation=tuple(_comparison(one, count) for one in result.validation),
+        knowledge=None if result.knowledge is None else _knowledge(result.knowledge),
+        behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
+    )
+
+
+def drawn_responses(responses: IterationResponses, iterations: int) -> IterationResponses:
+    """Return the responses that one figure can show, of a history of so many lines.
+
+    They lie denser at the start, where most of the way is made; the first and last are among them.
+    """
+    wanted = np.geomspace(1, max(iterations, 1), MOST_RESPONSES).round() - 1
+    numbers = np.array(responses.numbers)
+    nearest = np.argmin(np.abs(numbers[:, None] - wanted), axis=0)
+    rows = np.unique(nearest)
+    return replace(
+        responses,
+        numbers=tuple(int(number) for number in numbers[rows]),
+        samples=responses.samples[rows],
+    )
+
+
+def _comparison(comparison: Comparison, iterations: int) -> Comparison:
+    signals = [
+        samples
+        for one in comparison.overlays.values()
+        for samples in (one.measured, one.simulated, one.start, one.error)
+        if samples is not None
+    ]
+    rows = _rows(signals, MOST_ROWS) if signals else np.arange(0)
+    responses = comparison.iteration_responses
+    return replace(
+        comparison,
+        time=_instants(comparison.time, rows),
+        overlays={
+            signal: Overlay(
+                _rounded(one.measured[rows]),
+                _rounded(one.simulated[rows]),
+                None if one.start is None else _rounded(one.start[rows]),
+            )
+            for signal, one in comparison.overlays.items()
+        },
+        iteration_responses=None if responses is None else _responses(responses, iterations),
+    )
+
+
+def _responses(responses: IterationResponses, iterations: int) -> IterationResponses:
+    drawn = drawn_responses(responses, iterations)
+    signals = [drawn.measured, *drawn.samples]
+    rows = _rows(signals, MOST_NUMBERS // len(signals))
+    return replace(
+        drawn,
+        time=_instants(drawn.time, rows),
+        measured=_rounded(drawn.measured[rows]),
+        samples=np.stack([_rounded(samples[rows]) for samples in drawn.samples]),
+    )
+
+
+def _knowledge(known: UncertaintyAnalysis) -> UncertaintyAnalysis:
+    return replace(known, sensitivity=tuple(_sensitivity(one) for one in known.sensitivity))
+
+
+def _sensitivity(one: Sensitivity) -> Sensitivity:
+    signals = list(one.moved.values())
+    if not signals:
+        return one
+    rows = _rows(signals, MOST_NUMBERS // len(signals))
+    moved: Mapping[str, Array] = {name: _rounded(line[rows]) for name, line in one.moved.items()}
+    return Sensitivity(one.label, _instants(one.time, rows), moved)
+
+
+def _behaviour(behaviour: Behaviour) -> Behaviour:
+    return replace(behaviour, small_signal=tuple(map(_small_signal, behaviour.small_signal)))
+
+
+def _small_signal(one: SmallSignalView) -> SmallSignalView:
+    view = one.view
+    if view is None:
+        return one
+    opened = None if view.open is None else _bode(view.open)
+    rounded: SmallSignal = replace(view, closed=_bode(view.closed), open=opened)
+    return replace(one, view=rounded)
+
+
+def _bode(bode: Bode) -> Bode:
+    response = _rounded(bode.response.real) + 1j * _rounded(bode.response.imag)
+    return Bode(_rounded(bode.frequency), np.asarray(response, dtype=np.complex128))
+
+
+def _rows(signals: Sequence[Array], most: int) -> NDArray[np.intp]:
+    """Return the rows that are kept of signals (M,): of more than ``most`` the extremes."""
+    return kept_rows(signals, max(1, most // (2 * len(signals))))
+
+
+def _instants(time: Array, rows: NDArray[np.intp]) -> Array:
+    return _rounded(time[rows], clock_digits(time, DIGITS)) if len(rows) else time[rows]
+
+
+def _rounded(samples: Array, digits: int = DIGITS) -> Array:
+    return np.array([float(f"{x:.{digits}g}") for x in samples.tolist()])
