@@ -74,7 +74,7 @@ def text_of(data: bytes, file: str) -> str:
 
 def read_records(text: str, file: str) -> list[Fields]:
     """Return the records of a text; raises DynamicsError where one has no end."""
-    found: list[Fields] = []
+    records: list[Fields] = []
     open_: tuple[Field, ...] = ()
     faults: list[DynamicsFault] = []
     after_comma = True  # a comma here has nothing before it
@@ -90,12 +90,12 @@ def read_records(text: str, file: str) -> list[Fields]:
         open_ += read.fields
         after_comma = read.after_comma
         if read.ended:
-            found += [Fields(open_[0].line, open_)] if open_ else []
+            records += [Fields(open_[0].line, open_)] if open_ else []
             open_, after_comma = (), True
     if open_:
         faults.append(_endless(open_, "before the end of the file"))
     refuse(faults, file)
-    return found
+    return records
 
 
 def refuse(faults: list[DynamicsFault], file: str) -> None:
@@ -106,7 +106,7 @@ def refuse(faults: list[DynamicsFault], file: str) -> None:
 
 def located(faults: Iterable[DynamicsFault], file: str) -> list[str]:
     """Return faults as ``file:line: what``, in the order of their lines."""
-    return [f"{file}:{line}: {text}" for line, text in sorted(faults, key=lambda one: one.line)]
+    return [f"{file}:{line}: {text}" for line, text in sorted(faults, key=lambda fault: fault.line)]
 
 
 def number(field: Field) -> float:

@@ -59,25 +59,28 @@ def definition_of(name: str) -> Definition | None:
     A further record of a model is meant only where the model is known by that very name: PSS/E's
     ESAC8B is another model than the AC8B that can be written as one.
     """
-    of_that_name = [one for one in definitions() if one.record.name == name.upper()]
-    for one in of_that_name:
-        if one.record == one.model.records[0]:
-            return one
-    for one in of_that_name:
-        if one.record.name in (one.model.name, *getattr(one.model, "aliases", ())):
-            return one
+    of_that_name = [
+        definition for definition in definitions() if definition.record.name == name.upper()
+    ]
+    for definition in of_that_name:
+        if definition.record == definition.model.records[0]:
+            return definition
+    for definition in of_that_name:
+        model = definition.model
+        if definition.record.name in (model.name, *getattr(model, "aliases", ())):
+            return definition
     return None
 
 
 def alternatives(model: Model | Machine) -> list[Definition]:
     """Return the records that a model can be written as, its own first."""
-    return [one for one in definitions() if one.model is model]
+    return [definition for definition in definitions() if definition.model is model]
 
 
 def contradictions(
     model: Model | Machine, values: Mapping[str, float]
 ) -> Iterable[tuple[str, str]]:
-    """Return (symbol, fault) for values of a model that do not go together."""
+    """Return (symbol, fault) for values of a model that contradict each other."""
     return model.faults(values) if isinstance(model, Machine) else sheet.contradictions(values)
 
 
@@ -89,18 +92,19 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         return Reading({}, [count, *_no_numbers(record.name, fields)], [])
     lines = dict(zip(names, (field.line for field in fields), strict=True))
 
-    def placed(found: Iterable[tuple[str, str]]) -> list[DynamicsFault]:
+    def placed(texts: Iterable[tuple[str, str]]) -> list[DynamicsFault]:
         return [
             DynamicsFault(lines.get(name, line), f"{record.name}: {name}: {text}")
-            for name, text in found
+            for name, text in texts
         ]
 
     given, unreadable = _numbers(definition, fields)
-    known = {row.symbol: given[row.symbol] for row in definition.model.sheet if row.symbol in given}
-    if all(known.get(name) == 0.0 for name in UNSATURATED):
-        known |= UNSATURATED  # the voltages say nothing
-    values = {**typical(definition.model.sheet), **known}
-    wrong = [*unreadable, *_outside(definition.model.sheet, known)]
+    rows = definition.model.sheet
+    of_sheet = {row.symbol: given[row.symbol] for row in rows if row.symbol in given}
+    if all(of_sheet.get(name) == 0.0 for name in UNSATURATED):
+        of_sheet |= UNSATURATED  # the voltages say nothing
+    values = {**typical(rows), **of_sheet}
+    wrong = [*unreadable, *_outside(rows, of_sheet)]
     wrong = wrong or [*contradictions(definition.model, values)]
     doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
     lacking = [
@@ -163,9 +167,9 @@ def _unmodelled(
 ) -> Iterable[tuple[str, str]]:
     """Yield (symbol, warning) for what the model, of these symbols, has in one way only."""
     for name, modelled in (*record.icons, *record.absent):
-        found = given.get(name, modelled)
-        if found != modelled and name not in symbols:
-            yield name, f"{show(found)} is not modelled; {show(modelled)} is taken"
+        value = given.get(name, modelled)
+        if value != modelled and name not in symbols:
+            yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
 
 
 def _outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
@@ -177,12 +181,12 @@ def _outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, st
             yield row.symbol, f"{show(value)} lies outside {limits}, its data sheet's range"
 
 
-def _wrong_count(definition: Definition, found: int) -> str:
+def _wrong_count(definition: Definition, count: int) -> str:
     icons, cons = len(definition.record.icons), len(definition.record.cons)
     parts = f"{icons} integers and {cons} constants" if icons else f"{cons} constants"
     order = " ".join(definition.names)
-    plural = "value" if found == 1 else "values"
+    plural = "value" if count == 1 else "values"
     return (
-        f"{definition.record.name}: {found} {plural} after the id, "
+        f"{definition.record.name}: {count} {plural} after the id, "
         f"but the record has {icons + cons} ({parts}): {order}"
     )

@@ -10,8 +10,10 @@ from exfit.exchange.psse.records import Definition, definition_of, definitions, 
 from exfit.util.text import near, show_value
 
 NEEDED = ("machine", "exciter")
-LISTED = 20  # units in a message
+MOST_LISTED = 20  # units in a message
 LONGEST_ID = 2
+LONGEST_BUS = 10  # digits that are looked at
+MOST_BUSES = 10**6
 OTHERS: Mapping[str, str] = {
     name: kind
     for kind, names in {
@@ -82,7 +84,7 @@ def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | No
         parts["machine"],
         parts["exciter"],
         parts.get("stabiliser"),
-        tuple(sorted(warnings, key=lambda one: one.line)),
+        tuple(sorted(warnings, key=lambda warning: warning.line)),
     )
 
 
@@ -109,25 +111,40 @@ def _parts(
 
 
 def _heads(record: Fields, faults: list[DynamicsFault]) -> Iterator[Head]:
-    """Yield the head of a record that belongs to a unit; add a fault where it cannot be told."""
+    """Yield the head of a record that belongs to a unit; add a fault where it has none."""
     line, fields = record
     if len(fields) < 3 or not fields[1].text[:1].isalpha():
-        if any(definition_of(field.text) for field in fields[:2]) or len(fields) < 3:
+        if len(fields) < 3 or any(definition_of(field.text) for field in fields[:2]):
             begin = " ".join(field.text for field in fields[:3])
             faults.append(DynamicsFault(line, f"{show_value(begin)} is not bus, 'model' and id"))
         return  # of a line or a device: their records begin otherwise
     bus, name, machine_id = (field.text for field in fields[:3])
-    label = f"{name} {fields[3].text}" if name.upper() == "USRMDL" and fields[3:] else name
-    wrong = []
-    if fields[0].quoted or not (bus.isascii() and bus.isdigit() and 0 < int(bus[:10]) < 10**6):
-        wrong.append(f"{show_value(bus)} is not the number of a bus")
-    if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
-        wrong.append(f"{show_value(machine_id)} is not a machine id of one or two characters")
+    wrong = [*_wrong_bus(fields[0]), *_wrong_id(machine_id)]
     if not wrong:
-        label = "".join(letter if letter.isprintable() else "?" for letter in label)
-        yield Head(int(bus), label.upper(), machine_id, line, fields[3:])
+        yield Head(int(bus), _label(fields), machine_id, line, fields[3:])
     elif definition_of(name) is not None:
         faults += [DynamicsFault(line, f"{name.upper()}: {text}") for text in wrong]
+
+
+def _wrong_bus(field: Field) -> Iterator[str]:
+    """Yield why a field is not the number of a bus."""
+    bus = field.text
+    whole = not field.quoted and bus.isascii() and bus.isdigit()
+    if not whole or not 0 < int(bus[:LONGEST_BUS]) < MOST_BUSES:
+        yield f"{show_value(bus)} is not the number of a bus"
+
+
+def _wrong_id(machine_id: str) -> Iterator[str]:
+    """Yield why a text is not the id of a machine."""
+    if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
+        yield f"{show_value(machine_id)} is not a machine id of one or two characters"
+
+
+def _label(fields: Sequence[Field]) -> str:
+    """Return the name of a record's model; of a user's model with its own name."""
+    name = fields[1].text
+    label = f"{name} {fields[3].text}" if name.upper() == "USRMDL" and fields[3:] else name
+    return "".join(letter if letter.isprintable() else "?" for letter in label).upper()
 
 
 def _chosen(heads: list[Head], file: str, bus: int | None, machine_id: str | None) -> list[Head]:
@@ -136,8 +153,8 @@ def _chosen(heads: list[Head], file: str, bus: int | None, machine_id: str | Non
     for head in heads:
         units.setdefault((head.bus, head.id.upper()), []).append(head)
     meant = {
-        key: found
-        for key, found in units.items()
+        key: records
+        for key, records in units.items()
         if bus in (None, key[0]) and (machine_id is None or machine_id.strip().upper() == key[1])
     }
     if len(meant) == 1:
@@ -150,37 +167,45 @@ def _chosen(heads: list[Head], file: str, bus: int | None, machine_id: str | Non
         raise DynamicsError(
             [f"{file}: {len(meant)} units; choose by --bus and --id", *_list(meant)]
         )
-    asked = ", ".join(
+    wanted = ", ".join(
         f"{label} {value!r}"
         for label, value in (("bus", bus), ("id", machine_id))
         if value is not None
     )
-    raise DynamicsError([f"{file}: no record of {asked}; the file has", *_list(units)])
+    raise DynamicsError([f"{file}: no record of {wanted}; the file has", *_list(units)])
 
 
 def _list(units: Mapping[tuple[int, str], list[Head]]) -> Iterator[str]:
-    for (bus, machine_id), heads in list(units.items())[:LISTED]:
+    for (bus, machine_id), heads in list(units.items())[:MOST_LISTED]:
         yield f"  bus {bus}, id {machine_id}: {', '.join(head.name for head in heads)}"
-    if len(units) > LISTED:
-        yield f"  and {len(units) - LISTED} more"
+    if len(units) > MOST_LISTED:
+        yield f"  and {len(units) - MOST_LISTED} more"
 
 
 def _missing(
     parts: Mapping[str, UnitPart], chosen: Sequence[Head], left_out: Iterable[Head]
 ) -> Iterator[DynamicsFault]:
     """Yield a fault for each record that may be the machine or exciter that is missing."""
-    known = [one for one in definitions() if definition_of(one.record.name) == one]
     missing = [kind for kind in NEEDED if kind not in parts]
     unknown = [head for head in left_out if head.name not in OTHERS]
     for kind in missing:
-        names = sorted({one.record.name for one in known if one.kind == kind})
-        meant = [head for head in unknown if len(missing) == 1 or _looks_like(head) == kind]
-        for head in meant:
+        names = _names_of(kind)
+        candidates = [head for head in unknown if len(missing) == 1 or _looks_like(head) == kind]
+        for head in candidates:
             text = f"exfit has no {kind} of that name; {near(head.name, names)}"
             yield DynamicsFault(head.line, f"{head.name}: {text}")
-        if not meant:
+        if not candidates:
             unit = f"bus {chosen[0].bus}, id {chosen[0].id}"
             yield DynamicsFault(chosen[0].line, f"{unit}: has no {kind}; known: {', '.join(names)}")
+
+
+def _names_of(kind: str) -> list[str]:
+    """Return the names by which a file may have a machine or an exciter."""
+    return sorted(
+        definition.record.name
+        for definition in definitions()
+        if definition.kind == kind and definition_of(definition.record.name) == definition
+    )
 
 
 def _looks_like(head: Head) -> str:

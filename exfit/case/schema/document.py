@@ -1,0 +1,67 @@
+"""The whole of the case file."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
+from exfit.case.schema.plants import Plant, SaturationName, Stabiliser
+from exfit.case.schema.records import RecordFile, Recording
+from exfit.case.schema.tests import BumpTest
+from exfit.case.schema.values import Fact, Frozen, Section, Text, nothing
+
+ABOUT = Field(
+    default_factory=nothing,
+    description="Facts about unit and test that the report shows, under any names, such as Plant, "
+    "Unit, Rated, Test date, Tested by.",
+)
+
+
+class CaseDocument(Section):
+    """A model, its plant, a test, its record, and the parameters to be fitted."""
+
+    about: Frozen[Fact] = ABOUT
+    model: Text | None = Field(
+        default=None,
+        description="Name of a model, in upper or lower case, or path of a .py file; none with "
+        "plant machine-playback.",
+    )
+    saturation: SaturationName = Field(
+        default="quadratic", description="Form of the exciter's saturation curve."
+    )
+    plant: Annotated[Plant, Field(discriminator="type")] = Field(
+        description="The plant: what surrounds the exciter during the test."
+    )
+    stabiliser: Stabiliser | None = Field(
+        default=None, description="A power system stabiliser; it acts on load only."
+    )
+    test: BumpTest | None = Field(
+        default=None,
+        description="The steps that were made; with records, each of them has its own.",
+    )
+    record: RecordFile | None = Field(
+        default=None, description="The measured signals; not required by simulate."
+    )
+    records: tuple[Recording, ...] = Field(
+        default=(),
+        min_length=1,
+        description="In place of test and record: several tests with their records, in one fit.",
+    )
+    parameters: Parameters = Field(
+        default_factory=Parameters, description="Fixed and free parameters of the exciter."
+    )
+    estimate: Estimate = Field(
+        default_factory=Estimate, description="How the free parameters are estimated."
+    )
+    simulation: SimulationSection = Field(
+        default_factory=SimulationSection, description="The grid of the simulation."
+    )
+    validations: tuple[Recording, ...] = Field(
+        default=(),
+        alias="validate",
+        description="Records on which the result is validated; they are not used in the fit.",
+    )
+    accept: Limit | None = Field(
+        default=None,
+        description="Limit of the error of a validation; beyond it the exit code is 3.",
+    )

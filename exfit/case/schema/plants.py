@@ -1,0 +1,132 @@
+"""The sections of the case file about what surrounds the exciter."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field
+
+from exfit.case.schema.values import FreeSection, Frozen, Given, Number, Section, Text, nothing
+from exfit.models import MACHINE_NAMES
+from exfit.plants import HEARD
+
+if TYPE_CHECKING:
+    Heard = str
+else:
+    Heard = Literal[HEARD]
+
+MACHINE = Field(description=f"Machine model: {', '.join(MACHINE_NAMES)}.")
+MACHINE_DATA = Field(
+    default_factory=nothing,
+    description="Machine data; a missing value is the typical one.",
+)
+MACHINE_FREE = Field(
+    default_factory=nothing, description="Machine data that are fitted, as under parameters.free."
+)
+
+
+class PlantSection(Section):
+    """What surrounds the exciter."""
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values that the case gives of the plant, beside the data of the machine."""
+        return {}
+
+
+class OpenCircuit(PlantSection):
+    """A machine with its breaker open, at rated speed."""
+
+    type: Literal["open-circuit"] = Field(description="Kind of plant.")
+    machine: Text = MACHINE
+    parameters: Frozen[Given] = MACHINE_DATA
+    free: Frozen[FreeSection] = MACHINE_FREE
+
+
+class InfiniteBus(PlantSection):
+    """A machine behind R + jX to a source of constant voltage and frequency."""
+
+    type: Literal["infinite-bus"] = Field(description="Kind of plant.")
+    machine: Text = MACHINE
+    parameters: Frozen[Given] = MACHINE_DATA
+    free: Frozen[FreeSection] = MACHINE_FREE
+    network: Frozen[Number] = Field(
+        description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
+        "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
+    )
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values of the network."""
+        return self.network
+
+
+class Playback(PlantSection):
+    """Recorded signals drive the exciter; efd is compared."""
+
+    type: Literal["playback"] = Field(description="Kind of plant.")
+    vref: Number | None = Field(
+        default=None,
+        description="Reference at the start, pu; default: the one that holds the recorded efd.",
+    )
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The reference, where it is given."""
+        return {} if self.vref is None else {"vref": self.vref}
+
+
+class MachinePlayback(PlantSection):
+    """A recorded field voltage drives the machine on open circuit; vt and ifd are compared."""
+
+    type: Literal["machine-playback"] = Field(description="Kind of plant; the case has no model.")
+    machine: Text = MACHINE
+    parameters: Frozen[Given] = MACHINE_DATA
+    free: Frozen[FreeSection] = MACHINE_FREE
+
+
+class NoPlant(PlantSection):
+    """The model alone: its output is vt."""
+
+    type: Literal["none"] = Field(description="Kind of plant.")
+
+
+Plant = OpenCircuit | InfiniteBus | Playback | MachinePlayback | NoPlant
+SaturationName = Literal["quadratic", "exponential", "exponential-se"]
+
+
+class Stabiliser(Section):
+    """A power system stabiliser; it acts on load only."""
+
+    model: Text = Field(description="Name of the stabiliser model.")
+    inputs: tuple[Heard, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="Input signals, one or two of speed, p, vt; default: those of the model.",
+    )
+    parameters: Frozen[Given] = Field(
+        default_factory=nothing,
+        description="Its data; a missing value is the typical one.",
+    )
+    free: Frozen[FreeSection] = Field(
+        default_factory=nothing, description="Parameters that are fitted."
+    )
+
+
+class OffLine(PlantSection):
+    """The machine of the case with its breaker open."""
+
+    type: Literal["open-circuit"] = Field(description="Kind of plant.")
+
+
+class OnLine(PlantSection):
+    """The machine of the case behind R + jX to a source."""
+
+    type: Literal["infinite-bus"] = Field(description="Kind of plant.")
+    network: Frozen[Number] = Field(
+        description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
+    )
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values of the network."""
+        return self.network

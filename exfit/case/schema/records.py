@@ -1,0 +1,207 @@
+"""The sections of the case file about a record: what was measured, and how it counts."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    WrapSerializer,
+)
+
+from exfit.case.messages import FILE_NAME
+from exfit.case.schema.plants import OffLine, OnLine
+from exfit.case.schema.tests import BumpTest
+from exfit.case.schema.values import Count, Findable, Number, Positive, Section, Text, thawed
+from exfit.signals import RECORDED
+
+if TYPE_CHECKING:
+    RecordedSignal = str
+else:
+    RecordedSignal = Literal[RECORDED]
+SINGLE = "fit"  # name of a record that stands alone
+
+
+def _channel(value: Any) -> Any:
+    return {"column": value} if isinstance(value, str) else value
+
+
+class LowPassSection(Section):
+    """A low-pass filter, applied forwards and backwards, so without delay."""
+
+    lowpass: Positive = Field(description="Cut-off frequency, Hz.")
+
+
+class MedianSection(Section):
+    """A running median."""
+
+    median: Count = Field(description="Number of samples, odd.")
+
+
+def _is_median(value: Any) -> str:
+    median = isinstance(value, MedianSection) or (isinstance(value, dict) and "median" in value)
+    return "[median]" if median else "[lowpass]"
+
+
+Filter = Annotated[
+    Annotated[LowPassSection, Tag("[lowpass]")] | Annotated[MedianSection, Tag("[median]")],
+    Discriminator(_is_median),
+]
+
+
+class Compared(Section):
+    """How a signal is compared with its record."""
+
+    weight: Positive = Field(default=1.0, description="Weight of the residuals of the signal.")
+    noise: Positive | None = Field(
+        default=None,
+        description="Standard deviation of its noise, pu, in place of a weight; give it for all "
+        "compared channels or for none.",
+    )
+    filter: Filter | None = Field(
+        default=None, description="{lowpass: Hz} or {median: samples}, for record and simulation."
+    )
+    outliers: Positive | None = Field(
+        default=None,
+        description="Leaves out samples that are farther from the running median than this many "
+        "standard deviations of the noise.",
+    )
+    averaged: Positive | None = Field(
+        default=None,
+        description="Length over which the recorder averages around each sample, s; the simulation "
+        "is averaged in the same way. If it averages over the time before the sample, give half "
+        "of this length as delay.",
+    )
+
+
+class ChannelSection(Compared):
+    """The column of a signal and its conversion to per unit: column / base * scale + offset."""
+
+    column: Text = Field(description="Name of the column.")
+    unit: Text | None = Field(
+        default=None, description="Unit of the column, such as kV, V, A, MW, pu or %."
+    )
+    base: Positive | None = Field(
+        default=None,
+        description="Value of 1 pu in that unit; for ifd the field current on the air-gap line at "
+        "rated voltage.",
+    )
+    scale: Findable = Field(
+        default=1.0,
+        description="Factor; or {start, min, max} to fit it.",
+    )
+    offset: Findable = Field(
+        default=0.0,
+        description="Added after scaling, pu; or {start, min, max} to fit it.",
+    )
+
+
+class PhasesSection(Compared):
+    """The terminal voltage from three phases: its positive sequence."""
+
+    phases: tuple[Text, Text, Text] = Field(
+        description="Columns of the three phases, in phase order."
+    )
+    kind: Literal["waveform", "rms"] = Field(
+        description="waveform: instantaneous values, from which the positive sequence is computed; "
+        "rms: RMS values, which are averaged."
+    )
+    unit: Text = Field(description="Unit of the columns and of base, such as V or kV.")
+    base: Positive = Field(description="Rated voltage, RMS, line to line, in that unit.")
+    connection: Literal["phase-to-ground", "phase-to-phase"] = Field(
+        description="Whether phase-to-ground or phase-to-phase voltages are recorded."
+    )
+    cycles: Count = Field(
+        default=1, description="Length of the window in whole cycles; waveforms only."
+    )
+
+
+def _kind_of_channel(value: Any) -> str:
+    phases = isinstance(value, PhasesSection) or (isinstance(value, dict) and "phases" in value)
+    return "[phases]" if phases else "[column]"
+
+
+Entry = Annotated[
+    Annotated[ChannelSection, Tag("[column]")] | Annotated[PhasesSection, Tag("[phases]")],
+    Discriminator(_kind_of_channel),
+]
+
+
+class TimeColumn(Section):
+    """The column with the time, and its unit."""
+
+    column: Text = Field(description="Name of the column.")
+    unit: Literal["s", "ms", "us", "min"] = Field(description="Unit of its numbers.")
+
+
+def _kind_of_clock(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return "[pair]"
+    return "[column]" if isinstance(value, dict | BaseModel) else "[name]"
+
+
+Time = Annotated[
+    Annotated[Text, Tag("[name]")]
+    | Annotated[tuple[Text, Text], Tag("[pair]")]
+    | Annotated[TimeColumn, Tag("[column]")],
+    Discriminator(_kind_of_clock),
+]
+
+
+class RecordFile(Section):
+    """A measured record: a file as a recorder writes it."""
+
+    file: Text = Field(description="Path, relative to the case file.")
+    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    time: Time = Field(
+        description="Column with the time, in s or in the unit that the file gives; or two "
+        "columns, [date, time of day]; or {column, unit}. Timestamps count from the first sample."
+    )
+    channels: Annotated[
+        Mapping[
+            RecordedSignal,
+            Annotated[Entry, BeforeValidator(_channel, json_schema_input_type=Text | Entry)],
+        ],
+        Field(min_length=1),
+        AfterValidator(MappingProxyType),
+        WrapSerializer(thawed),
+    ] = Field(description="Measured signals: the name of a column, or a mapping.")
+    window: tuple[Number, Number] | None = Field(
+        default=None,
+        description="Start and end of the part that is used, s; default: the whole record.",
+    )
+    mask: tuple[tuple[Number, Number], ...] = Field(
+        default=(), description="Parts that are not compared: start and end of each, s."
+    )
+    gaps: Literal["refuse", "skip"] = Field(
+        default="refuse", description="Whether samples without a value are refused or left out."
+    )
+    resample: Positive | None = Field(
+        default=None,
+        description="Sampling rate to which the record is reduced through an anti-alias filter, "
+        "Hz; default: as recorded.",
+    )
+    delay: Findable = Field(
+        default=0.0,
+        description="Delay of the recorder, s; or {start, min, max} to fit it.",
+    )
+
+
+class Recording(Section):
+    """A test and its record."""
+
+    name: str = Field(
+        pattern=FILE_NAME,
+        max_length=100,
+        description="Name of letters, digits, - _ and .; files are named after it.",
+    )
+    plant: Annotated[OffLine | OnLine, Field(discriminator="type")] | None = Field(
+        default=None, description="Plant of this record, if it differs from that of the case."
+    )
+    test: BumpTest = Field(description="The steps that were made.")
+    record: RecordFile = Field(description="The measured signals.")
