@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from exfit.case.assembly import plain_content
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import channel_faults, record_faults
 from exfit.case.json_schema import json_schema
 from exfit.case.messages import form_faults
@@ -30,7 +30,7 @@ def record_section(content: Mapping[str, Any]) -> RecordFile:
         places = {fault.place for fault in faults}
         wrong_forms = form_faults(details, json_schema())
         faults += [fault for fault in wrong_forms if fault.place not in places]
-    node, steady_test = Node((HERE,), plain), Node(("test",), {"vt0": 1.0})
+    node, steady_test = ContentNode((HERE,), plain), ContentNode(("test",), {"vt0": 1.0})
     places = {fault.place for fault in faults}
     contradictions = [
         *record_faults(steady_test, node),

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.util.text import show
 
 
-def bound_faults(section: Node) -> Iterator[Fault]:
+def bound_faults(section: ContentNode) -> Iterator[Fault]:
     """Yield why ``start``, ``min`` and ``max`` of a section contradict each other."""
     start, low, high = (section.at(key).number for key in ("start", "min", "max"))
     if low is not None and high is not None and low >= high:

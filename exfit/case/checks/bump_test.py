@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator
 
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.plants import EVENTS, PlantKind
 from exfit.util.text import show
 
 
-def bump_test_faults(test: Node, network: Node, kind: PlantKind) -> Iterator[Fault]:
+def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of a test; ``network`` is that of its plant."""
     for name in EVENTS:
         yield from _step_faults(test, name)
@@ -27,7 +27,7 @@ def bump_test_faults(test: Node, network: Node, kind: PlantKind) -> Iterator[Fau
         yield from _voltage_faults(test.at("vt0"))
 
 
-def instants_of(test: Node) -> Iterator[tuple[Node, float]]:
+def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
     """Yield the readable instants of all events of a test, with their places."""
     for name in EVENTS:
         for event in test.at(name).entries:
@@ -36,7 +36,7 @@ def instants_of(test: Node) -> Iterator[tuple[Node, float]]:
                 yield event.at("at"), at
 
 
-def missing_without_record(test: Node) -> Iterator[Fault]:
+def missing_without_record(test: ContentNode) -> Iterator[Fault]:
     """Yield what a test lacks that no record is there to give."""
     if "begin" in test:
         text = "only with a record; without one the time begins at 0"
@@ -48,7 +48,7 @@ def missing_without_record(test: Node) -> Iterator[Fault]:
         yield test.at("vt0").fault("is missing: without a record it says where to start")
 
 
-def _playback_faults(test: Node, kind: PlantKind) -> Iterator[Fault]:
+def _playback_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield what a test lacks, or has in vain, where a record drives the simulation."""
     if "begin" in test:
         text = f"not allowed with plant {kind.name}: the record drives the simulation"
@@ -58,7 +58,7 @@ def _playback_faults(test: Node, kind: PlantKind) -> Iterator[Fault]:
         yield steady.fault("is missing: until when is the record at rest?")
 
 
-def _rest_faults(test: Node) -> Iterator[Fault]:
+def _rest_faults(test: ContentNode) -> Iterator[Fault]:
     """Yield a state of rest that lasts beyond the first step."""
     first = min((at for _, at in instants_of(test)), default=None)
     steady = test.at("steady_until")
@@ -67,7 +67,7 @@ def _rest_faults(test: Node) -> Iterator[Fault]:
         yield steady.fault(text)
 
 
-def _voltage_faults(vt0: Node) -> Iterator[Fault]:
+def _voltage_faults(vt0: ContentNode) -> Iterator[Fault]:
     """Yield why the voltage before the first step is none of a machine."""
     lowest = vt0.at("min")
     if vt0.start is not None and vt0.start <= 0:
@@ -76,7 +76,7 @@ def _voltage_faults(vt0: Node) -> Iterator[Fault]:
         yield lowest.fault(f"{show(lowest.number)} is not above 0")
 
 
-def _step_faults(test: Node, name: str) -> Iterator[Fault]:
+def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
     """Yield steps that change nothing, are out of order, or outside the duration."""
     before: float | None = None
     for step in test.at(name).entries:
@@ -91,7 +91,7 @@ def _step_faults(test: Node, name: str) -> Iterator[Fault]:
 
 
 def _instant_faults(
-    place: Node, at: float, before: float | None, end: float | None
+    place: ContentNode, at: float, before: float | None, end: float | None
 ) -> Iterator[Fault]:
     if before is not None and at <= before:
         yield place.fault(f"{show(at)} s is not after {show(before)} s, the step before")

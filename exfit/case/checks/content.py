@@ -5,7 +5,7 @@ from typing import Any
 
 from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
 from exfit.case.checks.model import parameter_faults
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
 from exfit.case.checks.plant import model_faults, plants_of_records_faults, stabiliser_faults
 from exfit.case.checks.record import channels_faults, noise_faults, record_faults, repeated_names
@@ -20,7 +20,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
 
     A value of the wrong form is left to the schema and skipped here.
     """
-    content = Node((), plain)
+    content = ContentNode((), plain)
     kind = kind_of(content.at("plant").content)
     several = [entry for key in ("records", "validate") for entry in content.at(key).entries]
     yield from model_faults(content, kind)
@@ -37,7 +37,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from _estimate_faults(content)
 
 
-def _single_record_faults(content: Node) -> Iterator[Fault]:
+def _single_record_faults(content: ContentNode) -> Iterator[Fault]:
     """Yield a test that is missing, or stands beside several records."""
     if "records" not in content:
         if "test" not in content:
@@ -48,7 +48,9 @@ def _single_record_faults(content: Node) -> Iterator[Fault]:
             yield content.at(key).fault("not allowed with records: each of them has its own")
 
 
-def _recording_faults(recording: Node, content: Node, kind: PlantKind) -> Iterator[Fault]:
+def _recording_faults(
+    recording: ContentNode, content: ContentNode, kind: PlantKind
+) -> Iterator[Fault]:
     """Yield what contradicts itself in a test and its record; a single one is the whole content."""
     plant = recording.at("plant")
     kind = kind_of(plant.content) if "type" in plant else kind
@@ -66,7 +68,7 @@ def _recording_faults(recording: Node, content: Node, kind: PlantKind) -> Iterat
         yield from missing_without_record(test)
 
 
-def _estimate_faults(content: Node) -> Iterator[Fault]:
+def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
     """Yield settings that nothing uses."""
     if "accept" in content and not content.at("validate").entries:
         yield content.at("accept").fault("there is no validation to judge")

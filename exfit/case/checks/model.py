@@ -6,7 +6,7 @@ from math import inf
 from typing import Any
 
 from exfit.case.checks.bounds import bound_faults
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.messages import PERCENT
 from exfit.case.parts import Part, Parts, helpers_of, places_of_ties, used_by_ties
 from exfit.case.ties import TieError, Ties, is_tie
@@ -16,7 +16,7 @@ from exfit.models.sheet import Parameter
 from exfit.util.text import near, show, show_value
 
 
-def parameter_faults(content: Node, parts: Parts, ties: Ties) -> Iterator[Fault]:
+def parameter_faults(content: ContentNode, parts: Parts, ties: Ties) -> Iterator[Fault]:
     """Yield the faults of the parameters of all parts, those that follow others among them."""
     tied, faults = _tied_values(content, parts, ties)
     yield from faults
@@ -26,7 +26,9 @@ def parameter_faults(content: Node, parts: Parts, ties: Ties) -> Iterator[Fault]
         yield from part_faults(content, part, tied, helpers)
 
 
-def _tied_values(content: Node, parts: Parts, ties: Ties) -> tuple[dict[str, float], list[Fault]]:
+def _tied_values(
+    content: ContentNode, parts: Parts, ties: Ties
+) -> tuple[dict[str, float], list[Fault]]:
     """Return the start values of what follows other parameters, and what is wrong with them."""
     values: dict[str, float] = {}
     for part in parts.all:
@@ -50,18 +52,18 @@ def _tied_values(content: Node, parts: Parts, ties: Ties) -> tuple[dict[str, flo
     return tied, faults
 
 
-def _sections_of(content: Node, part: Part) -> tuple[Node, Node]:
+def _sections_of(content: ContentNode, part: Part) -> tuple[ContentNode, ContentNode]:
     """Return what the file gives for one part: fixed and free."""
-    free = Node((), None) if part.free is None else content.at(*part.free)
+    free = ContentNode((), None) if part.free is None else content.at(*part.free)
     return content.at(*part.fixed), free
 
 
-def _starts(free: Node) -> dict[str, Any]:
+def _starts(free: ContentNode) -> dict[str, Any]:
     return {symbol: section.at("start").value for symbol, section in free.sections}
 
 
 def part_faults(
-    content: Node, part: Part, tied: Mapping[str, float], helpers: Collection[str]
+    content: ContentNode, part: Part, tied: Mapping[str, float], helpers: Collection[str]
 ) -> Iterator[Fault]:
     """Yield the faults of what the file gives for one part, and of its free parameters."""
     section, free = _sections_of(content, part)
@@ -72,7 +74,7 @@ def part_faults(
     }
     rows = {row.symbol: row for row in part.sheet}
     allowed = [*rows, *helpers] if part.kind == "exciter" else [*rows]
-    values = Node(part.fixed, fixed)
+    values = ContentNode(part.fixed, fixed)
     yield from _unknown_symbols(values, allowed, part.name)
     yield from _outside_sheet(values, rows)
     yield from _unknown_symbols(free, allowed, part.name)
@@ -86,13 +88,13 @@ def part_faults(
     yield from _placed(whole, places, part.check(_readable(part, fixed, _starts(free))))
 
 
-def _unknown_symbols(given: Node, known: Collection[str], owner: str) -> Iterator[Fault]:
+def _unknown_symbols(given: ContentNode, known: Collection[str], owner: str) -> Iterator[Fault]:
     for symbol, parameter in given.sections:
         if symbol not in known:
             yield parameter.fault(f"not a parameter of {owner}; {near(symbol, known)}")
 
 
-def _outside_sheet(given: Node, rows: Mapping[str, Parameter]) -> Iterator[Fault]:
+def _outside_sheet(given: ContentNode, rows: Mapping[str, Parameter]) -> Iterator[Fault]:
     for symbol, value in given.numbers.items():
         row = rows.get(symbol)
         if row is not None and not row.low <= value <= row.high:
@@ -101,7 +103,7 @@ def _outside_sheet(given: Node, rows: Mapping[str, Parameter]) -> Iterator[Fault
             yield given.at(symbol).fault(text)
 
 
-def _free_faults(section: Node, row: Parameter | None) -> Iterator[Fault]:
+def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]:
     """Yield the faults of one free parameter: its bounds, its start, its scale, its prior."""
     yield from bound_faults(section)
     low = section.at("min").number
@@ -116,7 +118,7 @@ def _free_faults(section: Node, row: Parameter | None) -> Iterator[Fault]:
             yield from _bypass_faults(section)
 
 
-def _bypass_faults(time: Node) -> Iterator[Fault]:
+def _bypass_faults(time: ContentNode) -> Iterator[Fault]:
     """Yield a time constant whose bounds lie on both sides of the shortest one."""
     low, high = time.at("min").number, time.at("max").number
     if low is not None and low < SHORTEST <= (inf if high is None else high):
@@ -125,7 +127,7 @@ def _bypass_faults(time: Node) -> Iterator[Fault]:
         yield time.at("min").fault(text)
 
 
-def _prior_faults(prior: Node) -> Iterator[Fault]:
+def _prior_faults(prior: ContentNode) -> Iterator[Fault]:
     """Yield why a share of the mean is no standard deviation."""
     std = prior.at("std")
     if std.text is None or not re.search(PERCENT, std.text):
@@ -152,7 +154,7 @@ def _placed(
 
 def _readable(part: Part, *given: Mapping[str, Any]) -> dict[str, float]:
     """Return the resolved values without those that the file gives in no readable form."""
-    numbers = [Node((), {**values}).numbers for values in given]
+    numbers = [ContentNode((), {**values}).numbers for values in given]
     unreadable = {
         symbol
         for values, readable in zip(given, numbers, strict=True)

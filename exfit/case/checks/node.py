@@ -13,7 +13,7 @@ from exfit.case.yaml import Fault, Place
 
 
 @dataclass(frozen=True)
-class Node:
+class ContentNode:
     """A place of the content and what stands there; None where nothing does.
 
     What is asked for in a form that the value does not have is None, or empty.
@@ -22,13 +22,13 @@ class Node:
     place: Place
     value: Any
 
-    def at(self, *keys: str | int) -> "Node":
+    def at(self, *keys: str | int) -> "ContentNode":
         """Return the place under the keys and indices, one within the other."""
         value = self.value
         for key in keys:
             inside = value.get(key) if isinstance(value, dict) else None
             value = _entry(value, key) if isinstance(value, list) else inside
-        return Node((*self.place, *keys), value)
+        return ContentNode((*self.place, *keys), value)
 
     def __contains__(self, key: str) -> bool:
         """Whether a mapping stands here that has the key."""
@@ -45,12 +45,12 @@ class Node:
         return isinstance(self.value, dict)
 
     @property
-    def sections(self) -> Iterator[tuple[str, "Node"]]:
+    def sections(self) -> Iterator[tuple[str, "ContentNode"]]:
         """The entries of the mapping that stands here, by key."""
         return ((key, self.at(key)) for key in self.content)
 
     @property
-    def entries(self) -> list["Node"]:
+    def entries(self) -> list["ContentNode"]:
         """The entries of the list that stands here."""
         count = len(self.value) if isinstance(self.value, list) else 0
         return [self.at(index) for index in range(count)]

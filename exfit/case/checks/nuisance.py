@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from exfit.case.checks.bounds import bound_faults
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
 from exfit.util.text import show
@@ -11,7 +11,9 @@ from exfit.util.text import show
 AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
 
 
-def nuisance_faults(test: Node, record: Node, kind: PlantKind, has_record: bool) -> Iterator[Fault]:
+def nuisance_faults(
+    test: ContentNode, record: ContentNode, kind: PlantKind, has_record: bool
+) -> Iterator[Fault]:
     """Yield the faults of what the fit shall find about a record: instants, sizes, levels."""
     for value in _findable(test, record):
         if not value.is_section:
@@ -27,7 +29,7 @@ def nuisance_faults(test: Node, record: Node, kind: PlantKind, has_record: bool)
         yield delay.fault(f"not allowed with plant {kind.name}")
 
 
-def _findable(test: Node, record: Node) -> Iterator[Node]:
+def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:
     """Yield the places at which a number or {start, min, max} may stand."""
     yield test.at("vt0")
     for name in ("vref", "vs"):
@@ -40,14 +42,14 @@ def _findable(test: Node, record: Node) -> Iterator[Node]:
         yield channel.at("offset")
 
 
-def _automatic_faults(start: Node, record: Node, has_record: bool) -> Iterator[Fault]:
+def _automatic_faults(start: ContentNode, record: ContentNode, has_record: bool) -> Iterator[Fault]:
     if not has_record:
         yield start.fault("auto needs a record")
     elif "vt" not in record.at("channels"):
         yield start.fault("auto needs vt in the record")
 
 
-def _level_faults(test: Node, vt: Node) -> Iterator[Fault]:
+def _level_faults(test: ContentNode, vt: ContentNode) -> Iterator[Fault]:
     """Yield the voltage that is missing where a fit finds scale or offset of the recorded one."""
     unknown = [key for key in ("scale", "offset") if vt.at(key).is_section]
     if test.content and unknown and "vt0" not in test:
@@ -55,7 +57,7 @@ def _level_faults(test: Node, vt: Node) -> Iterator[Fault]:
         yield test.at("vt0").fault(text)
 
 
-def _value_faults(value: Node) -> Iterator[Fault]:
+def _value_faults(value: ContentNode) -> Iterator[Fault]:
     """Yield the faults of one value that the fit shall find: its bounds and its start."""
     key = value.place[-1]
     automatic = value.at("start").text == "auto"

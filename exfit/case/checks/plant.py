@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 
 from exfit.case.checks.model import part_faults
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.parts import Parts, kind_of, network_part
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
 
 
-def model_faults(content: Node, kind: PlantKind) -> Iterator[Fault]:
+def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield a model that is missing, or what describes one where there is none."""
     if kind.has_exciter:
         if "model" not in content:
@@ -21,7 +21,7 @@ def model_faults(content: Node, kind: PlantKind) -> Iterator[Fault]:
             yield content.at(key).fault(text)
 
 
-def stabiliser_faults(content: Node, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
+def stabiliser_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
     """Yield a stabiliser that does not act, and inputs of another number than its model's."""
     section = content.at("stabiliser")
     if not section.content:
@@ -40,7 +40,7 @@ def stabiliser_faults(content: Node, parts: Parts, kind: PlantKind) -> Iterator[
             yield inputs.fault(text)
 
 
-def plants_of_records_faults(content: Node, kind: PlantKind) -> Iterator[Fault]:
+def plants_of_records_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of the plants that records have in place of the case's."""
     for plant in plants_of_records(content):
         network = plant.at("network")
@@ -50,7 +50,7 @@ def plants_of_records_faults(content: Node, kind: PlantKind) -> Iterator[Fault]:
             yield from part_faults(content, network_part(network.content, network.place), {}, {})
 
 
-def plants_of_records(content: Node) -> list[Node]:
+def plants_of_records(content: ContentNode) -> list[ContentNode]:
     """Return the plants that records have in place of the case's."""
     return [
         recording.at("plant")

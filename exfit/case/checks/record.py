@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from exfit.case.checks.bump_test import instants_of
-from exfit.case.checks.node import Node
+from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
 from exfit.records.units import needs_base
@@ -25,7 +25,7 @@ FILES_OF_A_RUN = (
 PREFIXES_OF_PARTS = ("machine", "network", "stabiliser")
 
 
-def record_faults(test: Node, record: Node) -> Iterator[Fault]:
+def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
     """Yield what contradicts itself in a record, or between it and its test."""
     if "duration" in test:
         text = "only without a record; record.window cuts a record"
@@ -40,13 +40,13 @@ def record_faults(test: Node, record: Node) -> Iterator[Fault]:
     yield from _window_faults(test, record.at("window").pair)
 
 
-def _order_faults(stretch: Node) -> Iterator[Fault]:
+def _order_faults(stretch: ContentNode) -> Iterator[Fault]:
     if stretch.pair is not None and stretch.pair[0] >= stretch.pair[1]:
         start, end = map(show, stretch.pair)
         yield stretch.fault(f"start {start} is not below end {end}")
 
 
-def _start_faults(test: Node, channels: Node) -> Iterator[Fault]:
+def _start_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
     """Yield the voltage before the first step, where nothing gives it."""
     if "vt0" in test:
         return
@@ -57,7 +57,7 @@ def _start_faults(test: Node, channels: Node) -> Iterator[Fault]:
         yield test.at("vt0").fault(text)
 
 
-def _window_faults(test: Node, window: tuple[float, float] | None) -> Iterator[Fault]:
+def _window_faults(test: ContentNode, window: tuple[float, float] | None) -> Iterator[Fault]:
     """Yield what lies outside the window of a record."""
     if window is None or window[0] >= window[1]:
         return
@@ -74,7 +74,7 @@ def _window_faults(test: Node, window: tuple[float, float] | None) -> Iterator[F
             yield place.fault(f"{show(at)} s lies outside the window {limits} of the record")
 
 
-def channels_faults(channels: Node, kind: PlantKind) -> Iterator[Fault]:
+def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of the channels of a record, one by one and together."""
     for signal, channel in channels.sections:
         if signal not in kind.signals:
@@ -93,21 +93,21 @@ def channels_faults(channels: Node, kind: PlantKind) -> Iterator[Fault]:
         yield channels.fault(f"{lacking}: there is nothing to compare")
 
 
-def channel_faults(signal: str, channel: Node, per_unit: bool) -> Iterator[Fault]:
+def channel_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterator[Fault]:
     """Yield what contradicts itself in a channel, whose signal may have to be ``per_unit``."""
     yield from _scale_faults(channel)
     yield from _unit_faults(channel, per_unit)
     yield from _phase_faults(channel, signal)
 
 
-def _driving_faults(channel: Node) -> Iterator[Fault]:
+def _driving_faults(channel: ContentNode) -> Iterator[Fault]:
     for key in ("weight", "noise", "filter", "outliers"):
         if key in channel:
             text = "has no effect: the signal drives the simulation and is not compared"
             yield channel.at(key).fault(text)
 
 
-def _scale_faults(channel: Node) -> Iterator[Fault]:
+def _scale_faults(channel: ContentNode) -> Iterator[Fault]:
     median = channel.at("filter", "median")
     if median.number is not None and median.number % 2 == 0:
         yield median.fault(f"{show(median.number)} is not an odd number")
@@ -115,7 +115,7 @@ def _scale_faults(channel: Node) -> Iterator[Fault]:
         yield channel.at("scale").fault("must not be 0")
 
 
-def _unit_faults(channel: Node, per_unit: bool) -> Iterator[Fault]:
+def _unit_faults(channel: ContentNode, per_unit: bool) -> Iterator[Fault]:
     """Yield a base of no unit, and a unit that nothing makes per unit, as a machine's must be."""
     unit = channel.at("unit").text
     if "base" in channel and "unit" not in channel:
@@ -126,7 +126,7 @@ def _unit_faults(channel: Node, per_unit: bool) -> Iterator[Fault]:
         yield channel.at("base").fault(f"is missing: what is 1 pu in {unit}?")
 
 
-def _phase_faults(channel: Node, signal: str) -> Iterator[Fault]:
+def _phase_faults(channel: ContentNode, signal: str) -> Iterator[Fault]:
     """Yield three phases of what is no voltage of the machine, and keys of the other kind."""
     if "phases" not in channel:
         return
@@ -139,7 +139,7 @@ def _phase_faults(channel: Node, signal: str) -> Iterator[Fault]:
         yield channel.at("averaged").fault("waveforms have a window of their own: cycles")
 
 
-def noise_faults(recordings: Sequence[Node], kind: PlantKind) -> Iterator[Fault]:
+def noise_faults(recordings: Sequence[ContentNode], kind: PlantKind) -> Iterator[Fault]:
     """Yield channels without noise where another has it, and channels with weight and noise."""
     channels = [
         channel
@@ -154,14 +154,14 @@ def noise_faults(recordings: Sequence[Node], kind: PlantKind) -> Iterator[Fault]
     yield from _missing_noise([node for node in channels if node.place[0] != "validate"])
 
 
-def _missing_noise(channels: Sequence[Node]) -> Iterator[Fault]:
+def _missing_noise(channels: Sequence[ContentNode]) -> Iterator[Fault]:
     if any("noise" in channel for channel in channels):
         for channel in channels:
             if "noise" not in channel:
                 yield channel.at("noise").fault("is missing: other channels have it")
 
 
-def repeated_names(recordings: Sequence[Node]) -> Iterator[Fault]:
+def repeated_names(recordings: Sequence[ContentNode]) -> Iterator[Fault]:
     """Yield the names of records that are taken: files and values are named after them."""
     taken = dict.fromkeys(FILES_OF_A_RUN, "a file of every run")
     for recording in recordings:
