@@ -16,17 +16,20 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from interrupted_runs import CASE, TEMPORARY, fit, fit_before, met_by
+from interrupted_runs import CASE, TEMPORARY, fit, fit_before, met_by, seconds_of_fit
 
 INTERRUPTIONS, KILLS, SEED = 200, 100, 2026
 WRITING = 0.06  # s: about how long the numbers take
+TIMED = 10  # runs until a fit is timed again: other work on the machine slows it down
 LATE = 1.1  # of the time of a fit: some signals come too late
 
 
-def study(number, count, while_writing, before, seconds, place):
+def study(number, count, while_writing, before, place):
     """Send a signal to so many fits and print what they left."""
     rng, counts = random.Random(f"{SEED} {number} {while_writing}"), Counter()
     for run in range(count):
+        if run % TIMED == 0:
+            seconds = seconds_of_fit(CASE, place / "timed")
         moment = rng.uniform(0.0, WRITING if while_writing else LATE * seconds)
         folder = place / f"{number}-{while_writing}-{run}"
         outcome = met_by(number, moment, before, folder, while_writing)
@@ -51,10 +54,10 @@ def main():
     interruptions, kills = (*given, *(INTERRUPTIONS, KILLS)[len(given) :])
     with tempfile.TemporaryDirectory() as place:
         before, seconds = fit_before(Path(place))
-        print(f"a fit with figures takes {seconds:.2f} s")
+        print(f"a fit with figures takes {seconds:.2f} s", flush=True)
         for number, count in ((signal.SIGINT, interruptions), (signal.SIGKILL, kills)):
             for while_writing, runs in ((False, count), (True, count // 4)):
-                study(number, runs, while_writing, before, seconds, Path(place))
+                study(number, runs, while_writing, before, Path(place))
 
 
 if __name__ == "__main__":

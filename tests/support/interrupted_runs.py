@@ -53,18 +53,23 @@ def fit(case, folder):
 
 
 def fit_before(place):
-    """Return the folder of a fit as the one before a run leaves it, and how long it took, s."""
+    """Return the folder of a fit as the one before a run leaves it, and how long that took, s."""
     content = yaml.safe_load(CASE.read_text(encoding="utf-8"))
     for recording in (content, *content["validate"]):
         file = CASE.parent / recording["record"]["file"]
         recording["record"]["file"] = str(file.resolve())
     content["validate"][0]["name"] = FORMER
     (place / "case.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    return place / "before", seconds_of_fit(place / "case.yaml", place / "before")
+
+
+def seconds_of_fit(case, folder):
+    """Return how long a fit takes with its figures, s."""
     began = time.perf_counter()
-    process = fit(place / "case.yaml", place / "before")
+    process = fit(case, folder)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
-    return place / "before", time.perf_counter() - began
+    return time.perf_counter() - began
 
 
 def met_by(number, moment, before, folder, while_writing=False):
