@@ -49,7 +49,7 @@ def fit(case: Path, strategy: str | None, watch: bool, output: Output) -> None:
         fit_again_and_again(case, output.folder(f"{case.stem}-fit"), strategy, output.figures)
         return
     loaded = load(case)
-    folder = output.folder(f"{case.stem}-fit")
+    folder = output.folder_of(loaded, "fit")
     if output.shown:
         result = fit_live(loaded, folder, strategy, output.figures)
     else:

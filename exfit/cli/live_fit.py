@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exfit.cli.options import Refusal, load, warn
+from exfit.cli.options import Refusal, load, refuse_own_files, warn
 from exfit.cli.streams import output_is_lost
 from exfit.errors import ExfitError
 
@@ -59,7 +59,9 @@ def fit_again_and_again(case: Path, folder: Path, strategy: str | None, plots: b
         while True:
             stamps = stamps_of(case)
             try:
-                before = fit_live(load(case), folder, strategy, plots, before)
+                loaded = load(case)
+                refuse_own_files(loaded, folder)
+                before = fit_live(loaded, folder, strategy, plots, before)
             except ExfitError as fault:
                 Refusal(str(fault)).show()
             if before is not None and before.interrupted:

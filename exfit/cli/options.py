@@ -47,15 +47,23 @@ class Output:
         """Whether tables are printed."""
         return not (self.quiet or self.as_json)
 
-    def folder(self, default: str) -> Path:
+    def folder(self, default: str, *inputs: Path | None) -> Path:
         """Return the folder for the files, by default one in runs.
 
-        Raises ExfitError where it cannot be written: before a run is spent on it.
+        Raises ExfitError where it cannot be written, or ``inputs`` would be lost there: before a
+        run is spent on it.
         """
         from exfit.output import run_folder
 
         folder = self.given or Path("runs") / default
         run_folder.refuse_unwritable(folder)
+        run_folder.refuse_inputs([path for path in inputs if path is not None], folder)
+        return folder
+
+    def folder_of(self, case: "Case", command: str) -> Path:
+        """Return the folder for the files of a command that a case is given to."""
+        folder = self.folder(f"{case.path.stem}-{command}")
+        refuse_own_files(case, folder)
         return folder
 
 
@@ -104,6 +112,15 @@ class Interruption(click.ClickException):
         """Print the message below the terminal's own ^C."""
         line = ": ".join(filter(None, ("Interrupted", self.message)))
         click.echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
+
+
+def refuse_own_files(case: "Case", folder: Path) -> None:
+    """Raise ExfitError where results in a folder would write over files that a case is made of."""
+    from exfit.output import run_folder
+
+    recordings = (*case.recordings, *case.validations)
+    files = [case.path, *(case.folder / recording.record.file for recording in recordings)]
+    run_folder.refuse_inputs(files, folder, [recording.name for recording in recordings])
 
 
 def load(case: Path) -> "Case":

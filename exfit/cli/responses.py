@@ -48,7 +48,7 @@ def simulate(
     from exfit.output import run_folder
 
     loaded = load(case)
-    folder = output.folder(f"{case.stem}-simulate")
+    folder = output.folder_of(loaded, "simulate")
     values = read_parameters(loaded, parameters) if parameters else {}
     values |= changed_values(loaded, assignments(changes, "--set"), "--set")
     simulation = workflows.simulate(loaded, values)
@@ -91,7 +91,7 @@ def validate(
     from exfit.util.typed import plain
 
     loaded = load(case)
-    folder = output.folder(f"{case.stem}-validate")
+    folder = output.folder_of(loaded, "validate")
     source = parameters or run_folder.last_fit(case)
     comparisons = workflows.validate(loaded, read_parameters(loaded, source), record)
     warn(run_folder.write_validation(comparisons, folder, output.figures))

@@ -42,7 +42,7 @@ def profile(
     from exfit.output import run_folder
 
     loaded = load(case)
-    folder = output.folder(f"{case.stem}-profile")
+    folder = output.folder_of(loaded, "profile")
     if not output.shown:
         profiles = workflows.profile(loaded, parameters)
     else:
@@ -85,7 +85,7 @@ def identify(
     from exfit.output import run_folder
 
     loaded = load(case)
-    folder = output.folder(f"{case.stem}-identify")
+    folder = output.folder_of(loaded, "identify")
     design = workflows.identify(loaded, assignments(noise, "--noise"))
     warn(run_folder.write_design(design, folder, output.figures))
     if output.as_json:

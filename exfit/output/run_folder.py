@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -42,6 +42,7 @@ PARAMETERS = "parameters.yaml"
 ITERATIONS = "iterations.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
 INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
+TABLES = (PARAMETERS, ITERATIONS, "history.csv", "profile.csv", "compare.csv")
 MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT)
 # what a fit may write, beside the files that are named after records
 FILES_OF_FIT = (
@@ -67,6 +68,20 @@ def refuse_unwritable(folder: Path) -> None:
     for name in MAIN_FILES:
         if (folder / name).is_dir():
             raise ExfitError(f"{folder / name}: cannot be written: it is a folder")
+
+
+def refuse_inputs(inputs: Iterable[Path], folder: Path, records: Iterable[str] = ()) -> None:
+    """Raise ExfitError where a run into a folder would write over a file that it reads.
+
+    ``records`` are the names after which it names files.
+    """
+    names = {*TABLES, *MAIN_FILES, *_named_after(records)}
+    for path in inputs:
+        if path.name in names and path.resolve().parent == folder.resolve():
+            raise ExfitError(
+                f"{path}: would be written over by the results of that name; "
+                f"choose another folder than {folder} with -o"
+            )
 
 
 def write_fit(result: FitResult, folder: Path, figures: bool) -> tuple[str, ...]:
@@ -113,8 +128,13 @@ def _of_records(main: Path) -> set[str]:
         names = [Path(match["name"]).name for match in matches]
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return set()  # there is none, or it is not ours
+    return _named_after(names)
+
+
+def _named_after(records: Iterable[str]) -> set[str]:
+    """Return the names of the files that are named after records."""
     endings = (".csv", ".png", f"-{ITERATIONS}")
-    return {name + ending for name in names if name for ending in endings}
+    return {name + ending for name in records if name for ending in endings}
 
 
 def _draw(main: Path, drawings: Callable[[], run_figures.Drawings]) -> tuple[str, ...]:

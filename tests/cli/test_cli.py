@@ -23,9 +23,10 @@ from rich.console import Console
 from exfit import cli, workflows
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
-from exfit.output import terminal
+from exfit.output import plots, terminal
 from exfit.results.model import Iteration
 from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel
+from exfit.util import files
 
 CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
 COMMANDS = ("fit", "simulate", "validate", "check")
@@ -634,6 +635,90 @@ def test_ctrl_c_in_a_search_from_many_starts_keeps_the_best_point_and_ends_with_
         assert {one["interval"] for one in stored["parameters"].values()} == {None}
         assert "starts.png" not in names
     assert names >= {"overlay.png", "convergence.png", "response.csv", "parameters.yaml"}
+
+
+@pytest.mark.parametrize("command", ["fit", "validate"])
+def test_results_never_go_over_the_record_of_a_case(run, workplace, command):
+    """The table of a validation is named after it, and so may its record be."""
+    Path("down.csv").rename("down-step.csv")
+    case = case_file(changed(CASE, ("validate.0.record.file", "down-step.csv")))
+    before = listing(workplace)
+    ran = run(*arguments(command, case), "-o", ".")
+    is_refused(ran, ["down-step.csv", "written over", "-o"], before, workplace)
+    assert run(*arguments(command, case), "-o", "elsewhere").code == 0
+
+
+def test_a_comparison_never_goes_over_what_it_compares(run, workplace):
+    Path("up.csv").rename("compare.csv")
+    before = listing(workplace)
+    ran = run("compare", "compare.csv", "down.csv", "-o", ".")
+    is_refused(ran, ["compare.csv", "written over", "-o"], before, workplace)
+
+
+def test_a_disk_that_is_full_leaves_the_former_files_and_shows_the_result(run, monkeypatch):
+    case = case_file()
+    assert run("fit", case, "--no-plots").code == 0
+    folder = Path("runs/case-fit")
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+
+    def full(path, data):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files, "_write_new", full)
+    ran = run("fit", case)
+    assert ran.code == 1
+    assert ran.err == f"Error: {folder}: cannot be written: No space left on device\n"
+    assert "converged" in ran.out
+    assert "written to" not in ran.out
+    printed = run("fit", case, "--json")
+    assert (printed.code, printed.err) == (1, ran.err)
+    assert json.loads(printed.out)["success"]
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_figure_that_fails_is_a_warning(run, monkeypatch):
+    def broken(result):
+        raise ZeroDivisionError("of its own")
+
+    monkeypatch.setattr(plots, "convergence", broken)
+    ran = run("fit", case_file())
+    place = Path("runs/case-fit/convergence.png")
+    assert ran.code == 0
+    assert ran.err == f"Warning: {place}: not drawn: ZeroDivisionError: of its own\n"
+    assert not place.exists()
+    assert (place.parent / "trajectories.png").is_file()
+
+
+def test_ctrl_c_while_drawing_ends_with_130_and_says_what_stands(run, monkeypatch):
+    def interrupted(result):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plots, "convergence", interrupted)
+    ran = run("fit", case_file())
+    place = Path("runs/case-fit")
+    assert ran.code == 130
+    assert ran.err == f"Interrupted: {place}: the numbers are whole, figures are missing\n"
+    assert "converged" in ran.out
+    assert json.loads((place / "result.json").read_text())["success"]
+
+
+def test_ctrl_c_elsewhere_ends_with_130_and_one_line(run, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(workflows, "simulate", interrupted)
+    ran = run("simulate", case_file())
+    assert (ran.code, ran.out, ran.err) == (130, "", "Interrupted\n")
+
+
+@pytest.mark.parametrize("command", ["fit", "simulate", "validate"])
+def test_a_folder_in_the_place_of_the_results_is_refused(run, workplace, command):
+    case = case_file()
+    name = {"fit": "result.json", "simulate": "response.csv", "validate": "validation.json"}
+    (Path("runs") / name[command]).mkdir(parents=True)
+    before = listing(workplace)
+    ran = run(*arguments(command, case), "-o", "runs")
+    is_refused(ran, [name[command], "it is a folder"], before, workplace)
 
 
 def test_an_interruption_at_the_start_leaves_the_start_and_all_figures(run, monkeypatch):
