@@ -50,7 +50,8 @@ def compare(
     from exfit.analysis.comparison import compare as compared
     from exfit.output import run_folder
 
-    folder = output.folder("compare", a, b, record)
+    folder = output.folder("compare")
+    run_folder.refuse_inputs("compare", [a, b, *([record] if record else ())], folder)
     agreement = compared(a, b, record, ColumnChoice(_columns(columns), time), shift, step_at)
     warn(run_folder.write_agreement(agreement, folder, output.figures))
     if output.as_json:

@@ -60,7 +60,7 @@ def fit_again_and_again(case: Path, folder: Path, strategy: str | None, plots: b
             stamps = stamps_of(case)
             try:
                 loaded = load(case)
-                refuse_own_files(loaded, folder)
+                refuse_own_files(loaded, folder, "fit")
                 before = fit_live(loaded, folder, strategy, plots, before)
             except ExfitError as fault:
                 Refusal(str(fault)).show()

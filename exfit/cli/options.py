@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from exfit.case.case import Case
 
 NOT_CONVERGED = 3
+NAMED_AFTER_RECORDS = ("fit", "validate")  # commands that name files so
 
 case_argument = click.argument("case", type=click.Path(path_type=Path))
 parameters_option = click.option(
@@ -47,23 +48,21 @@ class Output:
         """Whether tables are printed."""
         return not (self.quiet or self.as_json)
 
-    def folder(self, default: str, *inputs: Path | None) -> Path:
+    def folder(self, default: str) -> Path:
         """Return the folder for the files, by default one in runs.
 
-        Raises ExfitError where it cannot be written, or ``inputs`` would be lost there: before a
-        run is spent on it.
+        Raises ExfitError where it cannot be written: before a run is spent on it.
         """
         from exfit.output import run_folder
 
         folder = self.given or Path("runs") / default
         run_folder.refuse_unwritable(folder)
-        run_folder.refuse_inputs([path for path in inputs if path is not None], folder)
         return folder
 
     def folder_of(self, case: "Case", command: str) -> Path:
         """Return the folder for the files of a command that a case is given to."""
         folder = self.folder(f"{case.path.stem}-{command}")
-        refuse_own_files(case, folder)
+        refuse_own_files(case, folder, command)
         return folder
 
 
@@ -114,13 +113,14 @@ class Interruption(click.ClickException):
         click.echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
 
 
-def refuse_own_files(case: "Case", folder: Path) -> None:
-    """Raise ExfitError where results in a folder would write over files that a case is made of."""
+def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
+    """Raise ExfitError where a command's results would write over the files of its case."""
     from exfit.output import run_folder
 
     recordings = (*case.recordings, *case.validations)
     files = [case.path, *(case.folder / recording.record.file for recording in recordings)]
-    run_folder.refuse_inputs(files, folder, [recording.name for recording in recordings])
+    names = [recording.name for recording in recordings] if command in NAMED_AFTER_RECORDS else ()
+    run_folder.refuse_inputs(command, files, folder, names)
 
 
 def load(case: Path) -> "Case":

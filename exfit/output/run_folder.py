@@ -42,8 +42,16 @@ PARAMETERS = "parameters.yaml"
 ITERATIONS = "iterations.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
 INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
-TABLES = (PARAMETERS, ITERATIONS, "history.csv", "profile.csv", "compare.csv")
 MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT)
+# what a command may write that could be an input too, beside files that are named after records
+NUMBERS = {
+    "fit": (PARAMETERS, "history.csv", RESPONSE, ITERATIONS, WHOLE_FIT),
+    "simulate": (RESPONSE,),
+    "validate": (VALIDATION,),
+    "profile": ("profile.csv", PROFILES),
+    "identify": (DESIGN,),
+    "compare": ("compare.csv", AGREEMENT),
+}
 # what a fit may write, beside the files that are named after records
 FILES_OF_FIT = (
     ITERATIONS,
@@ -70,12 +78,14 @@ def refuse_unwritable(folder: Path) -> None:
             raise ExfitError(f"{folder / name}: cannot be written: it is a folder")
 
 
-def refuse_inputs(inputs: Iterable[Path], folder: Path, records: Iterable[str] = ()) -> None:
-    """Raise ExfitError where a run into a folder would write over a file that it reads.
+def refuse_inputs(
+    command: str, inputs: Iterable[Path], folder: Path, records: Iterable[str] = ()
+) -> None:
+    """Raise ExfitError where a command would write over a file that it reads.
 
     ``records`` are the names after which it names files.
     """
-    names = {*TABLES, *MAIN_FILES, *_named_after(records)}
+    names = {*NUMBERS[command], *_named_after(records)}
     for path in inputs:
         if path.name in names and path.resolve().parent == folder.resolve():
             raise ExfitError(

@@ -653,6 +653,9 @@ def test_a_comparison_never_goes_over_what_it_compares(run, workplace):
     before = listing(workplace)
     ran = run("compare", "compare.csv", "down.csv", "-o", ".")
     is_refused(ran, ["compare.csv", "written over", "-o"], before, workplace)
+    Path("compare.csv").rename("response.csv")  # which no comparison writes
+    columns = ["--columns", "vt=v", "--time", "t"]
+    assert run("compare", "response.csv", "down.csv", *columns, "--no-plots", "-o", ".").code == 0
 
 
 def test_a_disk_that_is_full_leaves_the_former_files_and_shows_the_result(run, monkeypatch):
