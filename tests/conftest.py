@@ -28,10 +28,12 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     """Let all workers, and the next session, share one folder of machine code.
 
-    Its names are hashes of what the code is made from.
+    Its names are hashes of what the code is made from. A worker has one thread of OpenBLAS, as the
+    command line has: there are as many workers as processors.
     """
     config.addinivalue_line("markers", "long: runs with --models=all only")
     hypothesis.settings.load_profile(config.getoption("models"))
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "EXFIT_CACHE" not in os.environ:
         os.environ["EXFIT_CACHE"] = str(config.cache.mkdir("machine_code"))
 

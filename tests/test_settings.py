@@ -36,7 +36,11 @@ def test_the_settings_of_this_run_are_in_effect():
     assert list(settings.faults(os.environ)) == []
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+# the settings alone are shown to be in effect by the runs under them
+ALONE = [pytest.param(name, marks=pytest.mark.long) for name in SETTINGS if name != "oldest"]
+
+
+@pytest.mark.parametrize("name", ["oldest", *ALONE])
 def test_a_setting_takes_effect(name):
     assert faults(SETTINGS[name], [SETTINGS[name]]) == [[]]
 

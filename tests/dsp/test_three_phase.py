@@ -11,7 +11,7 @@ from exfit.dsp.three_phase import mean_rms, positive_sequence, vt_of_rms, vt_of_
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
-RATES = [1000.0, 1234.5, 4800.0, 20_000.0]  # Hz
+RATES = [1000.0, 1234.5, 4800.0, pytest.param(20_000.0, marks=pytest.mark.long)]  # Hz
 FREQUENCIES = [49.2, 50.0, 60.3]  # Hz
 BEHIND = 2.0 * pi / 3.0 * np.arange(3)  # of each phase, rad
 ROUNDING = 1e-12

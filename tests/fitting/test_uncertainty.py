@@ -260,6 +260,7 @@ def test_an_interrupted_fit_claims_no_intervals():
     assert found.to_dict()["parameters"]["k"]["interval"] is None
 
 
+@pytest.mark.long
 def test_several_parameters_that_are_not_determined_stand_in_one_sentence():
     found = fit(case_of("ac1a_both")).knowledge
     assert found.confidence.parameters["KA"].interval is None
