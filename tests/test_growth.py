@@ -167,3 +167,31 @@ def test_a_strategy_is_its_words_and_its_function(copy):
     copy.write("case.yaml", json.dumps(case))
     shown = copy.exfit("fit --help", "fit case.yaml -o run --no-plots")
     assert "lm, then lm again" in " ".join(shown.split())
+
+
+COMMAND = '''"""The command poles."""
+
+from pathlib import Path
+
+import click
+
+from exfit.cli.options import case_argument
+
+
+@click.command()
+@case_argument
+def poles(case: Path) -> None:
+    """Print the poles of CASE."""
+    click.echo(f"poles of {case}")
+'''
+
+
+def test_a_command_is_one_file_and_its_place_in_the_list(copy):
+    """Beside the workflow that it calls, its table, its tests, and its row in the README."""
+    copy.write("exfit/cli/poles.py", COMMAND)
+    importing = "from exfit.cli.records import"
+    copy.add("exfit/cli/__init__.py", importing, "from exfit.cli.poles import poles\n")
+    copy.add("exfit/cli/__init__.py", "*OF_RESULTS, models", "poles, ")
+    shown = copy.exfit("--help", "poles --help", "poles case.yaml")
+    assert "Print the poles of CASE" in shown
+    assert "poles of case.yaml" in shown
