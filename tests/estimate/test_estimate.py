@@ -14,7 +14,10 @@ from scipy.optimize import least_squares as scipy_least_squares
 from exfit import estimate
 from exfit.estimate import least_squares
 from exfit.estimate.bounded import bounded_minimum
+from exfit.estimate.gauss_newton import FullStep, LineSearch
 from exfit.estimate.strategies import STRATEGIES
+from exfit.estimate.trust_region import TrustRegion
+from exfit.util.strategies import PHASES
 from exfit.util.strategies import STRATEGIES as EXPLANATIONS
 
 EVERY_METHOD = list(STRATEGIES)
@@ -219,6 +222,10 @@ def test_the_package_offers_what_its_users_name():
     }
     assert all(hasattr(estimate, name) for name in estimate.__all__)
     assert list(signature(least_squares).parameters)[:5] == ["fun", "x0", "jac", "bounds", "method"]
+
+
+def test_every_search_has_a_phase_with_a_name():
+    assert {search.phase for search in (FullStep(), LineSearch(), TrustRegion())} == {*PHASES}
 
 
 def test_every_strategy_with_a_name_has_its_function():

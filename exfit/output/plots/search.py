@@ -1,17 +1,18 @@
 """The course of a search: its iterations, its starts."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from exfit.output.plots.style import LIMIT, MEASURED, SIMULATED, WIDTH, tidy
+from exfit.output.plots.style import GREEN, LIMIT, MEASURED, SIMULATED, START, WIDTH, tidy
 from exfit.results.model import FitResult, Minima
 from exfit.util.strategies import PHASES
 
-COLOURS: Mapping[str, str] = {"lm": "#2b6cb0", "dgn": "#c1272d", "gn": "#2f855a"}  # of phases
+COLOURS: Mapping[str, str] = dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False))
 
 
 def convergence(result: FitResult) -> Figure:

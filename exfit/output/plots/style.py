@@ -8,10 +8,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 MEASURED, SIMULATED, START, LIMIT = "#8a8f98", "#c1272d", "#2b6cb0", "#b7791f"
+GREEN = "#2f855a"
 WIDTH = 9.0  # inches
 DPI = 120
 MILLI = 1e3
-COLORS = ("#1f4e9c", "#c1272d", "#2f855a", "#b7791f", "#6b46c1", "#0e7490", "#4a5568")
+COLORS = ("#1f4e9c", "#c1272d", GREEN, "#b7791f", "#6b46c1", "#0e7490", "#4a5568")
 STYLES = ("-", "--", ":")
 
 
