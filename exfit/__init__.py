@@ -23,6 +23,7 @@ from exfit.errors import (
 if TYPE_CHECKING:
     from exfit.case.case import Case
     from exfit.records.record import Record
+    from exfit.results.io import load_result
     from exfit.results.model import FitResult
     from exfit.workflows import (
         check,
@@ -53,6 +54,7 @@ __all__ = [
     "fit",
     "identify",
     "load_case",
+    "load_result",
     "profile",
     "read_record",
     "simulate",
@@ -67,6 +69,7 @@ _MODULES = {
     "fit": "exfit.workflows",
     "identify": "exfit.workflows",
     "load_case": "exfit.workflows",
+    "load_result": "exfit.results.io",
     "profile": "exfit.workflows",
     "read_record": "exfit.workflows",
     "simulate": "exfit.workflows",

@@ -1,16 +1,21 @@
 """What ``import exfit`` offers: light to import, typed, and the same functions as the commands."""
 
+import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
+from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from places import ROOT
 
 import exfit
 from exfit.fitting.recordings import record_of
+from exfit.output import run_folder
 
 CASE = ROOT / "configs" / "first_order.yaml"
 HEAVY = {"numpy", "scipy", "pydantic", "yaml", "matplotlib", "rich", "click", "llvmlite"}
@@ -216,3 +221,86 @@ def test_columns_that_are_not_given_rightly_are_refused_with_their_place(channel
 def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(exfit.RecordError, match="cannot be read"):
         exfit.read_record(tmp_path / "bump.csv", "t", {"vt": "v"})
+
+
+def test_a_parameter_has_its_value_standard_error_and_interval(result):
+    for name in ("k", "a"):
+        parameter = result.parameters[name]
+        low, high = parameter.interval
+        assert low < parameter.value < high
+        assert 0.0 < parameter.stderr < high - low
+    # what the record was made with, rounded to five decimals, 300 of them
+    assert result.parameters["k"].value == pytest.approx(4.0, rel=1e-5)
+
+
+def test_a_result_is_plain_data_with_a_row_for_each_parameter(result):
+    content = result.to_dict()
+    assert json.loads(json.dumps(content)) == content
+    rows = content["parameters"]
+    assert rows.keys() == result.parameters.keys()
+    assert len({tuple(row) for row in rows.values()}) == 1  # the same columns
+    assert {"value", "std_error", "interval", "unit"} <= {*rows["k"]}
+
+
+def test_a_result_is_shown_in_one_line(result):
+    assert repr(result).startswith("<FitResult FIRST_ORDER to first_order.csv: rmse ")
+    assert "k=4" in repr(result)
+    assert "\n" not in repr(result)
+
+
+class Page(HTMLParser):
+    """The cells of the tables of a page, and whether its tags are balanced."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.open_tags, self.rows, self.texts = [], [], []
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.open_tags.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+
+    def handle_endtag(self, tag):
+        assert self.open_tags.pop() == tag
+
+    def handle_data(self, data):
+        if self.open_tags and self.open_tags[-1] in ("td", "th"):
+            self.rows[-1].append(data)
+        self.texts.append(data)
+
+
+def test_a_notebook_shows_a_row_for_each_parameter_and_escapes_what_is_named(result):
+    page = Page(replace(result, model="<script>", notes=("a < b",))._repr_html_())
+    assert page.open_tags == []
+    assert [row[0] for row in page.rows] == ["parameter", *result.parameters]
+    assert all(len(row) == len(page.rows[0]) for row in page.rows)
+    assert {"<script>", "a < b"} <= {*page.texts}
+
+
+def test_a_result_is_drawn_beside_each_of_its_records(result):
+    figure = result.plot()
+    assert isinstance(figure, Figure)
+    # the figure draws a thinned line, which passes through the fitted samples
+    lines = {line.get_label(): line for line in figure.axes[0].lines}
+    assert {"measured", "start values", "fitted"} <= lines.keys()
+    overlay = result.comparison.overlays["vt"]
+    assert np.isin(lines["fitted"].get_ydata(), overlay.simulated).all()
+    assert isinstance(result.plot(result.validation[0].name), Figure)
+
+
+def test_a_record_that_cannot_be_drawn_is_refused(result):
+    with pytest.raises(exfit.ExfitError, match="up: not a record of this fit; known: fit"):
+        result.plot("up")
+    without = replace(result, comparisons=(replace(result.comparison, overlays={}),))
+    with pytest.raises(exfit.ExfitError, match="no samples of this record: fit again"):
+        without.plot()
+
+
+def test_a_result_is_read_back_from_its_folder(result, tmp_path):
+    run_folder.write_fit(result, tmp_path, figures=False)
+    for place in (tmp_path, str(tmp_path), tmp_path / "result.json"):
+        read = exfit.load_result(place)
+        assert read.to_dict() == result.to_dict()
+        assert read._repr_html_() == result._repr_html_()
+        assert isinstance(read.plot(), Figure)

@@ -38,7 +38,7 @@ MAY_IMPORT["workflows"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
 MAY_IMPORT["output"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT} - {"errors", "util"}
 # a result draws itself: inside the call, so that nothing is imported before
-EXCEPTIONS: set[tuple[str, str]] = set()
+EXCEPTIONS = {("exfit.results.model", "exfit.output.notebook")}
 
 ONLY_IN = {  # where a library may be imported, inside functions too
     "yaml": {"case"},

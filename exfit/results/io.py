@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -21,13 +22,13 @@ def result_text(result: FitResult) -> str:
     return to_json({"version": VERSION, **plain(thinned(result), whole=True)})
 
 
-def load_result(path: Path) -> FitResult:
+def load_result(path: str | PathLike[str]) -> FitResult:
     """Return a fit, given its result.json or the folder that holds it.
 
     A file of the version before is read as far as it goes. Raises ExfitError where the file cannot
     be read, or is no result of a fit: with the place in it, and what is wrong there.
     """
-    source = result_file(path)
+    source = result_file(Path(path))
     content = _content(source)
     version = content.get("version", 1)
     if isinstance(version, bool) or not isinstance(version, int) or version < 1:

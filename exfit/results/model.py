@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour, PartDescription, RecordedTest
 from exfit.util.typed import IN_FILE, KEY, plain
+
+if TYPE_CHECKING:
+    from exfit.output.notebook import Figure
 
 Array = NDArray[np.float64]
 
@@ -242,6 +245,22 @@ class FitResult:
         """
         found: dict[str, Any] = plain(self)
         return found
+
+    def plot(self, record: str | None = None) -> "Figure":
+        """Return a figure of the fitted response beside a record of the fit or of its validation.
+
+        ``record`` is its name, by default the first. Raises ExfitError where there is no such
+        record.
+        """
+        from exfit.output.notebook import fit_figure
+
+        return fit_figure(self, record)
+
+    def _repr_html_(self) -> str:
+        """Return the table that a notebook shows."""
+        from exfit.output.notebook import fit_html
+
+        return fit_html(self)
 
     def __repr__(self) -> str:
         """Return the model, the record, the match and the values in one line."""

@@ -1,0 +1,87 @@
+"""A fit as a notebook shows it: a table of its parameters, a figure of its response."""
+
+from matplotlib.figure import Figure
+
+from exfit.errors import ExfitError
+from exfit.output.plots import overlay
+from exfit.output.terminal.terminal import number
+from exfit.results.model import FitResult, FittedParameter
+from exfit.util.text import near
+
+__all__ = ["Figure", "fit_figure", "fit_html"]
+
+TABLE = """\
+<div>
+<p><b>{{ result.model }}</b> fitted to {{ records }}:
+{{ "converged" if result.success else "not converged" }} ({{ result.message }}),
+rmse {{ "%.3g" | format(result.rmse) }} pu, fit {{ "%.2f" | format(fit_percent) }} %</p>
+<table>
+<thead><tr>
+{% for heading in ("parameter", "start", "fitted", "standard error", "95 % interval", "unit") %}
+<th>{{ heading }}</th>
+{% endfor %}
+</tr></thead>
+<tbody>
+{% for meaning, cells in rows %}
+<tr title="{{ meaning }}">{% for cell in cells %}<td>{{ cell }}</td>{% endfor %}</tr>
+{% endfor %}
+</tbody>
+</table>
+{% if remarks %}
+<ul>
+{% for remark in remarks %}
+<li>{{ remark }}</li>
+{% endfor %}
+</ul>
+{% endif %}
+</div>
+"""
+
+
+def fit_html(result: FitResult) -> str:
+    """Return the parameters of a fit and what it leaves unresolved, as HTML."""
+    from jinja2 import Environment
+
+    template = Environment(autoescape=True, trim_blocks=True).from_string(TABLE)
+    unresolved = () if result.knowledge is None else result.knowledge.sentences
+    return template.render(
+        result=result,
+        records=", ".join(comparison.record for comparison in result.comparisons),
+        fit_percent=result.comparison.fit_percent,
+        rows=[
+            (parameter.meaning, _cells(name, parameter))
+            for name, parameter in result.parameters.items()
+        ],
+        remarks=[*(f"unresolved: {text}" for text in unresolved), *result.notes],
+    )
+
+
+def _cells(name: str, parameter: FittedParameter) -> tuple[str, ...]:
+    """Return what the table says of a parameter."""
+    error, interval = parameter.stderr, "-"
+    if parameter.interval is not None:
+        interval = " ... ".join(number(limit) for limit in parameter.interval)
+    bound = f", on its {parameter.at_bound}" if parameter.at_bound else ""
+    return (
+        name,
+        number(parameter.start),
+        f"{number(parameter.value)}{bound}",
+        number(error, 2),
+        interval,
+        parameter.unit,
+    )
+
+
+def fit_figure(result: FitResult, record: str | None = None) -> Figure:
+    """Return the fitted response beside a record, one of the fit or of its validation by name.
+
+    Raises ExfitError where there is no such record, or where a file of an earlier version holds no
+    samples.
+    """
+    comparisons = {one.name: one for one in (*result.comparisons, *result.validation)}
+    name = next(iter(comparisons)) if record is None else record
+    if name not in comparisons:
+        raise ExfitError(f"{name}: not a record of this fit; {near(name, comparisons)}")
+    if not comparisons[name].overlays:
+        raise ExfitError(f"{name}: the result holds no samples of this record: fit again")
+    return overlay(comparisons[name], f"{result.name}: {result.model}, record {name}")
