@@ -145,6 +145,20 @@ def test_no_folder_of_the_package_has_more_than_25_entries():
     assert crowded.keys() <= {"exciters"}
 
 
+def test_no_class_is_defined_in_two_modules():
+    homes = defaultdict(list)
+    for name, path in MODULES.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                homes[node.name].append(name)
+    assert {name: modules for name, modules in homes.items() if len(modules) > 1} == {}
+
+
+def test_no_module_has_more_than_400_lines():
+    lengths = {name: len(path.read_bytes().splitlines()) for name, path in MODULES.items()}
+    assert {name: length for name, length in lengths.items() if length > 400} == {}
+
+
 CHANGING = {
     "add", "append", "clear", "discard", "extend", "insert", "pop", "popitem", "remove",
     "setdefault", "update",

@@ -1,6 +1,6 @@
 """The section of a record by itself: checked like that of a case, for a file without a case."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pydantic import ValidationError
@@ -21,27 +21,34 @@ def record_section(content: Mapping[str, Any]) -> RecordFile:
     """Return the section of a record of a machine; raises CaseError with all faults of it."""
     faults = list[Fault]()
     plain = plain_content(content, faults, (HERE,))
+    section, wrong_forms = _section(plain)
+    faults += _elsewhere(wrong_forms, faults)
+    faults += _elsewhere(_contradictions(ContentNode((HERE,), plain)), faults)
+    if section is None or faults:
+        file = content.get("file", HERE)
+        raise CaseError(f"{file}: {dotted(fault.place[1:])}: {fault.text}" for fault in faults)
+    return section
+
+
+def _section(plain: Any) -> tuple[RecordFile | None, list[Fault]]:
+    """Return the section, None where a value has the wrong form, and these faults."""
     try:
-        section = RecordFile.model_validate(plain)
+        return RecordFile.model_validate(plain), []
     except ValidationError as error:
         details = [
             {**detail, "loc": (HERE, *detail["loc"])} for detail in error.errors(include_url=False)
         ]
-        places = {fault.place for fault in faults}
-        wrong_forms = form_faults(details, json_schema())
-        faults += [fault for fault in wrong_forms if fault.place not in places]
-    node, steady_test = ContentNode((HERE,), plain), ContentNode(("test",), {"vt0": 1.0})
-    places = {fault.place for fault in faults}
-    contradictions = [
-        *record_faults(steady_test, node),
-        *(
-            fault
-            for signal, channel in node.at("channels").sections
-            for fault in channel_faults(signal, channel, per_unit=True)
-        ),
-    ]
-    faults += [fault for fault in contradictions if fault.place not in places]
-    if faults:
-        file = content.get("file", HERE)
-        raise CaseError(f"{file}: {dotted(fault.place[1:])}: {fault.text}" for fault in faults)
-    return section
+        return None, [*form_faults(details, json_schema())]
+
+
+def _contradictions(section: ContentNode) -> Iterator[Fault]:
+    """Yield the faults of values that contradict each other, as in a test that is steady before."""
+    yield from record_faults(ContentNode(("test",), {"vt0": 1.0}), section)
+    for signal, channel in section.at("channels").sections:
+        yield from channel_faults(signal, channel, per_unit=True)
+
+
+def _elsewhere(faults: Iterable[Fault], others: Iterable[Fault]) -> list[Fault]:
+    """Return the faults of those places that have no other."""
+    places = {fault.place for fault in others}
+    return [fault for fault in faults if fault.place not in places]

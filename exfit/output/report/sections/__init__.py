@@ -18,7 +18,7 @@ from exfit.output.report.sections.unit_and_test import unit_and_test
 from exfit.results.model import FitResult
 
 
-class Section(NamedTuple):
+class ReportSection(NamedTuple):
     """A section of a report: its id, its heading, what it says; its template is named after it."""
 
     key: str
@@ -28,20 +28,20 @@ class Section(NamedTuple):
 
 
 SECTIONS = (
-    Section("test", "Unit and test", unit_and_test, "unit_and_test"),
-    Section("model", "Model", model, "model"),
-    Section("parameters", "Parameters", parameters, "parameters"),
-    Section("findings", "Notes and unresolved findings", findings, "findings"),
-    Section("fit", "Fitted records", fitted_matches, "fit"),
-    Section(
+    ReportSection("test", "Unit and test", unit_and_test, "unit_and_test"),
+    ReportSection("model", "Model", model, "model"),
+    ReportSection("parameters", "Parameters", parameters, "parameters"),
+    ReportSection("findings", "Notes and unresolved findings", findings, "findings"),
+    ReportSection("fit", "Fitted records", fitted_matches, "fit"),
+    ReportSection(
         "validation", "Validation on records that the fit never saw", validation_matches,
         "validation",
     ),
-    Section("search", "Search", search, "search"),
-    Section("identifiability", "Identifiability", identifiability, "identifiability"),
-    Section("flat", "Flat run", flat_runs, "flat_run"),
-    Section("small", "Small-signal view", small_signal, "small_signal"),
-    Section("limits", "Limits that were hit", limits, "limits"),
-    Section("dyr", "PSS/E dynamics records", dynamics, "dynamics"),
-    Section("reproduction", "Reproduction", reproduction, "reproduction"),
+    ReportSection("search", "Search", search, "search"),
+    ReportSection("identifiability", "Identifiability", identifiability, "identifiability"),
+    ReportSection("flat", "Flat run", flat_runs, "flat_run"),
+    ReportSection("small", "Small-signal view", small_signal, "small_signal"),
+    ReportSection("limits", "Limits that were hit", limits, "limits"),
+    ReportSection("dyr", "PSS/E dynamics records", dynamics, "dynamics"),
+    ReportSection("reproduction", "Reproduction", reproduction, "reproduction"),
 )  # fmt: skip

@@ -29,17 +29,17 @@ class FixedGroup:
 
 
 @dataclass(frozen=True)
-class Parameters:
+class ParametersView:
     """The fitted parameters, then the others, part by part."""
 
     fitted: Mapping[str, FittedParameter]
     fixed: tuple[FixedGroup, ...]
 
 
-def parameters(result: FitResult) -> Parameters:
+def parameters(result: FitResult) -> ParametersView:
     """Return all parameters of a fit."""
     groups = (*_of_parts(result), *_helpers(result), *_networks_of_records(result))
-    return Parameters(result.parameters, tuple(group for group in groups if group.rows))
+    return ParametersView(result.parameters, tuple(group for group in groups if group.rows))
 
 
 def _of_parts(result: FitResult) -> Iterator[FixedGroup]:
