@@ -2,12 +2,12 @@
 
 from exfit.output.plots.agreement import agreement
 from exfit.output.plots.iterations import iterations
-from exfit.output.plots.knowledge import correlation, profiles, sensitivity
 from exfit.output.plots.overlays import overlay
 from exfit.output.plots.records import inspection
 from exfit.output.plots.responses import overview, response
 from exfit.output.plots.search import convergence, trajectories, waterfall
 from exfit.output.plots.style import png
+from exfit.output.plots.uncertainty import correlation, profiles, sensitivity
 
 __all__ = [
     "agreement",

@@ -24,7 +24,7 @@ def agreement(compared: Agreement) -> Figure:
     )[:, 0]
     for k, (signal, between) in enumerate(zip(signals, compared.between, strict=True)):
         _curves(axes[2 * k], compared.curves, between)
-        own = [one for one in compared.differences if one.signal == signal]
+        own = [each for each in compared.differences if each.signal == signal]
         _differences(axes[2 * k + 1], own)
     axes[-1].set_xlabel("time (s)")
     figure.align_ylabels()

@@ -21,31 +21,31 @@ EARLY = 0.5  # power of the place: most of the way is made in the first iteratio
 def iterations(result: FitResult) -> Figure:
     """Return the record and the response after each iteration, with the error, record by record.
 
-    Colour tells the iteration, from the start in pale blue to the fit in red. Of a fit without
-    courses the figure is empty but for its title.
+    The colour shows the iteration, from the start in pale blue to the fit in red. Where a fit kept
+    no responses the figure is empty but for its title.
     """
-    shown = [
-        (one, one.iteration_responses)
-        for one in result.comparisons
-        if one.iteration_responses is not None
+    recorded = [
+        (comparison, comparison.iteration_responses)
+        for comparison in result.comparisons
+        if comparison.iteration_responses is not None
     ]
-    count = len(shown)
+    count = len(recorded)
     figure = Figure(figsize=(WIDTH, 1.0 + 4.4 * max(count, 1)), layout="constrained")
     figure.suptitle(f"{result.name}: the response after each iteration", fontsize=11)
-    if not shown:
+    if not recorded:
         return figure
     axes = figure.subplots(2 * count, 1, height_ratios=[3.0, 1.2] * count, squeeze=False)[:, 0]
-    for k, (comparison, courses) in enumerate(shown):
+    for k, (comparison, responses) in enumerate(recorded):
         upper, lower = axes[2 * k], axes[2 * k + 1]
         lower.sharex(upper)
         upper.tick_params(labelbottom=False)
-        _responses(upper, courses)
-        _errors(lower, courses)
+        _responses(upper, responses)
+        _errors(lower, responses)
         if count > 1:
             upper.set_title(f"{comparison.name}: {comparison.record}", fontsize=9, loc="left")
     axes[-1].set_xlabel("time (s)")
     figure.align_ylabels()
-    numbers = sorted({number for _, courses in shown for number in courses.numbers})
+    numbers = sorted({number for _, responses in recorded for number in responses.numbers})
     _colour_bar(figure, list(axes), numbers)
     return figure
 
@@ -56,26 +56,26 @@ def _colours(numbers: Sequence[int]) -> list[tuple[float, float, float, float]]:
     return [FADING(place) for place in places[: len(numbers)]]
 
 
-def _responses(axes: Axes, courses: IterationResponses) -> None:
-    time, measured = courses.time, courses.measured
+def _responses(axes: Axes, responses: IterationResponses) -> None:
+    time, measured = responses.time, responses.measured
     axes.plot(time, measured, ".", color=MEASURED, markersize=3, label="measured")
-    last = len(courses.numbers) - 1
-    labels = {0: "start" if courses.numbers[0] == 0 else f"iteration {courses.numbers[0]}"}
-    labels[last] = f"iteration {courses.numbers[last]}" if last else labels[0]
-    colours = _colours(courses.numbers)
-    for k, (samples, colour) in enumerate(zip(courses.samples, colours, strict=True)):
+    last = len(responses.numbers) - 1
+    labels = {0: "start" if responses.numbers[0] == 0 else f"iteration {responses.numbers[0]}"}
+    labels[last] = f"iteration {responses.numbers[last]}" if last else labels[0]
+    colours = _colours(responses.numbers)
+    for k, (samples, colour) in enumerate(zip(responses.samples, colours, strict=True)):
         width = 1.6 if k in labels else 1.0
         axes.plot(time, samples, "-", color=colour, linewidth=width, label=labels.get(k))
-    axes.set_ylabel(label_of(courses.signal))
+    axes.set_ylabel(label_of(responses.signal))
     axes.legend(loc="best", frameon=False)
     tidy(axes)
 
 
-def _errors(axes: Axes, courses: IterationResponses) -> None:
+def _errors(axes: Axes, responses: IterationResponses) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
-    for samples, colour in zip(courses.samples, _colours(courses.numbers), strict=True):
-        error = MILLI * (samples - courses.measured)
-        axes.plot(courses.time, error, color=colour, linewidth=0.8)
+    for samples, colour in zip(responses.samples, _colours(responses.numbers), strict=True):
+        error = MILLI * (samples - responses.measured)
+        axes.plot(responses.time, error, color=colour, linewidth=0.8)
     axes.set_ylabel("simulated\n- measured\n(1e-3 pu)")
     tidy(axes)
 

@@ -16,24 +16,26 @@ def overlay(comparison: Comparison, title: str) -> Figure:
     axes = figure.subplots(
         2 * count, 1, sharex=True, height_ratios=[3.0, 1.0] * count, squeeze=False
     )
-    for k, (signal, one) in enumerate(comparison.overlays.items()):
-        _signal(axes[2 * k, 0], comparison, signal, one)
-        _error(axes[2 * k + 1, 0], comparison, one)
+    for k, (signal, overlaid) in enumerate(comparison.overlays.items()):
+        _signal(axes[2 * k, 0], comparison, signal, overlaid)
+        _error(axes[2 * k + 1, 0], comparison, overlaid)
     axes[-1, 0].set_xlabel("time (s)")
     figure.align_ylabels()
     figure.suptitle(title, fontsize=11)
     return figure
 
 
-def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> None:
+def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay) -> None:
     time = comparison.time
-    axes.plot(*envelope(time, one.measured), ".", color=MEASURED, markersize=3, label="measured")
-    if one.start is not None:
+    axes.plot(
+        *envelope(time, overlaid.measured), ".", color=MEASURED, markersize=3, label="measured"
+    )
+    if overlaid.start is not None:
         axes.plot(
-            *envelope(time, one.start), "--", color=START, linewidth=1.2, label="start values"
+            *envelope(time, overlaid.start), "--", color=START, linewidth=1.2, label="start values"
         )
-    label = "fitted" if one.start is not None else "simulated"
-    axes.plot(*envelope(time, one.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
+    label = "fitted" if overlaid.start is not None else "simulated"
+    axes.plot(*envelope(time, overlaid.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
     axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
     match = comparison.channels[signal]
@@ -42,8 +44,8 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, one: Overlay) -> No
     tidy(axes)
 
 
-def _error(axes: Axes, comparison: Comparison, one: Overlay) -> None:
+def _error(axes: Axes, comparison: Comparison, overlaid: Overlay) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
-    axes.plot(*envelope(comparison.time, MILLI * one.error), color=SIMULATED, linewidth=0.7)
+    axes.plot(*envelope(comparison.time, MILLI * overlaid.error), color=SIMULATED, linewidth=0.7)
     axes.set_ylabel("simulated\n- measured\n(1e-3 pu)")
     tidy(axes)

@@ -1,4 +1,4 @@
-"""What a record tells of the parameters."""
+"""How well a record determines the parameters."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,25 +14,25 @@ Array = NDArray[np.float64]
 PERCENT = 1e-2
 
 
-def sensitivity(known: UncertaintyAnalysis, title: str) -> Figure:
+def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
     """Return by how much 1 % more of each parameter moves each signal over time.
 
     What belongs to a record is left out.
     """
-    courses = known.sensitivity
-    figure = Figure(figsize=(WIDTH, 1.2 + 3.0 * len(courses)), layout="constrained")
-    panels = figure.subplots(len(courses), 1, squeeze=False)[:, 0]
-    for axes, course in zip(panels, courses, strict=True):
-        for place, (name, moved) in enumerate(course.moved.items()):
+    responses = analysis.sensitivity
+    figure = Figure(figsize=(WIDTH, 1.2 + 3.0 * len(responses)), layout="constrained")
+    panels = figure.subplots(len(responses), 1, squeeze=False)[:, 0]
+    for axes, response in zip(panels, responses, strict=True):
+        for place, (name, change) in enumerate(response.moved.items()):
             axes.plot(
-                *envelope(course.time, PERCENT * MILLI * moved),
+                *envelope(response.time, PERCENT * MILLI * change),
                 STYLES[place // len(COLORS) % len(STYLES)],
                 color=COLORS[place % len(COLORS)],
                 linewidth=1.3,
                 label=name,
             )
         axes.axhline(0.0, color="black", linewidth=0.6)
-        axes.set_ylabel(f"change of {course.label}\nfor +1 % (1e-3 pu)")
+        axes.set_ylabel(f"change of {response.label}\nfor +1 % (1e-3 pu)")
         tidy(axes)
     panels[-1].set_xlabel("time (s)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False)
@@ -40,9 +40,9 @@ def sensitivity(known: UncertaintyAnalysis, title: str) -> Figure:
     return figure
 
 
-def correlation(known: UncertaintyAnalysis, title: str) -> Figure:
+def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     """Return the correlations of the estimates as a map; what has none is left blank."""
-    names, values = known.confidence.names, known.confidence.correlation.matrix
+    names, values = analysis.confidence.names, analysis.confidence.correlation.matrix
     side = max(4.2, 1.6 + 0.62 * len(names))
     figure = Figure(figsize=(side + 1.2, side), layout="constrained")
     axes = figure.subplots()
@@ -63,26 +63,28 @@ def correlation(known: UncertaintyAnalysis, title: str) -> Figure:
     return figure
 
 
-def profiles(found: Profiles) -> Figure:
+def profiles(profiled: Profiles) -> Figure:
     """Return the profile of each parameter: the rise of the cost in units of that at the limit."""
-    columns = min(3, len(found.profiles))
-    rows = -(-len(found.profiles) // columns)
+    columns = min(3, len(profiled.profiles))
+    rows = -(-len(profiled.profiles) // columns)
     figure = Figure(figsize=(WIDTH, 1.1 + 2.4 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    for axes, one in zip(grid.flat, found.profiles, strict=False):
-        rise = (one.costs - found.cost) / one.rise
-        axes.plot(one.at, rise, "o-", color=SIMULATED, linewidth=1.3, markersize=3)
+    for axes, profile in zip(grid.flat, profiled.profiles, strict=False):
+        rise = (profile.costs - profiled.cost) / profile.rise
+        axes.plot(profile.at, rise, "o-", color=SIMULATED, linewidth=1.3, markersize=3)
         axes.axhline(1.0, color=LIMIT, linewidth=1.0, linestyle=":")
-        for limit in (one.low, one.high):
+        for limit in (profile.low, profile.high):
             if limit is not None:
                 axes.axvline(limit, color=LIMIT, linewidth=1.0)
-        axes.plot([one.value], [0.0], "s", color=START, markersize=5)
-        axes.set_xlabel(f"{one.name} ({one.unit})" if one.unit else one.name)
+        axes.plot([profile.value], [0.0], "s", color=START, markersize=5)
+        axes.set_xlabel(f"{profile.name} ({profile.unit})" if profile.unit else profile.name)
         axes.set_ylim(-0.05, 1.5)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         tidy(axes)
     for k, axes in enumerate(grid.flat):
-        axes.set_visible(k < len(found.profiles))
+        axes.set_visible(k < len(profiled.profiles))
     figure.supylabel("rise of the cost / rise at the 95 % limit", fontsize=10)
-    figure.suptitle(f"{found.name}: the cost along each parameter, the others fitted", fontsize=11)
+    figure.suptitle(
+        f"{profiled.name}: the cost along each parameter, the others fitted", fontsize=11
+    )
     return figure
