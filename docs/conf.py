@@ -12,7 +12,7 @@ author = "the authors of exfit"
 release = version = __version__
 copyright = author
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "generate"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "generate"]
 exclude_patterns = ["build", "_build", "**.ipynb_checkpoints"]
 
 html_theme = "furo"

@@ -337,9 +337,15 @@ def with_literal_tables(_app: Any, *where: Any) -> None:
 
 
 def _set(paragraph: list[str]) -> list[str]:
-    if any(re.search(r"\S {2,}\S", line) for line in paragraph):
+    example = any(">>>" in line for line in paragraph)
+    if not example and any(re.search(r"\S {2,}\S", line) for line in paragraph):
         return ["::", "", *(f"    {line}" for line in paragraph)]
     return paragraph
+
+
+def without_fields(_app: Any, what: str, *_: Any) -> tuple[str, None] | None:
+    """Leave the fields out of the head of a class: its docstring has those that matter."""
+    return ("", None) if what == "class" else None
 
 
 def prepare(_app: Any) -> None:
@@ -357,6 +363,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("builder-inited", prepare)
     app.connect("source-read", with_contents)
     app.connect("autodoc-process-docstring", with_literal_tables)
+    app.connect("autodoc-process-signature", without_fields)
     return {"parallel_read_safe": True}
 
 
