@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from places import ROOT
+from test_layers import MAY_IMPORT
 
+import exfit
 from exfit import workflows
 from exfit.case.load import load_case
 from exfit.cli import main
@@ -31,6 +33,7 @@ README = PAGES["README.md"]
 NOTEBOOK = DOCS / "tutorial_python.ipynb"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 WITH_SESSIONS = [name for name, page in PAGES.items() if "```console" in page]
+OF_OTHERS = {"--strict", "--models"}  # options of mypy and of the tests
 WIDTH = 120  # of the terminal: no table of a page is cut off
 
 MACHINE = "model: AC1A\nplant: {type: open-circuit, machine: GENROU}\n"
@@ -156,7 +159,7 @@ def test_every_option_that_a_page_names_is_one_of_a_command():
     options = {name for command in commands for name in options_of(command)}
     for name, page in PAGES.items():
         words = set(re.findall(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*", page))
-        assert words - options <= {"--help", "--strict"}, name  # of mypy
+        assert words - options <= {"--help"} | OF_OTHERS, name
 
 
 def test_every_command_that_a_page_names_is_one_of_exfit():
@@ -270,6 +273,27 @@ def test_the_strategies_of_the_page_are_those_of_a_case():
     cells = first_column(PAGES["docs/case_file.md"], "## Strategies")
     (option,) = (it for it in main.commands["fit"].params if it.name == "strategy")
     assert sorted(cell.strip("`") for cell in cells) == sorted(option.type.choices)
+
+
+# ---- architecture
+
+
+def test_the_tree_of_the_architecture_has_every_package():
+    tree = block("architecture.md", "text", 1)
+    entries = [path for path in Path(exfit.__file__).parent.iterdir() if path.suffix != ".typed"]
+    names = {f"{path.name}/" if path.is_dir() else path.name for path in entries}
+    assert set(re.findall(r"^  (\w\S+)", tree, re.MULTILINE)) == names - {"__pycache__/"}
+
+
+def test_the_layers_of_the_architecture_are_those_that_are_tested():
+    rows = re.findall(
+        r"^\| ([a-z, ]+) \| ([a-z, ]+) \|$", PAGES["docs/architecture.md"], re.MULTILINE
+    )
+    named = {row: cell for names, cell in rows for row in names.split(", ") if row in MAY_IMPORT}
+    assert set(named) == set(MAY_IMPORT) - {"util", "errors", "signals"} | {"util"}
+    for package, cell in named.items():
+        if set(cell.split(", ")) <= set(MAY_IMPORT):
+            assert set(cell.split(", ")) == MAY_IMPORT[package], package
 
 
 # ---- links
