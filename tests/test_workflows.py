@@ -35,9 +35,9 @@ def true_cost(name):
     truth = json.loads(reference.read_text())["params_in_effect"]
     known = {NAMES.get(key, key): value for key, value in truth.items()}
     wanted = [*loaded.parameters.free, "KA"]
-    trial = build_experiments(loaded)[0]
+    setup = build_experiments(loaded)[0]
     return compare_with_record(
-        trial, "truth", values_of(loaded, {key: known[key] for key in wanted})
+        setup, "truth", values_of(loaded, {key: known[key] for key in wanted})
     ).cost
 
 
@@ -180,10 +180,10 @@ def test_an_interrupted_fit_keeps_the_best_point_so_far():
 def test_the_initial_voltage_is_the_mean_before_the_step_where_the_case_gives_none():
     loaded = case("ac1a_typical")
     down = loaded.validations[0]
-    trial = build_experiment(loaded, down, loaded.values())
-    before = trial.record.time < 1.0
-    assert trial.experiment.own[VT0] == pytest.approx(
-        np.mean(trial.record.signals["vt"][before]), rel=1e-12
+    setup = build_experiment(loaded, down, loaded.values())
+    before = setup.record.time < 1.0
+    assert setup.experiment.own[VT0] == pytest.approx(
+        np.mean(setup.record.signals["vt"][before]), rel=1e-12
     )
     assert build_experiments(loaded)[0].experiment.own[VT0] == 1.0
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from exfit.case.case import Case
 from exfit.case.parts import Part
-from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, Unknown, known
+from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, Unknown, start_value
 from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import NETWORK
 from exfit.records.reading import file_hash
@@ -134,6 +134,6 @@ def _given(value: float | Unknown, form: str, unit: str) -> str:
     """Return a value of a test; one that the fit identified stands among the parameters."""
     if not isinstance(value, Unknown):
         return f"{value:{form}} {unit}"
-    start = known(value)
+    start = start_value(value)
     about = "" if start is None else f"about {start:{form}} {unit} "
     return f"{about}(found by the fit)"

@@ -58,14 +58,14 @@ class Check:
 def check(case: Case) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
     if case.recordings:
-        trials = build_experiments(case)
+        setups = build_experiments(case)
         experiments = [
-            trial.with_enough_substeps(trial.with_start_values(case.values())).experiment
-            for trial in trials
+            setup.with_enough_substeps(setup.with_start_values(case.values())).experiment
+            for setup in setups
         ]
     else:
-        trials, experiments = (), [planned(case)]
-    free = free_parameters(case, trials)
+        setups, experiments = (), [planned(case)]
+    free = free_parameters(case, setups)
     names = {parameter.name for parameter in free}
     values = {**{parameter.name: parameter.start for parameter in free}, **case.values()}
     fixed = {name: value for name, value in values.items() if name not in names}

@@ -1,4 +1,4 @@
-"""What is wrong with the form of a case file, in plain words: place, value and limit."""
+"""Messages about the form of a case file: place, value and limit."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -15,7 +15,7 @@ PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
 PATTERNS: Mapping[str, str] = {
     FILE_NAME: "must begin with a letter or digit and hold letters, digits, - _ . only",
-    PERCENT: "is neither a number nor a share such as 20 %",
+    PERCENT: "is neither a number nor a percentage such as 20 %",
 }
 # kind of fault -> what to say of the value, given the limits
 WORDS: Mapping[str, Callable[[str, Data], str]] = {
@@ -25,7 +25,7 @@ WORDS: Mapping[str, Callable[[str, Data], str]] = {
     "int_type": lambda value, _: f"{value} is not a whole number",
     "int_from_float": lambda value, _: f"{value} is not a whole number",
     "finite_number": lambda value, _: f"{value} is not a finite number",
-    "string_type": lambda value, _: f"{value} is not text; in quotes it would be",
+    "string_type": lambda value, _: f"{value} is not text; put it in quotes",
     "string_too_short": lambda _, __: "is empty",
     "string_too_long": lambda value, limits: (
         f"{value} is longer than {limits['max_length']} characters"
@@ -58,7 +58,7 @@ def form_faults(details: Iterable[Data], schema: Data) -> list[Fault]:
 
 
 def _only_counts_good_ones(detail: Data) -> bool:
-    """Tell whether a list is called too short for its faulty entries, which are told anyway."""
+    """Tell whether a list is too short only for its faulty entries, which are reported anyway."""
     return detail["type"] == "too_short" and bool(
         len(detail["input"]) >= detail["ctx"]["min_length"]
     )
@@ -124,7 +124,7 @@ def _at(schema: Data, part: Data, place: Place) -> list[Data]:
         return _at(schema, schema["$defs"][part["$ref"].rpartition("/")[2]], place)
     choices = [*part.get("oneOf", ()), *part.get("anyOf", ())]
     if choices:
-        return [found for choice in choices for found in _at(schema, choice, place)]
+        return [described for choice in choices for described in _at(schema, choice, place)]
     if not place:
         return [part]
     key, rest = place[0], place[1:]

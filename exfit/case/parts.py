@@ -81,18 +81,18 @@ def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
     exciter = _exciter(data, folder, faults) if kind.has_exciter else None
     machine = _machine(plant, faults) if kind.has_machine else None
     stabiliser = _stabiliser(data, faults)
-    found = []
+    parts = []
     if exciter is not None:
         exponential = str(data.get("saturation")).startswith("exponential")
-        found.append(exciter_part(exciter, exponential))
+        parts.append(exciter_part(exciter, exponential))
     if machine is not None:
         kinds = (kind, *map(kind_of, plants_of_records(data).values()))
-        found.append(machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
+        parts.append(machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
     if kind.on_load:
-        found.append(network_part(_mapping(plant.get("network"))))
+        parts.append(network_part(_mapping(plant.get("network"))))
     if stabiliser is not None:
-        found.append(stabiliser_part(stabiliser))
-    return Parts(exciter, machine, stabiliser, tuple(found))
+        parts.append(stabiliser_part(stabiliser))
+    return Parts(exciter, machine, stabiliser, tuple(parts))
 
 
 def kind_of(plant: Data) -> PlantKind:
@@ -119,23 +119,25 @@ def plants_of_records(data: Data) -> dict[Place, Data]:
 
 def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
     """Return the ties of a case file's data; add a fault for each that cannot be used."""
-    found: dict[str, Tie] = {}
+    ties: dict[str, Tie] = {}
     places: dict[str, Place] = {}
     for name, place, text in _tied(data, parts):
         places[name] = place
         try:
-            found[name] = parse(text)
+            ties[name] = parse(text)
         except TieError as error:
             faults.append(Fault(place, str(error)))
-    known = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
-    known += helpers_of(data, parts)
-    for name, tie in list(found.items()):
+    names = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
+    names += helpers_of(data, parts)
+    for name, tie in list(ties.items()):
         for used in tie.names:
-            if used not in known:
-                faults.append(Fault(places[name], f"{used} is no parameter; {near(used, known)}"))
-                found.pop(name, None)
+            if used not in names:
+                faults.append(
+                    Fault(places[name], f"{used} is not a parameter; {near(used, names)}")
+                )
+                ties.pop(name, None)
     try:
-        return Ties(found)
+        return Ties(ties)
     except TieError as error:
         first = str(error).partition(" -> ")[0]
         faults.append(Fault(places[first], str(error)))
@@ -233,9 +235,9 @@ def network_part(given: Data, place: Place = ("plant", "network")) -> Part:
         if "Q" not in given and "E" not in given:
             yield "Q", "is missing: with P it says where to start; or E, the voltage of the source"
         if "Q" in given and "E" in given:
-            yield "Q", "follows from E: give one of them"
+            yield "Q", "not allowed with E, from which it follows"
         if values.get("R") == values.get("X") == 0.0:
-            yield "X", "0 with R = 0 leaves nothing between the machine and the source"
+            yield "X", "0, and R = 0 as well: the machine needs an impedance to the source"
 
     sheet = flow_sheet("E" if "E" in given else "Q")
     if "Q" in given and "E" in given:

@@ -57,8 +57,8 @@ def _files(content: Any) -> Iterator[str]:
             yield file
         content = list(content.values())
     if isinstance(content, list):
-        for one in content:
-            yield from _files(one)
+        for entry in content:
+            yield from _files(entry)
 
 
 def _parts(file: Path) -> Iterator[Path]:
@@ -71,14 +71,14 @@ def _parts(file: Path) -> Iterator[Path]:
 
 
 def _names(content: Mapping[str, Any], free: bool) -> tuple[str, ...]:
-    found = [
+    names = [
         prefix + str(name)
         for prefix, places in SECTIONS.items()
         for place in places
         if not free or place[-1] == "free"
         for name in _section(content, place)
     ]
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(names))
 
 
 def _section(content: Mapping[str, Any], place: tuple[str, ...]) -> Mapping[str, Any]:

@@ -17,9 +17,9 @@ from exfit.case.yaml import DECIMAL
 Values = Mapping[str, float]
 Slopes = dict[str, float]
 
-LONGEST = 200  # characters; no text so short is nested too deep to be walked
-FOREIGN = re.compile(r"[^A-Za-z0-9_.+\-*/() ]")
-USED = "only numbers, names, + - * / ** and parentheses are used"
+MOST_CHARACTERS = 200  # characters; no text so short is nested too deep to be walked
+NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_.+\-*/() ]")
+USED = "only numbers, names, + - * / ** and parentheses are allowed"
 
 
 class TieError(ValueError):
@@ -49,7 +49,7 @@ class Tie:
         Raises TieError where the value or a derivative is not finite.
         """
         try:
-            value, found = _dual(self.tree, values, slopes)
+            value, derivatives = _dual(self.tree, values, slopes)
         except ZeroDivisionError:
             raise self._error("division by zero", values) from None
         except OverflowError:
@@ -58,10 +58,10 @@ class Tie:
             raise self._error(str(error), values) from None
         if not isfinite(value):
             raise self._error("not a finite number", values)
-        for name, slope in found.items():
+        for name, slope in derivatives.items():
             if not isfinite(slope):
                 raise self._error(f"the slope to {name} is not finite", values)
-        return value, found
+        return value, derivatives
 
     def _error(self, what: str, values: Values) -> TieError:
         at = ", ".join(f"{name} = {values[name]:g}" for name in self.names)
@@ -79,14 +79,14 @@ def parse(text: str) -> Tie:
     Raises TieError, which names the offending piece, for anything but numbers, names (dotted ones
     such as machine.Tpd0 too), + - * /, ** with an exponent without names, and parentheses.
     """
-    if len(text) > LONGEST:
+    if len(text) > MOST_CHARACTERS:
         start = text[:20]
-        raise TieError(f"{start}...: {len(text)} characters; at most {LONGEST} are allowed")
+        raise TieError(f"{start}...: {len(text)} characters; at most {MOST_CHARACTERS} are allowed")
     if not is_tie(text):
         raise TieError(f"{text}: does not begin with =")
     body = text[1:].strip(" ")
-    if foreign := FOREIGN.search(body):
-        raise TieError(f"{text}: {foreign[0]!r} has no meaning here; {USED}")
+    if foreign := NOT_ALLOWED.search(body):
+        raise TieError(f"{text}: {foreign[0]!r} is not allowed; {USED}")
     try:
         tree = ast.parse(body, mode="eval").body
     except SyntaxError as error:
@@ -123,10 +123,10 @@ class Ties:
 
     def apply(self, values: Values) -> dict[str, float]:
         """Return the values with those of the tied parameters, computed; raises TieError."""
-        found = dict(values)
+        completed = dict(values)
         for name in self.order:
-            found[name] = self.by_name[name].value(found)
-        return found
+            completed[name] = self.by_name[name].value(completed)
+        return completed
 
     def slopes(self, values: Values, free: Sequence[str]) -> dict[str, Slopes]:
         """Return the total derivatives of each tied parameter to the free ones it depends on.
@@ -157,7 +157,7 @@ def _names(node: ast.expr, text: str) -> Iterator[str]:
             yield from _names(left, text)
             yield from _names(right, text)
         case _:
-            raise TieError(f"{text}: {_piece(node, text)!r} is no arithmetic; {USED}")
+            raise TieError(f"{text}: {_piece(node, text)!r} is not arithmetic; {USED}")
 
 
 def _piece(node: ast.expr, text: str) -> str:

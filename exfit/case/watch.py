@@ -21,9 +21,9 @@ def changed(before: Stamps) -> tuple[Path, ...]:
     """Return which files are others than they were, once there are some and they stand still."""
     from watchfiles import watch
 
-    found = _others(before)
-    if found and _stands_still(found):
-        return found
+    others = _others(before)
+    if others and _stands_still(others):
+        return others
     announced = watch(
         *_folders(before),
         watch_filter=None,
@@ -33,9 +33,9 @@ def changed(before: Stamps) -> tuple[Path, ...]:
         recursive=False,
     )
     for _ in announced:
-        found = _others(before)
-        if found and _stands_still(found):
-            return found
+        others = _others(before)
+        if others and _stands_still(others):
+            return others
     return ()
 
 
@@ -56,13 +56,15 @@ def _folders(before: Stamps) -> tuple[Path, ...]:
 
     Of one that does not exist it is the nearest above it that does.
     """
-    found = (next(one for one in path.absolute().parents if one.is_dir()) for path in before)
-    return tuple(dict.fromkeys(found))
+    folders = (
+        next(parent for parent in path.absolute().parents if parent.is_dir()) for path in before
+    )
+    return tuple(dict.fromkeys(folders))
 
 
 def _stamp(path: Path) -> Stamp:
     try:
-        known = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return known.st_mtime_ns, known.st_size
+    return status.st_mtime_ns, status.st_size

@@ -17,7 +17,7 @@ Place = tuple[str | int, ...]
 
 LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
-DEEPEST = 20  # levels; a case file has five
+MOST_LEVELS = 20  # of nesting; a case file has five
 WHOLE = re.compile(r"[-+]?[0-9]+")
 DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 INFINITE = re.compile(r"([-+]?)\.(inf|Inf|INF)")
@@ -132,16 +132,16 @@ class _Reader:
         """Return the node that begins with an event."""
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
-                raise _NoYaml(_line(event), f"*{event.anchor} stands for nothing before it")
+                raise _NoYaml(_line(event), f"*{event.anchor}: no such anchor before it")
             return self.anchors[event.anchor]
-        if len(place) > DEEPEST:
-            raise _NoYaml(_line(event), f"nested more than {DEEPEST} levels deep")
+        if len(place) > MOST_LEVELS:
+            raise _NoYaml(_line(event), f"nested more than {MOST_LEVELS} levels deep")
         if event.tag is not None:
             self.faults.append(Fault(place, f"tag {event.tag} is not used here", _line(event)))
-        found = self._content(event, place)
+        node = self._content(event, place)
         if event.anchor is not None:
-            self.anchors[event.anchor] = found
-        return found
+            self.anchors[event.anchor] = node
+        return node
 
     def _content(self, event: Any, place: Place) -> YamlNode:
         if isinstance(event, yaml.MappingStartEvent):
@@ -155,27 +155,27 @@ class _Reader:
         entries: dict[str | int, YamlNode] = {}
         while not isinstance(event := next(self.events), yaml.MappingEndEvent):
             if not isinstance(event, yaml.ScalarEvent):
-                raise _NoYaml(_line(event), "a key must be a plain word")
+                raise _NoYaml(_line(event), "a key must be plain text")
             key, line = event.value, _line(event)
             here = (*place, key)
-            found = self.node(next(self.events), here)
-            if found.value is None:
+            node = self.node(next(self.events), here)
+            if node.value is None:
                 self.faults.append(Fault(here, "has no value", line))
             if key in entries:
                 first = entries[key].line
                 self.faults.append(Fault(here, f"duplicate key, first on line {first}", line))
             else:
-                entries[key] = YamlNode(found.value, line, found.entries)
+                entries[key] = YamlNode(node.value, line, node.entries)
         return YamlNode({key: node.value for key, node in entries.items()}, _line(start), entries)
 
     def _sequence(self, start: Any, place: Place) -> YamlNode:
         items: list[YamlNode] = []
         while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
             here = (*place, len(items))
-            found = self.node(event, here)
-            if found.value is None:
+            node = self.node(event, here)
+            if node.value is None:
                 self.faults.append(Fault(here, "has no value", _line(event)))
-            items.append(YamlNode(found.value, _line(event), found.entries))
+            items.append(YamlNode(node.value, _line(event), node.entries))
         return YamlNode([item.value for item in items], _line(start), dict(enumerate(items)))
 
 
@@ -187,8 +187,8 @@ def scalar(text: str) -> str | bool | int | float | None:
         return int(text) if len(text) < 16 else float(text)
     if DECIMAL.fullmatch(text):
         return float(text)
-    if found := INFINITE.fullmatch(text):
-        return float(found[1] + "inf")
+    if infinite := INFINITE.fullmatch(text):
+        return float(infinite[1] + "inf")
     return text
 
 

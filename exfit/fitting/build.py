@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, RecordFile, Recording, known
+from exfit.case.schema import BumpTest, RecordFile, Recording, start_value
 from exfit.errors import CaseError
 from exfit.fitting.channels import channel_of, without_masked
 from exfit.fitting.detected_steps import with_detected_steps
@@ -43,7 +43,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     nuisances, free = nuisance_parameters(prefix_of(recording), test, file, steps)
     if any(nuisance.kind == "shift" for nuisance in nuisances):
         steps = tuple(step._replace(smooth=False) for step in steps)
-    delay = known(file.delay) or 0.0
+    delay = start_value(file.delay) or 0.0
     beyond = max(0.0, _earliest_reading(nuisances, free) - delay)
     inputs = _inputs(test, record, steps, driving, beyond)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
@@ -113,7 +113,7 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
     Raises CaseError where the case does not say how long and from which voltage.
     """
     test = case.test or BumpTest()
-    vt0 = known(test.vt0)
+    vt0 = start_value(test.vt0)
     missing = [name for name in ("vt0", "duration") if getattr(test, name) is None]
     if vt0 is None or test.duration is None:
         raise CaseError(

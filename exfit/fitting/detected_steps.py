@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, FindableStep, RecordFile, Recording, Unknown, known
+from exfit.case.schema import BumpTest, FindableStep, RecordFile, Recording, Unknown, start_value
 from exfit.dsp.filtering import outliers
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
@@ -30,7 +30,7 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
     steps = tuple(
         _bounded(f"{place}.vref[{k}]", step, record, limit) for k, step in enumerate(test.vref)
     )
-    instants = [known(step.at) or 0.0 for step in steps]
+    instants = [start_value(step.at) or 0.0 for step in steps]
     for k, (before, at) in enumerate(pairwise(instants), 1):
         if at <= before:
             text = f"{at:g} s is not after {before:.4g} s, where the record shows the step before"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, StepSection, Switch, Unknown, known
+from exfit.case.schema import BumpTest, StepSection, Switch, Unknown, start_value
 from exfit.errors import CaseError
 from exfit.plants import NETWORK
 from exfit.simulation.inputs import InputStep
@@ -19,7 +19,10 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
     """
     steps = [
         InputStep(
-            known(step.at) or 0.0, known(step.step) or 0.0, signal, isinstance(step.at, Unknown)
+            start_value(step.at) or 0.0,
+            start_value(step.step) or 0.0,
+            signal,
+            isinstance(step.at, Unknown),
         )
         for signal in ("vref", "vs")
         for step in getattr(test, signal)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, known
+from exfit.case.schema import BumpTest, start_value
 from exfit.errors import RecordError
 from exfit.plants import VT0, initial
 from exfit.records.record import Record
@@ -63,5 +63,5 @@ def initial_level(test: BumpTest, record: Record, signal: str) -> float:
 
 def initial_voltage(test: BumpTest, record: Record) -> float:
     """Return the voltage before the first step: as the test gives it, else the record's mean."""
-    vt0 = known(test.vt0)
+    vt0 = start_value(test.vt0)
     return initial_level(test, record, "vt") if vt0 is None else vt0

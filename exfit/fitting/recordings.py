@@ -17,7 +17,7 @@ from exfit.case.schema import (
     Recording,
     TimeColumn,
     Unknown,
-    known,
+    start_value,
 )
 from exfit.errors import RecordError
 from exfit.records.clock import Clock
@@ -59,8 +59,8 @@ def _with_start_of_scale(samples: Array, channel: ChannelSection | PhasesSection
     """Return samples with the start of a scale and an offset that the fit finds."""
     if not isinstance(channel, ChannelSection):
         return samples
-    scale = known(channel.scale) if isinstance(channel.scale, Unknown) else None
-    offset = known(channel.offset) if isinstance(channel.offset, Unknown) else None
+    scale = start_value(channel.scale) if isinstance(channel.scale, Unknown) else None
+    offset = start_value(channel.offset) if isinstance(channel.offset, Unknown) else None
     return samples * (1.0 if scale is None else scale) + (offset or 0.0)
 
 
@@ -137,7 +137,7 @@ def clock_of(record: RecordFile) -> Clock:
 
 def column_of(channel: ChannelSection) -> Column:
     """Return the column of a channel; where a fit finds scale or offset, with their starts."""
-    scale, offset = known(channel.scale), known(channel.offset)
+    scale, offset = start_value(channel.scale), start_value(channel.offset)
     return Column(
         channel.column, 1.0 if scale is None else scale, offset or 0.0, channel.unit, channel.base
     )

@@ -73,8 +73,8 @@ def test_a_run_without_a_step_stays_flat(first_order):
 
 
 def test_the_drift_of_a_flat_run_can_be_asked_for_alone(first_order):
-    (trial,) = build_experiments(first_order)
-    one, values = trial.experiment, {"k": 4.0, "a": 2.0} | first_order.values()
+    (setup,) = build_experiments(first_order)
+    one, values = setup.experiment, {"k": 4.0, "a": 2.0} | first_order.values()
     assert flat_drift(one.with_inputs(values), one.parameters(values)) < 1e-12
 
 

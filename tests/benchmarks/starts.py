@@ -32,7 +32,7 @@ def problem():
     """Return the residuals of the case."""
     case = load_case(CASE)
     return residuals_of(
-        case, [trial.with_enough_substeps(case.values()) for trial in build_experiments(case)]
+        case, [setup.with_enough_substeps(case.values()) for setup in build_experiments(case)]
     )
 
 

@@ -136,8 +136,8 @@ def test_what_identifies_the_unit_is_text_or_a_number_under_any_name(case_file):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        ("[1]", "a list is not text; in quotes it would be"),
-        ("true", "true is not text; in quotes it would be"),
+        ("[1]", "a list is not text; put it in quotes"),
+        ("true", "true is not text; put it in quotes"),
         (".inf", "inf is not a finite number"),
         ("''", "is empty"),
         ("", "has no value"),

@@ -122,8 +122,8 @@ FORM = {
     "number for a prior": (STD[:-1], 5, STD[:-1], "5 is not a mapping"),
     "prior without std": (STD[:-1], {"mean": 3}, STD, "is missing"),
     "text for a mean": ((*STD[:-1], "mean"), "x", (*STD[:-1], "mean"), "'x' is not a number"),
-    "quoted std": (STD, "20", STD, "'20' is neither a number nor a share such as 20 %"),
-    "negative share": (STD, "-1 %", STD, "'-1 %' is neither a number nor a share"),
+    "quoted std": (STD, "20", STD, "'20' is neither a number nor a percentage such as 20 %"),
+    "negative share": (STD, "-1 %", STD, "'-1 %' is neither a number nor a percentage"),
     "std of nothing": (STD, 0, STD, "0 is not above 0"),
     "list for a std": (STD, [1], STD, "a list is not a number"),
     "number for a filter": ((*VT, "filter"), 5, (*VT, "filter"), "5 is not a mapping"),
@@ -351,7 +351,7 @@ MEANING = {
     ),
     "tie that ends": ((*FIXED, "VAMIN"), "=", (*FIXED, "VAMIN"), "ends too soon"),
     "tie that cannot be read": ((*FIXED, "VAMIN"), "=-VAMAX)", (*FIXED, "VAMIN"), "cannot be read"),
-    "function in a tie": ((*FIXED, "VAMIN"), "=exp(2)", (*FIXED, "VAMIN"), "is no arithmetic"),
+    "function in a tie": ((*FIXED, "VAMIN"), "=exp(2)", (*FIXED, "VAMIN"), "is not arithmetic"),
     "unknown name in a tie": (
         (*FIXED, "VAMIN"),
         "=-VAMX",
@@ -362,7 +362,7 @@ MEANING = {
         ("plant", "parameters"),
         {"Tppd0": "=Tpd0/200"},
         ("plant", "parameters", "Tppd0"),
-        "Tpd0 is no parameter",
+        "Tpd0 is not a parameter",
     ),
     "circle": (
         (*FIXED, "VAMAX"),
@@ -704,10 +704,10 @@ def test_junk_in_the_new_keys_gives_a_case_or_its_refusal(beside_a_record, chang
     except CaseError:
         return
     try:
-        trials = build_experiments(case)
+        setups = build_experiments(case)
     except ExfitError:
         return
-    residuals = residuals_of(case, trials)
+    residuals = residuals_of(case, setups)
     assert np.isfinite(residuals.start).all()
     low, high = residuals.bounds
     assert (low < high).all()

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from exfit.case.ties import LONGEST, Tie, TieError, Ties, parse
+from exfit.case.ties import MOST_CHARACTERS, Tie, TieError, Ties, parse
 
 NAMES = ("KE", "TE0", "machine.Tpd0")
 NUMBER = re.compile(r"(?<![\w.])\d+(\.\d+)?")
@@ -67,7 +67,7 @@ ANY = expressions(FLOATS, "+-*/", "+-", ("2", "-1", "0.5", "-1.5", "0", "3.0"))
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(ANY, st.tuples(*(st.floats(-10.0, 10.0) for _ in NAMES)))
 def test_a_value_is_to_the_last_bit_what_python_makes_of_the_text(body, numbers):
-    assume(len(body) < LONGEST)
+    assume(len(body) < MOST_CHARACTERS)
     values = dict(zip(NAMES, numbers, strict=True))
     try:
         expected = by_python(body, values)
@@ -93,7 +93,7 @@ def test_slopes_are_the_differences_of_exact_rational_values(bodies):
     @settings(max_examples=200, deadline=None, derandomize=True)
     @given(bodies, st.tuples(*(st.integers(1, 4) for _ in NAMES)))
     def holds(body, numbers):
-        assume(len(body) < LONGEST)
+        assume(len(body) < MOST_CHARACTERS)
         values = dict(zip(NAMES, map(float, numbers), strict=True))
         tie = parse("=" + body)
         value, slopes = tie.value(values), tie.slopes(values)
@@ -206,16 +206,16 @@ def test_anything_but_arithmetic_is_refused_and_named(text, piece):
 
 
 def test_a_text_too_long_is_refused_without_being_read():
-    assert parse("=" + "1" * (LONGEST - 1)).value({}) > 1.0
-    with pytest.raises(TieError, match=f"{10**7 + 1} characters; at most {LONGEST}"):
+    assert parse("=" + "1" * (MOST_CHARACTERS - 1)).value({}) > 1.0
+    with pytest.raises(TieError, match=f"{10**7 + 1} characters; at most {MOST_CHARACTERS}"):
         parse("=" + "(" * 10**7)
 
 
 @pytest.mark.parametrize("open_", ["(", "-", "-(", "KE+", "KE+(", "2**", "KE**-", "(KE)/(", "1--"])
 def test_the_deepest_text_is_computed_or_refused_without_harm(open_):
-    body = open_ * ((LONGEST - 3) // (len(open_) + open_.count("(")))
+    body = open_ * ((MOST_CHARACTERS - 3) // (len(open_) + open_.count("(")))
     text = f"={body}1{')' * (body.count('(') - body.count(')'))}"
-    assert len(text) <= LONGEST
+    assert len(text) <= MOST_CHARACTERS
     assert told(text).startswith(text)
 
 

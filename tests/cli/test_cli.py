@@ -921,7 +921,7 @@ def test_the_program_starts_as_a_command_and_as_a_pipe(tmp_path):
         pytest.param(("record.file", "flat.csv"), "vt is 1 pu throughout", id="flat"),
         pytest.param(
             ("record.channels.vt", {"column": "v", "scale": 0.0}),
-            "leaves nothing",
+            "must not be 0",
             id="scaled away",
         ),
         pytest.param(

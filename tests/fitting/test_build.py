@@ -87,12 +87,12 @@ def test_the_cost_is_half_the_sum_of_the_weighted_errors_squared(load):
 def test_the_saturation_that_a_case_names_is_the_one_simulated(load, form):
     case = load({**MACHINE_CASE, "saturation": form}, vt=1.0 + 0.025 * TRUTH)
     got = simulate(case, {}).response.signals["vt"]
-    trial = build_experiments(case)[0]
+    setup = build_experiments(case)[0]
     values = {**values_of(case, {}), VT0: 1.0}
 
     def response(name):
         system = oracle.system_of("AC1A", "GENROU", name)
-        simulator = Simulator(system, trial.experiment.simulator.inputs, TIME, case.simulation.step)
+        simulator = Simulator(system, setup.experiment.simulator.inputs, TIME, case.simulation.step)
         return simulator.with_enough_substeps(values).samples(values, ("vt",))[0][:, 0]
 
     assert got == pytest.approx(response(form), abs=1e-12)

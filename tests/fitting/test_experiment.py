@@ -78,13 +78,13 @@ def test_what_is_left_out_does_not_tell_the_noise(lost):
 WINDOW = 0.1  # s: so wide that what it does is far above rounding
 
 
-def averaged(trial, filter=None, kept=None):
+def averaged(setup, filter=None, kept=None):
     """Return a trial whose record holds averages already."""
-    time = trial.record.time
+    time = setup.record.time
     kept = np.ones(len(time), dtype=bool) if kept is None else kept
     alike = Filtering(time, kept, filter, MovingAverage(WINDOW))
-    channels = tuple(replace(one, filtering=alike) for one in trial.channels)
-    return replace(trial, experiment=replace(trial.experiment, channels=channels))
+    channels = tuple(replace(one, filtering=alike) for one in setup.channels)
+    return replace(setup, experiment=replace(setup.experiment, channels=channels))
 
 
 def averaged_case(folder, filter=None, lost=0):
@@ -95,34 +95,34 @@ def averaged_case(folder, filter=None, lost=0):
     content["records"][0]["test"]["vt0"] = 1.0
     content["parameters"]["fixed"] |= {name: UNIT[name] for name in UNIT if name not in NEAR}
     case = case_of(content, folder)
-    trial = build_experiments(case)[0].with_enough_substeps(case.values())
-    kept = np.ones(len(trial.record.time), dtype=bool)
+    setup = build_experiments(case)[0].with_enough_substeps(case.values())
+    kept = np.ones(len(setup.record.time), dtype=bool)
     kept[100 : 100 + lost] = False
-    return case, averaged(trial, filter, kept)
+    return case, averaged(setup, filter, kept)
 
 
 NEAR = {name: (UNIT[name], UNIT[name] / 5, UNIT[name] * 5) for name in ("KA", "TE", "KF")}
 
 
 def test_a_record_of_averages_is_held_against_the_averaged_simulation(tmp_path):
-    case, trial = averaged_case(tmp_path)
+    case, setup = averaged_case(tmp_path)
     values = case.values()
-    vt = trial.response(values).signals["vt"]
-    time = trial.record.time
+    vt = setup.response(values).signals["vt"]
+    time = setup.record.time
     average = Filtering(time, np.ones(len(time), dtype=bool), averaged=MovingAverage(WINDOW))
-    recorded = [replace(trial.channels[0], measured=average.as_recorded(vt))]
-    there = replace(trial, experiment=replace(trial.experiment, channels=tuple(recorded)))
+    recorded = [replace(setup.channels[0], measured=average.as_recorded(vt))]
+    there = replace(setup, experiment=replace(setup.experiment, channels=tuple(recorded)))
     assert there.experiment.errors(values)[0] == pytest.approx(np.zeros(len(time)), abs=1e-12)
     plain = replace(recorded[0], filtering=None)
-    off = replace(trial.experiment, channels=(plain,)).errors(values)[0]
+    off = replace(setup.experiment, channels=(plain,)).errors(values)[0]
     assert np.abs(off).max() > 1e-4
 
 
 @pytest.mark.parametrize("lost", [0, 30])
 @pytest.mark.parametrize("filter", [None, LowPass(5.0), Median(5)], ids=str)
 def test_the_derivatives_of_averaged_simulations_are_exact(tmp_path, filter, lost):
-    case, trial = averaged_case(tmp_path, filter, lost)
-    residuals = residuals_of(case, [trial])
+    case, setup = averaged_case(tmp_path, filter, lost)
+    residuals = residuals_of(case, [setup])
     theta = residuals.start
     # central differences of a limited response: some 1e-6 of the largest derivative
     central = residuals.central(theta)
@@ -131,15 +131,15 @@ def test_the_derivatives_of_averaged_simulations_are_exact(tmp_path, filter, los
 
 
 def test_what_is_drawn_is_what_is_compared(tmp_path):
-    case, trial = averaged_case(tmp_path, lost=30)
+    case, setup = averaged_case(tmp_path, lost=30)
     values = case.values()
     start = {**values, "KA": 0.5 * values["KA"]}
-    found = compare_with_record(trial, "up", values, start)
+    found = compare_with_record(setup, "up", values, start)
     vt = found.overlays["vt"]
-    errors = trial.channels[0].weight * (vt.simulated - vt.measured)
+    errors = setup.channels[0].weight * (vt.simulated - vt.measured)
     assert 0.5 * np.nansum(errors**2) == pytest.approx(found.cost, rel=1e-12)
     assert np.isnan(errors).sum() == 30
-    first = compare_with_record(trial, "up", start).overlays["vt"].simulated
+    first = compare_with_record(setup, "up", start).overlays["vt"].simulated
     assert np.array_equal(vt.start, first, equal_nan=True)
 
 

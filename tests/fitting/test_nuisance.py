@@ -80,8 +80,8 @@ def everything_open(tmp_path):
     content["parameters"]["fixed"] |= {"TE": "=0.9*TE0", "VAMIN": "=-VAMAX", "KF": 0.0444}
     content["parameters"]["fixed"] |= {"TF": 1.5754, "TA": 0.0545, "KC": 0.5111}
     case = case_of(content, tmp_path)
-    trials = build_experiments(case)
-    return residuals_of(case, [trial.with_enough_substeps(case.values()) for trial in trials])
+    setups = build_experiments(case)
+    return residuals_of(case, [setup.with_enough_substeps(case.values()) for setup in setups])
 
 
 def test_the_exact_jacobian_is_that_of_differences_with_all_that_can_be_found(everything_open):
@@ -193,8 +193,8 @@ def test_a_late_recorder_is_found(tmp_path):
     # what the recorder shows at t happened 37 ms before: simulated there, not interpolated
     synthetic(tmp_path, TEST, TIME)
     case = case_of(one(TEST, delay=0.037), tmp_path)
-    trial = build_experiments(case)[0]
-    late = trial.with_enough_substeps(case.values()).response(case.values()).signals["vt"]
+    setup = build_experiments(case)[0]
+    late = setup.with_enough_substeps(case.values()).response(case.values()).signals["vt"]
     assert np.interp(TIME - 0.037, TIME, shown) == pytest.approx(late, abs=6 * NOISE)
     rng = np.random.default_rng(1)
     write(tmp_path / "record.csv", t=TIME, vt=late + 2e-5 * rng.standard_normal(len(TIME)))
@@ -223,8 +223,8 @@ def test_an_early_recorder_sees_beyond_the_end_of_its_own_clock(tmp_path):
     whole = read_columns(tmp_path / "record.csv", ["t", "vt"])
     write(tmp_path / "record.csv", t=TIME[:151], vt=whole["vt"][:151])
     for delay in (-0.4, found_in(-0.4, -0.5, 0.1)):
-        trial = build_experiments(case_of(one(TEST, delay=delay), tmp_path))[0]
-        early = trial.response(values).signals["vt"]
+        setup = build_experiments(case_of(one(TEST, delay=delay), tmp_path))[0]
+        early = setup.response(values).signals["vt"]
         # grids of 1 ms that end elsewhere, and a cubic between the samples
         assert early == pytest.approx(whole["vt"][40:191], abs=1e-6)
 
@@ -236,8 +236,8 @@ def test_an_early_recorder_leaves_less_to_tell_the_level(tmp_path):
     shown = read_columns(tmp_path / "record.csv", ["t", "vt"])
     write(tmp_path / "record.csv", t=TIME, vt=np.interp(TIME + 0.4, shown["t"], shown["vt"]))
     for delay in (-0.4, found_in(0.0, -0.4, 0.1)):
-        trial = build_experiments(case_of(one(level, delay=delay), tmp_path))[0]
-        assert trial.experiment.own[VT0] == pytest.approx(1.0, abs=1e-9)
+        setup = build_experiments(case_of(one(level, delay=delay), tmp_path))[0]
+        assert setup.experiment.own[VT0] == pytest.approx(1.0, abs=1e-9)
 
 
 def test_the_base_of_a_signal_is_found(tmp_path):
@@ -310,8 +310,8 @@ def test_each_name_moves_its_own_step(tmp_path, order):
             {"at": found_in(instants[name], 0.5, 5.0), "step": 0.01 * instants[name]}
             for name in names
         ]
-    trial = build_experiments(case_of(one(test), tmp_path))[0]
-    moved = trial.experiment.with_inputs({name: at + 0.25 for name, at in instants.items()})
+    setup = build_experiments(case_of(one(test), tmp_path))[0]
+    moved = setup.experiment.with_inputs({name: at + 0.25 for name, at in instants.items()})
     assert {(step.at, round(step.step, 9)) for step in moved.inputs.steps} == {
         (at + 0.25, round(0.01 * at, 9)) for at in instants.values()
     }
@@ -321,9 +321,9 @@ def test_the_level_before_an_instant_that_is_found_is_that_before_its_lower_boun
     vt = np.where(TIME < 0.7, 1.0, 1.0 + 0.01 * (TIME - 0.7))
     write(tmp_path / "record.csv", t=TIME, vt=vt)
     test = {"vref": [{"at": found_in(1.0, 0.7, 1.2), "step": 0.05}]}
-    trial = build_experiments(case_of(one(test), tmp_path))[0]
-    assert trial.experiment.own[VT0] == 1.0
-    assert trial.test.steady == 0.7
+    setup = build_experiments(case_of(one(test), tmp_path))[0]
+    assert setup.experiment.own[VT0] == 1.0
+    assert setup.test.steady == 0.7
 
 
 def test_auto_finds_the_step_beside_gaps_and_masked_stretches(tmp_path):
@@ -376,9 +376,9 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     assert found.values == plain.values
     (before,), (after,) = plain.validation, found.validation
     assert after.rmse == pytest.approx(before.rmse, rel=0.05)
-    trial = build_experiment(case, case.validations[0], found.values)
-    assert validation_of(case, trial, found.values).rmse == after.rmse
-    unaligned = compare_with_record(trial.with_enough_substeps(found.values), "start", found.values)
+    setup = build_experiment(case, case.validations[0], found.values)
+    assert validation_of(case, setup, found.values).rmse == after.rmse
+    unaligned = compare_with_record(setup.with_enough_substeps(found.values), "start", found.values)
     assert unaligned.rmse > 10 * after.rmse
 
 

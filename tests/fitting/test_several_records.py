@@ -160,13 +160,13 @@ def on_and_off_line(tmp_path):
     fixed = content["parameters"]["fixed"]
     case = case_of({**content, "parameters": {"fixed": {**fixed, **truth}}}, tmp_path)
     rng = np.random.default_rng(2)
-    for trial in build_experiments(case):
-        response = trial.with_enough_substeps(case.values()).response(case.values())
+    for setup in build_experiments(case):
+        response = setup.with_enough_substeps(case.values()).response(case.values())
         shown = {
             signal: response.signals[signal] + 1e-5 * rng.standard_normal(len(TIME))
-            for signal in trial.experiment.signals
+            for signal in setup.experiment.signals
         }
-        write(tmp_path / f"{trial.name}.csv", t=TIME, **shown)
+        write(tmp_path / f"{setup.name}.csv", t=TIME, **shown)
     return content, free, truth
 
 
@@ -198,12 +198,12 @@ def test_a_switching_starts_from_the_network_of_its_own_record(tmp_path):
     on = content["records"][1]
     on["plant"]["network"] = {**on["plant"]["network"], "X": 0.25}
     on["test"]["network"] = [{"at": 2.0, "X": 0.4}]
-    trial = build_experiments(case_of(content, tmp_path))[1]
-    (switch,) = [step for step in trial.experiment.simulator.inputs.steps if step.signal == "X"]
+    setup = build_experiments(case_of(content, tmp_path))[1]
+    (switch,) = [step for step in setup.experiment.simulator.inputs.steps if step.signal == "X"]
     assert (switch.at, switch.step) == (2.0, pytest.approx(0.15))
     content["plant"] |= {"type": "infinite-bus", "network": {**on["plant"]["network"], "X": 0.1}}
-    trial = build_experiments(case_of(content, tmp_path))[1]
-    (switch,) = [step for step in trial.experiment.simulator.inputs.steps if step.signal == "X"]
+    setup = build_experiments(case_of(content, tmp_path))[1]
+    (switch,) = [step for step in setup.experiment.simulator.inputs.steps if step.signal == "X"]
     assert switch.step == pytest.approx(0.15)
 
 

@@ -172,11 +172,11 @@ def test_the_rise_is_the_quantile_of_one_parameter(ac1a):
 def first_order():
     """Return the residuals of a case, its samples the exact response to k = 4 and a = 2."""
     case = case_of("first_order")
-    (trial,) = build_experiments(case)
-    whole = residuals_of(case, (trial,))
-    (channel,) = trial.channels
-    exact = 2.0 * (1.0 - np.exp(-2.0 * trial.record.time))
-    seen = replace(trial.experiment, channels=(replace(channel, measured=exact),))
+    (setup,) = build_experiments(case)
+    whole = residuals_of(case, (setup,))
+    (channel,) = setup.channels
+    exact = 2.0 * (1.0 - np.exp(-2.0 * setup.record.time))
+    seen = replace(setup.experiment, channels=(replace(channel, measured=exact),))
     return Residuals([seen], whole.free, whole.fixed)
 
 

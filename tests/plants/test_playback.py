@@ -157,9 +157,9 @@ def test_an_exciter_that_needs_the_field_current_says_so(tmp_path):
 
 
 def test_what_drives_is_not_compared(tmp_path):
-    trial = build_experiments(case_of(exciter(), tmp_path))[0]
-    assert [channel.signal for channel in trial.channels] == ["efd"]
-    assert set(trial.experiment.simulator.inputs.recorded.signals) == {"vt", "ifd"}
+    setup = build_experiments(case_of(exciter(), tmp_path))[0]
+    assert [channel.signal for channel in setup.channels] == ["efd"]
+    assert set(setup.experiment.simulator.inputs.recorded.signals) == {"vt", "ifd"}
 
 
 @pytest.mark.parametrize(
@@ -213,17 +213,17 @@ def test_a_known_reference_far_away_is_reached_too(tmp_path):
     for vref in (1.004, 1.012):
         text = exciter().replace("{type: playback}", f"{{type: playback, vref: {vref}}}")
         case = case_of(text.replace(steps, "steady_until: 1.0"), tmp_path)
-        trial = build_experiments(case)[0]
-        still = replace(trial.experiment.simulator.inputs, recorded=None)
+        setup = build_experiments(case)[0]
+        still = replace(setup.experiment.simulator.inputs, recorded=None)
         simulator = Simulator(
-            trial.experiment.simulator.system, still, np.linspace(0.0, 1.0, 11), 1e-3
+            setup.experiment.simulator.system, still, np.linspace(0.0, 1.0, 11), 1e-3
         )
-        efd = simulator.response({**case.values(), **trial.experiment.own}).signals["efd"]
+        efd = simulator.response({**case.values(), **setup.experiment.own}).signals["efd"]
         assert np.ptp(efd) < 1e-9 * efd[0]
 
 
 def test_short_times_of_a_played_machine_ask_for_sub_steps(tmp_path):
     case = case_of(MACHINE, tmp_path)
-    trial = build_experiments(case)[0]
-    values = {**case.values(), **trial.experiment.own, "machine.Tppd0": 5e-4}
-    assert trial.experiment.simulator.substeps(values) >= 2
+    setup = build_experiments(case)[0]
+    values = {**case.values(), **setup.experiment.own, "machine.Tppd0": 5e-4}
+    assert setup.experiment.simulator.substeps(values) >= 2

@@ -182,9 +182,9 @@ def test_every_limit_of_the_data_sheet_is_known(name):
 @pytest.mark.parametrize("case", ["first_order", "ac8b_unit1"])
 def test_sample_cases_off_their_limits_show_none(case):
     loaded = load_case(CONFIGS / f"{case}.yaml")
-    trials = build_experiments(loaded)
-    values = {one.name: one.start for one in free_parameters(loaded, trials)} | loaded.values()
-    for one in (trial.experiment for trial in trials):
+    setups = build_experiments(loaded)
+    values = {one.name: one.start for one in free_parameters(loaded, setups)} | loaded.values()
+    for one in (setup.experiment for setup in setups):
         assert limits_hit(one.with_inputs(values), one.parameters(values)) == ()
 
 

@@ -105,12 +105,12 @@ def problem(name):
     """Return the residuals of one of CASES, their samples the exact response to the truth."""
     case, fixed = load_case(CASE), CASES[name]
     values = {**case.values(), **TRUTH, **fixed}
-    (trial,) = build_experiments(case)
-    trial = trial.with_enough_substeps(values)
-    whole = residuals_of(case, (trial,))
-    exact = trial.experiment.samples(values)[0][:, 0]
-    (channel,) = trial.channels
-    experiment = replace(trial.experiment, channels=(replace(channel, measured=exact),))
+    (setup,) = build_experiments(case)
+    setup = setup.with_enough_substeps(values)
+    whole = residuals_of(case, (setup,))
+    exact = setup.experiment.samples(values)[0][:, 0]
+    (channel,) = setup.channels
+    experiment = replace(setup.experiment, channels=(replace(channel, measured=exact),))
     return with_fixed(Residuals([experiment], whole.free, whole.fixed, whole.ties), fixed)
 
 

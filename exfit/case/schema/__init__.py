@@ -17,7 +17,7 @@ from exfit.case.schema.records import (
     TimeColumn,
 )
 from exfit.case.schema.tests import BumpTest, FindableStep, StepSection, Switch
-from exfit.case.schema.values import FreeSection, Unknown, Value, known
+from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
 
 __all__ = [
     "SINGLE",
@@ -45,5 +45,5 @@ __all__ = [
     "TimeColumn",
     "Unknown",
     "Value",
-    "known",
+    "start_value",
 ]

@@ -8,7 +8,7 @@ from exfit.case.schema.values import (
     Number,
     Positive,
     Section,
-    known,
+    start_value,
 )
 
 
@@ -76,7 +76,7 @@ class BumpTest(Section):
     @property
     def instants(self) -> tuple[float, ...]:
         """The times of all events that are given as numbers, s, in order."""
-        instants = {known(step.at) for step in (*self.vref, *self.vs)}
+        instants = {start_value(step.at) for step in (*self.vref, *self.vs)}
         instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
         return tuple(sorted(at for at in instants if at is not None))
 

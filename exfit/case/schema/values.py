@@ -132,7 +132,7 @@ Findable = Annotated[
 ]
 
 
-def known(value: "float | Unknown | None") -> float | None:
+def start_value(value: "float | Unknown | None") -> float | None:
     """Return a value where it is a number: given, or the start of one that is found."""
     start = value.start if isinstance(value, Unknown) else value
     return None if start == "auto" else start
