@@ -1,4 +1,4 @@
-"""A test beside its record: what is simulated, conditioned, and compared with what was measured."""
+"""A test beside its record: what is simulated, filtered, and compared with what was measured."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -76,14 +76,14 @@ class Channel:
         return samples if self.filtering is None else self.filtering.apply(samples)
 
     def as_recorded(self, simulated: Array) -> Array:
-        """Return simulated values (M, ...) as the recorder shows them, before they are conditioned.
+        """Return simulated values (M, ...) as the recorder shows them, before they are filtered.
 
         Where it records averages, these are averaged alike; so are derivatives.
         """
         return simulated if self.filtering is None else self.filtering.as_recorded(simulated)
 
     def slopes(self, samples: Array, slopes: Array) -> Array:
-        """Return the derivatives of conditioned samples, given those (M, N) of the samples."""
+        """Return the derivatives of filtered samples, given those (M, N) of the samples."""
         if self.filtering is None:
             return slopes
         return self.filtering.tangents(samples, slopes)
@@ -140,7 +140,7 @@ class Experiment:
     @property
     def moves(self) -> bool:
         """Whether the fit moves what its simulations do not have side by side."""
-        return any(one.kind in ("at", "shift", "step", "delay") for one in self.nuisances)
+        return any(nuisance.kind in ("at", "shift", "step", "delay") for nuisance in self.nuisances)
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -149,11 +149,11 @@ class Experiment:
 
     def parameters(self, values: Values) -> dict[str, float]:
         """Return the parameters of the system."""
-        found = {**values, **self.own}
-        for one in self.nuisances:
-            if one.kind == "vt0":
-                found[VT0] = values[one.name]
-        return found
+        parameters = {**values, **self.own}
+        for nuisance in self.nuisances:
+            if nuisance.kind == "vt0":
+                parameters[VT0] = values[nuisance.name]
+        return parameters
 
     def with_inputs(self, values: Values) -> Simulator:
         """Return the simulator with the steps and the delay that the values give."""
@@ -161,27 +161,31 @@ class Experiment:
             return self.simulator
         steps: list[InputStep] = list(self.simulator.inputs.steps)
         delay = self.simulator.delay
-        for one in self.nuisances:
-            if one.kind == "at":
-                steps[one.step] = steps[one.step]._replace(at=values[one.name])
-            elif one.kind == "step":
-                steps[one.step] = steps[one.step]._replace(step=values[one.name])
-            elif one.kind == "delay":
-                delay = values[one.name]
+        for nuisance in self.nuisances:
+            if nuisance.kind == "at":
+                steps[nuisance.step] = steps[nuisance.step]._replace(at=values[nuisance.name])
+            elif nuisance.kind == "step":
+                steps[nuisance.step] = steps[nuisance.step]._replace(step=values[nuisance.name])
+            elif nuisance.kind == "delay":
+                delay = values[nuisance.name]
         shifts = [
-            values[one.name] - steps[one.step].at for one in self.nuisances if one.kind == "shift"
+            values[nuisance.name] - steps[nuisance.step].at
+            for nuisance in self.nuisances
+            if nuisance.kind == "shift"
         ]
         return self.simulator.with_inputs(tuple(steps), sum(shifts, start=delay))
 
     def measured(self, channel: Channel, values: Values) -> Array:
         """Return a record (M,) in per unit, by the scale and offset that the values give."""
-        found = {
-            one.kind: values[one.name] for one in self.nuisances if one.signal == channel.signal
+        of_record = {
+            nuisance.kind: values[nuisance.name]
+            for nuisance in self.nuisances
+            if nuisance.signal == channel.signal
         }
-        if not found:
+        if not of_record:
             return channel.measured
         raw = (channel.measured - channel.offset) / channel.scale
-        return raw * found.get("scale", channel.scale) + found.get("offset", channel.offset)
+        return raw * of_record.get("scale", channel.scale) + of_record.get("offset", channel.offset)
 
     def samples(self, values: Values) -> tuple[Array, int]:
         """Return the simulated signals (M, channels), and the number of sub-steps."""
@@ -232,34 +236,34 @@ class Experiment:
         """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
         directions = [self._direction(move) for move in moves]
         moving = [k for k, direction in enumerate(directions) if direction != Direction()]
-        samples, found = self.with_inputs(values).tangents(
+        samples, derivatives = self.with_inputs(values).tangents(
             self.parameters(values), self.signals, [directions[k] for k in moving]
         )
         if len(moving) == len(moves):
-            return samples, found
+            return samples, derivatives
         slopes = np.zeros((*samples.shape, len(moves)))
-        slopes[:, :, moving] = found
+        slopes[:, :, moving] = derivatives
         return samples, slopes
 
     def _direction(self, move: Values) -> Direction:
         """Return a direction as the simulator takes it."""
         own = self.own.keys()
-        known = self.simulator.system.parameters
-        parameters = {name: d for name, d in move.items() if name in known and name not in own}
+        names = self.simulator.system.parameters
+        parameters = {name: d for name, d in move.items() if name in names and name not in own}
         steps: dict[int, tuple[float, float]] = {}
         delay = 0.0
-        for one in self.nuisances:
-            d = move.get(one.name, 0.0)
+        for nuisance in self.nuisances:
+            d = move.get(nuisance.name, 0.0)
             if d == 0.0:
                 continue
-            at, step = steps.get(one.step, (0.0, 0.0))
-            if one.kind == "at":
-                steps[one.step] = (at + d, step)
-            elif one.kind == "step":
-                steps[one.step] = (at, step + d)
-            elif one.kind in ("delay", "shift"):
+            at, step = steps.get(nuisance.step, (0.0, 0.0))
+            if nuisance.kind == "at":
+                steps[nuisance.step] = (at + d, step)
+            elif nuisance.kind == "step":
+                steps[nuisance.step] = (at, step + d)
+            elif nuisance.kind in ("delay", "shift"):
                 delay += d
-            elif one.kind == "vt0":
+            elif nuisance.kind == "vt0":
                 parameters = {**parameters, VT0: d}
         return Direction(parameters, steps, delay)
 
@@ -267,15 +271,15 @@ class Experiment:
         self, channel: Channel, values: Values, moves: Sequence[Values]
     ) -> Array | None:
         """Return the derivatives of what was measured, if its scale or offset is found."""
-        found = [one for one in self.nuisances if one.signal == channel.signal]
-        if not found:
+        nuisances = [nuisance for nuisance in self.nuisances if nuisance.signal == channel.signal]
+        if not nuisances:
             return None
         raw = (channel.measured - channel.offset) / channel.scale
         columns = np.zeros((len(raw), len(moves)))
-        for one in found:
+        for nuisance in nuisances:
             for k, move in enumerate(moves):
-                by = raw if one.kind == "scale" else np.ones_like(raw)
-                columns[:, k] += by * move.get(one.name, 0.0)
+                by = raw if nuisance.kind == "scale" else np.ones_like(raw)
+                columns[:, k] += by * move.get(nuisance.name, 0.0)
         return channel.slopes(self.measured(channel, values), columns)
 
     def with_enough_substeps(self, values: Values) -> "Experiment":

@@ -11,7 +11,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 
 Array = NDArray[np.float64]
 
-BENT = 2.0  # times the rise that the theory tells: there an end may be 30 % off
+MOST_RISE = 2.0  # times the rise that the linear theory predicts: there an end may be 30 % off
 
 
 def nonlinear_parameters(
@@ -26,12 +26,12 @@ def nonlinear_parameters(
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
     least, rises = half_square(residuals(theta)), known.rises
-    found = [
+    names = [
         name
         for name, end in _ends(residuals, theta, known)
-        if not 1.0 / BENT <= (half_square(residuals(end)) - least) / rises[name] <= BENT
+        if not 1.0 / MOST_RISE <= (half_square(residuals(end)) - least) / rises[name] <= MOST_RISE
     ]
-    return tuple(name for name in dict.fromkeys(found) if name not in of_record)
+    return tuple(name for name in dict.fromkeys(names) if name not in of_record)
 
 
 def _ends(
@@ -39,12 +39,12 @@ def _ends(
 ) -> Iterator[tuple[str, Array]]:
     """Yield both ends of each interval, with the others along, unless a bound comes before."""
     low, high = residuals.bounds
-    own = np.array([one.slope(float(x)) for one, x in zip(residuals.free, theta, strict=True)])
+    own = np.array([free.slope(float(x)) for free, x in zip(residuals.free, theta, strict=True)])
     covariance = np.nan_to_num(known.confidence.covariance / np.outer(own, own))
-    for k, one in enumerate(residuals.free):
-        for limit in known.confidence.parameters[one.name].interval or ():
-            if one.low < limit < one.high:
-                along = covariance[:, k] / covariance[k, k] * (one.scaled(limit) - theta[k])
+    for k, free in enumerate(residuals.free):
+        for limit in known.confidence.parameters[free.name].interval or ():
+            if free.low < limit < free.high:
+                along = covariance[:, k] / covariance[k, k] * (free.scaled(limit) - theta[k])
                 end = theta + along
                 if np.all((end >= low) & (end <= high)):
-                    yield one.name, end
+                    yield free.name, end

@@ -32,18 +32,22 @@ def names_of(recording: Recording) -> tuple[str, ...]:
     steps = [
         InputStep(0.0, 0.0, signal) for signal in ("vref", "vs") for _ in getattr(test, signal)
     ]
-    return tuple(one.name for one, _ in _found(prefix_of(recording), test, file, steps))
+    return tuple(
+        nuisance.name for nuisance, _ in _with_sections(prefix_of(recording), test, file, steps)
+    )
 
 
 def nuisance_parameters(
     prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep]
 ) -> tuple[tuple[Nuisance, ...], tuple[FreeParameter, ...]]:
     """Return what a fit finds about a record; the names begin with ``prefix``."""
-    found = [*_found(prefix, test, file, steps)]
-    return tuple(one for one, _ in found), tuple(_free(one.name, value) for one, value in found)
+    nuisances = [*_with_sections(prefix, test, file, steps)]
+    return tuple(nuisance for nuisance, _ in nuisances), tuple(
+        _free(nuisance.name, value) for nuisance, value in nuisances
+    )
 
 
-def _found(
+def _with_sections(
     prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep]
 ) -> Iterator[tuple[Nuisance, Unknown]]:
     yield from _of_steps(prefix, test, steps, shifted(test, file, steps))

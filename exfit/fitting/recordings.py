@@ -121,7 +121,7 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
     if test.vt0 is None and steady is not None and not start < steady:
         what = "the first step" if test.steady_until is None else "test.steady_until"
         raise RecordError(
-            f"{path}: begins at {show(start)} s, with {what}: nothing before it tells "
+            f"{path}: begins at {show(start)} s, with {what}: nothing before it shows "
             f"vt0, and {case.path} does not give it"
         )
 

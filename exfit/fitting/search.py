@@ -44,40 +44,40 @@ def search(
 
     ``counter`` counts the simulations of the search alone.
     """
-    asked = case.estimate
+    options = case.estimate
     residuals = problem.compressed.counted_by(counter)
     priors = len(residuals.priors)
     share = (residuals.samples + priors) / (residuals.count + priors)
-    good_enough = asked.good_enough.rmse * np.sqrt(share)
-    jacobian = JACOBIANS[asked.jacobian](residuals)
-    if asked.starts == 1:
-        found = estimate.least_squares(
+    good_enough = options.good_enough.rmse * np.sqrt(share)
+    jacobian = JACOBIANS[options.jacobian](residuals)
+    if options.starts == 1:
+        result = estimate.least_squares(
             residuals,
             residuals.start,
             jac=jacobian,
             bounds=residuals.bounds,
             method=method,
-            max_iterations=asked.iterations,
-            gtol=asked.tolerance.gradient,
-            xtol=asked.tolerance.step,
+            max_iterations=options.iterations,
+            gtol=options.tolerance.gradient,
+            xtol=options.tolerance.step,
             x_scale=UNIT,
             good_enough=good_enough,
             callback=announce,
         )
-        return found, None
+        return result, None
     minima = estimate.multistart(
         residuals,
         jacobian,
         residuals.bounds,
-        asked.starts,
+        options.starts,
         x0=residuals.start,
         screen=residuals.costs,
-        refine=asked.refine,
+        refine=options.refine,
         watch=progress,
         method=method,
-        max_iterations=asked.iterations,
-        gtol=asked.tolerance.gradient,
-        xtol=asked.tolerance.step,
+        max_iterations=options.iterations,
+        gtol=options.tolerance.gradient,
+        xtol=options.tolerance.step,
         x_scale=UNIT,
         good_enough=good_enough,
     )

@@ -1,4 +1,4 @@
-"""What the records of a fit tell of its parameters, and what they leave open."""
+"""How well the records of a fit determine its parameters, and which they do not."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -60,12 +60,16 @@ class UncertaintyAnalysis:
     def open(self) -> tuple[str, ...]:
         """What is not determined, and what could be done about it, in words."""
         without = {
-            name: one for name, one in self.confidence.parameters.items() if one.why is not None
+            name: parameter
+            for name, parameter in self.confidence.parameters.items()
+            if parameter.why is not None
         }
-        vague = [name for name, one in without.items() if one.std_error is not None]
+        vague = [name for name, parameter in without.items() if parameter.std_error is not None]
         if len(vague) < 2:
             vague = []  # its own reason says more
-        reasons = [f"{name} {one.why}" for name, one in without.items() if name not in vague]
+        reasons = [
+            f"{name} {parameter.why}" for name, parameter in without.items() if name not in vague
+        ]
         if vague:
             reasons.append(f"{listed(vague)} are not determined by the record: see `exfit profile`")
         return (*reasons, *self.identifiability.sentences)
@@ -74,8 +78,8 @@ class UncertaintyAnalysis:
     def sentences(self) -> tuple[str, ...]:
         """What a reader must know of it, in words."""
         names = ", ".join(self.nonlinear)
-        told = f"the response is not linear over the intervals of {names}: see `exfit profile`"
-        return (*self.confidence.sentences, *([told] if names else []), *self.open)
+        sentence = f"the response is not linear over the intervals of {names}: see `exfit profile`"
+        return (*self.confidence.sentences, *([sentence] if names else []), *self.open)
 
 
 def uncertainty_at(
@@ -121,7 +125,7 @@ def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Ite
 def slopes_of(residuals: Residuals, theta: Array) -> Array:
     """Return the derivative of each parameter to the number that the estimator moves, (N,)."""
     pairs = zip(residuals.free, theta, strict=True)
-    return np.array([one.slope(float(x)) for one, x in pairs])
+    return np.array([free.slope(float(x)) for free, x in pairs])
 
 
 def linearisation(
@@ -167,10 +171,14 @@ def _prior_rows(residuals: Residuals) -> Iterator[PriorRow]:
 def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[ResidualBlock]:
     """Yield where the errors of each channel stand among those of all, and its rows."""
     several = len(residuals.experiments) > 1
-    each = [(one, channel) for one in residuals.experiments for channel in one.channels]
+    each = [
+        (experiment, channel)
+        for experiment in residuals.experiments
+        for channel in experiment.channels
+    ]
     places = zip(slices(rows), slices(residuals.sizes), strict=True)
-    for (one, channel), (own, errors) in zip(each, places, strict=True):
-        label = f"{one.name} {channel.signal}" if several else channel.signal
+    for (experiment, channel), (own, errors) in zip(each, places, strict=True):
+        label = f"{experiment.name} {channel.signal}" if several else channel.signal
         noise = None if channel.noise is None else channel.noise * channel.weight
         yield ResidualBlock(label, own, noise, channel.weight, errors)
 
