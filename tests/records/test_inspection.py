@@ -14,11 +14,8 @@ from places import REFERENCE, SAMPLES
 from tables import read_columns
 
 from exfit.case.suggestion import bump_section, record_section
-from exfit.dsp.quality import quantum, spikes, stuck
-from exfit.dsp.sampling import sampling_of
 from exfit.errors import RecordError
 from exfit.output import plots
-from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.channel_recognition import connection_of, guess_signals, three_phases
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
@@ -270,45 +267,6 @@ def test_a_long_record_shows_its_steps_as_well_as_a_short_one(count):
     (channel,) = inspection.channels
     assert channel.spikes == 1
     assert channel.noise == pytest.approx(1e-4, rel=0.05)
-
-
-@pytest.mark.parametrize("step", [1e-5, 5.5e-5, 0.1, 2.0])
-def test_the_step_of_rounded_numbers_is_found(step):
-    rounded = step * np.round(RNG.normal(100.0, 8.0, 5000))
-    assert quantum(rounded) == pytest.approx(step, rel=1e-6)
-    assert quantum(RNG.normal(0.0, 1.0, 5000)) is None
-    assert quantum(np.ones(50)) is None
-
-
-@pytest.mark.parametrize("coarse", [0.3, 1.0, 3.0])
-def test_rounding_alone_is_no_stuck_recorder(coarse):
-    for seed in range(20):
-        noisy = np.random.default_rng(seed).normal(0.0, 1.0, 3000)
-        rounded = coarse * np.round(noisy / coarse)
-        assert stuck(rounded) == ()
-        rounded[1000:1200] = rounded[1000]
-        ((first, last),) = stuck(rounded)
-        assert first <= 1000
-        assert last >= 1199
-
-
-def test_white_noise_has_no_spikes_and_each_spike_is_found_at_its_place():
-    time = 0.01 * np.arange(20_000)
-    noisy = RNG.normal(0.0, 1.0, time.size)
-    assert len(spikes(time, noisy, 1.0, SPIKE_LIMIT)) <= 1
-    places = np.arange(100, 20_000, 400)
-    noisy[places] += 25.0  # six times what seven samples of noise may scatter by
-    assert set(places) <= set(spikes(time, noisy, 1.0, SPIKE_LIMIT))
-
-
-def test_gaps_are_judged_against_the_median_step():
-    time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(1.5, 2.0, 0.01)])
-    sampling = sampling_of(time)
-    assert [(gap.start, gap.end, gap.lost) for gap in sampling.gaps] == [
-        (pytest.approx(0.99), pytest.approx(1.5), 50)
-    ]
-    assert sampling.even
-    assert (sampling.smallest, sampling.largest) == pytest.approx((0.01, 0.01))
 
 
 # ---- names, units, phases
