@@ -155,7 +155,7 @@ def fit(
         status=best.status,
         message=best.message,
         success=best.success,
-        interrupted=interrupted or (search_result is not None and search_result.interrupted),
+        interrupted=interrupted or _was_interrupted(search_result),
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,
@@ -174,8 +174,17 @@ def fit(
         tests=tuple(tests_of(case, used)),
         behaviour=behaviour,
         files=input_names(case, used),
-        case_text=case.path.read_text(encoding="utf-8-sig") if case.from_file else "",
+        case_text=_text_of(case),
     )
+
+
+def _was_interrupted(search_result: estimate.MultistartResult | None) -> bool:
+    return search_result is not None and search_result.interrupted
+
+
+def _text_of(case: Case) -> str:
+    """Return the file of a case as it stands; "" for a case that was made in Python."""
+    return case.path.read_text(encoding="utf-8-sig") if case.from_file else ""
 
 
 def load_case(path: str | PathLike[str]) -> Case:

@@ -147,8 +147,8 @@ def test_no_folder_of_the_package_has_more_than_25_entries():
 
 def test_no_class_is_defined_in_two_modules():
     homes = defaultdict(list)
-    for name, path in MODULES.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for name, tree in TREES.items():
+        for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
                 homes[node.name].append(name)
     assert {name: modules for name, modules in homes.items() if len(modules) > 1} == {}

@@ -112,19 +112,20 @@ def parameter_file(result: FitResult) -> str:
         f"model: {result.model}",
         "parameters:",
     ]
-    of_records = {name: one for name, one in result.parameters.items() if one.of_record}
+    of_records = {name: p for name, p in result.parameters.items() if p.of_record}
     for name, value in result.values.items():
-        one = result.parameters.get(name)
-        if name in of_records:
-            continue
-        if one is None and name not in result.values_of(""):
-            continue  # as the case has it
-        if one is None:
-            origin = "typical" if name in result.typical else result.ties.get(name, "fixed")
-        else:
-            origin = f"fitted, on its {one.at_bound}" if one.at_bound else "fitted"
-        lines.append(f"  {name}: {yaml_number(value)}  # {origin}")
+        # the other values of machine, network and stabiliser are as the case has them
+        if name not in of_records and (name in result.parameters or name in result.values_of("")):
+            lines.append(f"  {name}: {yaml_number(value)}  # {_origin(result, name)}")
     if of_records:
         lines += ["records:  # what was found about them"]
-        lines += [f"  {name}: {yaml_number(one.value)}" for name, one in of_records.items()]
+        lines += [f"  {name}: {yaml_number(p.value)}" for name, p in of_records.items()]
     return "\n".join(lines) + "\n"
+
+
+def _origin(result: FitResult, name: str) -> str:
+    """Return where a value is from."""
+    parameter = result.parameters.get(name)
+    if parameter is None:
+        return "typical" if name in result.typical else result.ties.get(name, "fixed")
+    return f"fitted, on its {parameter.at_bound}" if parameter.at_bound else "fitted"

@@ -220,14 +220,18 @@ def _number(data: Any, place: Place) -> float:
 MOST = int(np.finfo(float).max)  # whole numbers beyond have no double
 
 
+def _complex_array(data: Any, place: Place) -> Any:
+    parts = _of_type(dict, data, place, "a mapping with real and imag")
+    real, imag = (_array(parts.get(part), (*place, part)) for part in ("real", "imag"))
+    if real.shape != imag.shape:
+        raise FormError(f"{dotted(place)}: real and imag differ in length")
+    return np.asarray(real + 1j * imag)
+
+
 def _array(data: Any, place: Place, null: float = np.nan, complex_: bool = False) -> Any:
     """Return lists of numbers, or lists of such lists, as an array."""
     if complex_:
-        parts = _of_type(dict, data, place, "a mapping with real and imag")
-        real, imag = (_array(parts.get(part), (*place, part)) for part in ("real", "imag"))
-        if real.shape != imag.shape:
-            raise FormError(f"{dotted(place)}: real and imag differ in length")
-        return np.asarray(real + 1j * imag)
+        return _complex_array(data, place)
     items = _of_type(list, data, place, "a list of numbers")
     if items and isinstance(items[0], list):
         rows = [_array(row, (*place, k), null) for k, row in enumerate(items)]
