@@ -33,27 +33,27 @@ class LiveResponse:
 
 
 def live_response(
-    trial: ExperimentSetup, residuals: Residuals, theta: Array
+    setup: ExperimentSetup, residuals: Residuals, theta: Array
 ) -> LiveResponse | None:
-    """Return the judged signal of the first trial at scaled parameters theta (N,).
+    """Return the judged signal of the first setup at scaled parameters theta (N,).
 
     It costs a simulation. None where there is no response, and where the record has more than
     MOST_SAMPLES.
     """
-    if len(trial.record.time) > MOST_SAMPLES:
+    if len(setup.record.time) > MOST_SAMPLES:
         return None
-    signals = trial.experiment.signals
+    signals = setup.experiment.signals
     place = signals.index(judged_of(signals))
-    channel, begin = trial.channels[place], sum(trial.experiment.sizes[:place])
-    end = begin + trial.experiment.sizes[place]
+    channel, begin = setup.channels[place], sum(setup.experiment.sizes[:place])
+    end = begin + setup.experiment.sizes[place]
     try:
         values = residuals.values(theta)
-        errors, _ = trial.experiment.errors(values)
+        errors, _ = setup.experiment.errors(values)
     except UNREACHABLE:
         return None
-    measured = channel.filtered(trial.experiment.measured(channel, values))
+    measured = channel.filtered(setup.experiment.measured(channel, values))
     simulated = measured + errors[begin:end] / channel.weight
-    return LiveResponse(channel.signal, trial.record.time[channel.kept], measured, simulated)
+    return LiveResponse(channel.signal, setup.record.time[channel.kept], measured, simulated)
 
 
 def chosen(count: int) -> list[int]:
@@ -64,21 +64,20 @@ def chosen(count: int) -> list[int]:
 
 def with_iteration_responses(
     comparison: Comparison,
-    trial: ExperimentSetup,
+    setup: ExperimentSetup,
     residuals: Residuals,
     history: Sequence[Iteration],
 ) -> Comparison:
-    """Return the comparison of a secured trial with the courses of the fit that led to it.
+    """Return the comparison of a setup with the responses of the iterations that led to it.
 
-    Iterations without a finite response are left out. A record of more than MOST_SAMPLES has no
-    courses.
+    Iterations without a finite response are left out. A record of more than MOST_SAMPLES has none.
     """
     if not history or len(comparison.time) > MOST_SAMPLES:
         return comparison
     signal = comparison.judged_by
     lines = [history[k] for k in chosen(len(history))]
     responses = list(
-        in_threads(lambda line: iteration_response(trial, residuals, signal, line.values), lines)
+        in_threads(lambda line: iteration_response(setup, residuals, signal, line.values), lines)
     )
     numbered = [
         (line.number, response)
@@ -98,13 +97,13 @@ def with_iteration_responses(
 
 
 def iteration_response(
-    trial: ExperimentSetup, residuals: Residuals, signal: str, values: Values
+    setup: ExperimentSetup, residuals: Residuals, signal: str, values: Values
 ) -> Array | None:
     """Return the response (M,) to the values of an iteration, None where there is none."""
-    place = trial.experiment.signals.index(signal)
-    channel = trial.channels[place]
+    place = setup.experiment.signals.index(signal)
+    channel = setup.channels[place]
     try:
-        samples, _ = trial.experiment.samples(residuals.completed(values))
+        samples, _ = setup.experiment.samples(residuals.completed(values))
     except UNREACHABLE:
         return None
     response = compared(channel, channel.as_recorded(samples[:, place]))

@@ -20,7 +20,7 @@ Values = Mapping[str, float]
 
 
 def compare_with_record(
-    trial: ExperimentSetup,
+    setup: ExperimentSetup,
     name: str,
     values: Values,
     start: Values | None = None,
@@ -29,47 +29,47 @@ def compare_with_record(
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
-    The trial has sub-steps enough for both; ``limit`` is the largest rmse to be accepted, in pu;
+    The setup has sub-steps enough for both; ``limit`` is the largest rmse to be accepted, in pu;
     ``of_record`` what was found about the record itself.
     """
-    at = trial.with_start_values(values)
-    samples, substeps = trial.experiment.samples(at)
-    first = None if start is None else trial.experiment.samples(trial.with_start_values(start))[0]
+    at = setup.with_start_values(values)
+    samples, substeps = setup.experiment.samples(at)
+    first = None if start is None else setup.experiment.samples(setup.with_start_values(start))[0]
     overlays = {
         channel.signal: Overlay(
-            compared(channel, trial.experiment.measured(channel, at)),
+            compared(channel, setup.experiment.measured(channel, at)),
             compared(channel, channel.as_recorded(samples[:, k])),
             None if first is None else compared(channel, channel.as_recorded(first[:, k])),
         )
-        for k, channel in enumerate(trial.channels)
+        for k, channel in enumerate(setup.channels)
     }
-    errors = trial.experiment.compared(samples, at)
+    errors = setup.experiment.compared(samples, at)
     channels = {signal: match_of(overlay) for signal, overlay in overlays.items()}
     vt = overlays.get("vt")
     return Comparison(
         name=name,
-        record=trial.record.source.name,
+        record=setup.record.source.name,
         cost=0.5 * float(errors @ errors),
         accepted=limit is None or channels[judged_of(channels)].rmse <= limit,
         channels=channels,
         features=StepFeatures(
-            measured=None if vt is None else _features(trial, vt.measured, at),
-            simulated=None if vt is None else _features(trial, vt.simulated, at),
+            measured=None if vt is None else _features(setup, vt.measured, at),
+            simulated=None if vt is None else _features(setup, vt.simulated, at),
         ),
         limit=limit,
         of_record={} if of_record is None else of_record,
-        sha256=trial.record.sha256,
+        sha256=setup.record.sha256,
         substeps=substeps,
-        time=trial.record.time,
+        time=setup.record.time,
         overlays=overlays,
     )
 
 
-def _features(trial: ExperimentSetup, signal: Array, values: Values) -> Features | None:
+def _features(setup: ExperimentSetup, signal: Array, values: Values) -> Features | None:
     """Return the features of the first step of the reference that the record holds."""
     kept = np.isfinite(signal)
-    time = trial.record.time[kept]
-    simulator = trial.experiment.with_inputs(values)
+    time = setup.record.time[kept]
+    simulator = setup.experiment.with_inputs(values)
     steps = [step._replace(at=step.at + simulator.delay) for step in simulator.inputs.steps]
     inside = [change for change in steps if change.at >= time[0]]
     if not inside or inside[0].signal != "vref":
