@@ -145,7 +145,7 @@ def test_a_unit_that_the_file_contradicts_is_refused(csv):
 
 
 @pytest.mark.parametrize(
-    ("unit", "told"),
+    ("unit", "advice"),
     [("kV", "unit: kV and base"), ("MVA", "unit: MVA and base"), ("%", "scale: 0.01"),
      ("A", "unit: A and base")],
 )  # fmt: skip
