@@ -128,7 +128,13 @@ def edited(text: str, language: str, body: str) -> str:
     return text
 
 
-@pytest.mark.parametrize("name", WITH_SESSIONS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name == "README.md" else pytest.param(name, marks=pytest.mark.long)
+        for name in WITH_SESSIONS
+    ],
+)
 def test_the_commands_of_a_page_print_what_it_says(name, run):
     printed, case = "", None
     for language, body in BLOCK.findall(PAGES[name]):

@@ -126,6 +126,7 @@ def test_an_interruption_keeps_the_iterations_until_then():
     assert result.comparison.iteration_responses.numbers == (0, 1, 2)
 
 
+@pytest.mark.long
 def test_a_large_record_leaves_no_courses_and_says_so(fitted, monkeypatch, tmp_path):
     run_folder.write_fit(fitted, tmp_path / "run", figures=True)
     monkeypatch.setattr(iteration_responses, "MOST_SAMPLES", 100)

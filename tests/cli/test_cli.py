@@ -619,7 +619,7 @@ main()
 """
 
 
-@pytest.mark.parametrize("stage", ["screening", "refining"])
+@pytest.mark.parametrize("stage", [pytest.param("screening", marks=pytest.mark.long), "refining"])
 def test_ctrl_c_in_a_search_from_many_starts_keeps_the_best_point_and_ends_with_3(stage):
     case = case_file(changed(CASE, ("estimate", {"starts": 20})))
     ran = program(SEARCH_INTERRUPTED.replace("STAGE", stage), "fit", case)

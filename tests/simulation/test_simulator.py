@@ -524,7 +524,7 @@ def secured(name, values, course, times, step):
     return simulator.with_enough_substeps(values).samples(values, ("vt",))[0]
 
 
-@pytest.mark.parametrize("step", [1e-3, 2e-2])
+@pytest.mark.parametrize("step", [pytest.param(1e-3, marks=pytest.mark.long), 2e-2])
 def test_no_response_is_unstable_without_a_word(model, step):
     """Either a set cannot be simulated, or a four times smaller step gives the same response.
 
