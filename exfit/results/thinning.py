@@ -126,4 +126,5 @@ def _instants(time: Array, rows: NDArray[np.intp]) -> Array:
 
 
 def _rounded(samples: Array, digits: int = DIGITS) -> Array:
-    return np.array([float(f"{x:.{digits}g}") for x in samples.tolist()])
+    text = f"%.{digits}g " * len(samples) % tuple(samples.tolist())  # faster than one by one
+    return np.array(text.split(), dtype=np.float64)

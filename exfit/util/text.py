@@ -12,39 +12,44 @@ def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
 
     A list of numbers stands in one line.
     """
-    return "".join(_json(_finite(content), ascii_only, "\n")) + "\n"
+    return "".join(_json(content, ascii_only, "\n")) + "\n"
+
+
+NUMBERS = {int, float, NoneType, bool}
 
 
 def _json(content: Any, ascii_only: bool, line: str) -> Iterator[str]:
     """Yield the pieces of a text of JSON; ``line`` begins one at this depth."""
     inner = line + "  "
-    if isinstance(content, dict) and content:
+    if isinstance(content, Mapping) and content:
         begin = "{"
         for key, value in content.items():
             yield f"{begin}{inner}{json.dumps(str(key), ensure_ascii=ascii_only)}: "
             yield from _json(value, ascii_only, inner)
             begin = ","
         yield line + "}"
-    elif isinstance(content, list) and not all(isinstance(x, NUMBER) for x in content):
-        for k, value in enumerate(content):
-            yield ("," if k else "[") + inner
+    elif isinstance(content, list | tuple) and not {*map(type, content)} <= NUMBERS:
+        begin = "["
+        for value in content:
+            yield begin + inner
             yield from _json(value, ascii_only, inner)
+            begin = ","
         yield line + "]"
     else:
-        yield json.dumps(content, ensure_ascii=ascii_only)
+        yield _plain(content, ascii_only)
 
 
-NUMBER = (int, float, NoneType)  # and the truth values, which are of type int
+def _plain(content: Any, ascii_only: bool) -> str:
+    """Return a text of JSON in one line: of a single value, or of a list of numbers."""
+    try:
+        return json.dumps(content, ensure_ascii=ascii_only, allow_nan=False)
+    except ValueError:
+        one = _finite(content) if isinstance(content, float) else [_finite(x) for x in content]
+        return json.dumps(one)
 
 
-def _finite(content: Any) -> Any:
-    if isinstance(content, Mapping):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [_finite(value) for value in content]
-    if isinstance(content, float) and not isfinite(content):
-        return None
-    return content
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def yaml_number(value: float) -> str:
