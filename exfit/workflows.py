@@ -236,9 +236,12 @@ def read_record(
     return read_section(record_section(given), Path(), per_unit=True)
 
 
-def loaded(case: CaseOrPath) -> Case:
-    """Return a case, read from its file where it is a path; raises CaseError."""
-    return case if isinstance(case, Case) else load_case(case)
+def loaded(case: CaseOrPath, values: ValuesOrResult | None = None) -> Case:
+    """Return a case, read from its file where it is a path, whose own model is that of a fit."""
+    if isinstance(case, Case):
+        return case
+    sha256 = values.inputs.get("model", "") if isinstance(values, FitResult) else ""
+    return load.load_case(Path(case), sha256)
 
 
 def versions() -> dict[str, str]:
@@ -274,7 +277,7 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
     Example:
         >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
     """
-    case = loaded(case)
+    case = loaded(case, values)
     values = values_of(case, _numbers(values))
     if case.recordings:
         setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
@@ -319,7 +322,7 @@ def validate(
         >>> result = exfit.fit("case.yaml")
         >>> [match.rmse for match in exfit.validate("case.yaml", result)]
     """
-    case = loaded(case)
+    case = loaded(case, values)
     fitted, unseen = list(case.recordings), list(case.validations)
     if record is not None:
         unseen = [_in_place_of([*unseen, *fitted], case, Path(record))]

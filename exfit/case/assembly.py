@@ -27,13 +27,14 @@ class CheckedContent:
 
 
 def check_content(
-    content: dict[str, Any], folder: Path, faults: list[Fault]
+    content: dict[str, Any], folder: Path, faults: list[Fault], model_sha256: str = ""
 ) -> CheckedContent | None:
     """Return the checked content of a case file; None, and faults added, where it has any.
 
-    The files that it names are relative to ``folder``; ``faults`` holds those found before.
+    The files that it names are relative to ``folder``; ``faults`` holds those found before. A
+    user's own model is run only if its file has the hash given, where one is.
     """
-    parts = parts_of(content, folder, faults)
+    parts = parts_of(content, folder, faults, model_sha256)
     ties = ties_of(content, parts, faults)
     document = _validated(content, faults)
     places = {fault.place for fault in faults}

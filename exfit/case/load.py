@@ -8,18 +8,21 @@ from exfit.case.yaml import dotted, read_text, read_yaml
 from exfit.errors import CaseError
 
 
-def load_case(path: Path) -> Case:
+def load_case(path: Path, model_sha256: str = "") -> Case:
     """Return the case of a YAML file.
+
+    The file of a user's own model is run only if it has the hash ``model_sha256``, where one is
+    given.
 
     Raises CaseError with all faults of the file, each as ``file:line: place: what is wrong``.
     """
-    return parse_case(read_text(path), path)
+    return parse_case(read_text(path), path, model_sha256)
 
 
-def parse_case(text: str, path: Path) -> Case:
+def parse_case(text: str, path: Path, model_sha256: str = "") -> Case:
     """Return the case of a YAML text, as if it stood in the file ``path``; raises CaseError."""
     top, faults = read_yaml(text, path)
-    checked = check_content(top.value, path.parent, faults)
+    checked = check_content(top.value, path.parent, faults, model_sha256)
     if checked is None:
         lines = [(fault.line or top.line_of(fault.place), fault) for fault in faults]
         raise CaseError(

@@ -74,11 +74,14 @@ class Parts:
     all: tuple[Part, ...]
 
 
-def parts_of(data: Data, folder: Path, faults: list[Fault]) -> Parts:
-    """Return the parts of a case file's data; add a fault for a name that stands for none."""
+def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = "") -> Parts:
+    """Return the parts of a case file's data; add a fault for a name that stands for none.
+
+    The file of a user's own model is run only if it has the hash given, where one is.
+    """
     plant = _mapping(data.get("plant"))
     kind = kind_of(plant)
-    exciter = _exciter(data, folder, faults) if kind.has_exciter else None
+    exciter = _exciter(data, folder, faults, model_sha256) if kind.has_exciter else None
     machine = _machine(plant, faults) if kind.has_machine else None
     stabiliser = _stabiliser(data, faults)
     parts = []
@@ -245,12 +248,12 @@ def network_part(given: Data, place: Place = ("plant", "network")) -> Part:
     return Part("network", "the network", NETWORK, sheet, place, None, check)
 
 
-def _exciter(data: Data, folder: Path, faults: list[Fault]) -> Model | None:
+def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Model | None:
     name = data.get("model")
     if not isinstance(name, str) or not name:
         return None
     try:
-        return find(name, folder)
+        return find(name, folder, sha256)
     except ModelError as error:
         faults.append(Fault(("model",), str(error)))
         return None

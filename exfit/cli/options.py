@@ -123,11 +123,14 @@ def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
     run_folder.refuse_inputs(command, files, folder, names)
 
 
-def load(case: Path) -> "Case":
-    """Return the case of a file; raises CaseError with all faults of it."""
+def load(case: Path, model_sha256: str = "") -> "Case":
+    """Return the case of a file; raises CaseError with all faults of it.
+
+    A user's own model is run only if its file has the hash given, where one is.
+    """
     from exfit.case.load import load_case
 
-    return load_case(case)
+    return load_case(case, model_sha256)
 
 
 def refuse_existing(output: Path, force: bool) -> None:

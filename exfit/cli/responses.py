@@ -44,10 +44,10 @@ def simulate(
     is named as in --set machine.Tpd0=6.
     """
     from exfit import workflows
-    from exfit.fitting.overrides import changed_values, read_parameters
+    from exfit.fitting.overrides import changed_values, fitted_model_hash, read_parameters
     from exfit.output import run_folder
 
-    loaded = load(case)
+    loaded = load(case, fitted_model_hash(parameters) if parameters else "")
     folder = output.folder_of(loaded, "simulate")
     values = read_parameters(loaded, parameters) if parameters else {}
     values |= changed_values(loaded, assignments(changes, "--set"), "--set")
@@ -86,13 +86,15 @@ def validate(
     samples and overlays to runs/CASE-validate, or to DIR.
     """
     from exfit import workflows
-    from exfit.fitting.overrides import read_parameters
+    from exfit.case.yaml import read_text
+    from exfit.fitting.overrides import fitted_model_hash, read_parameters
     from exfit.output import run_folder
     from exfit.util.typed import plain
 
-    loaded = load(case)
-    folder = output.folder_of(loaded, "validate")
+    read_text(case)  # a file that is missing is no case without a fit
     source = parameters or run_folder.last_fit(case)
+    loaded = load(case, fitted_model_hash(source))
+    folder = output.folder_of(loaded, "validate")
     comparisons = workflows.validate(loaded, read_parameters(loaded, source), record)
     warn(run_folder.write_validation(comparisons, folder, output.figures))
     if output.as_json:

@@ -63,6 +63,16 @@ def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
         yield from (f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own))
 
 
+def fitted_model_hash(path: Path) -> str:
+    """Return the SHA-256 of the user's own model that a file of parameters is of, or nothing.
+
+    It is asked for before a case is loaded, which runs the model.
+    """
+    top, _ = read_yaml(read_text(path), path)
+    content = top.value if isinstance(top.value, dict) else {}
+    return str(content.get("model_sha256", ""))
+
+
 def read_parameters(case: Case, path: Path) -> dict[str, float]:
     """Return the changes that a file of parameters makes to a case.
 

@@ -10,6 +10,7 @@ from types import ModuleType
 from exfit.errors import ModelError
 from exfit.models import exciters, stabilisers
 from exfit.models.sheet import Model, model
+from exfit.models.user_code import run_user_code
 
 
 class Catalogue(Mapping[str, Model]):
@@ -48,13 +49,15 @@ STABILISERS = Catalogue(stabilisers)
 MACHINE_NAMES = ("GENROU", "GENROE", "GENSAL", "GENSAE", "ONE_AXIS")  # known without their files
 
 
-def find(name: str, folder: Path) -> Model:
+def find(name: str, folder: Path, sha256: str = "") -> Model:
     """Return the model of a catalogue name, an alias, or a .py file relative to ``folder``.
+
+    A file is run only if it has the hash ``sha256``, where one is given.
 
     Raises ModelError where there is none.
     """
     if name.endswith(".py"):
-        return from_file(folder / name)
+        return from_file(folder / name, sha256)
     wanted = name.upper()
     if wanted in MODELS:
         return MODELS[wanted]
@@ -70,17 +73,10 @@ def find(name: str, folder: Path) -> Model:
     raise ModelError(f"{name} is not in the catalogue ({', '.join(names)}){hint}")
 
 
-def from_file(path: Path) -> Model:
-    """Return the model of a user's own file, named after it.
+def from_file(path: Path, sha256: str = "") -> Model:
+    """Return the model of a user's own file, named after it; a ``sha256`` given must be its own.
 
-    Raises ModelError where the file cannot be read, fails as Python, or defines no model.
+    Raises ModelError where the file cannot be read, has another hash, fails as Python, or defines
+    no model.
     """
-    if not path.is_file():
-        raise ModelError(f"{path}: no such file")
-    module = ModuleType(f"exfit_user_{path.stem}")
-    try:
-        # compiled here, not imported: a module cache beside it would outlive a quick edit
-        exec(compile(path.read_bytes(), path.absolute(), "exec"), vars(module))
-    except (Exception, SystemExit) as fault:
-        raise ModelError(f"{path}: {type(fault).__name__}: {fault}") from fault
-    return model(path.stem.upper(), vars(module))
+    return model(path.stem.upper(), run_user_code(path, sha256))

@@ -110,6 +110,7 @@ def parameter_file(result: FitResult) -> str:
     lines = [
         f"# {result.model} fitted to {', '.join(matches)}; {state}",
         f"model: {result.model}",
+        *([f"model_sha256: {result.inputs['model']}"] if "model" in result.inputs else []),
         "parameters:",
     ]
     of_records = {name: p for name, p in result.parameters.items() if p.of_record}

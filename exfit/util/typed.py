@@ -211,13 +211,12 @@ def _scalar(kind: Any, data: Any, place: Place) -> Any:
 
 
 def _number(data: Any, place: Place) -> float:
-    if isinstance(data, int | float) and not isinstance(data, bool) and abs(data) < inf:
-        with_limits = min(max(data, -MOST), MOST) if isinstance(data, int) else data
-        return float(with_limits)
+    if isinstance(data, int | float) and not isinstance(data, bool) and -MOST <= data <= MOST:
+        return float(data)
     raise FormError(f"{dotted(place)}: {show_value(data)} is not a number")
 
 
-MOST = int(np.finfo(float).max)  # whole numbers beyond have no double
+MOST = float(np.finfo(float).max)  # a whole number beyond has no double
 
 
 def _complex_array(data: Any, place: Place) -> Any:
@@ -238,11 +237,11 @@ def _array(data: Any, place: Place, null: float = np.nan, complex_: bool = False
         if any(row.shape != rows[0].shape for row in rows):
             raise FormError(f"{dotted(place)}: its rows differ in length")
         return np.stack(rows)
-    wrong = {*map(type, items)} - {int, float, NoneType}
-    if wrong:
-        at = next(k for k, value in enumerate(items) if type(value) in wrong)
-        _number(items[at], (*place, at))
-    samples = np.array(items, dtype=np.float64)
+    if {*map(type, items)} <= {float, NoneType}:  # quickly: there are many
+        samples = np.array(items, dtype=np.float64)
+    else:
+        each = enumerate(items)
+        samples = np.array([np.nan if x is None else _number(x, (*place, k)) for k, x in each])
     if np.isinf(samples).any():
         _number(inf, (*place, int(np.argmax(np.isinf(samples)))))
     return np.where(np.isnan(samples), null, samples)

@@ -18,6 +18,7 @@ from exfit import cli, workflows
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.exchange.psse.export import export
+from exfit.models import from_file
 from exfit.output import run_folder
 from exfit.output.report import html, write_report
 from exfit.output.report.charts import Axis, Chart, Panel, Series, drawing, ticks
@@ -355,7 +356,7 @@ def test_text_from_outside_stays_text(tmp_path):
 HOSTILE_MODEL = """
 from pathlib import Path
 
-Path(__file__).with_name("executed").touch()
+Path({folder!r}, "executed").touch()
 raise SystemExit("executed")
 """
 
@@ -377,7 +378,7 @@ def test_a_page_needs_the_result_alone(of_own_model, capsys):
         if path.is_file() and path.name != "result.json":
             path.unlink()
     assert page_of(of_own_model) == page
-    (folder / "mine.py").write_text(HOSTILE_MODEL)
+    (folder / "mine.py").write_text(HOSTILE_MODEL.format(folder=str(folder)))
     write_report(of_own_model)
     assert (of_own_model / "report.html").read_text(encoding="utf-8") == page
     for command in (["export"], ["report"]):
@@ -385,6 +386,9 @@ def test_a_page_needs_the_result_alone(of_own_model, capsys):
             cli.main([*command, str(of_own_model)], prog_name="exfit")
     assert "executed" not in capsys.readouterr().err
     assert not (folder / "executed").exists()
+    with pytest.raises(ExfitError, match="executed"):
+        from_file(folder / "mine.py")  # it would have
+    assert (folder / "executed").exists()
 
 
 def test_what_was_changed_since_the_fit_leaves_the_page_as_it_was(own):

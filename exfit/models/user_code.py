@@ -1,0 +1,37 @@
+"""The one place where a file of Python that a case names is run: with the rights of its user."""
+
+import hashlib
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from exfit.errors import ModelError
+
+SHOWN = 12  # digits of a hash that tell files apart
+
+
+def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
+    """Run a file of Python and return the names that it defines.
+
+    Raises ModelError where the file cannot be read or fails, and, before anything of it is run,
+    where its hash is not ``sha256``; empty: any hash will do.
+    """
+    if not path.is_file():
+        raise ModelError(f"{path}: no such file")
+    try:
+        code = path.read_bytes()
+    except OSError as fault:
+        raise ModelError(f"{path}: cannot be read: {fault.strerror}") from fault
+    own = hashlib.sha256(code).hexdigest()
+    if sha256 and own != sha256:
+        raise ModelError(
+            f"{path}: not run: the file has changed since the fit: its SHA-256 begins with "
+            f"{own[:SHOWN]}, that of the fitted model was {sha256[:SHOWN]}; fit again"
+        )
+    module = ModuleType(f"exfit_user_{path.stem}")
+    try:
+        # compiled here, not imported: a module cache beside it would outlive a quick edit
+        exec(compile(code, path.absolute(), "exec"), vars(module))
+    except (Exception, SystemExit) as fault:
+        raise ModelError(f"{path}: {type(fault).__name__}: {fault}") from fault
+    return vars(module)

@@ -1,0 +1,81 @@
+"""A user's own model: the file is run only if it is the one that was fitted."""
+
+import hashlib
+import shutil
+
+import pytest
+import yaml
+from cases import FIRST_ORDER, TIME, TRUTH
+from places import ROOT
+
+import exfit
+from exfit import cli
+from exfit.errors import CaseError, ModelError
+from exfit.models.user_code import run_user_code
+
+SOURCE = ROOT / "exfit" / "models" / "exciters" / "first_order.py"
+
+
+def trap(folder):
+    """Return a piece of Python that leaves a file in a folder when it is run."""
+    return f"from pathlib import Path\nPath({str(folder)!r}, 'run').touch()\n"
+
+
+@pytest.fixture
+def case(tmp_path, monkeypatch):
+    """A case with a model of its own and a record, in the working folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
+    shutil.copy(SOURCE, "mine.py")
+    rows = "\n".join(f"{t:.9g},{v:.9g}" for t, v in zip(TIME, TRUTH, strict=True))
+    (tmp_path / "up.csv").write_text(f"t,v\n{rows}\n")
+    record = {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}
+    path = tmp_path / "case.yaml"
+    path.write_text(yaml.safe_dump({**FIRST_ORDER, "model": "mine.py", "record": record}))
+    return path
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*map(str, arguments)], prog_name="exfit")
+    return ended.value.code
+
+
+def test_a_file_with_another_hash_is_not_run(tmp_path):
+    path = tmp_path / "trap.py"
+    path.write_text(trap(tmp_path))
+    with pytest.raises(ModelError, match=r"trap\.py: not run: the file has changed"):
+        run_user_code(path, "0" * 64)
+    assert not (tmp_path / "run").exists()
+    run_user_code(path, hashlib.sha256(path.read_bytes()).hexdigest())
+    assert (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["validate", "case.yaml"],
+        ["validate", "case.yaml", "--parameters", "run-1/parameters.yaml"],
+        ["simulate", "case.yaml", "--parameters", "run-1/parameters.yaml"],
+    ],
+)
+def test_a_model_that_changed_since_the_fit_is_refused_before_it_is_run(case, command, capsys):
+    assert run("fit", case, "-o", "run-1", "--no-plots", "--quiet") == 0
+    assert run(*command, "--no-plots", "--quiet") == 0
+    (case.parent / "mine.py").write_text(SOURCE.read_text() + trap(case.parent))
+    capsys.readouterr()
+    assert run(*command, "--no-plots", "--quiet") == 1
+    assert "mine.py: not run: the file has changed since the fit" in capsys.readouterr().err
+    assert not (case.parent / "run").exists()
+    # a new fit is of the new model
+    assert run("fit", case, "-o", "run-1", "--no-plots", "--quiet") == 0
+    assert run(*command, "--no-plots", "--quiet") == 0
+
+
+def test_values_of_a_fit_are_not_those_of_another_model(case):
+    result = exfit.fit(case)
+    (case.parent / "mine.py").write_text(SOURCE.read_text() + trap(case.parent))
+    for use in (exfit.simulate, exfit.validate):
+        with pytest.raises(CaseError, match="not run: the file has changed"):
+            use(case, result)
+    assert not (case.parent / "run").exists()

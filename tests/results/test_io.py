@@ -1,0 +1,173 @@
+"""result.json: what is written is read back, a damaged file ends in a message with its place."""
+
+import json
+import random
+
+import numpy as np
+import pytest
+from records import config, several
+from records import recording as recorded
+
+from exfit import workflows
+from exfit.case.load import load_case
+from exfit.errors import ExfitError
+from exfit.results.io import VERSION, load_result, result_text
+from exfit.results.thinning import MOST_ROWS, thinned
+
+DAMAGES = 400  # random ones of a file
+
+
+@pytest.fixture(scope="module")
+def texts(tmp_path_factory):
+    """The results of several fits as files hold them."""
+    import yaml
+
+    folder = tmp_path_factory.mktemp("results")
+    cases = {
+        "one": config("first_order"),
+        "several": several(
+            recorded("up"),
+            recorded("down", at={"start": 1.02, "min": 0.9, "max": 1.1}),
+            free={"KA": {"start": 300.0, "min": 76.6, "max": 7660.0}},
+        ),
+        "starts": {
+            **config("first_order"),
+            "estimate": {"strategy": "auto", "starts": 3},
+        },
+    }
+    found = {}
+    for name, content in cases.items():
+        path = folder / f"{name}.yaml"
+        path.write_text(yaml.safe_dump(content))
+        found[name] = workflows.fit(load_case(path))
+    return found
+
+
+@pytest.fixture
+def saved(texts, tmp_path):
+    """The file of a fit, and its content."""
+    path = tmp_path / "result.json"
+    path.write_text(result_text(texts["one"]), encoding="utf-8")
+    return path, json.loads(path.read_text(encoding="utf-8"))
+
+
+def written(saved, **changes):
+    path, content = saved
+    path.write_text(json.dumps({**content, **changes}), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", ["one", "several", "starts"])
+def test_what_is_read_back_is_written_alike(texts, tmp_path, name):
+    text = result_text(texts[name])
+    (tmp_path / "result.json").write_text(text, encoding="utf-8")
+    back = load_result(tmp_path)
+    assert result_text(back) == text
+    assert json.dumps(back.to_dict()) == json.dumps(texts[name].to_dict())
+    assert repr(back) == repr(texts[name])
+
+
+def test_a_fitted_parameter_has_value_error_and_interval(texts, tmp_path):
+    (tmp_path / "result.json").write_text(result_text(texts["several"]), encoding="utf-8")
+    for result in (texts["several"], load_result(tmp_path / "result.json")):
+        gain, instant = result.parameters["KA"], result.parameters["down.vref.at"]
+        own = result.knowledge.confidence.parameters["KA"]
+        assert (gain.stderr, gain.interval) == (own.std_error, own.interval)
+        assert gain.interval[0] < gain.value < gain.interval[1]
+        assert (gain.unit, gain.of_record) == ("pu", False)
+        assert (instant.unit, instant.of_record) == ("s", True)
+        assert instant.meaning == "instant of a step"
+
+
+def test_a_file_of_a_later_version_is_refused(saved):
+    with pytest.raises(ExfitError, match=f"version {VERSION + 1}: written by a later exfit"):
+        load_result(written(saved, version=VERSION + 1))
+    for version in (None, "2", True, 0, -1):
+        with pytest.raises(ExfitError, match=r"version: .* is not a version of results"):
+            load_result(written(saved, version=version))
+
+
+def test_no_damage_ends_in_a_traceback(saved):
+    """Values of another kind, missing keys, cut files: ExfitError with the file, or no harm."""
+    path, _ = saved
+    whole = path.read_text(encoding="utf-8")
+    draw = random.Random(1)
+    others = [None, True, -1, 1e999, 10**400, "x", [], {}, [[1.0], [1.0, 2.0]]]
+    refused = 0
+    for _ in range(DAMAGES):
+        content = json.loads(whole)
+        section, key = _somewhere(content, draw)
+        if draw.random() < 0.3:
+            del section[key]
+        else:
+            section[key] = draw.choice(others)
+        path.write_text(json.dumps(content), encoding="utf-8")
+        refused += _refused(path)
+    assert refused > DAMAGES // 2
+    for cut in (0, 1, len(whole) // 2, len(whole) - 3):
+        path.write_text(whole[:cut], encoding="utf-8")
+        assert _refused(path)
+    path.write_bytes(b"\xff\xfe{}")
+    assert _refused(path)
+
+
+def _refused(path):
+    """Tell whether a file is refused, with its name."""
+    try:
+        load_result(path)
+    except ExfitError as fault:
+        return str(path) in str(fault)
+    return False
+
+
+def _somewhere(content, draw):
+    """Return a random mapping or list of a content, and a key of it."""
+    places = []
+
+    def walk(section):
+        keys = section.keys() if isinstance(section, dict) else range(min(len(section), 2))
+        for key in keys:
+            places.append((section, key))
+            if isinstance(section[key], dict | list):
+                walk(section[key])
+
+    walk(content)
+    return draw.choice(places)
+
+
+def test_long_samples_are_thinned_and_keep_their_extremes(texts):
+    from dataclasses import replace
+
+    result = texts["one"]
+    match = result.comparison
+    time = np.linspace(0.0, 100.0, 100_001)
+    noise = np.random.default_rng(1).standard_normal((2, len(time)))
+    overlay = replace(match.overlays["vt"], measured=noise[0], simulated=noise[1], start=None)
+    long = replace(match, time=time, overlays={"vt": overlay}, iteration_responses=None)
+    kept = thinned(replace(result, comparisons=(long,))).comparison
+    assert len(kept.time) <= MOST_ROWS + 2
+    assert np.all(np.diff(kept.time) > 0.0)
+    for ours, theirs in zip(
+        (kept.overlays["vt"].measured, kept.overlays["vt"].simulated), noise, strict=True
+    ):
+        # nine digits are kept
+        assert ours.max() == pytest.approx(theirs.max(), rel=1e-8)
+        assert ours.min() == pytest.approx(theirs.min(), rel=1e-8)
+    assert kept.channels == match.channels
+
+
+def test_a_validation_holds_what_it_found_about_its_own_record(tmp_path):
+    import yaml
+
+    found_at = {"start": 1.02, "min": 0.9, "max": 1.1}
+    content = several(recorded("up"), free={"KA": {"start": 300.0, "min": 76.6, "max": 7660.0}})
+    content["validate"] = [recorded("down", at=found_at)]
+    path = tmp_path / "case.yaml"
+    path.write_text(yaml.safe_dump(content))
+    result = workflows.fit(load_case(path))
+    (match,) = result.validation
+    # one free parameter leaves an error that the instant takes up a part of
+    assert match.of_record["down.vref.at"] == pytest.approx(1.0, abs=0.05)
+    assert match.of_record["down.vref.at"] != 1.02
+    assert not result.comparison.of_record
+    assert [one.test for one in result.behaviour.limits] == ["up", "down"]
