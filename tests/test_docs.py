@@ -1,6 +1,7 @@
 """The README and the pages of docs/ are true: commands, output, cases, models, tables, links."""
 
 import importlib.util
+import json
 import re
 import shutil
 from collections.abc import Iterator
@@ -279,6 +280,30 @@ def test_the_strategies_of_the_page_are_those_of_a_case():
     cells = first_column(PAGES["docs/case_file.md"], "## Strategies")
     (option,) = (it for it in main.commands["fit"].params if it.name == "strategy")
     assert sorted(cell.strip("`") for cell in cells) == sorted(option.type.choices)
+
+
+# ---- Python
+
+
+def test_the_notebook_runs(monkeypatch):
+    monkeypatch.chdir(DOCS)
+    cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    assert all(not cell.get("outputs") for cell in cells), "Sphinx runs it: store no outputs"
+    names: dict[str, object] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            lines = [line for line in cell["source"] if not line.startswith("%")]
+            exec("".join(lines), names)
+    low, high = names["k"].interval
+    assert low < 200.0 < high
+
+
+def test_the_python_of_the_page_gives_the_values_that_it_says(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    exec(block("python_api.md", "python"), names)
+    for expression, value in re.findall(r"^(\S+) +# ([\d.]+)$", block("python_api.md", "python")):
+        assert eval(expression, names) == pytest.approx(float(value), rel=1e-4)
 
 
 # ---- architecture
