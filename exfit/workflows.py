@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from exfit import __version__, estimate
 from exfit.analysis import experiment_design, model_check, profiles
-from exfit.analysis.behaviour import behaviour_of
 from exfit.analysis.case_description import (
     fixed_values,
     input_hashes,
@@ -32,13 +31,13 @@ from exfit.analysis.model_check import Check
 from exfit.analysis.profiles import Profiles
 from exfit.analysis.solution import (
     aligned,
+    analysed,
     comparisons_of,
     fit_notes,
     fitted_parameters,
     iteration_of,
     minima_of,
     record_notes,
-    uncertainty_of_solution,
     validation_of,
 )
 from exfit.case import load
@@ -64,10 +63,6 @@ CaseOrPath = Case | str | PathLike[str]
 ValuesOrResult = Values | FitResult
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
-INTERRUPTED_AFTERWARDS = (
-    "interrupted after the search: intervals, or comparisons with records that the fit never saw, "
-    "are missing"
-)
 
 
 def _ignore(_: object) -> None:
@@ -115,20 +110,9 @@ def fit(
 
     best, search_result = search(case, problem, method, announce, search_progress, counter)
     values = residuals.values(best.x)
-    interrupted = best.stop is estimate.Stop.INTERRUPTED
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
-    uncertainty, behaviour = None, None
-    validation, unfinished = list[Comparison](), list[str]()
-    try:
-        if not interrupted:
-            uncertainty = uncertainty_of_solution(problem, best.x, setups)
-        validated = [aligned(case, setup, values) for setup in unseen]
-        validation += [validation_of(case, *pair) for pair in validated]
-        behaviour = behaviour_of(fine, values, validated)
-    except KeyboardInterrupt:  # what the search came to stays
-        interrupted, unfinished = True, [INTERRUPTED_AFTERWARDS]
-    why = "the search was interrupted" if interrupted else "no finite derivatives"
+    analysis = analysed(case, problem, best, fine, unseen)
     used = [*setups, *unseen]
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
@@ -138,7 +122,7 @@ def fit(
         model=case.subject,
         strategy=method,
         saturation=case.saturation,
-        parameters=fitted_parameters(case, residuals, values, uncertainty, why),
+        parameters=fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why),
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
         typical=case.typical(),
         fixed=fixed_values(case, values),
@@ -150,29 +134,26 @@ def fit(
         stabiliser_model=models.get("stabiliser"),
         cost=best.cost,
         comparisons=comparisons,
-        knowledge=uncertainty,
+        knowledge=analysis.uncertainty,
         minima=minima_of(residuals, search_result),
         status=best.status,
         message=best.message,
         success=best.success,
-        interrupted=interrupted or _was_interrupted(search_result),
+        interrupted=analysis.interrupted or _was_interrupted(search_result),
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,
         simulations=counter.simulations,
         substeps=counter.substeps,
         seconds=clock.perf_counter() - began,
-        notes=(
-            *fit_notes(case, residuals, best, setups, comparisons, validation, uncertainty),
-            *unfinished,
-        ),
-        validation=tuple(validation),
+        notes=tuple(fit_notes(case, residuals, best, setups, comparisons, analysis)),
+        validation=analysis.validation,
         versions=versions(),
         inputs=input_hashes(case, used),
         strategy_given=method != case.estimate.strategy,
         parts=tuple(parts_of(case)),
         tests=tuple(tests_of(case, used)),
-        behaviour=behaviour,
+        behaviour=analysis.behaviour,
         files=input_names(case, used),
         case_text=_text_of(case),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from exfit import workflows
+from exfit.analysis import solution
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiment, build_experiments
 from exfit.fitting.system import values_of
@@ -206,13 +206,13 @@ def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, s
         raise KeyboardInterrupt
 
     whole = fit(case("first_order"))
-    monkeypatch.setattr(workflows, step, interrupt)
+    monkeypatch.setattr(solution, step, interrupt)
     result = fit(case("first_order"))
     assert result.interrupted
     assert result.success
     assert result.values == whole.values
     assert result.validation == ()
-    assert workflows.INTERRUPTED_AFTERWARDS in result.notes
+    assert solution.INTERRUPTED_AFTERWARDS in result.notes
 
 
 def test_an_interruption_before_the_second_jacobian_is_told_without_a_note_on_redundance():

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
+from exfit.analysis.behaviour import behaviour_of
 from exfit.analysis.diagnostics import (
     level_notes,
     match_notes,
@@ -31,10 +33,59 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import Uncertainty
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
+from exfit.results.description import Behaviour
 from exfit.results.model import FittedParameter, Iteration, Minima, Minimum
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+
+INTERRUPTED_AFTERWARDS = (
+    "interrupted after the search: intervals, or comparisons with records that the fit never saw, "
+    "are missing"
+)
+
+
+class Analysis(NamedTuple):
+    """What follows from a solution; ``interrupted`` where it, or the search before, is not whole.
+
+    ``unfinished`` where the interruption came after the search: what was done by then stands.
+    """
+
+    uncertainty: UncertaintyAnalysis | None
+    validation: tuple[Comparison, ...]
+    behaviour: Behaviour | None
+    interrupted: bool
+    unfinished: bool
+
+    @property
+    def why(self) -> str:
+        """Why there is no uncertainty, where there is none."""
+        return "the search was interrupted" if self.interrupted else "no finite derivatives"
+
+
+def analysed(
+    case: Case,
+    problem: FitProblem,
+    best: estimate.Result,
+    setups: Sequence[ExperimentSetup],
+    unseen: Sequence[ExperimentSetup],
+) -> Analysis:
+    """Return how well the best point is determined, how it does on ``unseen`` records, and more.
+
+    ``setups`` have sub-steps enough. An interruption ends it with what was done by then.
+    """
+    values = problem.residuals.values(best.x)
+    interrupted, unfinished = best.stop is estimate.Stop.INTERRUPTED, False
+    uncertainty, behaviour, validation = None, None, list[Comparison]()
+    try:
+        if not interrupted:
+            uncertainty = uncertainty_of_solution(problem, best.x, setups)
+        validated = [aligned(case, setup, values) for setup in unseen]
+        validation += [validation_of(case, *pair) for pair in validated]
+        behaviour = behaviour_of(setups, values, validated)
+    except KeyboardInterrupt:  # what the search came to stays
+        interrupted = unfinished = True
+    return Analysis(uncertainty, tuple(validation), behaviour, interrupted, unfinished)
 
 
 def fitted_parameters(
@@ -149,8 +200,7 @@ def fit_notes(
     best: estimate.Result,
     setups: Sequence[ExperimentSetup],
     comparisons: Sequence[Comparison],
-    validation: Sequence[Comparison],
-    uncertainty: UncertaintyAnalysis | None,
+    analysis: Analysis,
 ) -> Iterator[str]:
     """Yield what must be known beside the numbers of a fit."""
     if not best.success:
@@ -164,10 +214,12 @@ def fit_notes(
             yield from voltage_notes(comparison)
         yield from record_notes(setup, comparison)
         yield from outlier_notes(setup.record.source.name, setup.channels)
-    yield from validation_notes(comparisons, validation)
-    if uncertainty is not None:
-        yield from misfit_notes(residuals, uncertainty)
+    yield from validation_notes(comparisons, analysis.validation)
+    if analysis.uncertainty is not None:
+        yield from misfit_notes(residuals, analysis.uncertainty)
     yield from skipped_response_notes(comparisons)
+    if analysis.unfinished:
+        yield INTERRUPTED_AFTERWARDS
 
 
 def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[ExperimentSetup, Values]:
