@@ -22,7 +22,7 @@ from records import (
 )
 from tables import read_columns
 
-from exfit.analysis.solution import validation_of
+from exfit.analysis.solution import aligned, validation_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment, build_experiments
 from exfit.fitting.nuisance import names_of
@@ -210,8 +210,8 @@ def test_a_delay_moves_the_features_of_both_signals_alike(tmp_path):
     prompt = build_experiments(case_of(one(TEST), tmp_path))[0]
     late = build_experiments(case_of(one(TEST, delay=0.5), tmp_path))[0]
     values = case_of(one(TEST), tmp_path).values()
-    peak = compare_with_record(prompt, "prompt", values).simulated.peak_time
-    assert compare_with_record(late, "late", values).simulated.peak_time == pytest.approx(
+    peak = compare_with_record(prompt, "prompt", values).features.simulated.peak_time
+    assert compare_with_record(late, "late", values).features.simulated.peak_time == pytest.approx(
         peak, abs=1e-3
     )
 
@@ -377,7 +377,7 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     (before,), (after,) = plain.validation, found.validation
     assert after.rmse == pytest.approx(before.rmse, rel=0.05)
     setup = build_experiment(case, case.validations[0], found.values)
-    assert validation_of(case, setup, found.values).rmse == after.rmse
+    assert validation_of(case, *aligned(case, setup, found.values)).rmse == after.rmse
     unaligned = compare_with_record(setup.with_enough_substeps(found.values), "start", found.values)
     assert unaligned.rmse > 10 * after.rmse
 
@@ -448,4 +448,4 @@ def test_the_file_of_parameters_names_every_record_with_its_error(tmp_path):
     found = fit(case_of(content, tmp_path))
     heading = parameter_file(found).splitlines()[0]
     for one_of in found.comparisons:
-        assert f"{one_of.record.name}: rmse {one_of.rmse:.4g} pu" in heading
+        assert f"{one_of.record}: rmse {one_of.rmse:.4g} pu" in heading
