@@ -98,11 +98,13 @@ def outcome(before, folder, code, errors):
     try:
         content = json.loads(new or b"")
         validated = {f"{match['name']}.csv" for match in content["validation"]}
-        result = "new" if content["history"] and content["parameters"] else "lost"
+        # one that was interrupted before its first iteration has none to show
+        expected = NUMBERS - ({VALIDATED} if content["history"] else {VALIDATED, "iterations.csv"})
+        result = "new" if content["parameters"] else "lost"
     except (ValueError, LookupError):
         return Outcome("lost", False, temporary, code, errors)
     # one that was interrupted between its search and its validation has none
-    together = left >= NUMBERS - {VALIDATED} | validated and not left & OWN
+    together = left >= expected | validated and not left & OWN
     return Outcome(result, together, temporary, code, errors)
 
 
