@@ -39,12 +39,12 @@ def load_result(path: str | PathLike[str]) -> FitResult:
         )
     whole = {**content, "parts": _parts_of(content)} if version == 1 else content
     try:
-        found: FitResult = Reader(complete=version == VERSION).read(FitResult, whole)
+        result: FitResult = Reader(complete=version == VERSION).read(FitResult, whole)
     except FormError as fault:
         raise ExfitError(f"{source}: {fault}; fit again") from None
-    if not found.comparisons:
+    if not result.comparisons:
         raise ExfitError(f"{source}: records: empty; fit again")
-    return found
+    return result
 
 
 def result_file(path: Path) -> Path:

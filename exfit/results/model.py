@@ -206,7 +206,7 @@ class FitResult:
             own: Mapping[str, float] = getattr(self, kind)
             every |= {f"{kind}.{symbol}": value for symbol, value in own.items()}
         others = {name: value for name, value in every.items() if name not in self.parameters}
-        return {**others, **{name: one.value for name, one in self.parameters.items()}}
+        return {**others, **{name: parameter.value for name, parameter in self.parameters.items()}}
 
     def values_of(self, prefix: str) -> dict[str, float]:
         """Return the values of one part by symbol; the exciter's prefix is empty."""
@@ -231,20 +231,20 @@ class FitResult:
     @property
     def accepted(self) -> bool:
         """Whether every validation is within the limit of the case."""
-        return all(one.accepted for one in self.validation)
+        return all(match.accepted for match in self.validation)
 
     @property
     def describes(self) -> bool:
         """Whether the response matches every record better than a constant would."""
-        return all(one.judged.describes for one in self.comparisons)
+        return all(match.judged.describes for match in self.comparisons)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data: everything but the history, samples and descriptions.
 
         It is what ``--json`` prints.
         """
-        found: dict[str, Any] = plain(self)
-        return found
+        figures: dict[str, Any] = plain(self)
+        return figures
 
     def plot(self, record: str | None = None) -> "Figure":
         """Return a figure of the fitted response beside a record of the fit or of its validation.
@@ -264,7 +264,7 @@ class FitResult:
 
     def __repr__(self) -> str:
         """Return the model, the record, the match and the values in one line."""
-        values = ", ".join(f"{name}={one.value:.5g}" for name, one in self.parameters.items())
+        values = ", ".join(f"{name}={each.value:.5g}" for name, each in self.parameters.items())
         state = "" if self.success else ", not converged"
-        to = ", ".join(one.record for one in self.comparisons)
+        to = ", ".join(match.record for match in self.comparisons)
         return f"<FitResult {self.model} to {to}: rmse {self.rmse:.3g} pu{state}; {values}>"

@@ -40,7 +40,7 @@ def table(header: Sequence[str], columns: Sequence[Array]) -> str:
 
 
 def clock_digits(time: Array, digits: int) -> int:
-    """Return how many digits instants (M,) need to be told as finely as so many from zero on."""
+    """Return how many digits instants (M,) need to be as fine as so many digits from zero on."""
     span = float(np.ptp(time))
     if span == 0.0:
         return digits
@@ -106,7 +106,7 @@ def history_table(result: FitResult) -> str:
 def parameter_file(result: FitResult) -> str:
     """Return the values as YAML, to be read back by simulate and validate."""
     state = "interrupted" if result.interrupted else result.message
-    matches = (f"{one.record}: rmse {one.rmse:.4g} pu" for one in result.comparisons)
+    matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in result.comparisons)
     lines = [
         f"# {result.model} fitted to {', '.join(matches)}; {state}",
         f"model: {result.model}",
@@ -119,7 +119,7 @@ def parameter_file(result: FitResult) -> str:
         if name not in of_records and (name in result.parameters or name in result.values_of("")):
             lines.append(f"  {name}: {yaml_number(value)}  # {_origin(result, name)}")
     if of_records:
-        lines += ["records:  # what was found about them"]
+        lines += ["records:  # identified with the parameters"]
         lines += [f"  {name}: {yaml_number(p.value)}" for name, p in of_records.items()]
     return "\n".join(lines) + "\n"
 

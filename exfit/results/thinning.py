@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 MOST_ROWS = 20_000  # of the samples of a comparison
 MOST_NUMBERS = 100_000  # of the iterations' responses, and of the sensitivities of a signal
-MOST_RESPONSES = 12  # of iterations in one figure that can be told apart
+MOST_RESPONSES = 12  # of iterations in one figure that can be distinguished
 
 
 def thinned(result: FitResult) -> FitResult:
@@ -26,8 +26,8 @@ def thinned(result: FitResult) -> FitResult:
     count = len(result.history)
     return replace(
         result,
-        comparisons=tuple(_comparison(one, count) for one in result.comparisons),
-        validation=tuple(_comparison(one, count) for one in result.validation),
+        comparisons=tuple(_comparison(match, count) for match in result.comparisons),
+        validation=tuple(_comparison(match, count) for match in result.validation),
         knowledge=None if result.knowledge is None else _knowledge(result.knowledge),
         behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
     )
@@ -52,8 +52,8 @@ def drawn_responses(responses: IterationResponses, iterations: int) -> Iteration
 def _comparison(comparison: Comparison, iterations: int) -> Comparison:
     signals = [
         samples
-        for one in comparison.overlays.values()
-        for samples in (one.measured, one.simulated, one.start, one.error)
+        for overlay in comparison.overlays.values()
+        for samples in (overlay.measured, overlay.simulated, overlay.start, overlay.error)
         if samples is not None
     ]
     rows = _rows(signals, MOST_ROWS) if signals else np.arange(0)
@@ -63,11 +63,11 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
         time=_instants(comparison.time, rows),
         overlays={
             signal: Overlay(
-                _rounded(one.measured[rows]),
-                _rounded(one.simulated[rows]),
-                None if one.start is None else _rounded(one.start[rows]),
+                _rounded(overlay.measured[rows]),
+                _rounded(overlay.simulated[rows]),
+                None if overlay.start is None else _rounded(overlay.start[rows]),
             )
-            for signal, one in comparison.overlays.items()
+            for signal, overlay in comparison.overlays.items()
         },
         iteration_responses=None if responses is None else _responses(responses, iterations),
     )
@@ -85,30 +85,34 @@ def _responses(responses: IterationResponses, iterations: int) -> IterationRespo
     )
 
 
-def _knowledge(known: UncertaintyAnalysis) -> UncertaintyAnalysis:
-    return replace(known, sensitivity=tuple(_sensitivity(one) for one in known.sensitivity))
+def _knowledge(uncertainty: UncertaintyAnalysis) -> UncertaintyAnalysis:
+    return replace(
+        uncertainty, sensitivity=tuple(_sensitivity(channel) for channel in uncertainty.sensitivity)
+    )
 
 
-def _sensitivity(one: Sensitivity) -> Sensitivity:
-    signals = list(one.moved.values())
+def _sensitivity(channel: Sensitivity) -> Sensitivity:
+    signals = list(channel.moved.values())
     if not signals:
-        return one
+        return channel
     rows = _rows(signals, MOST_NUMBERS // len(signals))
-    moved: Mapping[str, Array] = {name: _rounded(line[rows]) for name, line in one.moved.items()}
-    return Sensitivity(one.label, _instants(one.time, rows), moved)
+    moved: Mapping[str, Array] = {
+        name: _rounded(line[rows]) for name, line in channel.moved.items()
+    }
+    return Sensitivity(channel.label, _instants(channel.time, rows), moved)
 
 
 def _behaviour(behaviour: Behaviour) -> Behaviour:
     return replace(behaviour, small_signal=tuple(map(_small_signal, behaviour.small_signal)))
 
 
-def _small_signal(one: SmallSignalView) -> SmallSignalView:
-    view = one.view
+def _small_signal(of_tests: SmallSignalView) -> SmallSignalView:
+    view = of_tests.view
     if view is None:
-        return one
+        return of_tests
     opened = None if view.open is None else _bode(view.open)
     rounded: SmallSignal = replace(view, closed=_bode(view.closed), open=opened)
-    return replace(one, view=rounded)
+    return replace(of_tests, view=rounded)
 
 
 def _bode(bode: Bode) -> Bode:

@@ -43,13 +43,13 @@ class Entry(NamedTuple):
 def plain(content: Any, whole: bool = False) -> Any:
     """Return the plain data of a data class and of all in it; ``whole``: what is stored, too."""
     if is_dataclass(content) or hasattr(content, "_fields"):
-        found = {
+        data = {
             entry.key: _entry_of(getattr(content, entry.name), entry.kind, whole)
             for entry in entries(_class_of(content))
             if whole or not entry.stored
         }
         derived: Mapping[str, str] = getattr(content, "DERIVED", {})
-        return found | {key: plain(getattr(content, name)) for key, name in derived.items()}
+        return data | {key: plain(getattr(content, name)) for key, name in derived.items()}
     if isinstance(content, Mapping):
         return {key: plain(value, whole) for key, value in content.items()}
     if isinstance(content, np.ndarray):
@@ -101,13 +101,16 @@ def entries(kind: type) -> tuple[Entry, ...]:
         defaults = getattr(kind, "_field_defaults", {})
         names = getattr(kind, "_fields", ())
         return tuple(Entry(n, n, hints[n], False, defaults.get(n, MISSING)) for n in names)
-    found = []
-    for one in fields(kind):
-        made = one.default_factory
-        default = one.default if made is MISSING else made()
-        key, only_stored = one.metadata.get(KEY, one.name), one.metadata.get(STORED, False)
-        found.append(Entry(key, one.name, hints[one.name], only_stored, default))
-    return tuple(found)
+    described = []
+    for attribute in fields(kind):
+        made = attribute.default_factory
+        default = attribute.default if made is MISSING else made()
+        key, only_stored = (
+            attribute.metadata.get(KEY, attribute.name),
+            attribute.metadata.get(STORED, False),
+        )
+        described.append(Entry(key, attribute.name, hints[attribute.name], only_stored, default))
+    return tuple(described)
 
 
 class Reader(NamedTuple):

@@ -54,12 +54,12 @@ def export(result: FitResult, bus: int, machine_id: str, name: str | None = None
     comments = [*_origin(result), *(f"{text}." for text in _of_fit(result))]
     comments += [text for record in written for text in _comments(record)]
     lines = [line for text in comments for line in _wrapped(text)]
-    lines += [record_text(one.definition, one.values, bus, machine_id) for one in written]
+    lines += [record_text(entry.definition, entry.values, bus, machine_id) for entry in written]
     return Exported("\n".join(lines) + "\n", tuple(warnings))
 
 
 def _of_fit(result: FitResult) -> Iterator[str]:
-    """Yield what of the fit itself must be known."""
+    """Yield what of the fit itself must be candidates."""
     if not result.success:
         yield f"the fit did not converge: {result.message}"
     if result.saturation != "quadratic":
@@ -74,38 +74,42 @@ def _exciter(result: FitResult, name: str | None) -> Iterator[Written]:
     model = MODELS.get(result.model)
     if model is None or "model" in result.inputs:
         raise ExfitError(f"{result.model} is not a model of the catalogue: it has no PSS/E record")
-    known = {one.record.name: one for one in alternatives(model)}
-    if not known:
+    candidates = {entry.record.name: entry for entry in alternatives(model)}
+    if not candidates:
         raise ExfitError(f"{result.model} has no PSS/E record")
-    wanted = next(iter(known)) if name is None else name.upper()
-    if wanted not in known:
-        raise ExfitError(f"--model {name}: not a record of {result.model}; {near(wanted, known)}")
-    yield _written(result, known[wanted], "")
+    wanted = next(iter(candidates)) if name is None else name.upper()
+    if wanted not in candidates:
+        raise ExfitError(
+            f"--model {name}: not a record of {result.model}; {near(wanted, candidates)}"
+        )
+    yield _written(result, candidates[wanted], "")
 
 
 def _machine(result: FitResult, warnings: list[str]) -> Iterator[Written]:
     name = result.machine_model
-    known = alternatives(MACHINES[name]) if name in MACHINES else []
-    if not known:
+    candidates = alternatives(MACHINES[name]) if name in MACHINES else []
+    if not candidates:
         what = "no machine is named" if name is None else f"machine {name} has no PSS/E record"
         warnings.append(f"{what}: only the exciter is written")
         return
-    yield _written(result, known[0], "machine.")
+    yield _written(result, candidates[0], "machine.")
 
 
 def _stabiliser(result: FitResult, warnings: list[str]) -> Iterator[Written]:
     name = result.stabiliser_model
     if name is None:
         return
-    known = [one for one in definitions() if one.kind == "stabiliser" and one.model.name == name]
-    if not known:
+    candidates = [
+        entry for entry in definitions() if entry.kind == "stabiliser" and entry.model.name == name
+    ]
+    if not candidates:
         warnings.append(f"stabiliser {name} has no PSS/E record: it is left out")
         return
-    yield _written(result, known[0], "stabiliser.")
+    yield _written(result, candidates[0], "stabiliser.")
 
 
 def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
-    """Return a record with the values of a result; raises ExfitError where one is missing."""
+    """Return a record with the values of a result; raises ExfitError where entry is missing."""
     values = result.values_of(prefix)
     missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
     if missing:
@@ -119,17 +123,17 @@ def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
     )
 
 
-def _warnings(one: Written) -> Iterator[str]:
-    """Yield what a record cannot hold, leaves open, or takes from no one's data."""
-    record = one.definition.record
-    for row in one.definition.model.sheet:
-        value = one.values[row.symbol]
-        if row.symbol not in one.definition.names and _matters(row.symbol, value):
+def _warnings(entry: Written) -> Iterator[str]:
+    """Yield what a record cannot hold, leaves undefined, or takes from typical data."""
+    record = entry.definition.record
+    for row in entry.definition.model.sheet:
+        value = entry.values[row.symbol]
+        if row.symbol not in entry.definition.names and _matters(row.symbol, value):
             yield f"{record.name} cannot hold {row.symbol} = {show(value)}: it is lost"
     if record.doubt:
         yield f"{record.name}: {record.doubt}"
-    if one.typical:
-        names = ", ".join(one.typical)
+    if entry.typical:
+        names = ", ".join(entry.typical)
         yield f"{record.name}: as in exfit's typical data, check that it is the unit's: {names}"
 
 
@@ -148,11 +152,11 @@ def _origin(result: FitResult) -> Iterator[str]:
     yield f"Case: {result.case}."
 
 
-def _comments(one: Written) -> Iterator[str]:
-    record = one.definition.record
-    if one.fitted:
-        yield f"{record.name}: fitted: {' '.join(one.fitted)}."
-    for warning in _warnings(one):
+def _comments(entry: Written) -> Iterator[str]:
+    record = entry.definition.record
+    if entry.fitted:
+        yield f"{record.name}: fitted: {' '.join(entry.fitted)}."
+    for warning in _warnings(entry):
         yield f"{warning}."
 
 

@@ -57,10 +57,10 @@ def library() -> list[str]:
 
     They are read as files: importing bokeh takes longer than all of a report.
     """
-    found = find_spec("bokeh")
-    if found is None or found.origin is None:
+    package = find_spec("bokeh")
+    if package is None or package.origin is None:
         raise ExfitError("the package bokeh is missing: pip install bokeh")
-    folder = Path(found.origin).parent / "server" / "static" / "js"
+    folder = Path(package.origin).parent / "server" / "static" / "js"
     return [(folder / name).read_text(encoding="utf-8") for name in LIBRARY]
 
 

@@ -15,5 +15,5 @@ class Findings:
 
 def findings(result: FitResult) -> Findings:
     """Return the findings of a fit."""
-    known = result.knowledge
-    return Findings(() if known is None else known.sentences, result.notes)
+    uncertainty = result.knowledge
+    return Findings(() if uncertainty is None else uncertainty.sentences, result.notes)

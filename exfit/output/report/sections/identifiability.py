@@ -25,27 +25,32 @@ class IdentifiabilityView:
 
 def identifiability(result: FitResult) -> IdentifiabilityView | None:
     """Return what the records determine; None where that is not known."""
-    known = result.knowledge
-    if known is None:
+    uncertainty = result.knowledge
+    if uncertainty is None:
         return None
-    charts = (sensitivity(f"moved-{k}", one) for k, one in enumerate(known.sensitivity))
-    return IdentifiabilityView(bool(known.sentences), tuple(charts), known.confidence.correlation)
+    charts = (
+        sensitivity(f"moved-{k}", channel) for k, channel in enumerate(uncertainty.sensitivity)
+    )
+    return IdentifiabilityView(
+        bool(uncertainty.sentences), tuple(charts), uncertainty.confidence.correlation
+    )
 
 
-def sensitivity(key: str, one: Sensitivity) -> Chart:
+def sensitivity(key: str, channel: Sensitivity) -> Chart:
     """Return by how much 1 % more of each parameter moves a signal over time."""
-    moved = {name: PERCENT * samples for name, samples in one.moved.items()}
+    moved = {name: PERCENT * samples for name, samples in channel.moved.items()}
     lines = tuple(
-        Series(name, *envelope(one.time, MILLI * samples, BINS // 2), line_style(k))
+        Series(name, *envelope(channel.time, MILLI * samples, BINS // 2), line_style(k))
         for k, (name, samples) in enumerate(moved.items())
     )
     most = [(float(np.max(np.abs(samples))), name) for name, samples in moved.items()]
     largest = ", ".join(f"{name} {MILLI * size:.2g}" for size, name in sorted(most, reverse=True))
     return Chart(
         key=key,
-        title=f"What 1 % more of each parameter does to {one.label}",
-        text=f"Largest change of {one.label} in 1e-3 pu for 1 % more of each parameter: {largest}.",
+        title=f"What 1 % more of each parameter does to {channel.label}",
+        text=f"Largest change of {channel.label} in 1e-3 pu for 1 % more of each parameter: "
+        f"{largest}.",
         x_title=TIME,
-        panels=(Panel(f"change of {one.label} (1e-3 pu)", lines, TALL, rules=(LEVEL,)),),
-        x_range=(float(one.time[0]), float(one.time[-1])),
+        panels=(Panel(f"change of {channel.label} (1e-3 pu)", lines, TALL, rules=(LEVEL,)),),
+        x_range=(float(channel.time[0]), float(channel.time[-1])),
     )

@@ -100,17 +100,20 @@ def live_data(overlays: Sequence[OverlayChart]) -> Iterator[dict[str, Any]]:
     A gap is None.
     """
     most = MOST_SENT // max(len(overlays), 1)
-    for one in overlays:
-        time, samples = one.comparison.time, one.comparison.overlays[one.signal]
+    for overlay_chart in overlays:
+        time, samples = (
+            overlay_chart.comparison.time,
+            overlay_chart.comparison.overlays[overlay_chart.signal],
+        )
         rows = kept_rows([samples.measured, samples.error], max(1, most // 4))
         signals = {"measured": samples.measured, "simulated": samples.simulated}
         if samples.start is not None:
             signals["start"] = samples.start
         yield {
-            "key": one.chart.key,
-            "group": one.comparison.name,
-            "title": one.chart.title,
-            "label": one.chart.panels[0].title,
+            "key": overlay_chart.chart.key,
+            "group": overlay_chart.comparison.name,
+            "title": overlay_chart.chart.title,
+            "label": overlay_chart.chart.panels[0].title,
             "time": _numbers(time[rows], clock_digits(time, DIGITS)),
             **{name: _numbers(line[rows], DIGITS) for name, line in signals.items()},
         }

@@ -31,8 +31,13 @@ def small_signal(result: FitResult) -> tuple[BodeFigures, ...] | None:
     if result.behaviour is None:
         return None
     return tuple(
-        BodeFigures(", ".join(one.tests), one.view, one.why, tuple(_bodes(f"bode-{k}", one)))
-        for k, one in enumerate(result.behaviour.small_signal)
+        BodeFigures(
+            ", ".join(of_tests.tests),
+            of_tests.view,
+            of_tests.why,
+            tuple(_bodes(f"bode-{k}", of_tests)),
+        )
+        for k, of_tests in enumerate(result.behaviour.small_signal)
     )
 
 
