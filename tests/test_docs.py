@@ -31,7 +31,7 @@ PAGES = {
     for path in [ROOT / "README.md", *DOCS.glob("*.md"), DOCS / "models" / "index.md"]
 }
 README = PAGES["README.md"]
-NOTEBOOK = DOCS / "tutorial_python.ipynb"
+NOTEBOOK = DOCS / "tutorial.ipynb"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 WITH_SESSIONS = [name for name, page in PAGES.items() if "```console" in page]
 OF_OTHERS = {"--strict", "--models"}  # options of mypy and of the tests

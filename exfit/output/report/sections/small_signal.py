@@ -46,7 +46,7 @@ def _bodes(key: str, of_tests: SmallSignalView) -> Iterator[Chart]:
     view, names = of_tests.view, ", ".join(of_tests.tests)
     if view is None:
         return
-    if view.open is not None:
+    if view.open is not None and np.any(view.open.response):  # nothing passes: no gain to draw
         gain, phase = _margins(view.margins)
         crossovers = [rule.label for rule in (*gain, *phase)]
         yield _bode(
