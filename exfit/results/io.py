@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from exfit.errors import ExfitError
+from exfit.results.consistency import contradictions
 from exfit.results.description import PartDescription
 from exfit.results.model import PARTS, FitResult
 from exfit.results.thinning import thinned
@@ -42,8 +43,8 @@ def load_result(path: str | PathLike[str]) -> FitResult:
         result: FitResult = Reader(complete=version == VERSION).read(FitResult, whole)
     except FormError as fault:
         raise ExfitError(f"{source}: {fault}; fit again") from None
-    if not result.comparisons:
-        raise ExfitError(f"{source}: records: empty; fit again")
+    for text in contradictions(result):
+        raise ExfitError(f"{source}: {text}; fit again")
     return result
 
 

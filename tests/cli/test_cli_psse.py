@@ -205,7 +205,7 @@ def test_a_stabiliser_goes_into_the_case_with_its_model_and_parameters(run, pssx
 def test_a_fitted_stabiliser_is_written_behind_its_exciter(run, fitted, pssx):
     parameters = {**result_of(fitted)["parameters"], "stabiliser.k": of_value(7.0)}
     changes = {"stabiliser_model": "PSSX", "stabiliser": {"k": 5.0, "a": 3.0}}
-    named(fitted, parameters=parameters, **changes)
+    named(fitted, parameters=parameters, history=[], **changes)
     code, out, _ = run("export", fitted)
     assert code == 0
     assert out.splitlines()[-1].split() == ["1", "'PSSX'", "1", "1", "3.0", "7.0", "/"]
@@ -300,7 +300,7 @@ def test_a_result_or_its_folder_gives_the_same_on_the_terminal(run, fitted):
 
 def test_fitted_values_of_the_machine_go_over_those_of_the_case(run, fitted):
     parameters = {**result_of(fitted)["parameters"], "machine.Tpd0": of_value(5.5)}
-    named(fitted, parameters=parameters)
+    named(fitted, parameters=parameters, history=[])
     _, out, _ = run("export", fitted)
     assert read_unit(out, "out.dyr").machine.values["Tpd0"] == 5.5
     assert "// GENROU: fitted: Tpd0." in out.splitlines()

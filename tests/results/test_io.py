@@ -135,6 +135,33 @@ def _somewhere(content, draw):
     return draw.choice(places)
 
 
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        (("records", 0, "time"), "records: fit: overlays: vt: not one sample for each instant"),
+        (("records", 0, "overlays", "vt", "start"), "not one sample for each instant"),
+        (("records", 0, "iteration_responses", "samples"), "iteration_responses: not one sample"),
+        (("history", 1, "values"), "history: its parameters are not those of the fit"),
+        (("knowledge", "sensitivity", 0, "time"), "sensitivity: vt: not one sample"),
+        (("knowledge", "confidence", "correlation", "names"), "not one row and column for each"),
+        (("behaviour", "small_signal", 0, "view", "closed", "frequency"), "not one response for"),
+    ],
+)
+def test_what_does_not_fit_together_is_refused(saved, place, words):
+    path, content = saved
+    section = content
+    for key in place[:-1]:
+        section = section[key]
+    part = section[place[-1]]
+    if isinstance(part, dict):
+        part.popitem()
+    else:
+        part.pop()
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(ExfitError, match=words):
+        load_result(path)
+
+
 def test_long_samples_are_thinned_and_keep_their_extremes(texts):
     from dataclasses import replace
 

@@ -59,7 +59,7 @@ def export(result: FitResult, bus: int, machine_id: str, name: str | None = None
 
 
 def _of_fit(result: FitResult) -> Iterator[str]:
-    """Yield what of the fit itself must be candidates."""
+    """Yield what of the fit itself the reader must know."""
     if not result.success:
         yield f"the fit did not converge: {result.message}"
     if result.saturation != "quadratic":
@@ -109,7 +109,7 @@ def _stabiliser(result: FitResult, warnings: list[str]) -> Iterator[Written]:
 
 
 def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
-    """Return a record with the values of a result; raises ExfitError where entry is missing."""
+    """Return a record with the values of a result; raises ExfitError where one is missing."""
     values = result.values_of(prefix)
     missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
     if missing:
