@@ -72,7 +72,7 @@ def test_no_room_but_that_of_the_plants_and_the_schema_knows_a_plant_by_its_name
         if isinstance(node, ast.Constant) and node.value in names
     }
     rest = {path for path in knowing if not path.startswith("plants/")}
-    assert rest == {"case/schema.py"}
+    assert rest == {"case/schema/plants.py"}
 
 
 def test_all_events_are_those_of_some_kind():
