@@ -70,19 +70,19 @@ def _bounded(place: str, step: FindableStep, record: Record, limit: float | None
     try:
         if limit is not None:
             kept[kept] = ~outliers(record.time[kept], vt[kept], limit)
-        shown = find_step(record.time[kept], vt[kept])
+        detected = find_step(record.time[kept], vt[kept])
     except ValueError as fault:
         raise RecordError(f"{record.source}: {fault}; {place} asks for start: auto") from fault
     first, last = float(record.time[0]), float(record.time[-1])
     bounds = {
         "at": (
-            shown.at,
-            max(first, shown.at - INSTANT_WITHIN),
-            min(last, shown.at + INSTANT_WITHIN),
+            detected.at,
+            max(first, detected.at - INSTANT_WITHIN),
+            min(last, detected.at + INSTANT_WITHIN),
         ),
         "step": (
-            shown.size,
-            *sorted(((1 - SIZE_WITHIN) * shown.size, (1 + SIZE_WITHIN) * shown.size)),
+            detected.size,
+            *sorted(((1 - SIZE_WITHIN) * detected.size, (1 + SIZE_WITHIN) * detected.size)),
         ),
     }
     update = {}

@@ -40,8 +40,8 @@ class Identifiability:
     def sentences(self) -> tuple[str, ...]:
         """What to tell: the combinations, and what fixing parameters would bring."""
         return (
-            *(one.sentence for one in self.unseen),
-            *(one.sentence for one in self.suggestion),
+            *(combination.sentence for combination in self.unseen),
+            *(fixing.sentence for fixing in self.suggestion),
         )
 
 

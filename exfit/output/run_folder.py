@@ -259,12 +259,16 @@ def write_agreement(agreement: Agreement, folder: Path, figures: bool) -> tuple[
     return _draw(folder / AGREEMENT, drawings) if figures else ()
 
 
-def agreement_table(found: Agreement) -> str:
+def agreement_table(agreement: Agreement) -> str:
     """Return both responses and their difference on their common clock, as CSV."""
-    header, columns = ["t"], [found.between[0].time]
-    for one in found.between:
-        header += [f"{one.signal}_A", f"{one.signal}_B", f"{one.signal}_difference"]
-        columns += [*one.values, one.error]
+    header, columns = ["t"], [agreement.between[0].time]
+    for difference in agreement.between:
+        header += [
+            f"{difference.signal}_A",
+            f"{difference.signal}_B",
+            f"{difference.signal}_difference",
+        ]
+        columns += [*difference.values, difference.error]
     return table(header, columns)
 
 

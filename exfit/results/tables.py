@@ -29,10 +29,10 @@ def table(header: Sequence[str], columns: Sequence[Array]) -> str:
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerow(header)
     signals = columns[1:]
-    shown = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
+    rows = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
     np.savetxt(
         out,
-        np.column_stack([column[shown] for column in columns]),
+        np.column_stack([column[rows] for column in columns]),
         fmt=[f"%.{clock_digits(columns[0], DIGITS)}g", *[f"%.{DIGITS}g"] * (len(columns) - 1)],
         delimiter=",",
     )

@@ -76,7 +76,9 @@ class Chart:
     @property
     def legend(self) -> tuple[Series, ...]:
         """A line of each kind, where there is more than one."""
-        kinds = {one.label: one for panel in self.panels for one in panel.series if one.label}
+        kinds = {
+            series.label: series for panel in self.panels for series in panel.series if series.label
+        }
         return tuple(kinds.values()) if len(kinds) > 1 else ()
 
 
@@ -141,8 +143,8 @@ class Axis:
 
     def places(self, values: Array) -> Array:
         """Return how far from the low end values lie on the drawing."""
-        shown = _log(values) if self.logarithmic else values
-        return np.asarray((shown - self.low) / (self.high - self.low) * self.length)
+        placed = _log(values) if self.logarithmic else values
+        return np.asarray((placed - self.low) / (self.high - self.low) * self.length)
 
     def place(self, value: float) -> float:
         """Return how far from the low end a value lies on the drawing."""
@@ -152,8 +154,8 @@ class Axis:
 def drawing(chart: Chart) -> Drawing:
     """Return where all of a chart lies."""
     inner = chart.width - LEFT - RIGHT
-    lines = [one for panel in chart.panels for one in panel.series]
-    x_range = chart.x_range or _span((one.x for one in lines), chart.logarithmic)
+    lines = [series for panel in chart.panels for series in panel.series]
+    x_range = chart.x_range or _span((series.x for series in lines), chart.logarithmic)
     across = Axis(*x_range, inner, chart.logarithmic)
     panels, top = [], TOP
     for panel in chart.panels:
@@ -176,7 +178,7 @@ def ticks(axis: Axis, most: int, whole: bool = False) -> tuple[Tick, ...]:
 
 
 def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:
-    levels = [one.y for one in panel.series]
+    levels = [series.y for series in panel.series]
     fixed = [np.array([rule.at]) for rule in panel.rules if not rule.upright]
     low, high = _span([*levels, *fixed], panel.logarithmic)
     room = ROOM * (high - low)
@@ -187,45 +189,45 @@ def _drawn(panel: Panel, across: Axis, top: float) -> Drawn:
         top,
         panel.height,
         tuple(Tick(panel.height - tick.at, tick.label) for tick in y_ticks),
-        tuple(_mark(one, across, upward) for one in panel.series),
-        tuple(_rule(one, across, upward) for one in panel.rules),
-        tuple(_label(one, across, upward) for one in panel.rules if one.label),
+        tuple(_mark(series, across, upward) for series in panel.series),
+        tuple(_rule(rule, across, upward) for rule in panel.rules),
+        tuple(_label(rule, across, upward) for rule in panel.rules if rule.label),
     )
 
 
-def _mark(one: Series, across: Axis, upward: Axis) -> Mark:
-    x, y = across.places(one.x), upward.length - upward.places(one.y)
-    seen = np.isfinite(x) & np.isfinite(y)
-    if one.dots:
-        path = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x[seen], y[seen], strict=True))
+def _mark(series: Series, across: Axis, upward: Axis) -> Mark:
+    x, y = across.places(series.x), upward.length - upward.places(series.y)
+    finite = np.isfinite(x) & np.isfinite(y)
+    if series.dots:
+        path = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x[finite], y[finite], strict=True))
     else:
-        path = "".join(_strokes(x, y, seen))
-    return Mark(path, one.style + (" dots" if one.dots else ""))
+        path = "".join(_strokes(x, y, finite))
+    return Mark(path, series.style + (" dots" if series.dots else ""))
 
 
-def _strokes(x: Array, y: Array, seen: NDArray[np.bool_]) -> Iterator[str]:
+def _strokes(x: Array, y: Array, finite: NDArray[np.bool_]) -> Iterator[str]:
     """Yield the strokes of a line: a gap in the values is one on the drawing."""
     pen = "M"
-    for a, b, drawn in zip(x.tolist(), y.tolist(), seen.tolist(), strict=True):
+    for a, b, drawn in zip(x.tolist(), y.tolist(), finite.tolist(), strict=True):
         if drawn:
             yield f"{pen}{a:.1f} {b:.1f}"
         pen = "L" if drawn else "M"
 
 
-def _rule(one: Rule, across: Axis, upward: Axis) -> Mark:
-    if one.upright:
-        return Mark(f"M{across.place(one.at):.1f} 0v{upward.length:.1f}", one.style)
-    return Mark(f"M0 {upward.length - upward.place(one.at):.1f}h{across.length:.1f}", one.style)
+def _rule(rule: Rule, across: Axis, upward: Axis) -> Mark:
+    if rule.upright:
+        return Mark(f"M{across.place(rule.at):.1f} 0v{upward.length:.1f}", rule.style)
+    return Mark(f"M0 {upward.length - upward.place(rule.at):.1f}h{across.length:.1f}", rule.style)
 
 
-def _label(one: Rule, across: Axis, upward: Axis) -> Label:
+def _label(rule: Rule, across: Axis, upward: Axis) -> Label:
     """Return where a rule says what it is: above a level, at the foot of an upright one."""
-    if not one.upright:
-        level = upward.length - upward.place(one.at)
-        return Label(across.length - 4.0, level - 4.0, one.label, True)
-    x = across.place(one.at)
+    if not rule.upright:
+        level = upward.length - upward.place(rule.at)
+        return Label(across.length - 4.0, level - 4.0, rule.label, True)
+    x = across.place(rule.at)
     end = x > 0.6 * across.length
-    return Label(x - 5.0 if end else x + 5.0, upward.length - 7.0, one.label, end)
+    return Label(x - 5.0 if end else x + 5.0, upward.length - 7.0, rule.label, end)
 
 
 def _span(lines: Iterable[Array], logarithmic: bool) -> Range:
