@@ -17,6 +17,7 @@ from exfit.cli.options import (
     print_json,
     warn,
 )
+from exfit.errors import CaseError
 
 
 @click.command()
@@ -86,14 +87,16 @@ def validate(
     samples and overlays to runs/CASE-validate, or to DIR.
     """
     from exfit import workflows
-    from exfit.case.yaml import read_text
     from exfit.fitting.overrides import fitted_model_hash, read_parameters
     from exfit.output import run_folder
     from exfit.util.typed import plain
 
-    read_text(case)  # a file that is missing is no case without a fit
     source = parameters or run_folder.last_fit(case)
-    loaded = load(case, fitted_model_hash(source))
+    loaded = load(case, "" if source is None else fitted_model_hash(source))
+    if source is None:
+        raise CaseError(
+            [f"{case}: no earlier fit of this case; run exfit fit, or give --parameters FILE"]
+        )
     folder = output.folder_of(loaded, "validate")
     comparisons = workflows.validate(loaded, read_parameters(loaded, source), record)
     warn(run_folder.write_validation(comparisons, folder, output.figures))

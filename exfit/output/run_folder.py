@@ -15,7 +15,7 @@ from exfit.analysis.comparison import Agreement
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
-from exfit.errors import CaseError, ExfitError
+from exfit.errors import ExfitError
 from exfit.output import run_figures
 from exfit.records.inspection import Inspection
 from exfit.results.comparisons import Comparison
@@ -272,14 +272,10 @@ def agreement_table(agreement: Agreement) -> str:
     return table(header, columns)
 
 
-def last_fit(case: Path) -> Path:
-    """Return the parameters of the last fit of a case; raises CaseError where there is none."""
+def last_fit(case: Path) -> Path | None:
+    """Return the parameters of the last fit of a case; None where there was no fit."""
     kept = _kept(case)
-    if not kept.is_file():
-        raise CaseError(
-            [f"{case}: no earlier fit of this case; run exfit fit, or give --parameters FILE"]
-        )
-    return kept
+    return kept if kept.is_file() else None
 
 
 def _kept(case: Path) -> Path:
