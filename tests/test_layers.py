@@ -37,6 +37,7 @@ MAY_IMPORT["exchange"] = {"results", "case", "models"}
 MAY_IMPORT["workflows"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
 MAY_IMPORT["output"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT} - {"errors", "util"}
+MAY_IMPORT["__main__"] = {"cli"}
 # a result draws itself: inside the call, so that nothing is imported before
 EXCEPTIONS = {("exfit.results.model", "exfit.output.notebook")}
 

@@ -73,7 +73,7 @@ def near(word: str, known: Iterable[str]) -> str:
 
 
 def show(value: float) -> str:
-    """Return a number in as few digits as tell it."""
+    """Return a number in as few digits as identify it."""
     return f"{value:.12g}"
 
 

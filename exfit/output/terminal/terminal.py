@@ -1,5 +1,7 @@
 """The terminal, and what all that is shown on it shares."""
 
+import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -11,6 +13,8 @@ from rich.text import Text
 from exfit.inference import Uncertainty
 
 NARROW = 80  # columns where the width is unknown
+UNBROKEN = re.compile(r"`[^`]*`|\d (?:%|pu|s|Hz)(?!\w)")  # commands, and figures with their units
+NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def console() -> Console:
@@ -76,11 +80,17 @@ def percent(share: float) -> str:
 
 
 def _remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
-    """Show sentences one below the other, each behind its kind."""
-    table = Table.grid(padding=(0, 1))
-    table.add_column(style="yellow", no_wrap=True)
-    table.add_column()
+    """Show sentences one below the other, each behind its kind; no figure leaves its unit."""
+    indent = " " * (len(kind) + 1)
     for text in texts:
-        table.add_row(kind, Text(text))
-    if table.row_count:
-        console.print(table)
+        whole = UNBROKEN.sub(lambda part: part[0].replace(" ", NO_BREAK), text)
+        lines = textwrap.fill(
+            whole,
+            max(console.width, NARROW // 2),
+            initial_indent=indent,
+            subsequent_indent=indent,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        sentence = lines.replace(NO_BREAK, " ").removeprefix(indent)
+        console.print(Text.assemble((kind, "yellow"), " ", sentence), soft_wrap=True)

@@ -1,0 +1,20 @@
+"""The program ``exfit``, also ``python -m exfit``: Ctrl-C ends it without a traceback."""
+
+import sys
+
+INTERRUPTED = 130  # the exit code of exfit.cli.options.Interruption, not imported yet
+
+
+def main() -> None:
+    """Run the command that the arguments of the program name, and raise SystemExit."""
+    try:
+        from exfit.cli import main as commands
+
+        commands()
+    except KeyboardInterrupt:
+        print("Interrupted", file=sys.stderr)
+        raise SystemExit(INTERRUPTED) from None
+
+
+if __name__ == "__main__":
+    main()
