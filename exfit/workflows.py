@@ -66,7 +66,7 @@ LIBRARIES = ("numpy", "llvmlite", "pydantic")
 
 
 def _ignore(_: object) -> None:
-    """Take a message that nobody asked for."""
+    """Ignore a progress message."""
 
 
 def fit(

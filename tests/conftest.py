@@ -48,7 +48,7 @@ def pytest_collection_modifyitems(config, items):
 
 
 def _is_left_out(item):
-    """Tell whether a test takes long, or is given a model that is not one of the few."""
+    """Return whether a test takes long, or is given a model that is not one of the few."""
     if item.get_closest_marker("long"):
         return True
     given = item.callspec.params.values() if hasattr(item, "callspec") else ()

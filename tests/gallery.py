@@ -229,13 +229,13 @@ def smaller(png: bytes) -> bytes:
 
 
 def same(one: bytes, other: bytes) -> bool:
-    """Tell whether two pictures differ by no more than another machine or version makes of one."""
+    """Return whether two pictures differ by no more than another machine or version does."""
     figures = [content.startswith(b"\x89PNG") for content in (one, other)]
     return same_figure(one, other) if all(figures) else same_words(one, other)
 
 
 def same_figure(one: bytes, other: bytes) -> bool:
-    """Tell whether two figures are alike, compared block by block."""
+    """Return whether two figures are alike, compared block by block."""
     first, second = (Image.open(io.BytesIO(png)) for png in (one, other))
     if first.size != second.size:
         return False
@@ -253,7 +253,7 @@ def means(image: np.ndarray, points: int) -> np.ndarray:
 
 
 def same_words(one: bytes, other: bytes) -> bool:
-    """Tell whether two terminals say the same, numbers up to one of their last digit."""
+    """Return whether two terminals say the same, numbers up to one of their last digit."""
     first, second = words_of(one), words_of(other)
     return len(first) == len(second) and all(map(same_word, first, second))
 

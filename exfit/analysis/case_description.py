@@ -131,7 +131,7 @@ def _channel(signal: str, entry: ChannelSection | PhasesSection) -> str:
 
 
 def _given(value: float | Unknown, form: str, unit: str) -> str:
-    """Return a value of a test; one that the fit identified stands among the parameters."""
+    """Return a value of a test; one that the fit identified is among the parameters."""
     if not isinstance(value, Unknown):
         return f"{value:{form}} {unit}"
     start = start_value(value)

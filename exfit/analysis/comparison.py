@@ -169,7 +169,7 @@ def compare(
 
     Each is the folder or the result.json of a run, or a file of any kind that records have. All
     signals that A and B share are compared over the time that they share, on the finer of their
-    clocks; between the samples of the coarser one stands a cubic (Akima 1970). A record is never
+    clocks; between the samples of the coarser one lies a cubic (Akima 1970). A record is never
     interpolated: what is simulated is read at its instants.
 
     Args:

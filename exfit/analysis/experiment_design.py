@@ -34,7 +34,6 @@ from exfit.util.typed import plain
 Array = NDArray[np.float64]
 
 STEPS = (0.02, 0.05, 0.10)  # pu, of the reference
-LONGER = 2.0  # times as long
 
 
 @dataclass(frozen=True, eq=False)

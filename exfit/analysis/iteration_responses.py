@@ -15,7 +15,7 @@ from exfit.util.threads import in_threads
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-MOST_RESPONSES = 40  # colours that an eye still tells apart, and columns of a table
+MOST_RESPONSES = 40  # colours that an eye still distinguishes, and columns of a table
 MOST_SAMPLES = 20_000  # of a record, 20 s at 1 kHz: a table of 9 MB, written within a second
 
 

@@ -123,7 +123,7 @@ def profile(
 
 
 def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str, int]:
-    """Return where the named parameters stand among the free ones, all if none is named.
+    """Return the indices of the named parameters among the free ones, all if none is named.
 
     Raises CaseError for a name that is not free.
     """

@@ -48,7 +48,7 @@ INTERRUPTED_AFTERWARDS = (
 class Analysis(NamedTuple):
     """What follows from a solution; ``interrupted`` where it, or the search before, is not whole.
 
-    ``unfinished`` where the interruption came after the search: what was done by then stands.
+    ``unfinished`` where the interruption came after the search: what was done by then is valid.
     """
 
     uncertainty: UncertaintyAnalysis | None

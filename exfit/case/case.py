@@ -1,4 +1,4 @@
-"""Case: one study, checked, with the models it names. It is data: nothing of it ever changes."""
+"""Case: a checked case file, with the models it names. It is data: nothing of it ever changes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -35,7 +35,7 @@ from exfit.util.text import near
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A study of exfit: a model, its plant, a test, its record, and what is to be found.
+    """A case of exfit: a model, its plant, a test, its record, and what is to be found.
 
     The sections are those of the case file. ``path`` is that file; of a case made in Python
     (``from_file`` is false) it is what messages call the case, in the folder of its files.
@@ -63,7 +63,7 @@ class Case:
 
     @classmethod
     def of(cls, checked: CheckedContent, path: Path, from_file: bool = True) -> "Case":
-        """Return the case of checked content that stands, or would stand, in the file ``path``."""
+        """Return the case of checked content that is, or would be, in the file ``path``."""
         sections: dict[str, Any] = dict(checked.document)
         return cls(
             path=path, from_file=from_file, parts=checked.parts, ties=checked.ties, **sections
@@ -133,7 +133,7 @@ class Case:
 
     @property
     def subject(self) -> str:
-        """The name of what is studied: the exciter, or the machine where it stands alone."""
+        """The name of what is simulated: the exciter, or the machine where it is alone."""
         return self.parts.all[0].name
 
     @property
@@ -180,7 +180,7 @@ class Case:
     def values(self) -> dict[str, float]:
         """Return every parameter of the parts, as the system names them: typical, fixed, start.
 
-        What follows others comes out of them; helpers that only such arithmetic uses stand last.
+        What follows others comes out of them; helpers that only such arithmetic uses come last.
         """
         values: dict[str, float] = {}
         for part in self.parts.all:
@@ -222,7 +222,7 @@ class Case:
         return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
 
     def _helpers(self, given: Mapping[str, Value]) -> dict[str, Value]:
-        """Return what stands among the exciter's parameters and is none of them."""
+        """Return the names among the exciter's parameters that are none of them."""
         own = next((part.symbols for part in self.parts.all if part.kind == "exciter"), ())
         return {name: value for name, value in given.items() if name not in own}
 
@@ -233,7 +233,7 @@ def numbers_of(given: Mapping[str, float | str]) -> dict[str, float]:
 
 
 def _at(section: Any, place: Place) -> Any:
-    """Return what stands at a place of the case."""
+    """Return the value at a place of the case."""
     for key in place:
         section = getattr(section, str(key))
     return section

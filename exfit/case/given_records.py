@@ -37,7 +37,7 @@ def with_record_sections(
 
 
 def _places(content: Content) -> Iterator[tuple[str, tuple[str, int | None]]]:
-    """Yield the name of each record of a content, and where it stands."""
+    """Yield the name of each record of a content, and its place."""
     if "records" not in content:
         yield SINGLE, ("record", None)
     for key in ("records", "validate"):

@@ -8,7 +8,7 @@ from exfit.util.text import near, show_value
 
 Data = Mapping[str, Any]
 
-FILL_IN = "'?'"  # what a new case has in place of a value that nobody gave, as it is shown
+FILL_IN = "'?'"  # what a new case has in place of a missing value, as it is shown
 FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
@@ -58,7 +58,7 @@ def form_faults(details: Iterable[Data], schema: Data) -> list[Fault]:
 
 
 def _only_counts_good_ones(detail: Data) -> bool:
-    """Tell whether a list is too short only for its faulty entries, which are reported anyway."""
+    """Return whether a list is too short only for its faulty entries, which are reported anyway."""
     return detail["type"] == "too_short" and bool(
         len(detail["input"]) >= detail["ctx"]["min_length"]
     )
@@ -83,7 +83,7 @@ def _fault(detail: Data, schema: Data) -> Fault:
 
 
 def _offered(schema: Data, place: Place) -> str:
-    """Return the words that may stand at a place, as the end of a sentence."""
+    """Return the words that are allowed at a place, as the end of a sentence."""
     words = [word for part in _at(schema, schema, place) for word in part.get("enum", ())]
     return f": {' or '.join(words)}?" if words else ""
 

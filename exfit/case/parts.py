@@ -148,7 +148,7 @@ def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
 
 
 def used_by_ties(data: Data, parts: Parts) -> set[str]:
-    """Return the names that stand in the arithmetic of a case file's data."""
+    """Return the names used in the arithmetic of a case file's data."""
     used: set[str] = set()
     for _, _, text in _tied(data, parts):
         with suppress(TieError):
@@ -157,7 +157,7 @@ def used_by_ties(data: Data, parts: Parts) -> set[str]:
 
 
 def places_of_ties(data: Data, parts: Parts) -> dict[str, Place]:
-    """Return where the arithmetic stands that gives each tied parameter."""
+    """Return the place of the arithmetic that gives each tied parameter."""
     return {name: place for name, place, _ in _tied(data, parts)}
 
 

@@ -9,7 +9,7 @@ from exfit.errors import CaseError
 from exfit.util.files import siblings
 
 RECORDS = ("record", "records", "validate")
-# where parameters stand, and how their names begin
+# the places of parameters, and how their names begin
 SECTIONS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "": (("parameters", "free"), ("parameters", "fixed")),
     "machine.": (("plant", "free"), ("plant", "parameters")),
@@ -50,7 +50,7 @@ def _content(case: Path) -> Mapping[str, Any]:
 
 
 def _files(content: Any) -> Iterator[str]:
-    """Yield what stands under a key ``file``, however deep."""
+    """Yield the values of the keys ``file``, however deep."""
     if isinstance(content, Mapping):
         file = content.get("file")
         if isinstance(file, str) and "\0" not in file:

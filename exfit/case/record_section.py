@@ -14,7 +14,7 @@ from exfit.case.schema import RecordFile
 from exfit.case.yaml import Fault, dotted
 from exfit.errors import CaseError
 
-HERE = "record"  # where the section stands in a case, for the keys that are known there
+HERE = "record"  # the place of the section in a case, for the keys allowed there
 
 
 def record_section(content: Mapping[str, Any]) -> RecordFile:

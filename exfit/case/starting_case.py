@@ -83,7 +83,7 @@ def _plant(model: Model, machine: Machine, inspection: Inspection) -> Iterator[s
 
 
 def _on_load(power: InspectedChannel) -> bool:
-    """Tell whether a channel shows active power at rest."""
+    """Return whether a channel shows active power at rest."""
     return not _per_unit(power) or abs(power.level) > ON_LOAD
 
 

@@ -83,7 +83,7 @@ def bump_section(inspection: Inspection, vt0: bool = False) -> list[str]:
 
 
 def in_per_unit(channel: InspectedChannel) -> bool:
-    """Tell whether a channel seems to be in per unit: it says so, or nothing, and looks so."""
+    """Return whether a channel seems to be in per unit: it says so, or nothing, and looks so."""
     if channel.unit is not None:
         return channel.unit == "pu"
     if channel.signal in ("vt", "vref"):

@@ -1,4 +1,4 @@
-"""Parameters that follow from others: the arithmetic that stands in place of a number.
+"""Parameters that follow from others: the arithmetic in place of a number.
 
 A text such as ``=0.9*machine.Tpd0/(1+KE)`` is read by Python's own grammar, and every node that is
 not plain arithmetic is refused; nothing of it is ever run.
@@ -69,7 +69,7 @@ class Tie:
 
 
 def is_tie(value: object) -> bool:
-    """Tell whether a value stands for the arithmetic of others."""
+    """Return whether a value stands for the arithmetic of others."""
     return isinstance(value, str) and value.startswith("=")
 
 

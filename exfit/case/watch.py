@@ -18,7 +18,7 @@ def stamps_of(case: Path) -> Stamps:
 
 
 def changed(before: Stamps) -> tuple[Path, ...]:
-    """Return which files are others than they were, once there are some and they stand still."""
+    """Return which files have changed, once there are some and they change no more."""
     from watchfiles import watch
 
     others = _others(before)

@@ -1,6 +1,6 @@
 """What a shell completes: names of models and of parameters.
 
-A shell asks at every press of a key: nothing heavy is imported, and nothing can fail.
+A shell calls it at every press of a key: nothing heavy is imported, and nothing can fail.
 """
 
 from collections.abc import Iterable

@@ -62,7 +62,7 @@ def unfailing_output() -> Iterator[Callable[[Any], Any]]:
 
 
 def output_is_lost() -> bool:
-    """Tell whether nobody sees any more what is written to standard output."""
+    """Return whether nobody sees any more what is written to standard output."""
     return _fault_of(sys.stdout) is not None
 
 

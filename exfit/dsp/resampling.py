@@ -108,7 +108,7 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
 
 
 def _is_even(time: Array, rate: float) -> bool:
-    """Tell whether instants lie on an even clock, up to the rounding of their stamps."""
+    """Return whether instants lie on an even clock, up to the rounding of their stamps."""
     away = time - np.linspace(time[0], time[-1], len(time))
     return float(np.max(np.abs(away))) * rate <= OFF_CLOCK
 

@@ -49,7 +49,7 @@ class Sampling:
 
     @property
     def even(self) -> bool:
-        """Tell whether the steps are alike, gaps aside."""
+        """Return whether the steps are alike, gaps aside."""
         return max(self.largest - self.step, self.step - self.smallest) <= MOST_UNEVEN * self.step
 
 

@@ -43,7 +43,7 @@ class Start(NamedTuple):
 
 
 class Span(NamedTuple):
-    """A stretch of a run: inputs u (n + 1, nu) at its grid points, linear between, and the step.
+    """A segment of a run: inputs u (n + 1, nu) at its grid points, linear between, and the step.
 
     ``step`` is in seconds; each of the n steps is taken in ``parts`` equal sub-steps. ``du``
     (n + 1, moving, N) are the tangents of the inputs that move, linear between as well.

@@ -28,7 +28,7 @@ class Motion(NamedTuple):
 class System:
     """Equations with the names of all that enters and leaves them.
 
-    ``rest(p)`` starts a run; ``motion(p, r, x, u)`` gives it its course, from parameters,
+    ``rest(p)`` starts a run; ``motion(p, r, x, u)`` gives its slopes, from parameters,
     setpoints, states and inputs by name.
     """
 

@@ -129,7 +129,7 @@ class Graph:
         return self._node("constant", (float(value),), False, False)
 
     def apply(self, op: str, *operands: Signal) -> Node:
-        """Return the node of an operation, as it stands."""
+        """Return the node of an operation, not simplified."""
         args = tuple(self.lift(operand) for operand in operands)
         varies, wide = any(a.varies for a in args), any(a.wide for a in args)
         return self._node(op, args, varies, wide)
@@ -214,7 +214,7 @@ def graph_of(*values: Signal) -> Graph | None:
 
 
 def is_zero(value: Signal) -> bool:
-    """Tell whether a value is the number zero as it stands, whatever the run brings."""
+    """Return whether a value is the number zero as it stands, whatever the run brings."""
     if isinstance(value, Node):
         return value.constant == 0.0
     return isinstance(value, float) and value == 0.0

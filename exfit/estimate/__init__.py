@@ -9,7 +9,7 @@ time: a variable rests on a bound exactly as long as the model wants it there. D
 does not see at all are left alone; those it sees weakly are taken in full, but no variable moves
 farther than recent steps have proved good.
 
-Upon it stand the search from many starts (`multistart`) and the profiles of single parameters
+Based on it are the search from many starts (`multistart`) and the profiles of single parameters
 (`profile`), both in threads.
 
 Sources: Levenberg 1944; Marquardt 1963; Armijo 1966; Moré 1978 (the Levenberg-Marquardt

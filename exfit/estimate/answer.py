@@ -1,4 +1,4 @@
-"""What the estimator tells: why it stopped, each iteration, the result."""
+"""What the estimator returns: why it stopped, each iteration, the result."""
 
 from dataclasses import dataclass
 from enum import Enum

@@ -261,14 +261,14 @@ def walk_all(
         if side.end is ProfileEnd.RISE and not fallen.is_set():
             side.crossing = crossing(valley, side)
 
-    def tell(_: None) -> None:
+    def report(_: None) -> None:
         done[0] += 1
         watch(Progress("profiling", done[0], len(sides), lowest().cost))
 
     def lowest() -> Spot:
         return min((spot for side in sides for spot in tuple(side.spots)), key=lambda s: s.cost)
 
-    side_by_side(walk, sides, workers, tell, stop)
+    side_by_side(walk, sides, workers, report, stop)
     return lowest()
 
 

@@ -82,7 +82,7 @@ class SearchRun:
         move: Move | None = None,
         before: LinearModel | None = None,
     ) -> None:
-        """Write a line of the log and tell the callback."""
+        """Write a line of the log and call the callback."""
         x = linear.point.x
         move = move or Move(None, nan, 0)
         line = SolverIteration(

@@ -18,7 +18,7 @@ from exfit.util.strategies import DEFAULT_STRATEGY
 
 SEED = 1  # any: what matters is that a run can be repeated
 CHUNK = 256  # points screened between two reports
-UNTOLD = 0.5  # standard errors: a difference that no record shows
+INDISTINGUISHABLE = 0.5  # standard errors: a difference that no record shows
 
 
 @dataclass(frozen=True)
@@ -127,11 +127,11 @@ def multistart(
             raise KeyboardInterrupt
         ends[k] = end_of(result, nothing)
 
-    def tell(_: None) -> None:
+    def report(_: None) -> None:
         lowest = min(end.result.cost for end in tuple(ends.values()))
         watch(Progress("refining", len(ends), len(chosen), lowest))
 
-    side_by_side(descend, chosen, workers, tell, stop)
+    side_by_side(descend, chosen, workers, report, stop)
     end_costs = np.full(count, nan)
     end_costs[list(ends)] = [end.result.cost for end in ends.values()]
     failed = int(np.count_nonzero(np.isinf(costs)))
@@ -186,12 +186,12 @@ def screened(
         costs[part] = np.where(np.isfinite(some), some, inf)
         return len(points[part])
 
-    def tell(_: int) -> None:
+    def report(_: int) -> None:
         done = int(np.count_nonzero(~np.isnan(costs)))
         watch(Progress("screening", done, len(points), float(np.nanmin(costs))))
 
     parts = [slice(first, first + CHUNK) for first in range(0, len(points), CHUNK)]
-    side_by_side(look, parts, workers if screen is None else 1, tell, stop)
+    side_by_side(look, parts, workers if screen is None else 1, report, stop)
     return costs
 
 
@@ -230,7 +230,7 @@ class StartOutcome:
 def end_of(result: Result, nothing: float) -> StartOutcome:
     """Return the end that a refinement came to; ``nothing`` is what a perfect match may cost."""
     freedom = max(1, len(result.fun) - len(result.x))
-    step = UNTOLD**2 * result.cost / freedom + nothing
+    step = INDISTINGUISHABLE**2 * result.cost / freedom + nothing
     triangle = np.asarray(np.linalg.qr(result.jac, mode="r"), dtype=np.float64)
     return StartOutcome(
         replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x)))), triangle, step
@@ -251,7 +251,7 @@ def distinct(ends: Iterable[StartOutcome]) -> list[list[StartOutcome]]:
 
 
 def same(best: StartOutcome, other: StartOutcome) -> bool:
-    """Tell whether two ends are one minimum, by the rule that `multistart` states."""
+    """Return whether two ends are one minimum, by the rule that `multistart` states."""
     way = best.triangle @ (other.result.x - best.result.x)
     rise = other.result.cost - best.result.cost
     return max(rise, 0.5 * float(way @ way)) <= best.step

@@ -70,7 +70,7 @@ class Rules:
         return Stop.CREEPING if linear.full.promise <= KINK * cost else Stop.STALLED
 
     def tiny(self, there: Array, here: Array, box: Box) -> bool:
-        """Tell whether a step is below the tolerance in every variable."""
+        """Return whether a step is below the tolerance in every variable."""
         size = np.maximum(abs(here), box.unit)
         return bool(np.all(abs(there - here) <= self.xtol * size))
 

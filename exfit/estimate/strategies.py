@@ -49,7 +49,7 @@ def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Outco
 
 
 def matches(outcome: Outcome, good_enough: float | None) -> bool:
-    """Tell whether the residuals are small enough; without a limit, whether it converged."""
+    """Return whether the residuals are small enough; without a limit, whether it converged."""
     if good_enough is None:
         return outcome.converged
     point = outcome.linear.point

@@ -34,7 +34,7 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
 class Nuisance:
     """What a fit finds about a record, under ``name``: it is no parameter of the unit.
 
-    ``step`` is the place in the course of a step whose instant or size it is, ``signal`` the
+    ``step`` is the index in the inputs of a step whose instant or size it is, ``signal`` the
     channel whose scale or offset it is. The instant of an only step is a ``shift`` of the whole
     response: the simulation stays as it is.
     """
@@ -112,7 +112,7 @@ class Channel:
 
     @property
     def plain(self) -> bool:
-        """Whether samples are compared as they stand."""
+        """Whether samples are compared as they are."""
         if self.filtering is None:
             return True
         return self.filtering.filter is None and self.filtering.averaged is None

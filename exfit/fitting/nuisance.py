@@ -11,7 +11,7 @@ from exfit.simulation.inputs import InputStep
 
 
 def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> bool:
-    """Tell whether the instant of a step can be found by shifting the whole response.
+    """Return whether the instant of a step can be found by shifting the whole response.
 
     That leaves the simulation as it is, and with it the steps at which limits are met; a smooth
     step that moves over the grid meets them now a step earlier, now later, and so gives the cost a

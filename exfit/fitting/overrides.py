@@ -18,7 +18,7 @@ from exfit.util.text import near
 def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[str, float]:
     """Return changes of values by name: KA, machine.Tpd0, or what is found about a record.
 
-    Raises CaseError, naming ``place``, for a name that the case does not know, a value that its
+    Raises CaseError, naming ``place``, for a name that the case does not have, a value that its
     data sheet excludes, or values that contradict each other.
     """
     rows = {part.prefix + row.symbol: row for part in case.parts.all for row in part.sheet}
@@ -66,7 +66,7 @@ def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
 def fitted_model_hash(path: Path) -> str:
     """Return the SHA-256 of the user's own model that a file of parameters is of, or nothing.
 
-    It is asked for before a case is loaded, which runs the model.
+    It is called before a case is loaded, which runs the model.
     """
     top, _ = read_yaml(read_text(path), path)
     content = top.value if isinstance(top.value, dict) else {}

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 class Column(NamedTuple):
-    """Where a signal stands in a file and how it becomes per unit."""
+    """The place of a signal in a file and how it becomes per unit."""
 
     column: str
     scale: float
@@ -77,7 +77,7 @@ def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
 def read_section(file: RecordFile, folder: Path, per_unit: bool) -> Record:
     """Return the record that a section describes, its file relative to a folder.
 
-    ``per_unit``: numbers that the section takes as they stand must not be in another unit by the
+    ``per_unit``: numbers that the section takes as they are must not be in another unit by the
     file. Raises RecordError where it cannot be read.
     """
     return read_record(
@@ -127,7 +127,7 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
 
 
 def clock_of(record: RecordFile) -> Clock:
-    """Return where the time of a record stands."""
+    """Return the place of the time of a record."""
     if isinstance(record.time, str):
         return Clock((record.time,))
     if isinstance(record.time, TimeColumn):
@@ -144,14 +144,14 @@ def column_of(channel: ChannelSection) -> Column:
 
 
 def _as_it_stands(channel: ChannelSection | PhasesSection) -> bool:
-    """Tell whether a case takes the numbers of a column for per unit."""
+    """Return whether a case takes the numbers of a column for per unit."""
     if not isinstance(channel, ChannelSection):
         return False
     return channel.unit is None and channel.base is None and channel.scale == 1.0
 
 
 def source_of(channel: ChannelSection | PhasesSection) -> Column | ThreePhases:
-    """Return where a signal stands: in a column, or in three."""
+    """Return the place of a signal: a column, or three."""
     if isinstance(channel, ChannelSection):
         return column_of(channel)
     return ThreePhases(

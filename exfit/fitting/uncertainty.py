@@ -169,7 +169,7 @@ def _prior_rows(residuals: Residuals) -> Iterator[PriorRow]:
 
 
 def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[ResidualBlock]:
-    """Yield where the errors of each channel stand among those of all, and its rows."""
+    """Yield where the errors of each channel are among those of all, and its rows."""
     several = len(residuals.experiments) > 1
     each = [
         (experiment, channel)
@@ -184,6 +184,6 @@ def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[ResidualBlo
 
 
 def slices(sizes: Sequence[int]) -> list[slice]:
-    """Return where blocks of these sizes stand, one behind the other."""
+    """Return where blocks of these sizes lie, one behind the other."""
     ends = list(accumulate(sizes))
     return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]

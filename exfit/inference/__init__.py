@@ -1,4 +1,4 @@
-"""What a least-squares fit knows about its parameters, and what it does not.
+"""What a least-squares fit determines of its parameters, and what it does not.
 
 Arrays in, results out: a `Linearisation` of the fit at its minimum gives `confidence` (standard
 errors, intervals) and `identifiability` (what can move together unseen, and what to fix).

@@ -1,4 +1,4 @@
-"""How well a fit knows each of its parameters."""
+"""How well a fit determines each of its parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -70,7 +70,7 @@ def confidence(lin: Linearisation) -> Confidence:
     The covariance is that of `Factors.covariance`, the noise that of `noise_of`. Parameters on a
     bound are held there: what is said of the others holds for that value. Intervals are those of
     Student's t, for the logarithm where the fit moved it: value * exp(-+ t s); else value -+ t s,
-    which may pass a bound: it tells of the record alone.
+    which may pass a bound: it describes the record alone.
 
     There is none where the standard error exceeds UNDETERMINED of what counts as 100 %
     (`Linearisation.size`): of the value on the logarithmic scale. On the linear one it is the

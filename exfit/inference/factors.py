@@ -1,4 +1,4 @@
-"""The normal equations of a fit, factored: what it knows, and what nothing in it tells apart."""
+"""The normal equations of a fit, factored: what it determines, and what it cannot distinguish."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +16,7 @@ TAKES_PART = 0.01  # of the largest component of a direction
 class Factors:
     """The rows of a fit, errors and priors, over relative changes of k parameters: rank r.
 
-    has_effect (N,) which parameters these are: those asked for that have an effect
+    has_effect (N,) which parameters these are: those requested that have an effect
     left    (R, r) and spread (k, r): the pseudo-inverse of the rows is spread left'
     null    (d, k) relative changes without any effect, largest component 1, sparse
     joined  (d, k) which parameters take part in them

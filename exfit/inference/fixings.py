@@ -1,4 +1,4 @@
-"""Which parameters to fix, so that a record tells of the others."""
+"""Which parameters to fix, so that a record determines the others."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -75,7 +75,7 @@ def next_to_fix(factors: Factors, noise: Sequence[Noise], model: Mask) -> int:
     singular, directions = seen_directions(factors, noise)
     own = np.flatnonzero(model[factors.has_effect])
     parts = np.round(directions[:, own], TIED)
-    # the last one at least: a fit may know less than its record, if it weights signals badly
+    # the last one at least: a fit may determine less than its record, if it weights signals badly
     limit = 0.0 if singular[-1] == 0.0 else max(1.0 / WEAK, singular[-1])
     pick = qr(parts[singular <= limit], mode="r", pivoting=True)[1][0]
     return int(np.flatnonzero(factors.has_effect)[own[pick]])

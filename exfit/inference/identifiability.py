@@ -1,4 +1,4 @@
-"""What a record cannot tell of the parameters, and which to fix so that it can."""
+"""What a record does not determine of the parameters, and which to fix so that it does."""
 
 from dataclasses import dataclass
 from math import inf
@@ -20,7 +20,7 @@ from exfit.inference.linear import Array, Linearisation
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """What the record tells of relative changes of the parameters ``names`` (K,).
+    """What the record determines of relative changes of the parameters ``names`` (K,).
 
     Those on a bound and those without effect are not among them. singular_values (K,) descend,
     0 where exactly redundant; directions (K, K) has a row for each; condition is the ratio of the
@@ -38,7 +38,7 @@ class Identifiability:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What to tell: the combinations, and what fixing parameters would bring."""
+        """What to report: the combinations, and what fixing parameters would bring."""
         return (
             *(combination.sentence for combination in self.unseen),
             *(fixing.sentence for fixing in self.suggestion),

@@ -55,14 +55,14 @@ class Noise:
             )
         if self.p_value is not None and self.p_value < SURPRISING:
             p = f"p {digits(self.p_value)}" if self.p_value > SURE else f"p below {SURE:.0e}"
-            told = f"the residuals of {self.label} are not white (Ljung-Box {p})"
+            finding = f"the residuals of {self.label} are not white (Ljung-Box {p})"
             if self.inflation == 1.0:
-                yield f"{told}, but alternate: the intervals are no wider for it"
+                yield f"{finding}, but alternate: the intervals are no wider for it"
                 return
             wider = "the intervals are" if alone else "its noise counts"
             more = " wider" if alone else ""
             yield (
-                f"{told}: {self.samples} samples count as {self.effective:.0f}, "
+                f"{finding}: {self.samples} samples count as {self.effective:.0f}, "
                 f"{wider} {digits(sqrt(self.inflation))} times{more}"
             )
 

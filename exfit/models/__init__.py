@@ -14,7 +14,7 @@ from exfit.models.user_code import run_user_code
 
 
 class Catalogue(Mapping[str, Model]):
-    """Models by name: a file each in a package, named after the model, loaded when first asked for.
+    """Models by name: a file each in a package, named after the model, loaded on first use.
 
     Their order is that of the alphabet.
     """

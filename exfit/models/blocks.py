@@ -286,7 +286,7 @@ def field_demand(ve: Signal, ifd: Signal, p: Signal) -> Signal:
 
 
 def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
-    """Return the VE at which VFE reaches VFEMAX, seen from a VE that stands near it.
+    """Return the VE at which VFE reaches VFEMAX, seen from a VE near it.
 
     The standard writes (VFEMAX - KD IFD) / (KE + SE(VE)); both are VE exactly where VFE = VFEMAX.
     This one is a Newton step, so that a state put back on it does not hunt around the limit.
@@ -297,7 +297,7 @@ def field_ceiling(ve: Signal, vfe: Signal, p: Signal) -> Signal:
 
 
 def zero(x: Signal) -> Signal:
-    """Say whether a value is 0, which in some data means: to be computed."""
+    """Return whether a value is 0, which in some data means: to be computed."""
     return (x <= 0.0) & (x >= 0.0)
 
 
@@ -333,7 +333,7 @@ def compound_source(
     XL: Signal = 0.0,
     THETAP: Signal = 0.0,
 ) -> Signal:
-    """Return VE = |KP VT + j (KI + KP XL) IT|, where KP stands at THETAP degrees.
+    """Return VE = |KP VT + j (KI + KP XL) IT|, where KP is at THETAP degrees.
 
     IT = (p - j q) / VT, with VT on the real axis. Everything is turned back by THETAP, so that on
     open circuit no angle is left and VE = KP VT.

@@ -85,7 +85,7 @@ def record(
 
 @dataclass(frozen=True)
 class Model:
-    """An exciter or a stabiliser: what stands in its file, under one name.
+    """An exciter or a stabiliser: the content of its file, under one name.
 
     ``equations(s, u, p, d)`` takes states, inputs and parameters, writes the slopes into ``d`` and
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into

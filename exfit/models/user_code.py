@@ -7,7 +7,7 @@ from typing import Any
 
 from exfit.errors import ModelError
 
-SHOWN = 12  # digits of a hash that tell files apart
+SHOWN = 12  # digits of a hash that distinguish files
 
 
 def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:

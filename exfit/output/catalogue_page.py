@@ -49,16 +49,16 @@ ABOUT = (
 
 def sample_response(model: Model) -> Response:
     """Return the response of a model with its typical data to a step of 5 %."""
-    course, times = Inputs(0.0, SECONDS, (STEP,)), np.linspace(0.0, SECONDS, SAMPLES)
+    inputs, times = Inputs(0.0, SECONDS, (STEP,)), np.linspace(0.0, SECONDS, SAMPLES)
     if model.name in WITHOUT_PLANT:
         values = {**typical(model.sheet), VT0: 1.0}
-        return Simulator(alone(model), course, times, GRID).response(values)
+        return Simulator(alone(model), inputs, times, GRID).response(values)
     machine = MACHINES["GENROU"]
     of_machine = {**typical(machine.sheet), **MACHINE_DATA}
     values = {**typical(model.sheet), VT0: 1.0}
     values |= {MACHINE + symbol: value for symbol, value in of_machine.items()}
     system = open_circuit(model, machine, SATURATION["quadratic"])
-    return Simulator(system, course, times, GRID).with_enough_substeps(values).response(values)
+    return Simulator(system, inputs, times, GRID).with_enough_substeps(values).response(values)
 
 
 def write_overview(folder: Path) -> list[Path]:

@@ -1,6 +1,6 @@
 """The figures that each kind of run leaves, by the names of their files.
 
-What draws them is imported only where they are asked for.
+What draws them is imported only where they are drawn.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -177,7 +177,7 @@ def _missing(main: Path, drawings: Callable[[], run_figures.Drawings]) -> Iterat
             write(path, picture)
         except ExfitError as fault:
             yield str(fault)
-        except Exception as fault:  # whatever it is: the numbers stand without the figure
+        except Exception as fault:  # whatever it is: the numbers are valid without the figure
             yield f"{path}: not drawn: {type(fault).__name__}: {fault}"
 
 

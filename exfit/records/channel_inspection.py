@@ -51,7 +51,7 @@ class InspectedChannel:
 
     @property
     def constant(self) -> bool:
-        """Tell whether it never changes."""
+        """Return whether it never changes."""
         return self.low == self.high
 
     @property

@@ -120,7 +120,7 @@ def _error(step: DetectedStep) -> float:
 
 
 def switches(samples: Array) -> bool:
-    """Tell whether a channel jumps between a few levels, as a recorded reference does."""
+    """Return whether a channel jumps between a few levels, as a recorded reference does."""
     jumps = np.flatnonzero(np.diff(samples)) + 1
     ends = np.concatenate([[0], jumps, [len(samples)]])
     return 0 < len(jumps) < MOST_LEVELS and bool(np.min(np.diff(ends)) >= SAMPLES_AT_REST)
@@ -173,7 +173,7 @@ def combined_steps(changes: Mapping[str, Sequence[LevelChange]]) -> tuple[Record
 
 
 def _close(change: LevelChange, others: Iterable[LevelChange]) -> bool:
-    """Tell whether a channel may show the step that one of the others shows."""
+    """Return whether a channel may show the step that one of the others shows."""
     return any(
         change.at - other.at <= SAME_STEP + SAME_STEP_ERRORS * (change.error + other.error)
         for other in others

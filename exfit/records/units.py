@@ -54,7 +54,7 @@ def usual(unit: str) -> str:
 
 
 def alike(unit: str, other: str) -> bool:
-    """Tell whether two texts are the same unit: kV and KV, pu and p.u.; but not MW and mW."""
+    """Return whether two texts are the same unit: kV and KV, pu and p.u.; but not MW and mW."""
     return usual(unit) == usual(other) or (
         unit_of(unit) is None and unit.strip().casefold() == other.strip().casefold()
     )
@@ -72,7 +72,7 @@ def quantity_of(unit: str | None) -> str | None:
 
 
 def needs_base(unit: str) -> bool:
-    """Tell whether numbers of a unit are per unit only after a division by their base."""
+    """Return whether numbers of a unit are per unit only after a division by their base."""
     return usual(unit) not in PER_UNIT
 
 
@@ -109,14 +109,14 @@ def _after_in(_: str, unit: str) -> bool:
 
 
 def _after_slash(name: str, unit: str) -> bool:
-    """Tell whether a unit is that of what stands before it, and no part of one, as in V/Hz."""
+    """Return whether a unit is that of what precedes it, and no part of one, as in V/Hz."""
     before = quantity_of(name.split()[-1])
     of_another = unit_of(name.split()[-1]) is not None and before != quantity_of(unit)
     return _in_brackets(name, unit) and not of_another
 
 
 def _apart(name: str, unit: str) -> bool:
-    """Tell whether a unit stands after a mark that may also be a part of the name.
+    """Return whether a unit follows a mark that may also be a part of the name.
 
     There letters alone are phases, and min is a limit, except after a time.
     """

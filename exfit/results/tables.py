@@ -24,7 +24,7 @@ def table(header: Sequence[str], columns: Sequence[Array]) -> str:
     """Return samples as CSV, one column after the other, the time first.
 
     Of more than MOST_ROWS those stay that hold the least and greatest of each column in each of
-    many stretches. The time has as many digits as its instants need to stay apart.
+    many segments. The time has as many digits as its instants need to stay apart.
     """
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerow(header)

@@ -1,4 +1,4 @@
-"""The course of a test on the grid of its simulation: inputs, steps, and how it is read."""
+"""The inputs of a test on the grid of its simulation: steps, recorded signals, segments."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -91,7 +91,7 @@ class Inputs:
 class Direction:
     """What moves together in one derivative, and how fast each.
 
-    System parameters by name; steps of the course by their index, as (d at, d step) in s and pu,
+    System parameters by name; steps of the inputs by their index, as (d at, d step) in s and pu,
     where only a smooth one has an instant that moves; the recorder's delay in s.
     """
 
@@ -105,17 +105,17 @@ def each(names: Iterable[str]) -> tuple[Direction, ...]:
     return tuple(Direction({name: 1.0}) for name in names)
 
 
-def grid_segments(course: Inputs, step: float) -> list[GridSegment]:
-    """Divide a course at its exact changes, which so fall on the grid, into steps of ``step``."""
-    if (course.end - course.start) / step > MOST_STEPS:
+def grid_segments(inputs: Inputs, step: float) -> list[GridSegment]:
+    """Divide inputs at their exact steps, which so fall on the grid, into steps of ``step``."""
+    if (inputs.end - inputs.start) / step > MOST_STEPS:
         raise SimulationError(
-            f"simulation.step: {step:g} s divides {course.end - course.start:g} s into more than "
+            f"simulation.step: {step:g} s divides {inputs.end - inputs.start:g} s into more than "
             f"{MOST_STEPS:.0e} steps"
         )
-    exact = (change.at for change in course.steps if not change.smooth)
-    instants = {at for at in exact if course.start < at < course.end}
+    exact = (change.at for change in inputs.steps if not change.smooth)
+    instants = {at for at in exact if inputs.start < at < inputs.end}
     result = []
-    for start, end in pairwise([course.start, *sorted(instants), course.end]):
+    for start, end in pairwise([inputs.start, *sorted(instants), inputs.end]):
         count = max(1, math.ceil((end - start) / step - ON_GRID))
         result.append(GridSegment(start, (end - start) / count, count))
     return result

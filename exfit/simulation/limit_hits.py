@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 LIMIT_ROUNDING = (
-    1e-9  # of a limit: a state put back on it stands that near, one that passes by does not
+    1e-9  # of a limit: a state put back on it is that near, one that passes by does not
 )
 POINTS_AT_ONCE = 16384  # of a run: the values of a whole graph along them take 50 MB
-FAR = 100.0  # times what a signal moves: a limit beyond that is a number that stands for none
+FAR = 100.0  # times what a signal moves: a limit beyond that stands for no limit
 
 
 class LimitHit(NamedTuple):
@@ -63,8 +63,8 @@ class Followed(NamedTuple):
 def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
     """Return the limits that the response to these values meets, in the order of their instants.
 
-    A state is at its non-windup limit while it stands on it, within rounding; any other value
-    while it wants to be beyond. Found at every point of the simulation's grid, whose step is how
+    A state is at its non-windup limit while it is on it, within rounding; any other value
+    while it would be beyond. Found at every point of the simulation's grid, whose step is how
     exactly the times are known. ``values`` are the parameters of the system; per unit.
 
     Raises SimulationError where the start is no rest.
@@ -140,7 +140,7 @@ def _follow(limiter: EquationLimit, parts: Sequence[tuple[Array, Array]]) -> Fol
     near = LIMIT_ROUNDING * np.maximum(np.abs(bound), np.abs(value))
     # a limit of zero has no size of its own
     near = np.maximum(near, LIMIT_ROUNDING * np.max(np.abs(value), initial=0.0))
-    held = beyond >= -near if limiter.stands else beyond > near
+    held = beyond >= -near if limiter.clamped else beyond > near
     return Followed(limiter, value, bound, held & np.isfinite(bound))
 
 

@@ -14,7 +14,7 @@ class EquationLimit(NamedTuple):
     """A value of the graph that stops at a limit: a ceiling where ``sign`` is 1, a floor at -1.
 
     ``limit`` is the parameter that sets it, "0" for a state that cannot become negative; ``signal``
-    is the state that is held or cut, "" where the value is none. A value that ``stands`` is never
+    is the state that is held or cut, "" where the value is none. A ``clamped`` value is never
     beyond its limit, as a state; any other is what the limited one would be without it.
     """
 
@@ -23,7 +23,7 @@ class EquationLimit(NamedTuple):
     sign: float
     value: Node
     bound: Node
-    stands: bool
+    clamped: bool
 
 
 @cache
@@ -126,7 +126,7 @@ def _limiter(value: Node, bound: Node, sign: float, state: Node | None) -> Equat
 def _given(bound: Node) -> str:
     """Return the parameter that gives a limit, also where it is computed at the start.
 
-    Where a parameter may ask for that by being 0, the setpoint has its name with a 0 behind it.
+    Where a parameter may select that by being 0, the setpoint has its name with a 0 behind it.
     """
     computed = any(n.op == "symbol" and n.args[0].startswith("r.") for n in in_order([bound]))
     return limit_name(bound).removesuffix("0") if computed else limit_name(bound)

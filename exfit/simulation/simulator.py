@@ -27,7 +27,7 @@ MOST_REPEATS = 3  # until the sub-steps are enough for the response that they gi
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
 REST_TOLERANCE = 1e-6  # pu/s: below any real motion
 STATE_ROUNDING = 1e-13  # of a state, relative
-REMEMBERED = 64  # sets of values: several threads ask for a few of theirs again
+REMEMBERED = 64  # sets of values: several threads use a few of theirs again
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ class Simulator:
         return parts
 
     def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
-        """Return the sub-steps that the rule asks for along a response with all its states."""
+        """Return the sub-steps that the rule requires along a response with all its states."""
         p = self._vector(values)
         rest = linear_kernel(self.system).rest(p)
         inputs = self._sampling(self._input_samples)

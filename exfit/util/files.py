@@ -47,7 +47,7 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
     """Write files of a folder as one: first all beside their places, then each to its place.
 
     Others that are ``obsolete`` disappear in between; the former version of the last of
-    ``contents`` stands until all else is in place. An interruption waits for the end.
+    ``contents`` remains until all else is in place. An interruption waits for the end.
 
     Raises ExfitError where the folder cannot be written: then all is as it was. A single file that
     cannot be replaced (a folder of its name, open in a program on Windows) is named by an
@@ -107,7 +107,7 @@ def _computer() -> str:
 
 
 def _runs(process: int) -> bool:
-    """Tell whether a process of this computer may still run; on Windows it cannot be asked."""
+    """Return whether a process of this computer may still run; always true on Windows."""
     if os.name == "nt":
         return True  # os.kill would send it Ctrl-C there
     try:

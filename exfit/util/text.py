@@ -10,7 +10,7 @@ from typing import Any
 def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
     """Return JSON that every reader takes: numbers that are not finite become null.
 
-    A list of numbers stands in one line.
+    A list of numbers is written in one line.
     """
     return "".join(_json(content, ascii_only, "\n")) + "\n"
 

@@ -242,7 +242,7 @@ def awake_values(model):
 
 
 def moves(model, symbol, row):
-    """Tell whether a parameter moves a response, by a bump of any size.
+    """Return whether a parameter moves a response, by a bump of any size.
 
     One of 0.3 pu meets the usual limits, a larger one those of the field current; a small one does
     not hold a quick regulator at its limits throughout.

@@ -112,7 +112,7 @@ def test_no_damage_ends_in_a_traceback(saved):
 
 
 def _refused(path):
-    """Tell whether a file is refused, with its name."""
+    """Return whether a file is refused, with its name."""
     try:
         load_result(path)
     except ExfitError as fault:

@@ -130,7 +130,7 @@ def test_a_large_step_meets_a_limit_and_passes_none(name, sign):
     held = {
         (one.limit, one.signal)
         for one in equation_limits(system_of(name))
-        if one.stands and one.signal
+        if one.clamped and one.signal
     }
     response = told.response(values).signals
     for hit in limits_hit(told, values):

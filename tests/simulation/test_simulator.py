@@ -437,7 +437,7 @@ def test_halving_the_step_hardly_moves_a_response_that_meets_limits(exciter):
 
 
 def freezes(exciter, values, course):
-    """Tell whether a state that has no limits of its own stands still for a while."""
+    """Return whether a state that has no limits of its own stands still for a while."""
     system = system_of(exciter)
     states = samples(exciter, values, course, outputs=system.states)
     still = (np.diff(states[course.steps[0].at < CLOCK], axis=0) == 0.0).any(axis=0)

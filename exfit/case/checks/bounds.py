@@ -18,5 +18,5 @@ def bound_faults(section: ContentNode) -> Iterator[Fault]:
 
 
 def _outside(start: float, low: float | None, high: float | None) -> bool:
-    """Tell whether a start lies outside its bounds, as far as these are readable."""
+    """Return whether a start lies outside its bounds, as far as these are readable."""
     return (low is not None and start < low) or (high is not None and start > high)

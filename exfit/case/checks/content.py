@@ -38,7 +38,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
 
 
 def _single_record_faults(content: ContentNode) -> Iterator[Fault]:
-    """Yield a test that is missing, or stands beside several records."""
+    """Yield a test that is missing, or is given beside several records."""
     if "records" not in content:
         if "test" not in content:
             yield content.at("test").fault("is missing")

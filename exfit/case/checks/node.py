@@ -14,9 +14,9 @@ from exfit.case.yaml import Fault, Place
 
 @dataclass(frozen=True)
 class ContentNode:
-    """A place of the content and what stands there; None where nothing does.
+    """A place of the content and its value; None where there is none.
 
-    What is asked for in a form that the value does not have is None, or empty.
+    A form that the value does not have is None, or empty.
     """
 
     place: Place
@@ -31,49 +31,49 @@ class ContentNode:
         return ContentNode((*self.place, *keys), value)
 
     def __contains__(self, key: str) -> bool:
-        """Whether a mapping stands here that has the key."""
+        """Whether the value is a mapping that has the key."""
         return key in self.content
 
     @property
     def content(self) -> Mapping[str, Any]:
-        """The mapping that stands here."""
+        """The value as a mapping."""
         return self.value if isinstance(self.value, dict) else {}
 
     @property
     def is_section(self) -> bool:
-        """Whether a mapping stands here."""
+        """Whether the value is a mapping."""
         return isinstance(self.value, dict)
 
     @property
     def sections(self) -> Iterator[tuple[str, "ContentNode"]]:
-        """The entries of the mapping that stands here, by key."""
+        """The entries of the value, a mapping, by key."""
         return ((key, self.at(key)) for key in self.content)
 
     @property
     def entries(self) -> list["ContentNode"]:
-        """The entries of the list that stands here."""
+        """The entries of the value, a list."""
         count = len(self.value) if isinstance(self.value, list) else 0
         return [self.at(index) for index in range(count)]
 
     @property
     def number(self) -> float | None:
-        """The finite number that stands here."""
+        """The value as a finite number."""
         number = isinstance(self.value, int | float) and not isinstance(self.value, bool)
         return float(self.value) if number and isfinite(self.value) else None
 
     @property
     def start(self) -> float | None:
-        """The number that stands here, or from which a fit starts that finds it."""
+        """The value as a number, or the one from which a fit starts that finds it."""
         return self.at("start").number if self.is_section else self.number
 
     @property
     def text(self) -> str | None:
-        """The text that stands here."""
+        """The value as a text."""
         return self.value if isinstance(self.value, str) else None
 
     @property
     def pair(self) -> tuple[float, float] | None:
-        """The two numbers that stand here as a list."""
+        """The value as a list of two numbers."""
         numbers = [entry.number for entry in self.entries]
         if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
             return None

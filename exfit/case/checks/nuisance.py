@@ -30,7 +30,7 @@ def nuisance_faults(
 
 
 def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:
-    """Yield the places at which a number or {start, min, max} may stand."""
+    """Yield the places at which a number or {start, min, max} is allowed."""
     yield test.at("vt0")
     for name in ("vref", "vs"):
         for step in test.at(name).entries:

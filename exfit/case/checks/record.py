@@ -33,17 +33,17 @@ def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
     if "resample" in record and record.at("gaps").text == "skip":
         text = "not allowed with gaps: skip: a filter needs all samples"
         yield record.at("resample").fault(text)
-    for stretch in record.at("mask").entries:
-        yield from _order_faults(stretch)
+    for interval in record.at("mask").entries:
+        yield from _order_faults(interval)
     yield from _start_faults(test, record.at("channels"))
     yield from _order_faults(record.at("window"))
     yield from _window_faults(test, record.at("window").pair)
 
 
-def _order_faults(stretch: ContentNode) -> Iterator[Fault]:
-    if stretch.pair is not None and stretch.pair[0] >= stretch.pair[1]:
-        start, end = map(show, stretch.pair)
-        yield stretch.fault(f"start {start} is not below end {end}")
+def _order_faults(interval: ContentNode) -> Iterator[Fault]:
+    if interval.pair is not None and interval.pair[0] >= interval.pair[1]:
+        start, end = map(show, interval.pair)
+        yield interval.fault(f"start {start} is not below end {end}")
 
 
 def _start_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:

@@ -138,7 +138,7 @@ def _warnings(entry: Written) -> Iterator[str]:
 
 
 def _matters(symbol: str, value: float) -> bool:
-    """Tell whether a value does anything: a gain of 0 and a limit out of reach do not."""
+    """Return whether a value does anything: a gain of 0 and a limit out of reach do not."""
     if symbol.endswith("MAX"):
         return value < NO_LIMIT
     if symbol.endswith("MIN"):

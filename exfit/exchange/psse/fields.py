@@ -44,7 +44,7 @@ class Field(NamedTuple):
 
 
 class Fields(NamedTuple):
-    """One record: its fields, the first of which stands on ``line``."""
+    """One record: its fields, the first of which is on ``line``."""
 
     line: int
     fields: tuple[Field, ...]

@@ -52,7 +52,7 @@ class UnitPart:
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit; ``warnings`` say, by line, what of the file its models do not stand for."""
+    """A unit; ``warnings`` say, by line, what of the file its models do not represent."""
 
     bus: int
     id: str

@@ -71,7 +71,7 @@ STATES = "VC VK VA VE VH"
 
 
 def limiter(vfe: Signal, p: Signal) -> Signal:
-    """Return VH, what the limiter asks for where the field current is above VFELIM."""
+    """Return VH, the output of the limiter where the field current is above VFELIM."""
     return clip(p.KH * (vfe - p.VFELIM), 0.0, p.VHMAX)
 
 

@@ -87,7 +87,7 @@ def _colour_bar(figure: Figure, axes: list[Axes], numbers: Sequence[int]) -> Non
     norm = BoundaryNorm(np.arange(len(numbers) + 1) - 0.5, len(numbers))
     steps = LinearSegmentedColormap.from_list("steps", _colours(numbers), N=len(numbers))
     every = -(-len(numbers) // MOST_TICKS)
-    # the fit is always named: what would stand right beside it gives way
+    # the fit is always named: what would be right beside it gives way
     ticks = [k for k in range(0, len(numbers) - 1, every) if 2 * (len(numbers) - 1 - k) >= every]
     ticks.append(len(numbers) - 1)
     bar = figure.colorbar(

@@ -17,7 +17,7 @@ from exfit.records.steps import RecordedStep
 Array = NDArray[np.float64]
 
 MOST_PANELS = 10  # of one figure that are still readable
-FEWEST_BINS = 50  # of a stretch between two gaps
+FEWEST_BINS = 50  # of a segment between two gaps
 SMALL = 8  # points, the size of letters
 MOST_SPIKES_RINGED = 200
 MOST_NAMES = 4  # of channels that are not drawn

@@ -1,4 +1,4 @@
-"""The course of a search: its iterations, its starts."""
+"""The progress of a search: its iterations, its starts."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle

@@ -16,7 +16,7 @@ def write_report(result: Path, output: Path | None = None, force: bool = False) 
     """Write the report of a fit, by default into the folder that the fit left; return where.
 
     ``result`` is a result.json or the folder that holds it; nothing else is read, and nothing is
-    simulated. A report that stands there already is replaced, any other file only with ``force``.
+    simulated. A report that is there already is replaced, any other file only with ``force``.
     Raises ExfitError for what cannot be used.
     """
     source = result_file(result)

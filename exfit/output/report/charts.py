@@ -267,7 +267,7 @@ def _round_step(least: float) -> float:
 
 
 def _number(value: float, step: float) -> str:
-    """Return the label of a tick: as many decimals, or digits, as tell it from its neighbours."""
+    """Return the label of a tick: enough decimals, or digits, to differ from its neighbours."""
     decimals = max(0, -floor(log10(step) + 1e-9))
     if decimals > 5 or abs(value) >= 1e6:
         digits = floor(log10(abs(value))) - floor(log10(step) + 1e-9) + 1 if value else 1

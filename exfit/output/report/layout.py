@@ -4,7 +4,7 @@ from exfit.output.report.charts import Rule
 
 MILLI = 1e3
 TALL, HALF, LOW = 220.0, 150.0, 90.0  # of panels: of signals, of gain and phase, of errors
-BINS = 600  # stretches of a line: about as many as a print or a screen shows
+BINS = 600  # segments of a line: about as many as a print or a screen shows
 TIME = "time (s)"
 LEVEL = Rule(0.0, style="level")
 COLOURS, DASHES = 7, 3  # of lines in the style sheet

@@ -47,7 +47,7 @@ def html(result: FitResult, folder: Path) -> str:
 
 
 def is_page(path: Path) -> bool:
-    """Tell whether a file is a page that this module made."""
+    """Return whether a file is a page that this module made."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return GENERATOR in file.read(HEAD)
 

@@ -16,7 +16,7 @@ MOST_MINIMA = 5  # columns that fit beside each other
 def fit(console: Console, result: FitResult, before: FitResult | None = None) -> None:
     """Show the fitted values, how well they are determined, and how well each record is met.
 
-    The values of a fit ``before`` stand beside the new ones.
+    The values of a fit ``before`` are printed beside the new ones.
     """
     console.print()
     console.print(fitted_table(result, before))
@@ -47,7 +47,7 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
 
 
 def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
-    """Return the fitted values with their intervals; what belongs to a record stands last."""
+    """Return the fitted values with their intervals; what belongs to a record comes last."""
     former = () if before is None else ("before",)
     numbers = ("start", *former, "fitted", "95 % interval", "error")
     table = plain_table("parameter", *numbers, "unit", "", numbers=numbers)

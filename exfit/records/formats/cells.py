@@ -12,7 +12,7 @@ THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '][0-9]{3})+(?:[.,][0-9]*)?")
 
 
 def is_number(cell: str, comma: bool | None) -> bool:
-    """Tell whether a cell is an ASCII number with that decimal mark; nan and inf too, not 1_000."""
+    """Return whether a cell is an ASCII number with that decimal mark; also nan, inf, not 1_000."""
     cell = cell.strip()
     if NUMBER.fullmatch(cell):
         return ("." if comma else ",") not in cell
@@ -20,7 +20,7 @@ def is_number(cell: str, comma: bool | None) -> bool:
 
 
 def is_missing(cell: str) -> bool:
-    """Tell whether a cell says that there is no sample: empty, nan, dashes, stars."""
+    """Return whether a cell says that there is no sample: empty, nan, dashes, stars."""
     return MISSING.fullmatch(cell.strip()) is not None
 
 

@@ -43,7 +43,7 @@ class TextRow(NamedTuple):
 class Dialect:
     """How a file is written: its rows, each of ``cells`` cells, begin at ``first_line``.
 
-    ``comma`` tells whether it is the decimal mark, None where there is no such mark. A last cell
+    ``comma`` is whether it is the decimal mark, None where there is no such mark. A last cell
     that is empty in every row has no name.
     """
 
@@ -89,7 +89,7 @@ class _Heading(NamedTuple):
 
 
 def is_value(cell: str) -> bool:
-    """Tell whether a cell is a number, with a point or a comma, or a timestamp."""
+    """Return whether a cell is a number, with a point or a comma, or a timestamp."""
     return bool(NUMBER.fullmatch(cell) or INFINITE.fullmatch(cell)) or is_timestamp(cell)
 
 
@@ -114,7 +114,7 @@ def split_rows(
 
 
 def is_comment(text: str, separator: str | None) -> bool:
-    """Tell whether a row, or its first cell, begins with the mark of a comment."""
+    """Return whether a row, or its first cell, begins with the mark of a comment."""
     return text.lstrip().startswith(tuple(mark for mark in COMMENT_MARKS if mark != separator))
 
 
@@ -244,7 +244,7 @@ def _is_full(row: TextRow, cells: int, columns: Sequence[int]) -> bool:
 
 
 def _is_partial(row: TextRow, shape: _Shape) -> bool:
-    """Tell whether a row has some of the values that belong there, or too many or too few."""
+    """Return whether a row has some of the values that belong there, or too many or too few."""
     if row.comment:
         return False
     if len(row.cells) == shape.cells:
@@ -303,7 +303,7 @@ def _fitted(row: TextRow, shape: _Shape) -> tuple[str, ...]:
 
 
 def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:
-    """Tell whether the first number with a decimal mark has a comma; None where none has any."""
+    """Return whether the first number with a decimal mark has a comma; None where none has any."""
     for row in rows:
         for cell in map(str.strip, row):
             if NUMBER.fullmatch(cell) and ("," in cell or "." in cell):

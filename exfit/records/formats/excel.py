@@ -106,7 +106,7 @@ def _table(name: str, rows: Sequence[Row]) -> _Sheet | None:
 
 
 def _is_sample(row: Row) -> bool:
-    """Tell whether a row holds a sample: numbers and timestamps, more of them than of texts."""
+    """Return whether a row holds a sample: numbers and timestamps, more of them than of texts."""
     texts = sum(isinstance(cell, str) and cell != "" for cell in row)
     numbers = sum(not isinstance(cell, str) for cell in row)
     return numbers >= FEWEST_CELLS and numbers > texts
@@ -117,7 +117,7 @@ def _is_units(row: Row) -> bool:
 
 
 def _is_head(row: Row, below: Row) -> bool:
-    """Tell whether a row names the columns of the one below: texts over two cells or more."""
+    """Return whether a row names the columns of the one below: texts over two cells or more."""
     named = [isinstance(cell, str) and cell.strip() != "" for cell in row]
     over = sum(name and cell != "" for name, cell in zip(named, below, strict=True))
     return over >= FEWEST_CELLS and all(isinstance(cell, str) for cell in row)

@@ -18,7 +18,7 @@ def names_of(cells: Sequence[str]) -> tuple[str, ...]:
 
 
 def is_units(cells: Sequence[str]) -> bool:
-    """Tell whether a row is one of units: each cell is a unit, or the mark that there is none."""
+    """Return whether a row is one of units: each cell is a unit, or the mark that there is none."""
     return all(cell.strip() in NO_UNIT or unit_of(cell) for cell in cells)
 
 

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from math import prod
 
-HEAD = 128  # bytes before the first element; their last two tell the order of bytes
+HEAD = 128  # bytes before the first element; the last two give the order of bytes
 ORDERS = {b"IM": "<", b"MI": ">"}
 MATRIX, COMPRESSED = 14, 15
 FLAGS = (6,)
@@ -29,7 +29,7 @@ class Damage(Exception):
 
 
 def is_mat5(data: bytes) -> bool:
-    """Tell whether a file is of version 5 to 7.2."""
+    """Return whether a file is of version 5 to 7.2."""
     return data[HEAD - 2 : HEAD] in ORDERS and not data.startswith(b"\0")
 
 

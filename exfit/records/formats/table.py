@@ -75,7 +75,7 @@ def listed(names: Sequence[str]) -> str:
 
 
 def increases(table: Table, columns: Sequence[str]) -> bool:
-    """Tell whether columns can be the time, numbers or timestamps that increase throughout."""
+    """Return whether columns can be the time, numbers or timestamps that increase throughout."""
     try:
         instants = table.instants(columns)
     except RecordError:

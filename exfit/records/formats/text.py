@@ -148,7 +148,7 @@ class TextTable:
         return (line for line in lines if not self._is_skipped(line))
 
     def _is_skipped(self, line: str) -> bool:
-        """Tell whether a line is a comment, and not a row that begins with its mark."""
+        """Return whether a line is a comment, and not a row that begins with its mark."""
         separator = self.dialect.separator
         if not is_comment(line, separator):
             return False

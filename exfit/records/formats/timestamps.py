@@ -60,7 +60,7 @@ class _Stamps:
 
 
 def is_timestamp(cell: str) -> bool:
-    """Tell whether a cell has the form of a date, a time of day, or both."""
+    """Return whether a cell has the form of a date, a time of day, or both."""
     return bool(cell.strip()) and FORM.fullmatch(cell) is not None
 
 
@@ -201,7 +201,7 @@ def _days(stamps: _Stamps) -> Whole:
 
 
 def _is_day_first(order: str, left: Whole, middle: Whole) -> bool | None:
-    """Tell whether the first of two parts of the dates is the day; None where it may be either."""
+    """Return whether the first of two parts of the dates is the day; None if it may be either."""
     if order != EITHER:
         return order == "dmy"
     if (left > MONTHS_A_YEAR).any():

@@ -61,7 +61,7 @@ def _sheet(result: FitResult, part: PartDescription) -> Mapping[str, SheetRow]:
 
 
 def _helpers(result: FitResult) -> Iterator[FixedGroup]:
-    """Yield what stands among the exciter's parameters and is none of them."""
+    """Yield what is listed among the exciter's parameters and is none of them."""
     own = {symbol for part in result.parts if not part.prefix for symbol in _sheet(result, part)}
     row = SheetRow(meaning="used by ties")
     rows = (
