@@ -14,7 +14,8 @@ from exfit.case.messages import form_faults
 from exfit.case.parts import Parts, parts_of, ties_of
 from exfit.case.schema import CaseDocument
 from exfit.case.ties import Ties
-from exfit.case.yaml import Fault, Place
+from exfit.case.yaml import Fault
+from exfit.util.text import Place
 
 
 @dataclass(frozen=True)

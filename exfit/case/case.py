@@ -26,11 +26,11 @@ from exfit.case.schema import (
     Value,
 )
 from exfit.case.ties import Ties
-from exfit.case.yaml import Fault, Place, dotted
+from exfit.case.yaml import Fault
 from exfit.errors import CaseError
 from exfit.plants import KINDS, PlantKind
 from exfit.records.record import Record
-from exfit.util.text import near
+from exfit.util.text import Place, dotted, near
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,8 +4,9 @@ from pathlib import Path
 
 from exfit.case.assembly import check_content
 from exfit.case.case import Case
-from exfit.case.yaml import dotted, read_text, read_yaml
+from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
+from exfit.util.text import dotted
 
 
 def load_case(path: Path, model_sha256: str = "") -> Case:

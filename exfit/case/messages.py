@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from exfit.case.yaml import Fault, Place
-from exfit.util.text import near, show_value
+from exfit.case.yaml import Fault
+from exfit.util.text import Place, near, show_value
 
 Data = Mapping[str, Any]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
-from exfit.case.yaml import Fault, Place
+from exfit.case.yaml import Fault
 from exfit.errors import ModelError
 from exfit.models import STABILISERS, find
 from exfit.models.blocks import SHORTEST
@@ -25,7 +25,7 @@ from exfit.plants import (
     flow_sheet,
 )
 from exfit.signals import RECORDED
-from exfit.util.text import near
+from exfit.util.text import Place, near
 
 Data = Mapping[str, Any]
 Contradictions = Iterator[tuple[str, str]]

@@ -11,8 +11,9 @@ from exfit.case.checks.record import channel_faults, record_faults
 from exfit.case.json_schema import json_schema
 from exfit.case.messages import form_faults
 from exfit.case.schema import RecordFile
-from exfit.case.yaml import Fault, dotted
+from exfit.case.yaml import Fault
 from exfit.errors import CaseError
+from exfit.util.text import dotted
 
 HERE = "record"  # the place of the section in a case, for the keys allowed there
 

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from exfit.errors import CaseError
-
-Place = tuple[str | int, ...]
+from exfit.util.text import Place
 
 LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
@@ -35,11 +34,6 @@ class Fault(NamedTuple):
     place: Place
     text: str
     line: int | None = None
-
-
-def dotted(place: Place) -> str:
-    """Return a place as ``test.vref[0].at``."""
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place)[1:]
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from math import isfinite
 from types import NoneType
 from typing import Any
 
+Place = tuple[str | int, ...]  # the keys and indices that lead to a value in nested data
+
 
 def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
     """Return JSON that every reader takes: numbers that are not finite become null.
@@ -70,6 +72,12 @@ def near(word: str, known: Iterable[str]) -> str:
     folded = {name.casefold(): name for name in known}
     close = difflib.get_close_matches(word.casefold(), folded, n=1)
     return f"did you mean {folded[close[0]]}?" if close else f"known: {', '.join(folded.values())}"
+
+
+def dotted(place: Place) -> str:
+    """Return a place as ``test.vref[0].at``."""
+    keys = (f"[{key}]" if isinstance(key, int) else f".{key}" for key in place)
+    return "".join(keys).removeprefix(".")
 
 
 def show(value: float) -> str:

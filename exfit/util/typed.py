@@ -17,13 +17,13 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 import numpy as np
 
 from exfit.errors import ExfitError
-from exfit.util.text import show_value
-
-Place = tuple[str | int, ...]
+from exfit.util.text import Place, dotted, show_value
 
 STORED = "stored"
 IN_FILE: Mapping[str, bool] = {STORED: True}  # metadata of a field that is only in a file
 KEY = "key"  # in the metadata of a field: its name in the data
+LARGEST = float(np.finfo(float).max)  # a whole number beyond has no double
+FORMS = {int: "a whole number", bool: "true or false", str: "a text"}
 
 
 class FormError(ExfitError):
@@ -40,59 +40,6 @@ class Entry(NamedTuple):
     default: Any
 
 
-def plain(content: Any, whole: bool = False) -> Any:
-    """Return the plain data of a data class and of all in it; ``whole``: what is stored, too."""
-    if is_dataclass(content) or hasattr(content, "_fields"):
-        data = {
-            entry.key: _entry_of(getattr(content, entry.name), entry.kind, whole)
-            for entry in entries(_class_of(content))
-            if whole or not entry.stored
-        }
-        derived: Mapping[str, str] = getattr(content, "DERIVED", {})
-        return data | {key: plain(getattr(content, name)) for key, name in derived.items()}
-    if isinstance(content, Mapping):
-        return {key: plain(value, whole) for key, value in content.items()}
-    if isinstance(content, np.ndarray):
-        return _plain_array(content)
-    return _plain_value(content, whole)
-
-
-def _class_of(content: Any) -> Any:
-    return type(content)
-
-
-def _plain_value(content: Any, whole: bool) -> Any:
-    if isinstance(content, list | tuple):
-        return [plain(value, whole) for value in content]
-    if isinstance(content, complex):
-        return [content.real, content.imag]
-    if isinstance(content, Path):
-        return str(content)
-    return None if isinstance(content, float) and not isfinite(content) else content
-
-
-def _entry_of(value: Any, kind: Any, whole: bool) -> Any:
-    return plain(dict(value) if _named_values(kind) else value, whole)
-
-
-def _plain_array(samples: Any) -> Any:
-    if np.iscomplexobj(samples):
-        return {"real": _plain_array(samples.real), "imag": _plain_array(samples.imag)}
-    if np.isfinite(samples).all():
-        return samples.tolist()
-    return (
-        [_plain_array(row) for row in samples]
-        if samples.ndim > 1
-        else [x if isfinite(x) else None for x in samples.tolist()]
-    )
-
-
-def _named_values(kind: Any) -> bool:
-    """Whether a type is a tuple of pairs of a name and a value."""
-    args = get_args(kind)
-    return get_origin(kind) is tuple and args[1:] == (...,) and get_args(args[0])[:1] == (str,)
-
-
 @cache
 def entries(kind: type) -> tuple[Entry, ...]:
     """Return the entries of a data class or a NamedTuple."""
@@ -102,15 +49,66 @@ def entries(kind: type) -> tuple[Entry, ...]:
         names = getattr(kind, "_fields", ())
         return tuple(Entry(n, n, hints[n], False, defaults.get(n, MISSING)) for n in names)
     described = []
-    for attribute in fields(kind):
-        made = attribute.default_factory
-        default = attribute.default if made is MISSING else made()
-        key, only_stored = (
-            attribute.metadata.get(KEY, attribute.name),
-            attribute.metadata.get(STORED, False),
-        )
-        described.append(Entry(key, attribute.name, hints[attribute.name], only_stored, default))
+    for each in fields(kind):
+        default = each.default if each.default_factory is MISSING else each.default_factory()
+        key, stored = each.metadata.get(KEY, each.name), each.metadata.get(STORED, False)
+        described.append(Entry(key, each.name, hints[each.name], stored, default))
     return tuple(described)
+
+
+def _has_entries(value: Any) -> bool:
+    """Return whether a value or a type is that of a data class or a NamedTuple."""
+    return is_dataclass(value) or hasattr(value, "_fields")
+
+
+def _named_values(kind: Any) -> bool:
+    """Return whether a type is a tuple of pairs of a name and a value."""
+    args = get_args(kind)
+    return get_origin(kind) is tuple and args[1:] == (...,) and get_args(args[0])[:1] == (str,)
+
+
+# ---- to plain data
+
+
+def plain(content: Any, whole: bool = False) -> Any:
+    """Return the plain data of a data class and of all in it; ``whole``: what is stored, too."""
+    if _has_entries(content):
+        return _plain_entries(content, whole)
+    if isinstance(content, Mapping):
+        return {key: plain(value, whole) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [plain(value, whole) for value in content]
+    if isinstance(content, np.ndarray):
+        return _plain_array(content)
+    if isinstance(content, complex):
+        return [content.real, content.imag]
+    if isinstance(content, Path):
+        return str(content)
+    return None if isinstance(content, float) and not isfinite(content) else content
+
+
+def _plain_entries(content: Any, whole: bool) -> dict[str, Any]:
+    kind: Any = type(content)
+    data = {}
+    for entry in entries(kind):
+        if whole or not entry.stored:
+            value = getattr(content, entry.name)
+            data[entry.key] = plain(dict(value) if _named_values(entry.kind) else value, whole)
+    derived: Mapping[str, str] = getattr(content, "DERIVED", {})
+    return data | {key: plain(getattr(content, name)) for key, name in derived.items()}
+
+
+def _plain_array(samples: Any) -> Any:
+    if np.iscomplexobj(samples):
+        return {"real": _plain_array(samples.real), "imag": _plain_array(samples.imag)}
+    if np.isfinite(samples).all():
+        return samples.tolist()
+    if samples.ndim > 1:
+        return [_plain_array(row) for row in samples]
+    return [x if isfinite(x) else None for x in samples.tolist()]
+
+
+# ---- back from plain data
 
 
 class Reader(NamedTuple):
@@ -129,12 +127,17 @@ class Reader(NamedTuple):
         if origin in (Union, UnionType):
             return self._one_of(args, data, place)
         if origin is np.ndarray:
-            return _array(data, place, complex_=args[1] == np.dtype[np.complex128])
-        if origin is tuple or (isinstance(origin, type) and issubclass(origin, Mapping)):
-            return self._collection(kind, data, place)
-        if is_dataclass(kind) or hasattr(kind, "_fields"):
-            return self._record(kind, data, place)
-        return _scalar(kind, data, place)
+            is_complex = args[1] == np.dtype[np.complex128]
+            return _complex_array(data, place) if is_complex else _array(data, place)
+        if _named_values(kind):
+            return tuple(self._mapping(get_args(args[0])[1], data, place).items())
+        if origin is tuple:
+            return self._tuple(args, data, place)
+        if isinstance(origin, type) and issubclass(origin, Mapping):
+            return self._mapping(args[1], data, place)
+        return (
+            self._entries(kind, data, place) if _has_entries(kind) else _scalar(kind, data, place)
+        )
 
     def _nullable(self, kind: Any, null: Any, data: Any, place: Place) -> Any:
         if get_origin(kind) is np.ndarray:
@@ -144,33 +147,28 @@ class Reader(NamedTuple):
     def _one_of(self, kinds: tuple[Any, ...], data: Any, place: Place) -> Any:
         if data is None and NoneType in kinds:
             return None
-        others = [kind for kind in kinds if kind is not NoneType]
-        for kind in others[:-1]:
+        *first, last = (kind for kind in kinds if kind is not NoneType)
+        for kind in first:
             try:
                 return self.read(kind, data, place)
             except FormError:
                 continue
-        return self.read(others[-1], data, place)
+        return self.read(last, data, place)
 
-    def _collection(self, kind: Any, data: Any, place: Place) -> Any:
-        args = get_args(kind)
-        if get_origin(kind) is not tuple or _named_values(kind):
-            item = get_args(args[0])[1] if _named_values(kind) else args[1]
-            values = {
-                key: self.read(item, value, (*place, key))
-                for key, value in _of_type(dict, data, place, "a mapping").items()
-            }
-            return tuple(values.items()) if _named_values(kind) else values
+    def _mapping(self, kind: Any, data: Any, place: Place) -> dict[str, Any]:
+        content = _of_type(dict, data, place, "a mapping")
+        return {key: self.read(kind, value, (*place, key)) for key, value in content.items()}
+
+    def _tuple(self, kinds: tuple[Any, ...], data: Any, place: Place) -> tuple[Any, ...]:
         items = _of_type(list, data, place, "a list")
-        kinds = [args[0]] * len(items) if args[1:] == (...,) else args
+        if kinds[1:] == (...,):
+            kinds = (kinds[0],) * len(items)
         if len(kinds) != len(items):
             raise FormError(f"{dotted(place)}: {len(items)} values, not {len(kinds)}")
-        return tuple(
-            self.read(each, value, (*place, k))
-            for k, (each, value) in enumerate(zip(kinds, items, strict=True))
-        )
+        pairs = enumerate(zip(kinds, items, strict=True))
+        return tuple(self.read(kind, value, (*place, k)) for k, (kind, value) in pairs)
 
-    def _record(self, kind: Any, data: Any, place: Place) -> Any:
+    def _entries(self, kind: Any, data: Any, place: Place) -> Any:
         content, values = _of_type(dict, data, place, "a mapping"), {}
         for entry in entries(kind):
             if entry.key in content:
@@ -182,18 +180,18 @@ class Reader(NamedTuple):
         return kind(**values)
 
 
-def dotted(place: Place) -> str:
-    """Return a place as ``records[0].channels.vt``."""
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place).lstrip(".")
-
-
-def _of_type(kind: type, data: Any, place: Place, name: str) -> Any:
+def _of_type(kind: type, data: Any, place: Place, form: str) -> Any:
     if not isinstance(data, kind):
-        raise FormError(f"{dotted(place)}: {show_value(data)} is not {name}")
+        raise FormError(f"{dotted(place)}: {show_value(data)} is not {form}")
     return data
 
 
 def _scalar(kind: Any, data: Any, place: Place) -> Any:
+    if get_origin(kind) is Literal:
+        if data not in get_args(kind):
+            choices = ", ".join(map(str, get_args(kind)))
+            raise FormError(f"{dotted(place)}: {show_value(data)} is none of {choices}")
+        return data
     if kind is float:
         return _number(data, place)
     if kind is complex:
@@ -201,25 +199,17 @@ def _scalar(kind: Any, data: Any, place: Place) -> Any:
         if pair.shape != (2,):
             raise FormError(f"{dotted(place)}: not a pair of real and imaginary part")
         return complex(pair[0], pair[1])
-    if get_origin(kind) is Literal:
-        if data not in get_args(kind):
-            choices = ", ".join(map(str, get_args(kind)))
-            raise FormError(f"{dotted(place)}: {show_value(data)} is none of {choices}")
-        return data
+    if kind is Path:
+        return Path(_scalar(str, data, place))
     if kind is int and isinstance(data, bool):
-        raise FormError(f"{dotted(place)}: {show_value(data)} is not a whole number")
-    names = {int: "a whole number", bool: "true or false", str: "a text", Path: "a text"}
-    text = _of_type(str if kind is Path else kind, data, place, names[kind])
-    return Path(text) if kind is Path else text
+        raise FormError(f"{dotted(place)}: {show_value(data)} is not {FORMS[int]}")
+    return _of_type(kind, data, place, FORMS[kind])
 
 
 def _number(data: Any, place: Place) -> float:
-    if isinstance(data, int | float) and not isinstance(data, bool) and -MOST <= data <= MOST:
+    if isinstance(data, int | float) and not isinstance(data, bool) and abs(data) <= LARGEST:
         return float(data)
     raise FormError(f"{dotted(place)}: {show_value(data)} is not a number")
-
-
-MOST = float(np.finfo(float).max)  # a whole number beyond has no double
 
 
 def _complex_array(data: Any, place: Place) -> Any:
@@ -230,10 +220,8 @@ def _complex_array(data: Any, place: Place) -> Any:
     return np.asarray(real + 1j * imag)
 
 
-def _array(data: Any, place: Place, null: float = np.nan, complex_: bool = False) -> Any:
+def _array(data: Any, place: Place, null: float = np.nan) -> Any:
     """Return lists of numbers, or lists of such lists, as an array."""
-    if complex_:
-        return _complex_array(data, place)
     items = _of_type(list, data, place, "a list of numbers")
     if items and isinstance(items[0], list):
         rows = [_array(row, (*place, k), null) for k, row in enumerate(items)]

@@ -16,13 +16,14 @@ from exfit.case.case import Case
 from exfit.case.json_schema import json_schema
 from exfit.case.load import load_case, parse_case
 from exfit.case.schema import CaseDocument
-from exfit.case.yaml import dotted, scalar
+from exfit.case.yaml import scalar
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.levels import initial_voltage
 from exfit.fitting.recordings import measured
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import MACHINE, SATURATION
+from exfit.util.text import dotted
 
 EXAMPLE = """\
 model: AC1A                     # a name of the catalogue

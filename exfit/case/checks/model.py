@@ -10,10 +10,10 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.messages import PERCENT
 from exfit.case.parts import Part, Parts, helpers_of, places_of_ties, used_by_ties
 from exfit.case.ties import TieError, Ties, is_tie
-from exfit.case.yaml import Fault, Place
+from exfit.case.yaml import Fault
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Parameter
-from exfit.util.text import near, show, show_value
+from exfit.util.text import Place, near, show, show_value
 
 
 def parameter_faults(content: ContentNode, parts: Parts, ties: Ties) -> Iterator[Fault]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from exfit.case.yaml import Fault, Place
+from exfit.case.yaml import Fault
+from exfit.util.text import Place
 
 
 @dataclass(frozen=True)
