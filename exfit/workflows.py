@@ -46,6 +46,7 @@ from exfit.case.record_section import record_section
 from exfit.case.schema import SINGLE, Recording
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
+from exfit.fitting.overrides import changed_values
 from exfit.fitting.recordings import read_section
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
@@ -56,6 +57,8 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult, Iteration
 from exfit.simulation.simulator import Response
+from exfit.util.strategies import STRATEGIES
+from exfit.util.text import near
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -94,11 +97,11 @@ def fit(
     """
     began = clock.perf_counter()
     case = loaded(case)
+    method = _known(strategy or case.estimate.strategy)
     start = case.values()
     setups, problem = fitted(case)
     residuals, counter = problem.residuals, SimulationCounter()
     unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
-    method = strategy or case.estimate.strategy
     history: list[Iteration] = []
 
     def announce(line: estimate.SolverIteration) -> None:
@@ -157,6 +160,13 @@ def fit(
         files=input_names(case, used),
         case_text=_text_of(case),
     )
+
+
+def _known(strategy: str) -> str:
+    """Return a strategy, or raise CaseError where there is none of this name."""
+    if strategy not in STRATEGIES:
+        raise CaseError([f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}"])
+    return strategy
 
 
 def _was_interrupted(search_result: estimate.MultistartResult | None) -> bool:
@@ -259,7 +269,7 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
     """
     case = loaded(case, values)
-    values = values_of(case, _numbers(values))
+    values = values_of(case, _changes(case, values))
     if case.recordings:
         setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
         response = setup.response(values)
@@ -272,9 +282,11 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
     return SimulationResult(response, None, tuple(simulation_notes(case, response)))
 
 
-def _numbers(values: ValuesOrResult | None) -> Values:
-    """Return values by name; those of a fit are all that it knows."""
-    return values.values if isinstance(values, FitResult) else values or {}
+def _changes(case: Case, values: ValuesOrResult | None) -> Values:
+    """Return changes of values by name: of a fit all that it has, of others the checked ones."""
+    if isinstance(values, FitResult):
+        return values.values
+    return changed_values(case, values or {}, "values")
 
 
 def simulation_notes(case: Case, response: Response) -> Iterator[str]:
@@ -309,7 +321,7 @@ def validate(
         unseen = [_in_place_of([*unseen, *fitted], case, Path(record))]
     if not fitted + unseen:
         raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
-    values = values_of(case, _numbers(values))
+    values = values_of(case, _changes(case, values))
     setups = [
         build_experiment(case, recording, values).with_enough_substeps(values)
         for recording in fitted
@@ -332,14 +344,14 @@ def _in_place_of(recordings: Sequence[Recording], case: Case, file: Path) -> Rec
 
 def profile(
     case: CaseOrPath,
-    names: Iterable[str] = (),
+    names: str | Iterable[str] = (),
     progress: Callable[[estimate.Progress], None] = _ignore,
 ) -> Profiles:
     """Fit a case and find the 95 % intervals of its parameters from their profile likelihood.
 
     Args:
         case: a case, or the path of its file.
-        names: of free parameters; none: all.
+        names: of free parameters, or of one; none: all.
         progress: called with how far the profiles are.
 
     An interruption keeps what is done of the profiles; one of the fit before them is passed on.
@@ -349,6 +361,7 @@ def profile(
         >>> for profile in exfit.profile("case.yaml", ["KA"]).profiles:
         ...     print(profile.name, profile.low, profile.high)
     """
+    names = [names] if isinstance(names, str) else names
     return profiles.profile(loaded(case), names, progress)
 
 

@@ -142,6 +142,36 @@ def test_a_case_of_a_dict_is_fitted_to_a_record_of_arrays(arrays):
     assert list(result.comparison.overlays) == ["vt"]
 
 
+@pytest.mark.parametrize("use", [exfit.simulate, exfit.validate])
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"KK": 2.0}, "values: KK: not a parameter"),
+        ({"k": -1.0e9}, "values: k: -1e.09 lies outside"),
+        ({"k": float("nan")}, "values: k: nan lies outside"),
+    ],
+)
+def test_values_that_the_case_does_not_take_are_refused(use, values, message):
+    with pytest.raises(exfit.CaseError, match=message):
+        use(CASE, values)
+
+
+def test_an_unknown_strategy_is_refused():
+    with pytest.raises(exfit.CaseError, match="strategy: 'dgm' is unknown; did you mean dgn"):
+        exfit.fit(CASE, strategy="dgm")
+
+
+def test_one_parameter_is_profiled_by_its_name():
+    assert [profile.name for profile in exfit.profile(CASE, "a").profiles] == ["a"]
+
+
+def test_a_case_and_a_record_are_shown_in_one_line(arrays):
+    case = exfit.load_case(CASE)
+    assert repr(case) == f"<Case first_order: FIRST_ORDER, {case.plant.type}; free: k, a>"
+    samples, last = len(arrays.time), arrays.time[-1]
+    assert repr(arrays) == f"<Record arrays: vt, efd; {samples} samples, 0 ... {last:g} s>"
+
+
 def test_a_case_without_a_record_section_takes_all_signals_of_the_arrays(arrays):
     case = exfit.Case.from_dict(SEXS, arrays)
     assert {*case.record.channels} == {"vt", "efd"}

@@ -35,11 +35,11 @@ from exfit.util.text import Place, dotted, near
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A case of exfit: a model, its plant, a test, its record, and what is to be found.
+    """A case of exfit: a model, its plant, a test, its records, and the parameters to be found.
 
-    The sections are those of the case file. ``path`` is that file; of a case made in Python
-    (``from_file`` is false) it is what messages call the case, in the folder of its files.
-    ``given_records`` are those, by name, that were given as arrays and are read from no file.
+    The sections are those of the case file. ``path`` is that file. For a case made in Python
+    (``from_file`` is false) ``path`` is the folder of its files and the name that messages use.
+    ``given_records`` holds, by name, the records that were given as arrays instead of files.
     """
 
     path: Path
@@ -60,6 +60,11 @@ class Case:
     parts: Parts
     ties: Ties
     given_records: Mapping[str, Record] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Return the name, what is studied, and the free parameters, in one line."""
+        free = ", ".join(self.free()) or "nothing"
+        return f"<Case {self.path.stem}: {self.subject}, {self.plant.type}; free: {free}>"
 
     @classmethod
     def of(cls, checked: CheckedContent, path: Path, from_file: bool = True) -> "Case":
@@ -106,11 +111,11 @@ class Case:
     def with_record(self, record: Record, name: str = SINGLE) -> "Case":
         """Return the case with other measurements for one of its records, in place of its file.
 
-        ``name`` is that of the record in the case, "fit" where there is one alone. The signals are
-        per unit and stand as they are: of the section of the record holds what says how it is
-        compared (weight, noise, filter, outliers, mask, delay), not how it is read (columns, units,
-        window, resample). Raises CaseError where the case has no such record, or where a signal is
-        missing.
+        ``name`` is that of the record in the case, "fit" where there is only one. The signals are
+        per unit and are not changed. The keys of the record's section that say how it is compared
+        (weight, noise, filter, outliers, mask, delay) apply; those that say how it is read
+        (columns, units, window, resample) do not. Raises CaseError where the case has no such
+        record, or where a signal is missing.
         """
         sections = {
             recording.name: recording.record for recording in (*self.recordings, *self.validations)

@@ -32,6 +32,11 @@ class Record:
     sha256: str
     averaged: Mapping[str, float] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Return the source, the signals and the time that they cover, in one line."""
+        span = f"{len(self.time)} samples, {self.time[0]:g} ... {self.time[-1]:g} s"
+        return f"<Record {self.source.name}: {', '.join(self.signals)}; {span}>"
+
     @classmethod
     def from_arrays(
         cls,
