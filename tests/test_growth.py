@@ -13,6 +13,8 @@ from cases import FIRST_ORDER, TIME, TRUTH
 
 import exfit
 
+pytestmark = pytest.mark.long  # each copies the whole package
+
 RECORD = {"file": "record.csv", "time": "t", "channels": {"vt": "vt"}}
 ROOT = Path(exfit.__file__).parent
 RUN = """

@@ -628,7 +628,8 @@ main()
 """
 
 
-@pytest.mark.parametrize("stage", [pytest.param("screening", marks=pytest.mark.long), "refining"])
+@pytest.mark.long
+@pytest.mark.parametrize("stage", ["screening", "refining"])
 def test_ctrl_c_in_a_search_from_many_starts_keeps_the_best_point_and_ends_with_3(stage):
     case = case_file(changed(CASE, ("estimate", {"starts": 20})))
     ran = program(SEARCH_INTERRUPTED.replace("STAGE", stage), "fit", case)
@@ -859,7 +860,16 @@ def test_an_unknown_model_is_told_with_the_known_ones(run, workplace):
     )
 
 
-@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+CHECKED = ("ac1a_typical", "ac8b_on_line", "machine_playback")  # by default: a plant each
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[] if path.stem in CHECKED else [pytest.mark.long])
+        for path in CONFIGS
+    ],
+)
 def test_every_case_of_configs_simulates_and_passes_its_check(run, path):
     assert run("simulate", path, "--no-plots", "-q").code == 0
     ran = run("check", path)

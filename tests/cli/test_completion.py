@@ -47,7 +47,7 @@ complete -C {line}
 """
 
 
-@pytest.fixture(params=SHELLS)
+@pytest.fixture(params=[SHELLS[0], *(pytest.param(s, marks=pytest.mark.long) for s in SHELLS[1:])])
 def shell(request):
     """Skip a shell that is not installed."""
     if shutil.which(request.param) is None:

@@ -7,6 +7,8 @@ import signal
 import pytest
 from interrupted_runs import CASE, TEMPORARY, fit, fit_before, met_by
 
+pytestmark = pytest.mark.long  # fits as processes, one after the other
+
 RUNS = 1  # of each kind; tests/studies/interrupts.py does hundreds
 SEED = 7
 

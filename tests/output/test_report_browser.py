@@ -21,6 +21,8 @@ from exfit.case.load import parse_case
 from exfit.output import run_folder
 from exfit.output.report import write_report
 
+pytestmark = pytest.mark.long  # a browser is started for each page
+
 FLAGS = (
     "--headless",
     "--no-sandbox",
