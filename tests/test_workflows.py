@@ -215,7 +215,7 @@ def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, s
     assert solution.INTERRUPTED_AFTERWARDS in result.notes
 
 
-def test_an_interruption_before_the_second_jacobian_is_told_without_a_note_on_redundance():
+def test_an_interruption_before_the_second_jacobian_is_reported_without_a_note_on_redundance():
     def interrupt(line):
         if line.number == 1:
             raise KeyboardInterrupt

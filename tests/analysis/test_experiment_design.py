@@ -82,7 +82,7 @@ def test_where_the_response_is_linear_twice_the_step_halves_the_errors(plain, na
 
 
 @pytest.mark.parametrize("name", EXCITERS)
-def test_a_step_down_tells_as_much_as_one_up_where_the_response_is_linear(plain, name):
+def test_a_step_down_determines_as_much_as_one_up_where_the_response_is_linear(plain, name):
     up, down = (errors(identify(plain(name, step), VT).own.confidence) for step in (SMALL, -SMALL))
     assert up == pytest.approx(down, rel=2e-3)
 
@@ -111,7 +111,7 @@ def test_more_signals_and_more_time_are_never_worse(plain, name):
 
 
 @pytest.mark.parametrize("name", EXCITERS)
-def test_a_step_as_large_as_the_own_one_tells_the_same(plain, name):
+def test_a_step_as_large_as_the_own_one_determines_the_same(plain, name):
     design = identify(plain(name, 0.05), {})
     assert errors(plans(design)["5 %"]) == pytest.approx(errors(design.own.confidence), rel=EXACT)
     other = identify(plain(name, -0.02), {})
@@ -119,7 +119,7 @@ def test_a_step_as_large_as_the_own_one_tells_the_same(plain, name):
     assert errors(plans(other)["10 %"]) == pytest.approx(errors(larger.own.confidence), rel=EXACT)
 
 
-def test_a_longer_test_tells_what_one_of_twice_the_duration_does(plain):
+def test_a_longer_test_determines_what_one_of_twice_the_duration_does(plain):
     planned = plans(identify(plain("ac1a"), VT))["longer"]
     own = identify(plain("ac1a", duration=20.0), VT).own.confidence
     assert errors(planned) == pytest.approx(errors(own), rel=EXACT)
@@ -179,7 +179,7 @@ def test_the_own_test_is_as_telling_as_the_fit_to_its_record(changed):
     assert errors(told) == pytest.approx(errors(known), rel=0.1)
 
 
-def test_records_of_different_noise_add_what_each_tells(tmp_path):
+def test_records_of_different_noise_add_what_each_determines(tmp_path):
     """The inverses of the covariances add up: each record counts by its own noise."""
     levels = {"up": 1e-4, "down": 1e-3}
     entries = {}

@@ -49,14 +49,14 @@ def with_many(result, count):
     return replace(result, comparisons=(replace(result.comparison, iteration_responses=many),))
 
 
-def test_the_first_course_is_the_start_and_the_last_the_fit(fitted):
+def test_the_first_response_is_the_start_and_the_last_the_fit(fitted):
     found, overlay = fitted.comparison.iteration_responses, judged(fitted.comparison)
     np.testing.assert_array_equal(found.samples[0], overlay.start)
     # the last line of the history holds the fitted values themselves
     np.testing.assert_array_equal(found.samples[-1], overlay.simulated)
 
 
-def test_every_course_costs_what_its_iteration_did(fitted):
+def test_every_response_costs_what_its_iteration_did(fitted):
     found, measured = fitted.comparison.iteration_responses, judged(fitted.comparison).measured
     costs = 0.5 * np.sum((found.samples - measured) ** 2, axis=1)
     lines = {line.number: line.cost for line in fitted.history}
@@ -64,7 +64,7 @@ def test_every_course_costs_what_its_iteration_did(fitted):
     np.testing.assert_allclose(costs, [lines[k] for k in found.numbers], rtol=1e-3)
 
 
-def test_every_record_has_its_own_courses(tmp_path):
+def test_every_record_has_its_own_responses(tmp_path):
     case = case_of(several(recording("up"), recording("down")), tmp_path)
     result = workflows.fit(case)
     run_folder.write_fit(result, tmp_path / "run", figures=False)
@@ -127,7 +127,7 @@ def test_an_interruption_keeps_the_iterations_until_then():
 
 
 @pytest.mark.long
-def test_a_large_record_leaves_no_courses_and_says_so(fitted, monkeypatch, tmp_path):
+def test_a_large_record_leaves_no_responses_and_says_so(fitted, monkeypatch, tmp_path):
     run_folder.write_fit(fitted, tmp_path / "run", figures=True)
     monkeypatch.setattr(iteration_responses, "MOST_SAMPLES", 100)
     result = workflows.fit(load_case(CASE))
@@ -146,7 +146,7 @@ def test_without_figures_the_table_is_written_on_the_record_s_clock(fitted, tmp_
 
 
 @pytest.mark.parametrize("count", [1, 2, 13, 40])
-def test_a_line_is_drawn_for_every_course_and_the_bar_names_first_and_last(fitted, count):
+def test_a_line_is_drawn_for_every_response_and_the_bar_names_first_and_last(fitted, count):
     figure = plots.iterations(with_many(fitted, count))
     assert plots.png(figure)
     responses, errors, *bar = figure.axes
@@ -162,6 +162,6 @@ def test_a_line_is_drawn_for_every_course_and_the_bar_names_first_and_last(fitte
         assert (labels[0], labels[-1]) == ("0", str(count - 1))
 
 
-def test_a_fit_without_courses_has_an_empty_figure(fitted):
+def test_a_fit_without_responses_has_an_empty_figure(fitted):
     bare = replace(fitted, comparisons=(replace(fitted.comparison, iteration_responses=None),))
     assert plots.iterations(bare).axes == []

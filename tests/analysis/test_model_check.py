@@ -72,7 +72,7 @@ def test_a_run_without_a_step_stays_flat(first_order):
     assert found.drift < 1e-12
 
 
-def test_the_drift_of_a_flat_run_can_be_asked_for_alone(first_order):
+def test_the_drift_of_a_flat_run_can_be_computed_alone(first_order):
     (setup,) = build_experiments(first_order)
     one, values = setup.experiment, {"k": 4.0, "a": 2.0} | first_order.values()
     assert flat_drift(one.with_inputs(values), one.parameters(values)) < 1e-12
@@ -101,7 +101,7 @@ def test_it_names_what_is_bypassed_and_what_is_taken_as_typical(tmp_path):
     assert "Tpd0" in machine
 
 
-def test_it_tells_the_sub_steps_of_a_fast_case(tmp_path):
+def test_it_reports_the_sub_steps_of_a_fast_case(tmp_path):
     text = WITHOUT_RECORD + "simulation: {step: 0.1}\n"
     found = check(parse_case(text, tmp_path / "bump.yaml"))
     assert found.step == 0.1
@@ -109,7 +109,7 @@ def test_it_tells_the_sub_steps_of_a_fast_case(tmp_path):
     assert found.substeps >= 5
 
 
-def test_the_error_of_the_step_is_told_and_falls_sixteenfold_with_it():
+def test_the_error_of_the_step_is_reported_and_falls_sixteenfold_with_it():
     text = WITHOUT_RECORD.replace("step: 0.02}]", "step: 0.001}]")  # off the limits
     errors = [
         check(

@@ -143,7 +143,7 @@ def test_an_interruption_keeps_what_is_done():
             assert (side is None) == (end != "")
 
 
-def test_the_progress_is_told_in_sides():
+def test_the_progress_is_reported_in_sides():
     told = []
     profile(case_of("first_order"), ["a"], told.append)
     assert [(one.stage, one.done, one.total) for one in told] == [

@@ -90,8 +90,8 @@ def simulator(smooth=False):
 
 def fitted_step(values):
     """Return a function for the Jacobian of a fit of the step's instant and size as well."""
-    study = simulator(smooth=True)
-    (change,) = study.inputs.steps
+    unit = simulator(smooth=True)
+    (change,) = unit.inputs.steps
     directions = (
         *each(FREE),
         Direction(steps={0: (1.0, 0.0)}),
@@ -102,7 +102,7 @@ def fitted_step(values):
     def run():
         now = next(values)
         moved = change._replace(at=change.at + now["KA"] - VALUES["KA"])
-        return study.with_inputs((moved,), 0.0123).tangents(now, ("vt",), directions)
+        return unit.with_inputs((moved,), 0.0123).tangents(now, ("vt",), directions)
 
     return run
 
@@ -139,7 +139,7 @@ def timed(ways, rounds):
 
 def main():
     in_c, one, slow = loop_in_c(), kernel(1), lsoda()
-    study = simulator()
+    unit = simulator()
     # values asked for a second time in a row cost less: a fit never does
     ever_new = (VALUES | {"KA": VALUES["KA"] + 1e-9 * n} for n in itertools.count())
     error = np.abs(in_c() - one()).max()
@@ -147,9 +147,9 @@ def main():
     ways = {
         "C, gcc -O3 -march=native": in_c,
         "exfit, bare machine code": one,
-        "exfit, sub-steps and samples": lambda: study.samples(next(ever_new), ("vt",)),
+        "exfit, sub-steps and samples": lambda: unit.samples(next(ever_new), ("vt",)),
         "exfit, bare Jacobian of 7": tangents(),
-        "exfit, Jacobian of 7 and samples": lambda: study.tangents(
+        "exfit, Jacobian of 7 and samples": lambda: unit.tangents(
             next(ever_new), ("vt",), each(FREE)
         ),
         "exfit, of 7, a step and the delay": fitted_step(ever_new),

@@ -295,7 +295,7 @@ def test_a_case_may_be_made_of_tuples_and_numbers_of_numpy():
     assert case.folder == Path()
 
 
-def test_all_faults_of_a_case_made_in_python_are_told_with_their_places():
+def test_all_faults_of_a_case_made_in_python_are_reported_with_their_places():
     content = yaml.safe_load(EXAMPLE)
     content["parameters"]["free"]["KA"]["start"] = None
     content["modle"] = content.pop("model")
@@ -491,7 +491,7 @@ FAULTS = FORM | MEANING
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_told_with_its_line_place_value_and_limit(case_file, fault):
+def test_a_fault_is_reported_with_its_line_place_value_and_limit(case_file, fault):
     old, new, place, named = FAULTS[fault]
     base = changed("quadratic", "exponential") if "logarithm" in fault else EXAMPLE
     text = changed(old, new, base)
@@ -851,7 +851,7 @@ def test_numbers_in_kv_are_not_taken_for_per_unit(case_file, tmp_path, started, 
         assert len(measured(case, case.test, case.record).time) == 3
 
 
-def test_a_missing_record_is_told_when_it_is_read(case_file):
+def test_a_missing_record_is_reported_when_it_is_read(case_file):
     case = load_case(case_file(EXAMPLE))
     with pytest.raises(RecordError, match=r"up\.csv: cannot be read"):
         measured(case, case.test, case.record)

@@ -96,7 +96,7 @@ def test_steps_and_switches_of_the_source_follow_each_other(tmp_path):
         simulate(load_case(written(tmp_path, *source, (steps, gone))), {})
 
 
-def test_a_machine_that_falls_out_of_step_is_told(tmp_path):
+def test_a_machine_that_falls_out_of_step_is_reported(tmp_path):
     assert not any("out of step" in n for n in simulate(load_case(written(tmp_path)), {}).notes)
     case = load_case(written(tmp_path, ("{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}", "{at: 3, X: 5}")))
     assert any("falls out of step at" in note for note in simulate(case, {}).notes)
@@ -204,7 +204,7 @@ def test_a_stabiliser_on_open_circuit_is_said_not_to_act(tmp_path):
         ("infinite-bus", "none", "stabiliser: not allowed with plant none"),
     ],
 )  # fmt: skip
-def test_a_fault_on_load_is_told_with_its_place(tmp_path, old, new, says):
+def test_a_fault_on_load_is_reported_with_its_place(tmp_path, old, new, says):
     path = written(tmp_path, (old, new))
     with pytest.raises(CaseError) as refused:
         load_case(path)

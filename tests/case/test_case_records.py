@@ -426,7 +426,7 @@ def test_the_example_is_sound():
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_told_with_its_place_and_limit_and_brings_no_others(fault):
+def test_a_fault_is_reported_with_its_place_and_limit_and_brings_no_others(fault):
     place, value, told_at, text = FAULTS[fault]
     told = [fault.split(": ", 2) for fault in faults_of(changed(place, value))]
     assert {where for _, where, _ in told} == {shown(told_at)}
@@ -557,7 +557,7 @@ def test_auto_needs_vt_in_the_record():
         ),
     ],
 )
-def test_what_does_not_go_with_a_record_that_drives_is_refused(place, value, told_at, text):
+def test_what_is_not_allowed_with_a_record_that_drives_is_refused(place, value, told_at, text):
     told = [fault.split(": ", 2) for fault in faults_of(changed(place, value, PLAYBACK))]
     assert [where for _, where, _ in told] == [shown(told_at)]
     assert text in told[0][2]
@@ -570,7 +570,7 @@ def test_what_does_not_go_with_a_record_that_drives_is_refused(place, value, tol
         ({"start": 1, "min": 2, "max": 0}, "test.vref[0].at.min", "2 is not below max = 0"),
     ],
 )
-def test_an_unknown_of_a_test_without_a_record_is_checked_too(value, told_at, text):
+def test_a_nuisance_of_a_test_without_a_record_is_checked_too(value, told_at, text):
     (told,) = faults_of(changed(("test", "vref", 0, "at"), value, ALONE))
     assert told.endswith(f": {told_at}: {text}")
 

@@ -239,14 +239,14 @@ def test_no_text_does_anything_but_become_a_tie_or_an_error(body):
         ("=1/0", {}, "=1/0: division by zero"),
     ],
 )
-def test_what_has_no_finite_value_is_told_with_its_names(text, values, message):
+def test_what_has_no_finite_value_is_reported_with_its_names(text, values, message):
     tie = parse(text)
     for computed in (tie.value, tie.slopes):
         with pytest.raises(TieError, match=re.escape(message)):
             computed(values)
 
 
-def test_a_slope_that_is_not_finite_is_an_error_only_where_it_is_asked_for():
+def test_a_slope_that_is_not_finite_is_an_error_only_where_it_is_needed():
     tie = parse("=KE**0.5")
     assert tie.value({"KE": 0.0}) == 0.0
     with pytest.raises(TieError, match="the slope to KE is not finite at KE = 0"):

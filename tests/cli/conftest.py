@@ -1,19 +1,31 @@
 """Fixtures of the tests of commands."""
 
 import pytest
+from commands import Ran
 
 from exfit import cli
 
 
 @pytest.fixture
 def run(capsys):
-    """Return a function that runs a command as the shell does: code, output, errors."""
+    """Return a function that runs a command as the shell does."""
 
     def command(*arguments):
         capsys.readouterr()
         with pytest.raises(SystemExit) as ended:
-            cli.main(args=[str(one) for one in arguments], prog_name="exfit")
-        found = capsys.readouterr()
-        return int(ended.value.code or 0), found.out, found.err
+            cli.main(args=[str(argument) for argument in arguments], prog_name="exfit")
+        printed = capsys.readouterr()
+        return Ran(int(ended.value.code or 0), printed.out, printed.err)
 
     return command
+
+
+@pytest.fixture
+def empty_folder(tmp_path, monkeypatch):
+    """Work in an empty folder, in no terminal."""
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "COLUMNS"):
+        monkeypatch.delenv(name, raising=False)
+    place = tmp_path / "work"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    return place

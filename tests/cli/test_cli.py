@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import yaml
 from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH
+from commands import Ran
 from places import ROOT
 from rich.console import Console
 
@@ -53,37 +54,9 @@ MACHINE_CASE = {
 }
 
 
-@dataclass(frozen=True)
-class Ran:
-    """What a command left on the terminal."""
-
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def run(capsys):
-    """Return a function that runs a command as the shell does."""
-
-    def command(*arguments):
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            cli.main(args=[str(one) for one in arguments], prog_name="exfit")
-        found = capsys.readouterr()
-        return Ran(int(ended.value.code or 0), found.out, found.err)
-
-    return command
-
-
 @pytest.fixture(autouse=True)
-def workplace(tmp_path, monkeypatch):
+def workplace(empty_folder):
     """Work in an empty folder with the records of CASE, in no terminal."""
-    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "COLUMNS"):
-        monkeypatch.delenv(name, raising=False)
-    place = tmp_path / "work"
-    place.mkdir()
-    monkeypatch.chdir(place)
     records = {
         "up.csv": TRUTH,
         "down.csv": 2.0 - TRUTH,
@@ -91,9 +64,9 @@ def workplace(tmp_path, monkeypatch):
         "unit.csv": 1.0 + 0.05 * (1.0 - np.exp(-3.0 * np.maximum(TIME - 0.5, 0.0))),
     }
     for name, samples in records.items():
-        (place / name).write_text(csv_text(TIME, samples))
-    (place / "values.yaml").write_text("parameters: {k: 4.0, a: 2.0}\n")
-    return place
+        (empty_folder / name).write_text(csv_text(TIME, samples))
+    (empty_folder / "values.yaml").write_text("parameters: {k: 4.0, a: 2.0}\n")
+    return empty_folder
 
 
 def program(code, *arguments):
@@ -230,7 +203,7 @@ def is_refused(ran, words, before, folder):
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("fault", CASE_FAULTS)
-def test_a_fault_of_the_case_is_told_and_nothing_is_written(run, workplace, fault, command):
+def test_a_fault_of_the_case_is_reported_and_nothing_is_written(run, workplace, fault, command):
     base, changes, words = CASE_FAULTS[fault]
     if base is MACHINE_CASE:
         Path("values.yaml").write_text("parameters: {KA: 400.0}\n")
@@ -241,7 +214,7 @@ def test_a_fault_of_the_case_is_told_and_nothing_is_written(run, workplace, faul
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("fault", RECORD_FAULTS)
-def test_a_fault_of_the_record_is_told_and_nothing_is_written(run, workplace, fault, command):
+def test_a_fault_of_the_record_is_reported_and_nothing_is_written(run, workplace, fault, command):
     text, words = RECORD_FAULTS[fault]
     if text is None:
         Path("up.csv").unlink()
@@ -252,14 +225,14 @@ def test_a_fault_of_the_record_is_told_and_nothing_is_written(run, workplace, fa
 
 
 @pytest.mark.parametrize("command", ["fit", "validate"])
-def test_a_fault_of_a_validation_is_told_before_anything_is_written(run, workplace, command):
+def test_a_fault_of_a_validation_is_reported_before_anything_is_written(run, workplace, command):
     Path("down.csv").unlink()
     case, before = case_file(), listing(workplace)
     is_refused(run(*arguments(command, case)), ["down.csv", "No such file"], before, workplace)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_case_that_does_not_exist_is_told(run, workplace, command):
+def test_a_case_that_does_not_exist_is_reported(run, workplace, command):
     before = listing(workplace)
     is_refused(run(*arguments(command, "none.yaml")), ["none.yaml", "No such"], before, workplace)
 
@@ -287,7 +260,7 @@ def test_a_fit_needs_a_record_but_a_simulation_does_not(run, workplace):
     assert run("check", case).code == 0
 
 
-def test_all_faults_of_a_case_are_told_at_once(run):
+def test_all_faults_of_a_case_are_reported_at_once(run):
     case = case_file(changed(CASE, ("model", "AC1B"), ("test.vref.0.at", "x"), ("accept", {})))
     ran = run("fit", case)
     assert ran.code == 1
@@ -315,7 +288,7 @@ def test_all_faults_of_a_case_are_told_at_once(run):
         (["--parameters", "symbol.yaml"], ["symbol.yaml", "KQ"]),
     ],
 )
-def test_a_wrong_value_is_told_and_nothing_is_written(run, workplace, given, words):
+def test_a_wrong_value_is_reported_and_nothing_is_written(run, workplace, given, words):
     Path("other.yaml").write_text("model: AC8B\nparameters: {k: 1.0}\n")
     Path("text.yaml").write_text("parameters: {k: four}\n")
     Path("symbol.yaml").write_text("parameters: {KQ: 1.0}\n")
@@ -325,7 +298,9 @@ def test_a_wrong_value_is_told_and_nothing_is_written(run, workplace, given, wor
 
 @pytest.mark.parametrize("command", ["fit", "simulate", "validate"])
 @pytest.mark.parametrize("place", ["taken", "taken/below"])
-def test_an_output_that_cannot_be_a_folder_is_told_before_the_work(run, workplace, command, place):
+def test_an_output_that_cannot_be_a_folder_is_reported_before_the_work(
+    run, workplace, command, place
+):
     Path("taken").write_text("mine")
     case, before = case_file(), listing(workplace)
     ran = run(*arguments(command, case), "-o", place)
@@ -525,7 +500,7 @@ def test_a_record_that_is_called_fit_is_not_taken_for_the_fitted_one(run):
     assert len(list(Path("runs/case-validate").glob("*.csv"))) == 2
 
 
-def test_a_record_that_does_not_exist_is_told(run, workplace):
+def test_a_record_that_does_not_exist_is_reported(run, workplace):
     case, before = case_file(), listing(workplace)
     ran = run("validate", case, "--parameters", "values.yaml", "--record", "none.csv")
     is_refused(ran, ["none.csv", "No such file"], before, workplace)
@@ -795,7 +770,7 @@ def test_a_model_of_the_user_s_own_gives_the_same_fit(run):
         pytest.param("error = vfe / p.KA", "error = vfe", ["rest"], id="rest that moves"),
     ],
 )
-def test_a_broken_model_of_the_user_s_own_is_told(run, workplace, monkeypatch, old, new, words):
+def test_a_broken_model_of_the_user_s_own_is_reported(run, workplace, monkeypatch, old, new, words):
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     assert OWN.count(old) >= 1
     case = own_case(OWN.replace(old, new, 1))
@@ -854,7 +829,7 @@ def test_a_data_sheet_holds_every_parameter_with_its_meaning(run, name):
         assert set(row.meaning.split()) <= words
 
 
-def test_an_unknown_model_is_told_with_the_known_ones(run, workplace):
+def test_an_unknown_model_is_reported_with_the_known_ones(run, workplace):
     is_refused(
         run("models", "AC1B"), ["AC1B", "AC1A", "did you mean"], listing(workplace), workplace
     )

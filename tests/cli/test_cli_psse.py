@@ -27,15 +27,10 @@ WIDTH = 80
 
 
 @pytest.fixture(autouse=True)
-def workplace(tmp_path, monkeypatch):
+def workplace(empty_folder):
     """Work in a folder that holds nothing but unit.dyr."""
-    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "COLUMNS"):
-        monkeypatch.delenv(name, raising=False)
-    place = tmp_path / "work"
-    place.mkdir()
-    monkeypatch.chdir(place)
     Path("unit.dyr").write_text(SOUND)
-    return place
+    return empty_folder
 
 
 def listing(folder):
@@ -139,7 +134,7 @@ def test_a_damaged_file_ends_in_a_message_or_a_sound_case(run, seed):
         (["empty.dyr"], "empty.dyr: holds no record of a unit"),
     ],
 )
-def test_a_file_that_is_none_is_told(run, arguments, words):
+def test_a_file_that_is_none_is_reported(run, arguments, words):
     Path("empty.dyr").write_text("// nothing\n")
     code, out, err = run("import", *arguments)
     assert (code, out) == (1, "")
@@ -329,7 +324,7 @@ def test_a_form_of_saturation_that_psse_does_not_have_is_warned_of(run, fitted):
     assert "PSS/E takes E1 SE1 E2 SE2 as quadratic" in run("export", fitted)[2]
 
 
-def test_an_order_that_is_in_doubt_is_told_twice(run, fitted_ac8b):
+def test_an_order_that_is_in_doubt_is_reported_twice(run, fitted_ac8b):
     doubt = MODELS["AC8B"].records[0].doubt
     code, out, err = run("export", fitted_ac8b)
     assert code == 0
@@ -363,7 +358,7 @@ def test_what_another_record_cannot_hold_is_named_with_its_value(run, fitted_ac8
         ({"parameters": {"KA": of_value("1")}}, "parameters.KA.value: '1' is not a number"),
     ],
 )
-def test_a_result_that_cannot_be_written_is_told(run, fitted, workplace, changes, words):
+def test_a_result_that_cannot_be_written_is_reported(run, fitted, workplace, changes, words):
     named(fitted, **changes)
     before = listing(workplace)
     code, out, err = run("export", fitted, "-o", "out.dyr")
@@ -384,7 +379,7 @@ def test_a_result_that_cannot_be_written_is_told(run, fitted, workplace, changes
         (None, "No such file"),
     ],
 )
-def test_a_file_that_is_no_result_is_told(run, content, words):
+def test_a_file_that_is_no_result_is_reported(run, content, words):
     if content is not None:
         Path("result.json").write_bytes(content)
     code, out, err = run("export", "result.json")
@@ -392,7 +387,7 @@ def test_a_file_that_is_no_result_is_told(run, content, words):
     assert words in err
 
 
-def test_a_record_that_the_model_is_not_written_as_is_told_with_those_it_is(run, fitted):
+def test_a_record_that_the_model_is_not_written_as_is_reported_with_those_it_is(run, fitted):
     code, _, err = run("export", fitted, "--model", "ESAC1")
     assert code == 1
     assert "--model ESAC1: not a record of AC1A; did you mean ESAC1A?" in err

@@ -17,16 +17,11 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 
 @pytest.fixture(autouse=True)
-def workplace(tmp_path, monkeypatch):
+def workplace(empty_folder, monkeypatch):
     """Work in a folder that holds nothing but up.csv, in no terminal; draw with few dots."""
-    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "COLUMNS"):
-        monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(plots.style, "DPI", 40)
-    place = tmp_path / "work"
-    place.mkdir()
-    monkeypatch.chdir(place)
     shutil.copy(SAMPLE, "up.csv")
-    return place
+    return empty_folder
 
 
 def suggested(out):
@@ -89,7 +84,7 @@ def test_a_column_of_time_can_be_named(run):
     assert "time: clock" in out
 
 
-def test_the_unit_of_the_time_can_be_told(run):
+def test_the_unit_of_the_time_can_be_given(run):
     rows = [f"{10 * k},{1 + 1e-4 * np.sin(9 * k):.6f}" for k in range(50)]
     Path("ms.csv").write_text("\n".join(["t,vt", *rows]) + "\n")
     code, out, _ = run("inspect", "ms.csv", "--no-plots", "--time-unit", "ms")

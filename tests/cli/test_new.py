@@ -146,7 +146,7 @@ def test_a_plants_record_leaves_the_base_of_its_voltage_and_the_step_open(tmp_pa
     assert load_case(path).record.channels["vt"].outliers == 6
 
 
-def test_on_load_the_record_tells_power_and_the_network_is_asked_for(tmp_path):
+def test_on_load_the_record_gives_power_and_the_network_is_required(tmp_path):
     time = np.arange(0.0, 5.0, 0.01)
     rng = np.random.default_rng(4)
     levels = {"vt": 1.0, "p": 0.8, "q": 0.1}

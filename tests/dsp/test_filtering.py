@@ -1,4 +1,4 @@
-"""Conditioning: lost samples are bridged, filters have no delay, tangents are exact."""
+"""Filtering: lost samples are bridged, filters have no delay, tangents are exact."""
 
 import numpy as np
 import pytest

@@ -228,7 +228,7 @@ def test_an_interruption_keeps_the_points_so_far(calls):
     assert set(one.at) <= set(whole.at)
 
 
-def test_watch_is_told_every_side_and_may_interrupt():
+def test_watch_receives_every_side_and_may_interrupt():
     found = enzyme_minimum()
     told = []
 

@@ -187,7 +187,7 @@ def test_minima_of_equal_cost_at_other_places_are_two():
     assert found.minima[0].cost == pytest.approx(found.minima[1].cost, rel=1e-9)
 
 
-def test_watch_is_told_of_both_stages():
+def test_watch_receives_both_stages():
     told = []
     found = multistart(*HIMMELBLAU, COUNT, refine=10, watch=told.append)
     for stage, total in zip(STAGES, (COUNT, 10), strict=True):

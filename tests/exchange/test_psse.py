@@ -218,7 +218,7 @@ def test_a_case_holds_the_numbers_of_its_file(definition):
 
 
 @pytest.mark.parametrize("seed", range(300))
-def test_a_damaged_file_is_told_with_its_line_or_is_sound(seed, tmp_path):
+def test_a_damaged_file_is_reported_with_its_line_or_is_sound(seed, tmp_path):
     random = np.random.default_rng(seed)
     path = tmp_path / "unit.dyr"
     path.write_bytes(garbage(SAMPLE.read_bytes(), random))
@@ -301,13 +301,13 @@ def test_a_fault_names_its_line_the_value_and_the_limit(fault):
     assert words in "\n".join(fault_of(replaced(old, new)))
 
 
-def test_a_unit_without_an_exciter_is_told_with_those_that_could_be_read():
+def test_a_unit_without_an_exciter_is_reported_with_those_that_could_be_read():
     (fault,) = fault_of(SOUND.splitlines()[0] + "\n1 IEEEG1 1 2 3 /")
     assert fault.startswith("unit.dyr:1: bus 1, id 1: has no exciter; known: ")
     assert "ESAC1A" in fault
 
 
-def test_all_faults_of_a_unit_are_told_at_once_in_the_order_of_their_lines():
+def test_all_faults_of_a_unit_are_reported_at_once_in_the_order_of_their_lines():
     text = replaced(" 766 ", " x ", replaced(" 1.3 ", " -1 ", replaced(" .12 ", " -1 ")))
     assert [fault.split(": ")[:3] for fault in fault_of(text)] == [
         ["unit.dyr:1", "GENROU", "S10"],
@@ -373,7 +373,7 @@ def test_what_other_units_and_devices_hold_is_no_fault():
         ("1 'USRMDL' 1 'MYGOV' 5 0 0 /", "USRMDL MYGOV is left out: not a known model"),
     ],
 )
-def test_what_is_left_out_is_told_and_stands_in_the_case(record, words):
+def test_what_is_left_out_is_reported_and_written_in_the_case(record, words):
     unit = read_unit(SOUND + record, "unit.dyr")
     assert unit.warnings == ((5, words),)
     assert f"# Line 5: {words}." in case_text(unit, "unit.dyr").splitlines()

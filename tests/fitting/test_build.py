@@ -1,4 +1,4 @@
-"""From a case to its trial: every word of the case that a simulation or a fit must heed."""
+"""From a case to its experiments: all of the case that a simulation or a fit depends on."""
 
 from copy import deepcopy
 
@@ -123,7 +123,7 @@ def test_a_jacobian_costs_the_simulations_of_its_kind(load, jacobian, runs):
     assert 0 <= found.simulations - (found.nfev + runs * found.njev) <= 1
 
 
-def test_a_fit_that_ends_where_the_response_has_no_slope_tells_what_it_found(load, tmp_path):
+def test_a_fit_that_ends_where_the_response_has_no_slope_reports_what_it_found(load, tmp_path):
     """The gain goes with the root of c, which is steepest where the best c lies: on its bound 0."""
     text = (ROOT / "exfit" / "models" / "exciters" / "first_order.py").read_text()
     text = text.replace("p.k", "(p.k + sqrt(p.c))")

@@ -1,4 +1,4 @@
-"""Condensed records: the same cost, gradient and J'J as those of all samples, and when not."""
+"""Compressed records: the same cost, gradient and J'J as those of all samples, and when not."""
 
 import numpy as np
 import pytest

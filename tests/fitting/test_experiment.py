@@ -79,7 +79,7 @@ WINDOW = 0.1  # s: so wide that what it does is far above rounding
 
 
 def averaged(setup, filter=None, kept=None):
-    """Return a trial whose record holds averages already."""
+    """Return a setup whose record holds averages already."""
     time = setup.record.time
     kept = np.ones(len(time), dtype=bool) if kept is None else kept
     alike = Filtering(time, kept, filter, MovingAverage(WINDOW))
@@ -88,7 +88,7 @@ def averaged(setup, filter=None, kept=None):
 
 
 def averaged_case(folder, filter=None, lost=0):
-    """Return the case of the step up, and its trial with a record of averages."""
+    """Return the case of the step up, and its setup with a record of averages."""
     content = several(
         recording("up"), free={name: found_in(*where) for name, where in NEAR.items()}
     )

@@ -32,7 +32,7 @@ from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
 TIMES = np.linspace(0.0, 2.0, 101)
-COURSE = Inputs(0.0, 2.0, (InputStep(0.5, 0.005),))
+INPUTS = Inputs(0.0, 2.0, (InputStep(0.5, 0.005),))
 WEIGHTS = {"vt": 1.0, "efd": 0.01, "ifd": 0.5}
 
 
@@ -42,7 +42,7 @@ def free_names(exciter):
     values = lively_values(exciter)
     rows = [row.symbol for row in MODELS[exciter].sheet if values[row.symbol] > 0.0]
     names = tuple(symbol for symbol in rows if not symbol.endswith(("MAX", "MIN")))
-    simulator = Simulator(system_of(exciter), COURSE, TIMES, 1e-3)
+    simulator = Simulator(system_of(exciter), INPUTS, TIMES, 1e-3)
     slopes = simulator.tangents(values, ("vt",), each(names))[1]
     moved = dict(zip(names, np.abs(slopes[:, 0]).max(axis=0), strict=True))
     return sorted(names, key=lambda name: values[name] * moved[name])[-5:]
@@ -51,7 +51,7 @@ def free_names(exciter):
 def problem(exciter, logarithmic=True, signals=("vt",), offset=0.01, **bounds):
     """Return residuals against a record that is everywhere ``offset`` above the truth."""
     values = lively_values(exciter)
-    simulator = Simulator(system_of(exciter), COURSE, TIMES, 1e-3)
+    simulator = Simulator(system_of(exciter), INPUTS, TIMES, 1e-3)
     truth = simulator.samples(values, signals)[0]
     channels = [
         Channel(name, truth[:, k] + offset, WEIGHTS[name]) for k, name in enumerate(signals)

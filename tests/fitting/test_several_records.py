@@ -251,7 +251,7 @@ def test_a_tie_across_the_parts_follows(tmp_path):
     assert (values["machine.Tppd0"], values["TF"]) == (0.025, 1.25)
 
 
-def test_a_tie_without_a_value_is_told(tmp_path):
+def test_a_tie_without_a_value_is_reported(tmp_path):
     content = single()
     content["parameters"]["fixed"]["SE1"] = "=0.1*KE/(KE+KF-0.0444)"
     case = case_of(content, tmp_path)
@@ -511,7 +511,7 @@ def test_a_check_covers_all_records_and_what_is_found_about_them(tmp_path):
     assert found.flat
 
 
-def test_a_fit_tells_what_is_of_the_unit_from_what_is_of_the_records(tmp_path):
+def test_a_fit_distinguishes_what_is_of_the_unit_from_what_is_of_the_records(tmp_path):
     content = three_free(several(recording("up", delay=found_in(0.0, -0.1, 0.1))))
     content["records"][0]["test"]["vt0"] = 1.0
     found = fit(case_of(content, tmp_path))
@@ -521,7 +521,7 @@ def test_a_fit_tells_what_is_of_the_unit_from_what_is_of_the_records(tmp_path):
     assert [one.name for one in found.comparisons] == ["up"]
 
 
-def test_many_starts_end_at_one_minimum_with_unknowns_too(tmp_path):
+def test_many_starts_end_at_one_minimum_with_nuisances_too(tmp_path):
     content = three_free(several(recording("up", step=found_in(0.045, 0.02, 0.08))))
     content["records"][0]["test"]["vt0"] = 1.0
     content["parameters"]["free"] = {"KA": found_in(300.0, 100.0, 1000.0)}

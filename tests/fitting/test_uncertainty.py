@@ -1,4 +1,4 @@
-"""What whole fits tell of their parameters: figures of known cases, promises kept, sentences."""
+"""What whole fits determine of their parameters: figures of known cases, promises, sentences."""
 
 from dataclasses import replace
 
@@ -242,7 +242,7 @@ def test_intervals_of_a_fit_are_widened_for_noise_that_is_not_white():
 
 
 @pytest.mark.parametrize(("name", "bent"), [("first_order", False), ("ac1a_typical", True)])
-def test_a_response_that_is_not_linear_over_the_intervals_is_told(name, bent):
+def test_a_response_that_is_not_linear_over_the_intervals_is_reported(name, bent):
     """The check system is nearly linear; AC1A meets its limits within the interval of KA."""
     found = fit(case_of(name)).knowledge
     assert ("KA" in found.nonlinear) == bent

@@ -325,7 +325,7 @@ def test_who_moves_little_in_a_redundancy_takes_part_in_it_too():
         assert last.std_error is not None
 
 
-def test_redundancies_that_have_nothing_to_do_with_each_other_are_told_apart():
+def test_redundancies_that_have_nothing_to_do_with_each_other_are_distinguished():
     rng = np.random.default_rng(16)
     first, second = rng.standard_normal((2, 50, 1))
     rows = np.hstack([first, second, 3.0 * first, -second, rng.standard_normal((50, 1))])
@@ -355,7 +355,7 @@ def test_what_has_no_effect_is_said_to_have_none():
     assert known.parameters["b"].std_error is None
 
 
-def test_a_wide_standard_error_is_told_but_no_interval():
+def test_a_wide_standard_error_is_reported_but_no_interval():
     errors = np.random.default_rng(19).standard_normal(400)
     known = confidence(linearised([1.0], 8.0 * errors, np.ones((400, 1))))
     one = known.parameters["a"]

@@ -134,7 +134,7 @@ def test_fixing_one_of_two_redundant_parameters_gives_the_other():
     assert one.sentence == f"with {one.names[0]} fixed, {other} is known to {100 * expected:.2g} %"
 
 
-def test_redundancies_that_have_nothing_to_do_with_each_other_are_told_apart():
+def test_redundancies_that_have_nothing_to_do_with_each_other_are_distinguished():
     rng = np.random.default_rng(5)
     first, second, third = rng.standard_normal((3, SAMPLES))
     rows = np.column_stack([first, second, -first, 5.0 * second, third])

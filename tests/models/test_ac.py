@@ -161,8 +161,8 @@ def test_the_clamp_of_exac4_winds_up_and_the_limit_of_ac4a_does_not():
     up_and_down = {}
     for name in ("AC4A", "EXAC4"):
         values = typical_values(name)
-        course = Inputs(0.0, 1.0, (InputStep(0.1, 0.5), InputStep(0.6, -0.5)))
-        simulator = Simulator(system_of(name), course, np.linspace(0.0, 1.0, 1001), 1e-3)
+        inputs = Inputs(0.0, 1.0, (InputStep(0.1, 0.5), InputStep(0.6, -0.5)))
+        simulator = Simulator(system_of(name), inputs, np.linspace(0.0, 1.0, 1001), 1e-3)
         up_and_down[name] = simulator.response(values, ("efd",)).signals["efd"]
     held = {name: efd[600:] >= 5.64 - 1e-9 for name, efd in up_and_down.items()}
     assert not held["AC4A"][2:].any()
@@ -227,11 +227,11 @@ def test_a_step_is_that_of_another_simulator(name, ours, vt, efd):
     program. Rounded constants have no part in it: neither model has a rectifier; saturation is
     quadratic in both.
     """
-    _, values, course, columns, told = reference(f"andes_{name}_up5")
-    simulator = Simulator(system_of(ours), course, columns["t"], 1e-3)
+    _, values, inputs, columns, described = reference(f"andes_{name}_up5")
+    simulator = Simulator(system_of(ours), inputs, columns["t"], 1e-3)
     assert values.keys() == set(simulator.system.parameters)
     got = simulator.response(values).signals
-    assert got["vref"][0] == pytest.approx(told["vref_initial"], abs=1e-9)
+    assert got["vref"][0] == pytest.approx(described["vref_initial"], abs=1e-9)
     assert np.abs(got["vt"] - columns["vt"]).max() < vt
     assert np.abs(got["efd"] - columns["efd"]).max() < efd
     assert np.abs(got["ifd"] - columns["ifd"]).max() < efd

@@ -214,7 +214,7 @@ def test_the_inner_arcs_of_the_rectifier_meet_without_a_kink(IN):
 
 @laws
 @given(st.floats(1e-3, 20.0), st.floats(0.0, 20.0))
-def test_the_supply_of_a_rectifier_gives_what_was_asked_for(efd, load):
+def test_the_supply_of_a_rectifier_gives_what_is_required(efd, load):
     ve = rectifier_supply(efd, load)
     assert rectifier(ve, load) == pytest.approx(efd, abs=1e-13 * (efd + load) * 10)
 

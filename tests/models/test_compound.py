@@ -172,8 +172,8 @@ def test_a_small_step_on_a_machine_without_saturation_is_that_of_the_diagram(
     transducer = lag(1.0, values.get("TR", 0.0))
     closed = machine.fed_back(-1.0 * Y + X * transducer) * X
     expected = size * closed.step(times)
-    course = Inputs(0.0, 3.0, (InputStep(0.0, size),))
-    simulator = Simulator(system_of(name, "ONE_AXIS"), course, times, 5e-4)
+    inputs = Inputs(0.0, 3.0, (InputStep(0.0, size),))
+    simulator = Simulator(system_of(name, "ONE_AXIS"), inputs, times, 5e-4)
     got = simulator.response(values, ("vt",)).signals["vt"] - 1.0
     assert np.abs(expected).max() > 0.3 * size
     assert np.abs(got - expected).max() < 5e-5 * size
@@ -206,9 +206,9 @@ CEILINGS = [
 @pytest.mark.parametrize(("name", "changes", "ceiling"), CEILINGS)
 def test_a_large_step_drives_the_field_to_its_ceiling_and_back(name, changes, ceiling):
     values = typical_values(name) | changes
-    course = Inputs(0.0, 20.0, (InputStep(0.5, 0.4), InputStep(1.5, -0.4)))
+    inputs = Inputs(0.0, 20.0, (InputStep(0.5, 0.4), InputStep(1.5, -0.4)))
     times = np.linspace(0.0, 20.0, 2001)
-    got = Simulator(system_of(name), course, times, 1e-3).response(values).signals
+    got = Simulator(system_of(name), inputs, times, 1e-3).response(values).signals
     expected = np.array(
         [ceiling(values, vt, ifd) for vt, ifd in zip(got["vt"], got["ifd"], strict=True)]
     )
@@ -307,10 +307,10 @@ def test_an_underexcitation_limiter_takes_the_error_over_when_it_is_larger(name)
 
 
 def test_a_step_of_sexs_is_that_of_another_simulator():
-    _, values, course, columns, told = reference("andes_sexs_up5")
-    simulator = Simulator(system_of("SEXS"), course, columns["t"], 1e-3)
+    _, values, inputs, columns, described = reference("andes_sexs_up5")
+    simulator = Simulator(system_of("SEXS"), inputs, columns["t"], 1e-3)
     got = simulator.response(values).signals
-    assert got["vref"][0] == pytest.approx(told["vref_initial"], abs=1e-9)
+    assert got["vref"][0] == pytest.approx(described["vref_initial"], abs=1e-9)
     # what its trapezoidal rule errs by at 1 ms, several times over
     assert np.abs(got["vt"] - columns["vt"]).max() < 1e-6
     assert np.abs(got["ifd"] - columns["ifd"]).max() < 5e-6

@@ -42,10 +42,10 @@ def vx(e):
 
 def respond(name, values, *changes, end=3.0, outputs=("vt", "efd")):
     """Return the outputs (M, ny) every 10 ms."""
-    course = Inputs(0.0, end, tuple(InputStep(*change) for change in changes))
+    inputs = Inputs(0.0, end, tuple(InputStep(*change) for change in changes))
     times = np.linspace(0.0, end, round(100 * end) + 1)
     system = system_of(name, "ONE_AXIS")
-    return Simulator(system, course, times, 1e-3).samples(values, outputs)[0]
+    return Simulator(system, inputs, times, 1e-3).samples(values, outputs)[0]
 
 
 # --- another simulator ----------------------------------------------------------------------------
@@ -54,11 +54,11 @@ def respond(name, values, *changes, end=3.0, outputs=("vt", "efd")):
 @pytest.mark.parametrize("name", ["ieeet1", "esdc2a"])
 def test_a_bump_up_is_that_of_another_simulator(name):
     """Nothing is rounded there: what differs is its trapezoidal rule at 1 ms."""
-    model, values, course, columns, told = reference(f"reference_{name}")
+    model, values, inputs, columns, described = reference(f"reference_{name}")
     system = system_of(model)
     assert values.keys() == set(system.parameters)
-    got = Simulator(system, course, columns["t"], 1e-3).response(values).signals
-    assert got["vref"][0] == pytest.approx(told["vref_initial"], abs=1e-9)
+    got = Simulator(system, inputs, columns["t"], 1e-3).response(values).signals
+    assert got["vref"][0] == pytest.approx(described["vref_initial"], abs=1e-9)
     assert np.abs(got["vt"] - columns["vt"]).max() < 5e-7
     assert np.abs(got["efd"] - columns["efd"]).max() < 5e-5
     assert np.abs(got["ifd"] - columns["ifd"]).max() < 5e-6

@@ -222,8 +222,8 @@ def test_halving_the_step_cuts_the_error_sixteenfold(model):
 def responses(model, sets, saturation="quadratic", size=0.3):
     """Return vt and the last state after a large bump up and down, for each set."""
     system = system_of(model, saturation=saturation)
-    course = Inputs(0.0, 4.0, (InputStep(0.1, size), InputStep(2.0, -2 * size)))
-    simulator = Simulator(system, course, np.linspace(0.0, 4.0, 81), 1e-3)
+    inputs = Inputs(0.0, 4.0, (InputStep(0.1, size), InputStep(2.0, -2 * size)))
+    simulator = Simulator(system, inputs, np.linspace(0.0, 4.0, 81), 1e-3)
     return [simulator.samples(values, ("vt",))[0] for values in sets]
 
 

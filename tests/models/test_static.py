@@ -134,8 +134,8 @@ def test_a_large_step_reaches_the_ceiling_or_the_floor_of_the_standard(name, vt)
 @pytest.mark.parametrize("name", STATIC)
 def test_the_output_never_leaves_the_limits_in_a_large_bump(name):
     system, values = system_of(name), lively_values(name)
-    course = Inputs(0.0, 20.0, (InputStep(0.1, 1.0), InputStep(2.0, -1.9), InputStep(4.0, 0.9)))
-    simulator = Simulator(system, course, np.linspace(0.0, 20.0, 2001), 1e-3)
+    inputs = Inputs(0.0, 20.0, (InputStep(0.1, 1.0), InputStep(2.0, -1.9), InputStep(4.0, 0.9)))
+    simulator = Simulator(system, inputs, np.linspace(0.0, 20.0, 2001), 1e-3)
     found = simulator.response(values).signals
     pairs = zip(found["vt"], found["ifd"], strict=True)
     high, low = np.array([(ceiling(name, values, *a), floor(name, values, *a)) for a in pairs]).T
@@ -153,8 +153,8 @@ def test_exst1_winds_up_behind_its_clamp_and_st1a_does_not():
     def time_at_the_ceiling(name, **changes):
         values = wide(name, KF=0.0, TC=0.0, TB=0.0, TA=0.5, KA=50.0, TR=0.0, KC=0.0, **changes)
         system = system_of(name)
-        course = Inputs(0.0, 2.0, (InputStep(0.1, 0.5), InputStep(0.6, -0.6)))
-        simulator = Simulator(system, course, np.linspace(0.0, 2.0, 2001), 1e-3)
+        inputs = Inputs(0.0, 2.0, (InputStep(0.1, 0.5), InputStep(0.6, -0.6)))
+        simulator = Simulator(system, inputs, np.linspace(0.0, 2.0, 2001), 1e-3)
         efd = simulator.response(values).signals["efd"]
         return np.flatnonzero(efd >= 4.0 - 1e-9)[-1] * 1e-3 - 0.6
 
@@ -195,8 +195,8 @@ def test_a_limiter_at_its_gate_takes_over(name):
 
 def test_a_start_beyond_the_reference_s_limit_is_refused():
     values = typical_values("ST7B") | {"VMAX": 1.1, VT0: 1.2}
-    course = Inputs(0.0, 1.0, (InputStep(0.1, 0.05),))
-    simulator = Simulator(system_of("ST7B"), course, np.linspace(0.0, 1.0, 11), 1e-3)
+    inputs = Inputs(0.0, 1.0, (InputStep(0.1, 0.05),))
+    simulator = Simulator(system_of("ST7B"), inputs, np.linspace(0.0, 1.0, 11), 1e-3)
     with pytest.raises(SimulationError, match=r"above VMAX = 1\.1"):
         simulator.response(values)
 

@@ -73,7 +73,7 @@ def test_the_field_record_is_what_its_script_makes():
         assert np.max(np.abs(one - other)) < 1.5 * quantum
 
 
-def test_the_field_record_tells_its_unit():
+def test_the_field_record_identifies_its_unit():
     """Of nine values, each within its 95 % interval, as sample_data/README.md says."""
     result = workflows.fit(load_case(ROOT / "configs" / "field_record.yaml"))
     assert result.success

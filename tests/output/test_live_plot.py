@@ -90,7 +90,7 @@ def test_samples_that_are_no_numbers_are_left_out():
 
 
 @pytest.mark.parametrize(("width", "height"), [(45, 9), (72, 14), (100, 20)])
-def test_a_plot_is_as_large_as_asked(width, height):
+def test_a_plot_is_as_large_as_requested(width, height):
     lines = drawing.sketched(SKETCH, width, height)
     assert len(lines) == height
     assert max(cell_len(text.plain) for text in lines) == width

@@ -148,7 +148,7 @@ def saved_of(run):
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_every_fitted_parameter_is_told_with_its_interval_or_the_reason_why_there_is_none(
+def test_every_fitted_parameter_is_reported_with_its_interval_or_the_reason_why_there_is_none(
     fits, pages, name
 ):
     rows = {row[0].split()[0]: row for row in pages(name).tables["Fitted parameters"][1:]}
@@ -165,7 +165,9 @@ def test_every_fitted_parameter_is_told_with_its_interval_or_the_reason_why_ther
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_every_parameter_that_was_not_fitted_is_told_with_its_value_and_source(fits, pages, name):
+def test_every_parameter_that_was_not_fitted_is_reported_with_its_value_and_source(
+    fits, pages, name
+):
     saved = saved_of(fits(name))
     told = {}
     for caption, rows in pages(name).tables.items():
@@ -217,13 +219,13 @@ def test_a_page_is_whole_self_contained_and_small(pages, name):
         assert head in page.words
 
 
-def test_what_identifies_unit_and_test_is_told(pages):
+def test_what_identifies_unit_and_test_is_reported(pages):
     for name, value in ABOUT.items():
         assert f"{name} {value}" in pages("first order").text
     assert "does not say which unit" in pages("ac1a").text
 
 
-def test_the_base_of_each_signal_is_told_and_a_step_that_the_fit_found(tmp_path):
+def test_the_base_of_each_signal_is_reported_and_a_step_that_the_fit_found(tmp_path):
     vt = synthetic(tmp_path, TEST, OF_UNIT)["vt"]
     write(tmp_path / "record.csv", t=OF_UNIT, u=15.75 * vt)
     test = {**TEST, "vref": [{"at": found_in(1.02, 0.9, 1.1), "step": 0.05}]}
@@ -243,7 +245,7 @@ def test_a_signal_with_a_wrong_base_stands_in_the_verdict(tmp_path):
         assert ("no better than by a constant matched: ifd" in sentence) == told
 
 
-def test_hashes_versions_case_and_commands_are_told(fits, pages):
+def test_hashes_versions_case_and_commands_are_reported(fits, pages):
     run, page = fits("first order"), pages("first order")
     for sha256 in saved_of(run)["inputs"].values():
         assert sha256 in page.text
@@ -254,7 +256,7 @@ def test_hashes_versions_case_and_commands_are_told(fits, pages):
     assert f"exfit fit {run.parent / 'case.yaml'} -o {run}" in page.text
 
 
-def test_findings_and_notes_are_told_word_by_word(fits, pages):
+def test_findings_and_notes_are_reported_word_by_word(fits, pages):
     saved = saved_of(fits("ac1a"))
     told = [*saved["notes"], *saved["knowledge"]["sentences"]]
     assert len(told) > 1
@@ -262,7 +264,7 @@ def test_findings_and_notes_are_told_word_by_word(fits, pages):
         assert " ".join(sentence.replace("`", " ").split()) in pages("ac1a").text.replace(" ,", ",")
 
 
-def test_the_dynamics_record_is_told_with_its_warnings_or_why_there_is_none(fits, pages):
+def test_the_dynamics_record_is_reported_with_its_warnings_or_why_there_is_none(fits, pages):
     found = export(load_result(fits("ac8b")), 1, "1")
     assert " ".join(found.text.split()) in pages("ac8b").text
     for warning in found.warnings:
@@ -320,7 +322,7 @@ def test_the_iterations_begin_with_the_start_and_end_with_the_fit_as_they_are_co
         np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
 
 
-def test_a_switch_is_told_though_it_sets_nothing_but_a_zero(pages):
+def test_a_switch_is_reported_though_it_sets_nothing_but_a_zero(pages):
     assert "network switched at 3 s: R 0 pu" in pages("on load").text
 
 

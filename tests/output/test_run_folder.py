@@ -111,7 +111,7 @@ def test_parameters_read_back_are_exactly_those_found(fitted, folder):
 
 
 @pytest.mark.parametrize("begin", [0.0, -0.5, 45_000.0, 1.6e9])
-def test_instants_are_told_apart_whenever_the_clock_began(begin):
+def test_instants_are_distinguished_whenever_the_clock_began(begin):
     time = begin + np.linspace(0.0, 3.0, 3001)
     rows = table(["t", "y"], [time, np.zeros(3001)]).splitlines()[1:]
     shown = np.array([float(row.split(",")[0]) for row in rows])

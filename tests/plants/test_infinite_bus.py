@@ -237,7 +237,7 @@ def test_a_line_trip_is_that_of_equations_typed_again(machine):
 
 
 @pytest.mark.parametrize("given", ["Q", "E"])
-def test_rest_is_rest_and_has_the_power_and_voltage_asked_for(machine, given):
+def test_rest_is_rest_and_has_the_power_and_voltage_given(machine, given):
     made = system(machine, given)
     for P, other, vt0 in ((0.8, 0.2, 1.0), (0.1, -0.2, 0.95), (1.0, 0.4, 1.05)):
         values = values_on_load(machine, given, network_P=P) | {VT0: vt0}
@@ -267,10 +267,10 @@ def test_a_flat_run_on_load_stays_flat_for_a_minute(machine):
 def test_far_from_the_source_without_power_it_is_open_circuit(machine):
     """Behind a million per unit nothing flows, and the voltage moves as with the breaker open."""
     values = values_on_load(machine, network_P=0.0, network_X=1e6, network_R=0.0) | {VT0: 1.0}
-    course = Inputs(0.0, 4.0, (InputStep(0.5, 0.05),))
-    apart = Simulator(system(machine), course, CLOCK, 1e-3).response(values, ("vt", "efd"))
+    inputs = Inputs(0.0, 4.0, (InputStep(0.5, 0.05),))
+    apart = Simulator(system(machine), inputs, CLOCK, 1e-3).response(values, ("vt", "efd"))
     opened = open_circuit(MODELS["AC8B"], machine, QUADRATIC)
-    alone = Simulator(opened, course, CLOCK, 1e-3).response(values, ("vt", "efd"))
+    alone = Simulator(opened, inputs, CLOCK, 1e-3).response(values, ("vt", "efd"))
     assert np.abs(apart.signals["vt"] - alone.signals["vt"]).max() < 1e-5
     assert np.ptp(alone.signals["vt"]) > 0.04
 
@@ -326,8 +326,8 @@ def test_short_times_of_a_stabiliser_ask_for_sub_steps():
 
 def test_exact_derivatives_on_load_equal_central_differences(machine):
     """To every parameter of machine and network, over a step of the reference and a line trip."""
-    course = Inputs(0.0, 2.0, (InputStep(0.2, 0.01), InputStep(0.8, 0.05, "X")))
-    simulator = Simulator(system(machine), course, np.linspace(0.0, 2.0, 41), 1e-3)
+    inputs = Inputs(0.0, 2.0, (InputStep(0.2, 0.01), InputStep(0.8, 0.05, "X")))
+    simulator = Simulator(system(machine), inputs, np.linspace(0.0, 2.0, 41), 1e-3)
     values = values_on_load(machine, network_Q=0.2, machine_D=0.5)
     free = tuple(name for name in values if name.startswith((MACHINE, NETWORK)))
     _, slopes = simulator.tangents(values, ("vt", "p"), each(free))
@@ -403,12 +403,12 @@ def test_a_step_of_vs_is_one_of_the_reference(machine):
     np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-13)
 
 
-def test_a_stabiliser_hears_what_it_is_told_to():
+def test_a_stabiliser_hears_the_inputs_it_is_given():
     """Of speed, power and voltage only what is named moves its states."""
     for heard in ("speed", "p", "vt"):
         made, values = stabilised(STABILISERS["PSS1A"], (heard,))
-        course = Inputs(0.0, 1.0, (InputStep(0.1, 0.1, "X"),))
-        response = Simulator(made, course, np.linspace(0.0, 1.0, 11), 1e-3).response(values)
+        inputs = Inputs(0.0, 1.0, (InputStep(0.1, 0.1, "X"),))
+        response = Simulator(made, inputs, np.linspace(0.0, 1.0, 11), 1e-3).response(values)
         moved = [np.ptp(x) for name, x in response.signals.items() if STABILISER in name]
         assert max(moved) > 0.0, heard
 
@@ -419,8 +419,8 @@ def test_exact_derivatives_reach_through_a_stabiliser(stabiliser):
     gains = {STABILISER + name for name in ("KS", "KS1", "K_T")} & values.keys()
     values |= {name: 0.2 * values[name] for name in gains}
     assert damping_of_the_swing(made, values) > 0.0
-    course = Inputs(0.0, 2.0, (InputStep(0.2, 0.0005),))
-    simulator = Simulator(made, course, np.linspace(0.0, 2.0, 41), 1e-3)
+    inputs = Inputs(0.0, 2.0, (InputStep(0.2, 0.0005),))
+    simulator = Simulator(made, inputs, np.linspace(0.0, 2.0, 41), 1e-3)
     free = tuple(
         STABILISER + row.symbol for row in stabiliser.sheet if row.unit == "s" and row.typical > 0.0
     )

@@ -18,12 +18,12 @@ from exfit.simulation.simulator import Simulator
 @pytest.mark.parametrize("name", ["ac1a", "ac8b_unit1", "ac8b_unit2"])
 def test_a_bump_up_and_down_is_that_of_another_simulator(name):
     """The other one rounds the rectifier's constants, which moves vt by 4e-6."""
-    model, values, course, columns, told = reference(f"reference_{name}")
+    model, values, inputs, columns, described = reference(f"reference_{name}")
     system = system_of(model)
     assert values.keys() == set(system.parameters)
-    simulator = Simulator(system, course, columns["t"], 1e-3)
+    simulator = Simulator(system, inputs, columns["t"], 1e-3)
     got = simulator.response(values).signals
-    assert got["vref"][0] == pytest.approx(told["vref_initial"], abs=2e-6)
+    assert got["vref"][0] == pytest.approx(described["vref_initial"], abs=2e-6)
     assert np.abs(got["vt"] - columns["vt"]).max() < 1e-5
     assert np.abs(got["efd"] - columns["efd"]).max() < 2e-3
     assert np.abs(got["ifd"] - columns["ifd"]).max() < 2e-3
@@ -41,8 +41,8 @@ TIMES = np.arange(16) / 10.0
 
 
 def check_system(k=K, a=A, vt0=0.0):
-    course = Inputs(0.0, TIMES[-1], (InputStep(0.0, 1.0),))
-    simulator = Simulator(system_of("FIRST_ORDER"), course, TIMES, 1e-3)
+    inputs = Inputs(0.0, TIMES[-1], (InputStep(0.0, 1.0),))
+    simulator = Simulator(system_of("FIRST_ORDER"), inputs, TIMES, 1e-3)
     return simulator, {"k": k, "a": a, VT0: vt0}
 
 
@@ -261,8 +261,8 @@ def test_another_integrator_of_other_words_agrees(unit, machine, changes_of_mach
 
 
 def response(name, machine, values, size=0.05):
-    course = Inputs(0.0, 3.0, (InputStep(0.1, size),))
-    simulator = Simulator(system_of(name, machine), course, np.linspace(0.0, 3.0, 301), 1e-3)
+    inputs = Inputs(0.0, 3.0, (InputStep(0.1, size),))
+    simulator = Simulator(system_of(name, machine), inputs, np.linspace(0.0, 3.0, 301), 1e-3)
     return simulator.samples(values, ("vt", "efd", "ifd"))[0]
 
 
@@ -315,8 +315,8 @@ def test_a_damper_that_is_not_seen_may_have_any_time_constant():
     machine = MACHINES["GENROU"]
     unseen = {"Xppd": typical(machine.sheet)["Xpd"]}
     assert list(machine.faults(typical(machine.sheet) | unseen | {"Tppd0": 999.0})) == []
-    course = Inputs(0.0, 3.0, (InputStep(0.5, 0.01),))
-    simulator = Simulator(system_of("AC1A"), course, np.linspace(0.0, 3.0, 61), 1e-3)
+    inputs = Inputs(0.0, 3.0, (InputStep(0.5, 0.01),))
+    simulator = Simulator(system_of("AC1A"), inputs, np.linspace(0.0, 3.0, 61), 1e-3)
     values = typical_values("AC1A", machine_Xppd=unseen["Xppd"])
     one, other = (
         simulator.samples(values | {MACHINE + "Tppd0": T}, ("vt",))[0] for T in (0.05, 999.0)

@@ -181,14 +181,14 @@ def test_what_drives_is_not_compared(tmp_path):
         (MACHINE, "Tpd0: {start: 3.77", "Tpd0: {start: 30", "Tpd0.start: 30 lies outside"),
     ],
 )  # fmt: skip
-def test_what_a_playback_lacks_or_cannot_have_is_told(tmp_path, text, old, new, says):
+def test_what_a_playback_lacks_or_cannot_have_is_reported(tmp_path, text, old, new, says):
     assert old in text
     with pytest.raises(CaseError, match=r"case\.yaml") as refused:
         case_of(exciter(text=text.replace(old, new)), tmp_path)
     assert says in str(refused.value)
 
 
-def test_a_steady_part_that_is_none_is_refused_or_told(tmp_path):
+def test_a_steady_part_that_is_none_is_refused_or_reported(tmp_path):
     beyond = MACHINE.replace("steady_until: 1.0", "steady_until: 100")
     with pytest.raises(RecordError, match=r"ends at 20 s, before test\.steady_until = 100 s"):
         fit(case_of(beyond, tmp_path))
@@ -200,7 +200,7 @@ def test_a_steady_part_behind_noise_is_not_complained_of(noisy, tmp_path):
     assert not any("at rest" in note for note in fit(case_of(MACHINE, tmp_path, noisy)).notes)
 
 
-def test_a_signal_on_another_base_is_told(noisy, tmp_path):
+def test_a_signal_on_another_base_is_reported(noisy, tmp_path):
     """Field current relative to rated, as recorders give it."""
     scaled = MACHINE.replace("{column: ifd,", "{column: ifd, scale: 0.46,")
     notes = fit(case_of(scaled, tmp_path, noisy)).notes

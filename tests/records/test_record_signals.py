@@ -40,7 +40,7 @@ def case_with(folder, channels, columns=None, free=(), **record):
     return case_of(one(TEST, channels, free, **record), folder)
 
 
-def trial(case):
+def setup_of(case):
     return build_experiments(case)[0].with_enough_substeps(case.values())
 
 
@@ -53,7 +53,7 @@ def test_a_voltage_that_is_not_there_outside_the_window_does_not_matter(tmp_path
     for phases in (whole, dead):
         columns = {"t": TIME, **dict(zip(PHASES["phases"], phases.T, strict=True))}
         case = case_with(tmp_path, {"vt": {**PHASES, "kind": kind}}, columns, window=[0.6, 3.9])
-        records.append(trial(case).record)
+        records.append(setup_of(case).record)
     np.testing.assert_array_equal(records[0].time, records[1].time)
     np.testing.assert_array_equal(records[0].signals["vt"], records[1].signals["vt"])
     assert records[0].time[0] == pytest.approx(0.6, abs=1.0 / FREQUENCY)
@@ -62,7 +62,7 @@ def test_a_voltage_that_is_not_there_outside_the_window_does_not_matter(tmp_path
 def test_waveforms_become_the_voltage_that_the_simulation_shows_averaged(tmp_path):
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     columns = {"t": TIME, **dict(zip(PHASES["phases"], waves(vt).T, strict=True))}
-    setup = trial(case_with(tmp_path, {"vt": PHASES}, columns))
+    setup = setup_of(case_with(tmp_path, {"vt": PHASES}, columns))
     errors, _ = setup.experiment.errors(
         setup.with_start_values(UNIT | load_case(tmp_path / "case.yaml").values())
     )
@@ -77,7 +77,7 @@ def test_other_channels_lose_the_same_ends(tmp_path):
     simulated = synthetic(tmp_path, TEST, TIME, noise=0.0, signals=("vt", "efd"))
     columns = {"t": TIME, "efd": simulated["efd"]}
     columns |= dict(zip(PHASES["phases"], waves(simulated["vt"]).T, strict=True))
-    record = trial(case_with(tmp_path, {"vt": PHASES, "efd": "efd"}, columns)).record
+    record = setup_of(case_with(tmp_path, {"vt": PHASES, "efd": "efd"}, columns)).record
     assert np.allclose(record.signals["efd"], np.interp(record.time, TIME, simulated["efd"]))
 
 
@@ -88,7 +88,7 @@ def test_rms_values_of_phases_become_one_voltage(tmp_path, connection, over):
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     columns = {"t": TIME, **dict.fromkeys(PHASES["phases"], RATED / over * vt)}
     entry = {**PHASES, "kind": "rms", "connection": connection}
-    record = trial(case_with(tmp_path, {"vt": entry}, columns)).record
+    record = setup_of(case_with(tmp_path, {"vt": entry}, columns)).record
     assert record.signals["vt"] == pytest.approx(vt, rel=1e-8)
     assert not record.averaged
 
@@ -113,7 +113,7 @@ def test_a_recorder_that_averages_is_simulated_so(tmp_path):
     averages = np.convolve(vt, kernel, "valid")
     columns = {"t": TIME[half:-half], "vt": averages}
     setup, plain = (
-        trial(case_with(tmp_path, {"vt": entry}, columns))
+        setup_of(case_with(tmp_path, {"vt": entry}, columns))
         for entry in ({"column": "vt", "averaged": window}, "vt")
     )
     values = setup.with_start_values(load_case(tmp_path / "case.yaml").values())
@@ -167,17 +167,17 @@ def test_what_are_no_waveforms_is_refused_with_their_columns(tmp_path):
     swapped = [PHASES["phases"][k] for k in (0, 2, 1)]
     columns = {"t": TIME, **dict(zip(swapped, waves(vt).T, strict=True))}
     with pytest.raises(RecordError, match=r"record\.csv: columns 'UL1', 'UL2', 'UL3': .*swapped"):
-        trial(case_with(tmp_path, {"vt": PHASES}, columns))
+        setup_of(case_with(tmp_path, {"vt": PHASES}, columns))
     columns = {"t": TIME, **dict.fromkeys(swapped, vt)}
     with pytest.raises(RecordError, match=r"record\.csv: columns 'UL1', 'UL2', 'UL3': "):
-        trial(case_with(tmp_path, {"vt": PHASES}, columns))
+        setup_of(case_with(tmp_path, {"vt": PHASES}, columns))
 
 
 @pytest.mark.parametrize("rate", [RATE, 0.1])
 def test_a_clock_that_is_not_slower_or_has_no_samples_is_refused(tmp_path, rate):
     synthetic(tmp_path, TEST, TIME)
     with pytest.raises(RecordError, match=r"record\.csv: resample: "):
-        trial(case_with(tmp_path, {"vt": "vt"}, resample=rate))
+        setup_of(case_with(tmp_path, {"vt": "vt"}, resample=rate))
 
 
 @pytest.mark.parametrize(("base", "rests"), [(15750.0, "0.001"), (1.575, "10")])

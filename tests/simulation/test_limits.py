@@ -26,8 +26,8 @@ BUMP = 0.02  # pu, as in a test
 
 @cache
 def simulator(name, size, step=STEP, delay=0.0):
-    course = Inputs(0.0, END, (InputStep(1.0, size),))
-    return Simulator(system_of(name), course, CLOCK, step, delay=delay)
+    inputs = Inputs(0.0, END, (InputStep(1.0, size),))
+    return Simulator(system_of(name), inputs, CLOCK, step, delay=delay)
 
 
 def by_name(hits):
@@ -85,8 +85,8 @@ def test_a_clamp_is_met_while_its_input_wants_to_be_beyond():
     size = 0.3
     hit = by_name(limits_hit(simulator("ST1A", size), values))["VIMAX", ""]
     fine = np.linspace(1.0, END, 30001)
-    course = simulator("ST1A", size).inputs
-    run = Simulator(system_of("ST1A"), course, fine, STEP).response(values, ("vt", "vref"))
+    inputs = simulator("ST1A", size).inputs
+    run = Simulator(system_of("ST1A"), inputs, fine, STEP).response(values, ("vt", "vref"))
     error = run.signals["vref"] - run.signals["vt"]
     error[0] = error[1]
     expected = seconds(error > 0.1, fine)

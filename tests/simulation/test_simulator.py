@@ -40,8 +40,8 @@ CLOCK = np.linspace(0.0, 2.0, 201)
 laws = settings(deadline=None, derandomize=True, max_examples=25)
 
 
-def samples(name, values, course=UP, times=CLOCK, step=1e-3, outputs=("vt",)):
-    return Simulator(system_of(name), course, times, step).samples(values, outputs)[0]
+def samples(name, values, inputs=UP, times=CLOCK, step=1e-3, outputs=("vt",)):
+    return Simulator(system_of(name), inputs, times, step).samples(values, outputs)[0]
 
 
 ROUNDING = 2e-12  # pu, of a run of thousands of steps
@@ -66,16 +66,16 @@ def test_the_grid_is_gapless_and_every_change_lies_on_it(instants, step):
     inside = [at for at in sorted(instants) if 0.0 < at < 3.0]
     assert [part.start for part in grid[1:]] == inside
     assert all(part.step <= step * (1.0 + 1e-5) for part in grid)
-    course = Inputs(0.0, 3.0, changes)
-    level = course.level("vref", grid[-1].start)
+    inputs = Inputs(0.0, 3.0, changes)
+    level = inputs.level("vref", grid[-1].start)
     assert level == pytest.approx(0.1 * sum(at < 3.0 for at in instants))
 
 
 def test_at_the_instant_of_a_step_the_value_is_that_before_it(model):
     for at in (0.5, 0.50037):
-        course = Inputs(0.0, 1.0, (InputStep(at, 0.02),))
+        inputs = Inputs(0.0, 1.0, (InputStep(at, 0.02),))
         times = np.array([at - 1e-3, at, at + 1e-3])
-        vref = samples(model, lively_values(model), course, times, outputs=("vref",))[:, 0]
+        vref = samples(model, lively_values(model), inputs, times, outputs=("vref",))[:, 0]
         assert vref[1] == pytest.approx(vref[0], abs=1e-12)  # a mean of equal values
         assert vref[2] - vref[1] == pytest.approx(0.02)
 
@@ -100,8 +100,8 @@ def test_steps_add_up(model):
 
 def test_a_step_up_and_back_returns_to_rest():
     values = typical_values("AC1A")
-    course = Inputs(0.0, 60.0, (InputStep(1.0, 0.05), InputStep(20.0, -0.05)))
-    vt = samples("AC1A", values, course, np.array([0.0, 20.0, 60.0]))[:, 0]
+    inputs = Inputs(0.0, 60.0, (InputStep(1.0, 0.05), InputStep(20.0, -0.05)))
+    vt = samples("AC1A", values, inputs, np.array([0.0, 20.0, 60.0]))[:, 0]
     assert vt[2] == pytest.approx(vt[0], abs=1e-6)
     assert vt[1] - vt[0] > 0.04
 
@@ -121,8 +121,8 @@ def test_samples_at_uneven_times_err_as_little_as_the_method(model):
     """Halving the step divides the error of samples between grid points by sixteen."""
     values, rng = lively_values(model), np.random.default_rng(4)
     times = np.sort(rng.uniform(0.01, 2.0, 200))
-    course, step = Inputs(0.0, 2.0, (InputStep(0.0, 3e-4),)), short_step(model, values, 0.2)
-    finest, *ends = (samples(model, values, course, times, h) for h in (step / 32, step, step / 2))
+    inputs, step = Inputs(0.0, 2.0, (InputStep(0.0, 3e-4),)), short_step(model, values, 0.2)
+    finest, *ends = (samples(model, values, inputs, times, h) for h in (step / 32, step, step / 2))
     errors = [np.abs(end - finest).max() for end in ends]
     assert errors[0] / errors[1] > 11.0 or errors[1] < ROUNDING
     assert errors[1] < 1e-8
@@ -203,8 +203,8 @@ def assert_exact(simulator, values, directions, outputs=("vt",), h=MOVED):
 def test_tangents_are_the_slopes_of_the_samples(model):
     """Of parameters, a tie of two, instant and size of a smooth step, another's size, a delay."""
     system, values = system_of(model), lively_values(model)
-    course = Inputs(0.0, 2.0, (SMOOTH._replace(at=0.20037), InputStep(0.9, -3e-4)))
-    simulator = Simulator(system, course, BETWEEN, 1e-3)
+    inputs = Inputs(0.0, 2.0, (SMOOTH._replace(at=0.20037), InputStep(0.9, -3e-4)))
+    simulator = Simulator(system, inputs, BETWEEN, 1e-3)
     free = (system.parameters[-1], *sorted(parameters_used(system))[:4])
     rates = {name: max(values[name], 0.1) for name in free}
     directions = (
@@ -254,8 +254,8 @@ def test_a_direction_that_moves_several_parameters_is_the_sum_of_theirs():
 
 def test_the_derivative_to_an_instant_adds_up_across_grid_points():
     """By Gauss's rule on each side: the derivative is continuous, and all but linear there."""
-    values, course = lively_values("AC1A"), Inputs(0.0, 2.0, (SMOOTH,))
-    simulator = Simulator(system_of("AC1A"), course, CLOCK, 1e-3)
+    values, inputs = lively_values("AC1A"), Inputs(0.0, 2.0, (SMOOTH,))
+    simulator = Simulator(system_of("AC1A"), inputs, CLOCK, 1e-3)
 
     def at(instant):
         return simulator.with_inputs((SMOOTH._replace(at=instant),), 0.0)
@@ -275,9 +275,9 @@ def test_the_derivative_to_an_instant_adds_up_across_grid_points():
 @laws
 @given(st.floats(0.1, 2.9), st.floats(-0.1, 0.1), st.sampled_from([0.05, 0.01, 1e-3]))
 def test_the_area_under_a_smooth_step_is_that_of_the_exact_one(at, size, step):
-    course = Inputs(0.0, 3.0, (InputStep(at, size, smooth=True),))
-    (part,) = grid_segments(course, step)
-    u = course.input("vref", part)
+    inputs = Inputs(0.0, 3.0, (InputStep(at, size, smooth=True),))
+    (part,) = grid_segments(inputs, step)
+    u = inputs.input("vref", part)
     area = part.step * (u.sum() - (u[0] + u[-1]) / 2.0)
     assert area == pytest.approx(size * (3.0 - at), abs=1e-13)
     away = np.abs(part.times - at) >= 1.001 * part.step
@@ -286,13 +286,13 @@ def test_the_area_under_a_smooth_step_is_that_of_the_exact_one(at, size, step):
 
 
 @pytest.mark.parametrize("at", [-5.0, -0.01, 3.01, 9.0])
-def test_a_smooth_step_outside_a_course_is_over_or_never_comes(at):
+def test_a_smooth_step_outside_the_test_is_over_or_never_comes(at):
     change = InputStep(at, 0.05, smooth=True)
-    course = Inputs(0.0, 3.0, (change,))
-    (part,) = grid_segments(course, 1e-3)
-    assert (course.input("vref", part) == (0.05 if at < 0.0 else 0.0)).all()
+    inputs = Inputs(0.0, 3.0, (change,))
+    (part,) = grid_segments(inputs, 1e-3)
+    assert (inputs.input("vref", part) == (0.05 if at < 0.0 else 0.0)).all()
     assert (change.share_slope(part) == 0.0).all()
-    assert course.level("vref", 10.0) == 0.0
+    assert inputs.level("vref", 10.0) == 0.0
 
 
 def test_a_smooth_step_nears_the_exact_one_with_the_square_of_the_step(model):
@@ -310,8 +310,8 @@ def test_a_smooth_step_nears_the_exact_one_with_the_square_of_the_step(model):
 
 def test_a_later_instant_is_a_later_recorder_for_a_plant_at_rest(model):
     """To rounding by whole steps; else by what the step's second moment moves within a step."""
-    values, course = lively_values(model), Inputs(0.0, 2.0, (SMOOTH,))
-    simulator = Simulator(system_of(model), course, CLOCK[CLOCK < 1.9], 1e-3)
+    values, inputs = lively_values(model), Inputs(0.0, 2.0, (SMOOTH,))
+    simulator = Simulator(system_of(model), inputs, CLOCK[CLOCK < 1.9], 1e-3)
     late, early = SMOOTH.at + 0.013, SMOOTH.at - 0.02
     for at, least in ((late, 1e-13), (early, 1e-13), (late + 0.0004, 2e-5 * SMOOTH.step)):
         delay = at - SMOOTH.at
@@ -342,8 +342,8 @@ def test_a_recorder_with_a_delay_shows_what_was(model):
 def test_a_moved_simulator_is_the_one_built_so():
     values, played = lively_values("AC1A"), RecordedInputs(CLOCK, {"vref": 1e-3 * np.sin(CLOCK)})
     steps = (SMOOTH, InputStep(0.7, 1e-4), InputStep(1.3, 2e-4, smooth=True))
-    course = Inputs(0.0, 2.0, steps, played)
-    simulator = Simulator(system_of("AC1A"), course, BETWEEN, 1e-3)
+    inputs = Inputs(0.0, 2.0, steps, played)
+    simulator = Simulator(system_of("AC1A"), inputs, BETWEEN, 1e-3)
     before = simulator.samples(values, ("vt",))[0]
     others = (steps[0]._replace(at=0.9), InputStep(0.7, 0.0), steps[2])
     moved = simulator.with_inputs(others, 0.0123)
@@ -377,13 +377,13 @@ def test_only_what_is_smooth_may_change_its_instant():
 def test_a_simulator_made_from_another_keeps_its_steps_and_its_delay():
     """With finer steps a smooth step is sharper: the step error tells of it."""
     end = 33.0**0.5
-    course = Inputs(0.0, 1.0, (InputStep(0.3, end + end**3, smooth=True),))
+    inputs = Inputs(0.0, 1.0, (InputStep(0.3, end + end**3, smooth=True),))
     times, values = np.linspace(0.0, 1.0, 51), {VT0: 0.0}
-    start = Simulator(STIFFENING, course, times, 0.02)
-    moved = start.with_inputs((course.steps[0]._replace(at=0.1),), 0.11)
-    secured = moved.with_enough_substeps(values)
-    assert secured is not moved
-    assert (secured.delay, secured.inputs) == (0.11, moved.inputs)
+    start = Simulator(STIFFENING, inputs, times, 0.02)
+    moved = start.with_inputs((inputs.steps[0]._replace(at=0.1),), 0.11)
+    resolved = moved.with_enough_substeps(values)
+    assert resolved is not moved
+    assert (resolved.delay, resolved.inputs) == (0.11, moved.inputs)
     parts = moved.substeps(values)
     coarse, fine = (
         Simulator(STIFFENING, moved.inputs, times, 0.02 / n, parts).samples(values, ("x",))[0]
@@ -402,8 +402,8 @@ def test_a_lag_meets_and_leaves_its_limits_when_a_run_of_tiny_steps_does():
     """
     changes = {"KA": 40.0, "TA": 0.1, "VAMAX": 5.0, "VAMIN": -1.0, "KF": 0.0, "TE": 99.0}
     values = typical_values("AC1A", **changes, VRMAX=99.0, VRMIN=-99.0)
-    course = Inputs(0.0, 2.0, (InputStep(0.2, 0.5), InputStep(0.9, -1.0), InputStep(1.4, 0.52)))
-    got = samples("AC1A", values, course, outputs=("VA", "vref", "vt"))
+    inputs = Inputs(0.0, 2.0, (InputStep(0.2, 0.5), InputStep(0.9, -1.0), InputStep(1.4, 0.52)))
+    got = samples("AC1A", values, inputs, outputs=("VA", "vref", "vt"))
     start, vt = got[0, 0], got[:, 2]
     vref = got[0, 1]
 
@@ -413,7 +413,7 @@ def test_a_lag_meets_and_leaves_its_limits_when_a_run_of_tiny_steps_does():
     x, expected = start, [start]
     fine = np.arange(0.0, 2.0, 1e-5)
     for k, t in enumerate(fine):
-        level = sum(change.step for change in course.steps if t >= change.at - 1e-9)
+        level = sum(change.step for change in inputs.steps if t >= change.at - 1e-9)
         x = min(max(x + 1e-5 * free(t, x, level), -1.0), 5.0)
         if (k + 1) % 1000 == 0:
             expected.append(x)
@@ -425,22 +425,22 @@ def test_a_lag_meets_and_leaves_its_limits_when_a_run_of_tiny_steps_does():
 
 def test_halving_the_step_hardly_moves_a_response_that_meets_limits(exciter):
     values = lively_values(exciter)
-    course = Inputs(0.0, 2.0, (InputStep(0.3, 0.3), InputStep(1.1, -0.4)))
+    inputs = Inputs(0.0, 2.0, (InputStep(0.3, 0.3), InputStep(1.1, -0.4)))
     step = min(1e-3, short_step(exciter, values, 0.05))
-    fine, *ends = (samples(exciter, values, course, step=h) for h in (step / 32, step, step / 4))
+    fine, *ends = (samples(exciter, values, inputs, step=h) for h in (step / 32, step, step / 4))
     errors = [np.abs(end - fine).max() for end in ends]
     # a state may be held a part of a step too early: what follows it errs by the step squared;
     # an integral is frozen a part of a step too early, and misses that part
-    most, order = (8e-5, 1.0) if freezes(exciter, values, course) else (3e-5, 1.5)
+    most, order = (8e-5, 1.0) if freezes(exciter, values, inputs) else (3e-5, 1.5)
     assert errors[0] < most
     assert errors[1] < most / 4.0**order
 
 
-def freezes(exciter, values, course):
+def freezes(exciter, values, inputs):
     """Return whether a state that has no limits of its own stands still for a while."""
     system = system_of(exciter)
-    states = samples(exciter, values, course, outputs=system.states)
-    still = (np.diff(states[course.steps[0].at < CLOCK], axis=0) == 0.0).any(axis=0)
+    states = samples(exciter, values, inputs, outputs=system.states)
+    still = (np.diff(states[inputs.steps[0].at < CLOCK], axis=0) == 0.0).any(axis=0)
     limited = [node.op == "clip" for node in trace(system, ("vt",)).clamped]
     return bool((still & ~np.array(limited)).any())
 
@@ -518,9 +518,9 @@ def stiff_values(name, seed):
     return drawn_values(name, seed, spread=10.0)
 
 
-def secured(name, values, course, times, step):
+def sampled(name, values, inputs, times, step):
     """Return vt with sub-steps that are enough all along, as every run of a case has them."""
-    simulator = Simulator(system_of(name), course, times, step)
+    simulator = Simulator(system_of(name), inputs, times, step)
     return simulator.with_enough_substeps(values).samples(values, ("vt",))[0]
 
 
@@ -530,7 +530,7 @@ def test_no_response_is_unstable_without_a_word(model, step):
 
     But for a set that swings from limit to limit for good at any step: each turn moves the next.
     """
-    course = Inputs(0.0, 4.0, (InputStep(0.5, 0.05), InputStep(2.0, -0.05)))
+    inputs = Inputs(0.0, 4.0, (InputStep(0.5, 0.05), InputStep(2.0, -0.05)))
     times = np.linspace(0.0, 4.0, 201)
     simulated = 0
     for seed in range(40):
@@ -538,14 +538,14 @@ def test_no_response_is_unstable_without_a_word(model, step):
             break
         values = stiff_values(model, seed)
         try:
-            coarse, fine = (secured(model, values, course, times, h) for h in (step, step / 4))
+            coarse, fine = (sampled(model, values, inputs, times, h) for h in (step, step / 4))
         except SimulationError:
             continue
         # where a limit holds a step of a fast loop, or a contact closes, its instant is known to a
         # sub-step: should that show, it shrinks with the sub-step, which no instability does
         error = np.abs(coarse - fine).max()
         if error >= 2e-2 * np.ptp(fine) + 1e-4:
-            finer, finest = (secured(model, values, course, times, step / n) for n in (16, 64))
+            finer, finest = (sampled(model, values, inputs, times, step / n) for n in (16, 64))
             swings = np.ptp(finest[-50:]) > 0.1 * np.ptp(finest)
             assert np.abs(finer - finest).max() < 0.5 * error or swings, seed
         simulated += 1
@@ -603,9 +603,9 @@ def test_a_parameter_that_matters_nowhere_costs_no_sub_steps():
 def test_a_fast_pole_without_a_time_constant_is_seen_too():
     """FIRST_ORDER has its rate as a parameter: the spectral radius finds it."""
     values = {"k": 900.0, "a": 900.0, VT0: 0.0}
-    course = Inputs(0.0, 0.1, (InputStep(0.0, 1.0),))
+    inputs = Inputs(0.0, 0.1, (InputStep(0.0, 1.0),))
     times = np.linspace(0.0, 0.1, 11)
-    simulator = Simulator(system_of("FIRST_ORDER"), course, times, 1e-2)
+    simulator = Simulator(system_of("FIRST_ORDER"), inputs, times, 1e-2)
     got, parts = simulator.samples(values, ("vt",))
     assert parts == 9
     exact = solve_ivp(lambda t, x: 900.0 * (1.0 - x), (0.0, 0.1), [0.0], "LSODA", times, rtol=1e-9)
@@ -630,22 +630,22 @@ STIFFENING = System(
 )
 
 
-def test_a_response_that_gets_faster_on_its_way_is_secured_by_more_sub_steps():
+def test_a_response_that_gets_faster_on_its_way_is_simulated_with_more_sub_steps():
     """dx/dt = vref - x - x^3 has the rate 1 at rest, and 1 + 3 x^2 = 100 where the step ends."""
     end = 33.0**0.5
-    course = Inputs(0.0, 1.0, (InputStep(0.1, end + end**3),))
+    inputs = Inputs(0.0, 1.0, (InputStep(0.1, end + end**3),))
     times, values = np.linspace(0.0, 1.0, 51), {VT0: 0.0}
-    plain = Simulator(STIFFENING, course, times, 0.02)
-    secured = plain.with_enough_substeps(values)
+    plain = Simulator(STIFFENING, inputs, times, 0.02)
+    resolved = plain.with_enough_substeps(values)
     assert plain.substeps(values) == 1
-    assert secured.substeps(values) >= 2  # 0.02 s at 100 1/s
-    fine = Simulator(STIFFENING, course, times, 0.02 / 16.0).samples(values, ("x",))[0]
+    assert resolved.substeps(values) >= 2  # 0.02 s at 100 1/s
+    fine = Simulator(STIFFENING, inputs, times, 0.02 / 16.0).samples(values, ("x",))[0]
     assert fine[-1] == pytest.approx([end])
-    errors = [np.abs(s.samples(values, ("x",))[0] - fine).max() for s in (plain, secured)]
+    errors = [np.abs(s.samples(values, ("x",))[0] - fine).max() for s in (plain, resolved)]
     assert errors[1] < 1e-2 * end
     assert errors[1] < errors[0] / 4.0  # two sub-steps of an order of four: 16, less at the edge
 
 
-def test_a_response_that_stays_as_fast_as_at_rest_is_secured_as_it_is(model):
+def test_a_response_that_stays_as_fast_as_at_rest_needs_no_more_sub_steps(model):
     simulator = Simulator(system_of(model), AT_REST, CLOCK, 1e-2)
     assert simulator.with_enough_substeps(lively_values(model)) is simulator

@@ -133,7 +133,7 @@ def test_one_or_two_lags_have_no_gain_margin_and_a_low_gain_no_phase_margin():
     assert low == (None, None, None, None)
 
 
-def test_of_several_crossovers_the_nearest_to_instability_is_told():
+def test_of_several_crossovers_the_nearest_to_instability_is_reported():
     """A double integrator with a lead, then two lags: -180 degrees below and above the gain."""
     loop = Transfer([6.0 * 4.0, 6.0 * 4.0 * 0.4, 6.0 * 0.2], np.poly([0.0, 0.0, 0.0, -20.0, -30.0]))
     loop = Transfer(600.0 * loop.over.c, loop.under.c)
@@ -268,8 +268,8 @@ def test_unstable_poles_are_those_of_a_run_that_grows(model):
 @pytest.mark.parametrize("name", ["AC1A", "ST1A", "SEXS", "DC2A", "AC8B", "FIRST_ORDER"])
 def test_a_small_step_settles_to_the_response_at_rest(name):
     system, values = system_of(name), lively_values(name)
-    course = Inputs(0.0, 200.0, (InputStep(1.0, TALL),))
-    vt = Simulator(system, course, np.array([0.0, 200.0]), 1e-3).samples(values, ("vt",))[0][:, 0]
+    inputs = Inputs(0.0, 200.0, (InputStep(1.0, TALL),))
+    vt = Simulator(system, inputs, np.array([0.0, 200.0]), 1e-3).samples(values, ("vt",))[0][:, 0]
     slow = small_signal(system, values, np.array([1e-6])).closed.response[0]
     # the rounding of vt, over the step
     assert (vt[1] - vt[0]) / TALL == pytest.approx(slow.real, abs=1e-5)
@@ -314,8 +314,8 @@ def test_damping_and_frequency_are_those_of_the_decay():
     poles = small_signal(system, values).poles
     (swing,) = [pole for pole in poles if {"delta", "dw"} <= set(pole.states)]
     times = np.linspace(0.0, 10.0, 10001)
-    course = Inputs(0.0, 10.0, (InputStep(0.1, TALL, "E"), InputStep(0.2, -TALL, "E")))
-    dw = Simulator(system, course, times, 1e-3).samples(values, ("speed",))[0][:, 0]
+    inputs = Inputs(0.0, 10.0, (InputStep(0.1, TALL, "E"), InputStep(0.2, -TALL, "E")))
+    dw = Simulator(system, inputs, times, 1e-3).samples(values, ("speed",))[0][:, 0]
     dw = dw - dw[0]
     turns = times[1:][np.diff(np.sign(dw)) != 0]
     turns = turns[(turns > 2.0) & (turns < 4.5)]
@@ -371,7 +371,7 @@ def test_a_bypassed_block_has_no_pole():
     assert not {"VC", "VL"} & {state for pole in found for state in pole.states}
 
 
-def test_frequencies_that_are_asked_for_are_told_and_change_no_figure():
+def test_frequencies_that_are_requested_are_reported_and_change_no_figure():
     system, values = system_of("AC8B"), lively_values("AC8B")
     asked = np.array([0.1, 1.0])
     few, all_of_them = small_signal(system, values, asked), small_signal(system, values)
@@ -410,8 +410,8 @@ def test_the_input_that_breaks_the_loop_moves_what_the_exciter_measures():
     times = np.linspace(0.0, 2.0, 21)
 
     def moved(signal, step):
-        course = Inputs(0.0, 2.0, (InputStep(0.5, step, signal),))
-        return Simulator(several, course, times, 1e-3).samples(values, ("vt",))[0]
+        inputs = Inputs(0.0, 2.0, (InputStep(0.5, step, signal),))
+        return Simulator(several, inputs, times, 1e-3).samples(values, ("vt",))[0]
 
     np.testing.assert_allclose(moved(MEASURED, 0.01), moved("vref", -0.01), rtol=0.0, atol=1e-12)
 

@@ -37,7 +37,7 @@ WITHOUT_LIMITS = {"VAMAX": 9999.0, "VAMIN": -9999.0}
 
 
 def reference(name):
-    """Return the model, the values, the course and the columns of a reference trajectory."""
+    """Return the model, the values, the inputs and the columns of a reference trajectory."""
     told = json.loads((REFERENCE / f"{name}.json").read_text())
     model = MODEL_NAMES.get(told["model"], told["model"])
     names, given = RENAMED.get(model, {}), told["params_in_effect"]
