@@ -66,11 +66,24 @@ def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
 def fitted_model_hash(path: Path) -> str:
     """Return the SHA-256 of the user's own model that a file of parameters is of, or nothing.
 
-    It is called before a case is loaded, which runs the model.
+    It is read before a case is loaded, which runs the model. Raises CaseError for a file that
+    holds no parameters: it would lack the hash too.
     """
-    top, _ = read_yaml(read_text(path), path)
-    content = top.value if isinstance(top.value, dict) else {}
+    content, _ = _content(path)
     return str(content.get("model_sha256", ""))
+
+
+def _content(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return what a file of parameters contains, and the faults of its text."""
+    top, faults = read_yaml(read_text(path), path)
+    content = top.value if isinstance(top.value, dict) else {}
+    if "inputs" in content:
+        raise CaseError([f"{path}: the result of a fit; give the parameters.yaml beside it"])
+    texts = [fault.text for fault in faults]
+    parameters = content.get("parameters")
+    if not isinstance(parameters, dict) or not parameters:
+        raise CaseError(f"{path}: {text}" for text in (*texts, "parameters: missing"))
+    return content, texts
 
 
 def read_parameters(case: Case, path: Path) -> dict[str, float]:
@@ -80,12 +93,8 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
     about records that the case does not have. Raises CaseError where it is not such a file, or is
     of another model.
     """
-    top, faults = read_yaml(read_text(path), path)
-    content = top.value if isinstance(top.value, dict) else {}
-    parameters, about = content.get("parameters"), content.get("records", {})
-    texts = [fault.text for fault in faults]
-    if not isinstance(parameters, dict) or not parameters:
-        raise CaseError(f"{path}: {text}" for text in (*texts, "parameters: missing"))
+    content, texts = _content(path)
+    parameters, about = content["parameters"], content.get("records", {})
     if str(content.get("model", case.subject)).upper() != case.subject:
         texts.append(f"model: {content['model']}, but {case.path} has {case.subject}")
     texts += _no_numbers("parameters", parameters)

@@ -72,6 +72,22 @@ def test_a_model_that_changed_since_the_fit_is_refused_before_it_is_run(case, co
     assert run(*command, "--no-plots", "--quiet") == 0
 
 
+@pytest.mark.parametrize("command", ["validate", "simulate"])
+@pytest.mark.parametrize("text", [None, "model: mine.py"])
+def test_a_file_without_parameters_is_refused_before_the_model_is_run(case, command, text, capsys):
+    """It says nothing of the hash of the model, so nothing could be compared."""
+    assert run("fit", case, "-o", "run-1", "--no-plots", "--quiet") == 0
+    (case.parent / "mine.py").write_text(SOURCE.read_text() + trap(case.parent))
+    file, fault = "run-1/result.json", "the result of a fit; give the parameters.yaml beside it"
+    if text is not None:
+        (case.parent / "other.yaml").write_text(text)
+        file, fault = "other.yaml", "parameters: missing"
+    capsys.readouterr()
+    assert run(command, "case.yaml", "--parameters", file, "--no-plots", "--quiet") == 1
+    assert capsys.readouterr().err == f"Error: {file}: {fault}\n"
+    assert not (case.parent / "run").exists()
+
+
 def test_values_of_a_fit_are_not_those_of_another_model(case):
     result = exfit.fit(case)
     (case.parent / "mine.py").write_text(SOURCE.read_text() + trap(case.parent))
