@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 COARSE = 0.2  # of the error of the fit: what halving the step may move
 INVISIBLE = 1e-7  # pu: no recorder shows it
-FAR = 0.01  # of vt0: beyond the noise of a record
+FAR_FROM_START = 0.01  # of vt0: beyond the noise of a record
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
 FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 UNSTEADY = 6.0  # standard errors between both halves of what is called steady
@@ -64,7 +64,7 @@ def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:
         way = measured.final_value - measured.initial_value
         if way * (simulated.final_value - simulated.initial_value) < 0.0:
             yield f"the record moves by {way:+.3g} pu, the response the other way"
-        if vt0 is not None and abs(measured.initial_value - vt0) > FAR * abs(vt0):
+        if vt0 is not None and abs(measured.initial_value - vt0) > FAR_FROM_START * abs(vt0):
             yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
 
 

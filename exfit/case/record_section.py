@@ -15,18 +15,18 @@ from exfit.case.yaml import Fault
 from exfit.errors import CaseError
 from exfit.util.text import dotted
 
-HERE = "record"  # the place of the section in a case, for the keys allowed there
+SECTION = "record"  # the place of the section in a case, for the keys allowed there
 
 
 def record_section(content: Mapping[str, Any]) -> RecordFile:
     """Return the section of a record of a machine; raises CaseError with all faults of it."""
     faults = list[Fault]()
-    plain = plain_content(content, faults, (HERE,))
+    plain = plain_content(content, faults, (SECTION,))
     section, wrong_forms = _section(plain)
     faults += _elsewhere(wrong_forms, faults)
-    faults += _elsewhere(_contradictions(ContentNode((HERE,), plain)), faults)
+    faults += _elsewhere(_contradictions(ContentNode((SECTION,), plain)), faults)
     if section is None or faults:
-        file = content.get("file", HERE)
+        file = content.get("file", SECTION)
         raise CaseError(f"{file}: {dotted(fault.place[1:])}: {fault.text}" for fault in faults)
     return section
 
@@ -37,7 +37,8 @@ def _section(plain: Any) -> tuple[RecordFile | None, list[Fault]]:
         return RecordFile.model_validate(plain), []
     except ValidationError as error:
         details = [
-            {**detail, "loc": (HERE, *detail["loc"])} for detail in error.errors(include_url=False)
+            {**detail, "loc": (SECTION, *detail["loc"])}
+            for detail in error.errors(include_url=False)
         ]
         return None, [*form_faults(details, json_schema())]
 

@@ -1,4 +1,4 @@
-"""The case file that a unit of a PSS/E dynamics file makes: to be read, run, and edited."""
+"""The lines of a case file that is made for a user to edit: values with their meanings."""
 
 from exfit.models.sheet import Parameter
 

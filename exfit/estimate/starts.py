@@ -17,7 +17,7 @@ from exfit.estimate.threads import side_by_side, until
 from exfit.util.strategies import DEFAULT_STRATEGY
 
 SEED = 1  # any: what matters is that a run can be repeated
-CHUNK = 256  # points screened between two reports
+SCREENED_AT_ONCE = 256  # points screened between two reports
 INDISTINGUISHABLE = 0.5  # standard errors: a difference that no record shows
 
 
@@ -190,7 +190,9 @@ def screened(
         done = int(np.count_nonzero(~np.isnan(costs)))
         watch(Progress("screening", done, len(points), float(np.nanmin(costs))))
 
-    parts = [slice(first, first + CHUNK) for first in range(0, len(points), CHUNK)]
+    parts = [
+        slice(first, first + SCREENED_AT_ONCE) for first in range(0, len(points), SCREENED_AT_ONCE)
+    ]
     side_by_side(look, parts, workers if screen is None else 1, report, stop)
     return costs
 

@@ -16,7 +16,7 @@ from exfit.inference.wording import digits, listed, move
 Indices = NDArray[np.intp]
 
 WEAK = 0.1  # relative standard error: worse than a data sheet
-SHOWN = 0.1  # of the largest part of a combination: smaller ones hide what matters
+SMALLEST_PART = 0.1  # of the largest part of a combination: smaller ones hide what matters
 EXACT_MOVE = 0.1  # relative change that shows an exact redundancy, which holds for any
 TIED = 6  # digits: components that differ less are equal but for rounding
 
@@ -85,7 +85,7 @@ def weak_combinations(
         if value == 0.0 or value * WEAK >= 1.0:
             continue
         step = direction / value
-        large = np.abs(step) > SHOWN * np.max(np.abs(step))
+        large = np.abs(step) > SMALLEST_PART * np.max(np.abs(step))
         moves = ordered(kept[large], step[large])
         changes = tuple(changes_of(lin, noise, lin.relative[:, kept] @ step))
         sentence = f"{together(lin, moves)}: {effects(changes)}"

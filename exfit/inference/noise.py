@@ -14,7 +14,7 @@ from exfit.inference.wording import digits
 SURPRISING = 0.01  # of tests of what is true reject it
 LAGS = 20  # the most that a test of whiteness takes (Box, Jenkins & Reinsel 1994, section 8.2.2)
 SAMPLES_PER_LAG = 5
-SURE = 1e-10  # a probability below it is not worth its digits
+LEAST_P = 1e-10  # a probability below it is not worth its digits
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Noise:
                 f"the noise given: {used} counts"
             )
         if self.p_value is not None and self.p_value < SURPRISING:
-            p = f"p {digits(self.p_value)}" if self.p_value > SURE else f"p below {SURE:.0e}"
+            p = f"p {digits(self.p_value)}" if self.p_value > LEAST_P else f"p below {LEAST_P:.0e}"
             finding = f"the residuals of {self.label} are not white (Ljung-Box {p})"
             if self.inflation == 1.0:
                 yield f"{finding}, but alternate: the intervals are no wider for it"

@@ -6,7 +6,7 @@ from math import exp
 from exfit.inference.linear import Linearisation
 
 PLAIN = 1e4  # below it a number is printed without an exponent
-MOST = 7.0  # natural logarithm: beyond a factor of a thousand only the order counts
+MOST_EXPONENT = 7.0  # natural logarithm: beyond a factor of a thousand only the order counts
 
 
 def listed(names: Sequence[str]) -> str:
@@ -37,6 +37,6 @@ def move(lin: Linearisation, index: int, share: float) -> str:
 
 
 def _factor(logarithm: float) -> str:
-    if abs(logarithm) > MOST:
+    if abs(logarithm) > MOST_EXPONENT:
         return "by orders of magnitude"
     return f"times {digits(exp(logarithm))}"

@@ -7,7 +7,7 @@ from typing import Any
 
 from exfit.errors import ModelError
 
-SHOWN = 12  # digits of a hash that distinguish files
+HASH_DIGITS = 12  # digits of a hash that distinguish files
 
 
 def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
@@ -26,7 +26,7 @@ def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
     if sha256 and own != sha256:
         raise ModelError(
             f"{path}: not run: the file has changed since the fit: its SHA-256 begins with "
-            f"{own[:SHOWN]}, that of the fitted model was {sha256[:SHOWN]}; fit again"
+            f"{own[:HASH_DIGITS]}, that of the fitted model was {sha256[:HASH_DIGITS]}; fit again"
         )
     module = ModuleType(f"exfit_user_{path.stem}")
     try:

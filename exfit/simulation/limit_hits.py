@@ -17,7 +17,7 @@ LIMIT_ROUNDING = (
     1e-9  # of a limit: a state put back on it is that near, one that passes by does not
 )
 POINTS_AT_ONCE = 16384  # of a run: the values of a whole graph along them take 50 MB
-FAR = 100.0  # times what a signal moves: a limit beyond that stands for no limit
+FARTHEST_LIMIT = 100.0  # times what a signal moves: a limit beyond that stands for no limit
 
 
 class LimitHit(NamedTuple):
@@ -92,8 +92,8 @@ def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
         distance = limit_side.limiter.sign * (limit_side.bound - limit_side.value)
         at = int(np.argmin(distance))
         width = abs(limit_side.bound[at] - other_side.bound[at])
-        span = float(np.ptp(limit_side.value))
-        if _key(limit_side.limiter) not in met and 0.0 < distance[at] <= FAR * span and width > 0.0:
+        most = FARTHEST_LIMIT * float(np.ptp(limit_side.value))
+        if _key(limit_side.limiter) not in met and 0.0 < distance[at] <= most and width > 0.0:
             limit, signal = limit_side.limiter.limit, limit_side.limiter.signal
             share = 100.0 * float(distance[at]) / float(width)
             near = Nearest(

@@ -29,7 +29,7 @@ TAKES_PART = 0.2  # of the participation of the state that takes part most
 NO_POLE = 1e-12  # of the fastest rate: an eigenvalue of zero, but for rounding
 SPLIT = 1e-6  # of a pole: rounding moves the two of a double one apart by its square root
 POINTS = 350  # of a frequency response, beside those around its peaks
-AROUND = np.linspace(-3.0, 3.0, 25)  # half widths of a peak: where its points lie
+PEAK_POINTS = np.linspace(-3.0, 3.0, 25)  # half widths of a peak: where its points lie
 LIGHTLY = 0.5  # damping ratio: a mode below it has a peak that the other points would cut off
 DECADE = 10.0  # beyond the slowest and the fastest pole
 FINER = 2  # times as many points to find crossovers between
@@ -270,7 +270,7 @@ def spanning(rates: Sequence[complex], points: int = POINTS) -> Array:
     sizes = sizes[sizes > NO_POLE * np.max(sizes, initial=0.0)]
     low, high = (np.min(sizes), np.max(sizes)) if len(sizes) else (1.0, 1.0)
     peaks = [
-        rate.imag + abs(rate.real) * AROUND
+        rate.imag + abs(rate.real) * PEAK_POINTS
         for rate in rates
         if rate.imag > 0.0 and abs(rate.real) < LIGHTLY * abs(rate)
     ]

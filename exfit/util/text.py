@@ -62,7 +62,7 @@ def yaml_number(value: float) -> str:
     return f"{mantissa}{'' if '.' in mantissa else '.0'}{e}{exponent}"
 
 
-SHOWN = 60  # characters of a wrong value
+LONGEST_VALUE = 60  # characters of a wrong value
 
 
 def near(word: str, known: Iterable[str]) -> str:
@@ -94,4 +94,4 @@ def show_value(value: Any) -> str:
     if isinstance(value, list | dict):
         return "a list" if isinstance(value, list) else "a mapping"
     text = repr(value)
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."

@@ -8,12 +8,12 @@ from math import isfinite
 from exfit import __version__
 from exfit.errors import ExfitError
 from exfit.exchange.psse import Definition, alternatives, definitions, record_text
+from exfit.exchange.psse.records import WIDTH
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.results.model import FitResult
 from exfit.util.text import near, show
 
-WIDTH = 80  # columns
 NO_LIMIT = 99.0  # pu: data sheets write limits that never act as 99 or 999
 
 

@@ -19,7 +19,7 @@ WIDE, SMALL = 720.0, 300.0  # units of a drawing; the page scales it
 ROOM = 0.06  # of the range, above and below the lines
 NARROW = 0.05  # of its level: the range of a signal that rests
 RESTS = 1e-6  # of its level: a signal that moves by less would fill its axis with rounding errors
-FEWEST = 0.1  # pu: the level of a signal that rests at zero
+LEAST_LEVEL = 0.1  # pu: the level of a signal that rests at zero
 PER_TICK = (80.0, 22.0)  # of an axis, across and upward: closer labels would touch
 UNIT_STEPS = (1.0, 2.0, 5.0, 10.0)  # of ticks, times a power of ten
 
@@ -242,7 +242,7 @@ def _span(lines: Iterable[Array], logarithmic: bool) -> Range:
     if logarithmic and high - low < 1.0:
         return floor(low), floor(low) + max(1.0, ceil(high) - floor(low))
     if high - low <= RESTS * level or high == low:
-        around = NARROW * max(level, FEWEST)
+        around = NARROW * max(level, LEAST_LEVEL)
         return low - around, high + around
     return low, high
 
