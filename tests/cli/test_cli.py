@@ -829,6 +829,14 @@ def test_a_data_sheet_holds_every_parameter_with_its_meaning(run, name):
         assert set(row.meaning.split()) <= words
 
 
+@pytest.mark.parametrize("name", ["AC1A", "GENROU"])
+def test_the_parameters_that_a_new_case_frees_are_listed_below_a_data_sheet(run, name):
+    free = [row.symbol for row in {**MODELS, **MACHINES}[name].sheet if row.free]
+    lines = run("models", name).out.splitlines()
+    last = [f"free in the case of `exfit new`: {', '.join(free)}"] if free else []
+    assert [line for line in lines if line.startswith("free")] == last
+
+
 def test_an_unknown_model_is_reported_with_the_known_ones(run, workplace):
     is_refused(
         run("models", "AC1B"), ["AC1B", "AC1A", "did you mean"], listing(workplace), workplace

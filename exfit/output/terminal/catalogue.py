@@ -53,6 +53,9 @@ def _describe(console: Console, described: Model | Machine, *drawing: str) -> No
     console.print(data_sheet(described.sheet))
     console.print()
     console.print(f"states: {', '.join(described.states)}")
+    free = [row.symbol for row in described.sheet if row.free]
+    if free:
+        console.print(f"free in the case of `exfit new`: {', '.join(free)}")
 
 
 def data_sheet(rows: Sheet) -> Table:
