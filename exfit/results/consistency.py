@@ -14,15 +14,19 @@ def contradictions(result: FitResult) -> Iterator[str]:
         yield "records: empty"
     for match in (*result.comparisons, *result.validation):
         yield from (f"records: {match.name}: {text}" for text in _of_comparison(match))
-    names = result.parameters.keys()
-    lines = [line.values for line in result.history]
-    lines += [] if result.minima is None else [each.values for each in result.minima.minima]
-    if any(line.keys() != names for line in lines):
-        yield "history: its parameters are not those of the fit"
+    yield from _of_search(result)
     if result.knowledge is not None:
         yield from (f"knowledge: {text}" for text in _of_uncertainty(result.knowledge))
     if result.behaviour is not None:
         yield from (f"behaviour: {text}" for text in _of_behaviour(result.behaviour))
+
+
+def _of_search(result: FitResult) -> Iterator[str]:
+    points = [line.values for line in result.history]
+    if result.minima is not None:
+        points += [minimum.values for minimum in result.minima.minima]
+    if any(values.keys() != result.parameters.keys() for values in points):
+        yield "history: its parameters are not those of the fit"
 
 
 def _of_comparison(match: Comparison) -> Iterator[str]:
