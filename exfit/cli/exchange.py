@@ -24,7 +24,7 @@ def import_(
     The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
     holds several units, --bus and --id choose one.
     """
-    from exfit.exchange.psse import located
+    from exfit.exchange.psse.fields import located
     from exfit.exchange.psse.import_case import case_text, import_unit
 
     if output is not None:

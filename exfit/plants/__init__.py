@@ -1,7 +1,7 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
 from exfit.plants.alone import alone
-from exfit.plants.infinite_bus import HEARD, Given, flow_sheet, infinite_bus
+from exfit.plants.infinite_bus import HEARD, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
@@ -18,11 +18,10 @@ from exfit.plants.parts import (
     exciter_parameters,
 )
 from exfit.plants.plant import Equipment, PlantKind, Stabilised
-from exfit.plants.playback import DRIVING, EFD0, VREF0, initial, playback
+from exfit.plants.playback import DRIVING, initial, playback
 
 __all__ = [
     "DRIVING",
-    "EFD0",
     "EVENTS",
     "HEARD",
     "KINDS",
@@ -32,10 +31,8 @@ __all__ = [
     "OPEN_CIRCUIT",
     "SATURATION",
     "STABILISER",
-    "VREF0",
     "VT0",
     "Equipment",
-    "Given",
     "Names",
     "PlantKind",
     "SaturationForm",

@@ -16,7 +16,8 @@ from places import ROOT
 
 from exfit import cli
 from exfit.case.load import load_case
-from exfit.exchange.psse import definition_of, read_unit
+from exfit.exchange.psse.records import definition_of
+from exfit.exchange.psse.unit import read_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record
 from exfit.output.run_folder import write_fit

@@ -14,18 +14,17 @@ from hypothesis import strategies as st
 from exfit.case.load import parse_case
 from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
-from exfit.exchange.psse import (
+from exfit.exchange.psse.fields import read_records, text_of
+from exfit.exchange.psse.import_case import case_text, import_unit
+from exfit.exchange.psse.records import (
     Definition,
     contradictions,
     definition_of,
     definitions,
-    read_records,
-    read_unit,
     read_values,
     record_text,
-    text_of,
 )
-from exfit.exchange.psse.import_case import case_text, import_unit
+from exfit.exchange.psse.unit import read_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record, typical
 

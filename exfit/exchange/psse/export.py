@@ -7,8 +7,7 @@ from math import isfinite
 
 from exfit import __version__
 from exfit.errors import ExfitError
-from exfit.exchange.psse import Definition, alternatives, definitions, record_text
-from exfit.exchange.psse.records import WIDTH
+from exfit.exchange.psse.records import WIDTH, Definition, alternatives, definitions, record_text
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.results.model import FitResult

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from exfit.case.templates import commented, parameter_line
 from exfit.errors import DynamicsError
-from exfit.exchange.psse import Unit, UnitPart, read_unit, text_of
+from exfit.exchange.psse.fields import text_of
+from exfit.exchange.psse.unit import Unit, UnitPart, read_unit
 from exfit.models.sheet import Sheet
 from exfit.util.text import yaml_number
 
