@@ -336,7 +336,7 @@ def validate(
 def _in_place_of(recordings: Sequence[Recording], case: Case, file: Path) -> Recording:
     """Return the first of the recordings with another file."""
     if not recordings:
-        raise CaseError([f"{case.path}: record: missing; nothing says how to read {file}"])
+        raise CaseError([f"{case.path}: record: missing; its columns are needed to read {file}"])
     section = recordings[0].record.model_copy(update={"file": str(file.absolute())})
     name = file.name if file.stem == SINGLE else file.stem
     return recordings[0].model_copy(update={"name": name, "record": section})

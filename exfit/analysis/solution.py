@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 INTERRUPTED_AFTERWARDS = (
-    "interrupted after the search: intervals, or comparisons with records that the fit never saw, "
+    "interrupted after the search: intervals, or comparisons with records that were not fitted, "
     "are missing"
 )
 
@@ -223,7 +223,7 @@ def fit_notes(
 
 
 def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[ExperimentSetup, Values]:
-    """Return a test that the fit never saw, and the values with what is found about its record.
+    """Return a test that was not fitted, and the values with what is found about its record.
 
     What that record leaves open about itself (its instants, its levels) is fitted to it, with the
     parameters of the unit as they are. The test has sub-steps enough. Raises KeyboardInterrupt at
@@ -248,7 +248,7 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[Experim
 
 
 def validation_of(case: Case, setup: ExperimentSetup, values: Values) -> Comparison:
-    """Return how `aligned` values do on a record that the fit never saw."""
+    """Return how `aligned` values do on a record that was not fitted."""
     limit = None if case.accept is None else case.accept.rmse
     of_record = {parameter.name: values[parameter.name] for parameter in setup.free}
     return compare_with_record(setup, setup.name, values, None, limit, of_record)

@@ -236,7 +236,7 @@ def network_part(given: Data, place: Place = ("plant", "network")) -> Part:
             if symbol not in given:
                 yield symbol, "is missing"
         if "Q" not in given and "E" not in given:
-            yield "Q", "is missing: with P it says where to start; or E, the voltage of the source"
+            yield "Q", "is missing: either Q or E, the voltage of the source, must be given with P"
         if "Q" in given and "E" in given:
             yield "Q", "not allowed with E, from which it follows"
         if values.get("R") == values.get("X") == 0.0:

@@ -115,8 +115,8 @@ def new(
 ) -> None:
     """Make a commented case from a model and a record: detected steps, typical values as starts.
 
-    Gains and time constants are free; `exfit models NAME` shows the typical values. What the record
-    does not show is left to be filled in, and the case is refused until it is.
+    The parameters that a bump test is fitted for are free; `exfit models NAME` lists them. What the
+    record does not show is left to be filled in, and the case is refused until it is.
     """
     from exfit.case.starting_case import starting_case
     from exfit.case.suggestion import relative

@@ -105,7 +105,7 @@ class Node:
     __hash__ = object.__hash__
 
     def __eq__(self, other: object) -> bool:
-        raise ModelError("a model may not ask for == or !=: compare values with <, <=, > or >=")
+        raise ModelError("a model must not use == or !=: compare values with <, <=, > or >=")
 
     def __bool__(self) -> bool:
         raise ModelError(

@@ -72,7 +72,7 @@ def _bounded(place: str, step: FindableStep, record: Record, limit: float | None
             kept[kept] = ~outliers(record.time[kept], vt[kept], limit)
         detected = find_step(record.time[kept], vt[kept])
     except ValueError as fault:
-        raise RecordError(f"{record.source}: {fault}; {place} asks for start: auto") from fault
+        raise RecordError(f"{record.source}: {fault}; {place} has start: auto") from fault
     first, last = float(record.time[0]), float(record.time[-1])
     bounds = {
         "at": (

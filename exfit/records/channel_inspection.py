@@ -68,7 +68,7 @@ class InspectedChannel:
         if self.spikes:
             yield self._spikes_in_words()
         for start, end in self.stuck[:PLACES_LISTED]:
-            yield f"stands still from {start:.6g} to {end:.6g} s"
+            yield f"does not change from {start:.6g} to {end:.6g} s"
         if self._is_implausible_voltage():
             yield f"{self.level:.5g} at rest cannot be a voltage in pu: what is its unit?"
 

@@ -186,7 +186,7 @@ def test_a_stabiliser_on_open_circuit_is_said_not_to_act(tmp_path):
     [
         ("f0: 50, ", "", "plant.network.f0: is missing"),
         ("X: 0.3, P: 0.8, ", "", "plant.network.X: is missing"),
-        (", Q: 0.2", "", "plant.network.Q: is missing: with P it says where to start"),
+        (", Q: 0.2", "", "plant.network.Q: is missing: either Q or E"),
         ("Q: 0.2", "Q: 0.2, E: 1.0", "plant.network.Q: not allowed with E"),
         ("R: 0.01, X: 0.3", "R: 0, X: 0", "plant.network.X: 0, and R = 0 as well"),
         ("R: 0.01, X: 0.3", "R: 0.01, XX: 0.3", "plant.network.XX: not a parameter of the net"),

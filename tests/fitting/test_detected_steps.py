@@ -78,7 +78,7 @@ def test_auto_keeps_the_bounds_that_are_given(tmp_path):
 def test_auto_refuses_a_record_without_a_step_and_one_whose_step_comes_after_the_next(tmp_path):
     write(tmp_path / "record.csv", t=TIME, vt=np.ones_like(TIME))
     auto = {"at": {"start": "auto"}, "step": {"start": "auto"}}
-    with pytest.raises(RecordError, match=r"record\.csv: .*test\.vref\[0\] asks for start: auto"):
+    with pytest.raises(RecordError, match=r"record\.csv: .*test\.vref\[0\] has start: auto"):
         build_experiments(case_of(one({"vref": [auto]}), tmp_path))
     synthetic(tmp_path, {**TEST, "vref": [{"at": 3.0, "step": 0.05}]}, TIME)
     test = {"vref": [auto, {"at": 2.0, "step": 0.01}]}

@@ -42,10 +42,10 @@ def missing_without_record(test: ContentNode) -> Iterator[Fault]:
         text = "only with a record; without one the time begins at 0"
         yield test.at("begin").fault(text)
     if test.content and "duration" not in test:
-        text = "is missing: without a record it says how long to simulate"
+        text = "is missing: without a record it must be given"
         yield test.at("duration").fault(text)
     if test.content and "vt0" not in test:
-        yield test.at("vt0").fault("is missing: without a record it says where to start")
+        yield test.at("vt0").fault("is missing: without a record it must be given")
 
 
 def _playback_faults(test: ContentNode, kind: PlantKind) -> Iterator[Fault]:

@@ -17,7 +17,7 @@ def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
         return
     for key in ("model", "saturation", "parameters", "stabiliser"):
         if key in content:
-            text = f"not allowed with plant {kind.name}: the machine stands alone"
+            text = f"not allowed with plant {kind.name}: it has no exciter"
             yield content.at(key).fault(text)
 
 

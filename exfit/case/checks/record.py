@@ -51,7 +51,7 @@ def _start_faults(test: ContentNode, channels: ContentNode) -> Iterator[Fault]:
     if "vt0" in test:
         return
     if test.at("begin").number is not None:
-        yield test.at("vt0").fault("is missing: with begin it says where to start")
+        yield test.at("vt0").fault("is missing: it must be given with begin")
     if channels.content and "begin" not in test and "vt" not in channels:
         text = "is missing, and the record has no vt to take it from"
         yield test.at("vt0").fault(text)

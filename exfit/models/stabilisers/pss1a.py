@@ -36,7 +36,7 @@ RECORDS = (
         "A1 A2 T1 T2 T3 T4 T5 T6 KS VSTMAX VSTMIN VCU VCL",
         icons={"ICS": 1, "REMBUS": 0},
         absent={"VCU": 0.0, "VCL": 0.0},
-        doubt="whether REMBUS, VCU and VCL stand in the record of PSS1A is not confirmed",
+        doubt="whether REMBUS, VCU and VCL are in the record of PSS1A is not confirmed",
     ),
 )
 

@@ -34,7 +34,7 @@ SECTIONS = (
     ReportSection("findings", "Notes and unresolved findings", findings, "findings"),
     ReportSection("fit", "Fitted records", fitted_matches, "fit"),
     ReportSection(
-        "validation", "Validation on records that the fit never saw", validation_matches,
+        "validation", "Validation on records that were not fitted", validation_matches,
         "validation",
     ),
     ReportSection("search", "Search", search, "search"),

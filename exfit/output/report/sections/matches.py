@@ -48,7 +48,7 @@ def fitted_matches(result: FitResult) -> tuple[MatchView, ...]:
 
 
 def validation_matches(result: FitResult) -> tuple[MatchView, ...]:
-    """Return the records that the fit never saw, beside their simulations."""
+    """Return the records that were not fitted, beside their simulations."""
     return _matches(result)[len(result.comparisons) :]
 
 
