@@ -97,7 +97,7 @@ def fit(
     """
     began = clock.perf_counter()
     case = loaded(case)
-    method = _known(strategy or case.estimate.strategy)
+    method = _checked_strategy(strategy or case.estimate.strategy)
     start = case.values()
     setups, problem = fitted(case)
     residuals, counter = problem.residuals, SimulationCounter()
@@ -162,7 +162,7 @@ def fit(
     )
 
 
-def _known(strategy: str) -> str:
+def _checked_strategy(strategy: str) -> str:
     """Return a strategy, or raise CaseError where there is none of this name."""
     if strategy not in STRATEGIES:
         raise CaseError([f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}"])
@@ -174,7 +174,7 @@ def _was_interrupted(search_result: estimate.MultistartResult | None) -> bool:
 
 
 def _text_of(case: Case) -> str:
-    """Return the file of a case as it stands; "" for a case that was made in Python."""
+    """Return the text of the file of a case; "" for a case that was made in Python."""
     return case.path.read_text(encoding="utf-8-sig") if case.from_file else ""
 
 
@@ -274,8 +274,8 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
         response = setup.response(values)
         comparison = compare_with_record(setup, "record", values) if setup.channels else None
-        said = [] if comparison is None else record_notes(setup, comparison)
-        return SimulationResult(response, comparison, (*simulation_notes(case, response), *said))
+        notes = [] if comparison is None else record_notes(setup, comparison)
+        return SimulationResult(response, comparison, (*simulation_notes(case, response), *notes))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     response = with_enough_substeps(simulator, at, case.path).response(at)

@@ -88,8 +88,8 @@ def _offered(schema: Data, place: Place) -> str:
     return f": {' or '.join(words)}?" if words else ""
 
 
-def _unknown(key: str, known: list[str]) -> str:
-    return "not allowed with this type" if key in known else f"unknown key; {near(key, known)}"
+def _unknown(key: str, keys: list[str]) -> str:
+    return "not allowed with this type" if key in keys else f"unknown key; {near(key, keys)}"
 
 
 def _wrong_choice(place: Place, value: Any, expected: str) -> Fault:

@@ -260,17 +260,17 @@ def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Mode
 
 
 def _machine(plant: Data, faults: list[Fault]) -> Machine | None:
-    name = _known(plant, ("plant", "machine"), MACHINES, "machine", faults)
+    name = _catalogue_name(plant, ("plant", "machine"), MACHINES, "machine", faults)
     return None if name is None else MACHINES[name]
 
 
 def _stabiliser(data: Data, faults: list[Fault]) -> Model | None:
     section = _mapping(data.get("stabiliser"))
-    name = _known(section, ("stabiliser", "model"), STABILISERS, "stabiliser", faults)
+    name = _catalogue_name(section, ("stabiliser", "model"), STABILISERS, "stabiliser", faults)
     return None if name is None else STABILISERS[name]
 
 
-def _known(
+def _catalogue_name(
     section: Data, place: Place, catalogue: Mapping[str, Any], kind: str, faults: list[Fault]
 ) -> str | None:
     """Return the entry that a section names; add a fault where there is none of that name."""

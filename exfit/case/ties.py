@@ -133,9 +133,9 @@ class Ties:
 
         ``free`` holds no tied parameter. Raises TieError where one is not finite.
         """
-        found, slopes = dict(values), {name: {name: 1.0} for name in free}
+        every, slopes = dict(values), {name: {name: 1.0} for name in free}
         for name in self.order:
-            found[name], slopes[name] = self.by_name[name].along(found, slopes)
+            every[name], slopes[name] = self.by_name[name].along(every, slopes)
         return {name: slopes[name] for name in self.by_name}
 
 

@@ -78,7 +78,7 @@ def fit_figure(result: FitResult, record: str | None = None) -> Figure:
     Raises ExfitError where there is no such record, or where a file of an earlier version holds no
     samples.
     """
-    comparisons = {one.name: one for one in (*result.comparisons, *result.validation)}
+    comparisons = {match.name: match for match in (*result.comparisons, *result.validation)}
     name = next(iter(comparisons)) if record is None else record
     if name not in comparisons:
         raise ExfitError(f"{name}: not a record of this fit; {near(name, comparisons)}")

@@ -104,7 +104,7 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> tuple[str, ...]
         numbers = dict(_numbers_of_fit(result))
         write_together(folder, numbers, {*FILES_OF_FIT, *_of_records(folder / WHOLE_FIT)})
         with suppress(ExfitError):  # a cache that cannot be written keeps nothing
-            write(_kept(result.case), numbers[PARAMETERS])
+            write(_last_parameters(result.case), numbers[PARAMETERS])
     return _draw(folder / WHOLE_FIT, partial(run_figures.of_fit, result)) if figures else ()
 
 
@@ -274,11 +274,11 @@ def agreement_table(agreement: Agreement) -> str:
 
 def last_fit(case: Path) -> Path | None:
     """Return the parameters of the last fit of a case; None where there was no fit."""
-    kept = _kept(case)
-    return kept if kept.is_file() else None
+    parameters = _last_parameters(case)
+    return parameters if parameters.is_file() else None
 
 
-def _kept(case: Path) -> Path:
+def _last_parameters(case: Path) -> Path:
     """Return where the parameters of a case's last fit are kept.
 
     A copy beside the compiled code: a folder of results may be written over by another case.

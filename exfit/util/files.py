@@ -165,5 +165,5 @@ def siblings(path: Path, suffix: str) -> list[Path]:
     if not path.parent.is_dir():
         return []
     wanted = (path.stem + suffix).lower()
-    found = [one for one in sorted(path.parent.iterdir()) if one.name.lower() == wanted]
-    return [one for one in found if one.stem == path.stem] or found
+    alike = [file for file in sorted(path.parent.iterdir()) if file.name.lower() == wanted]
+    return [file for file in alike if file.stem == path.stem] or alike

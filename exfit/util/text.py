@@ -46,8 +46,8 @@ def _plain(content: Any, ascii_only: bool) -> str:
     try:
         return json.dumps(content, ensure_ascii=ascii_only, allow_nan=False)
     except ValueError:
-        one = _finite(content) if isinstance(content, float) else [_finite(x) for x in content]
-        return json.dumps(one)
+        finite = _finite(content) if isinstance(content, float) else [_finite(x) for x in content]
+        return json.dumps(finite)
 
 
 def _finite(value: Any) -> Any:
@@ -65,11 +65,11 @@ def yaml_number(value: float) -> str:
 LONGEST_VALUE = 60  # characters of a wrong value
 
 
-def near(word: str, known: Iterable[str]) -> str:
-    """Return a hint at the known word that is meant, or at all of them."""
+def near(word: str, names: Iterable[str]) -> str:
+    """Return a hint at the name that is meant by a word, or at all names."""
     import difflib
 
-    folded = {name.casefold(): name for name in known}
+    folded = {name.casefold(): name for name in names}
     close = difflib.get_close_matches(word.casefold(), folded, n=1)
     return f"did you mean {folded[close[0]]}?" if close else f"known: {', '.join(folded.values())}"
 

@@ -88,10 +88,10 @@ def part_faults(
     yield from _placed(whole, places, part.check(_readable(part, fixed, _starts(free))))
 
 
-def _unknown_symbols(given: ContentNode, known: Collection[str], owner: str) -> Iterator[Fault]:
+def _unknown_symbols(given: ContentNode, symbols: Collection[str], owner: str) -> Iterator[Fault]:
     for symbol, parameter in given.sections:
-        if symbol not in known:
-            yield parameter.fault(f"not a parameter of {owner}; {near(symbol, known)}")
+        if symbol not in symbols:
+            yield parameter.fault(f"not a parameter of {owner}; {near(symbol, symbols)}")
 
 
 def _outside_sheet(given: ContentNode, rows: Mapping[str, Parameter]) -> Iterator[Fault]:

@@ -28,7 +28,7 @@ def verdict(result: FitResult) -> Verdict:
 
 
 def _determined(result: FitResult) -> str:
-    own = {name: one for name, one in result.parameters.items() if not one.of_record}
+    own = {name: fitted for name, fitted in result.parameters.items() if not fitted.of_record}
     vague = [name for name, parameter in own.items() if parameter.interval is None]
     if not vague:
         return "every parameter determined"

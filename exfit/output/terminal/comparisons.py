@@ -35,7 +35,7 @@ def _beside_each_other(
     console: Console, comparisons: Sequence[Comparison]
 ) -> Iterator[Sequence[Comparison]]:
     """Yield as many comparisons at a time as the terminal has room for."""
-    widest = max(len(heading) for one in comparisons for heading in (one.name, "simulated"))
+    widest = max(len(heading) for match in comparisons for heading in (match.name, "simulated"))
     count = max(1, (console.width - LABEL_WIDTH) // (2 * (widest + BETWEEN_COLUMNS)))
     for first in range(0, len(comparisons), count):
         yield comparisons[first : first + count]
@@ -52,11 +52,11 @@ def _error_table(comparisons: Sequence[Comparison]) -> Table:
     names = [comparison.name for comparison in comparisons]
     table = _folding(plain_table("", "unit", *names, numbers=names))
     table.add_row("cost", "pu²", *(f"{comparison.cost:.4e}" for comparison in comparisons))
-    signals = list(dict.fromkeys(signal for one in comparisons for signal in one.channels))
+    signals = list(dict.fromkeys(signal for match in comparisons for signal in match.channels))
     for signal in signals:
         label = "rmse" if len(signals) == 1 else f"rmse {signal}"
         table.add_row(label, "pu", *(_rmse(comparison, signal) for comparison in comparisons))
-    table.add_row("maximum error", "pu", *(f"{one.max_error:.3e}" for one in comparisons))
+    table.add_row("maximum error", "pu", *(f"{match.max_error:.3e}" for match in comparisons))
     table.add_row("fit", "%", *(f"{comparison.fit_percent:.2f}" for comparison in comparisons))
     return table
 

@@ -11,13 +11,13 @@
   }
 
   // the overlays of a record are documents of their own, and follow each other along the time
-  function range(one) {
-    const start = one.time[0], end = one.time[one.time.length - 1];
+  function range(match) {
+    const start = match.time[0], end = match.time[match.time.length - 1];
     const own = new Bokeh.Range1d({start, end, bounds: [start, end]});
-    const alike = ranges.get(one.group) ?? [];
-    ranges.set(one.group, [...alike, own]);
+    const alike = ranges.get(match.group) ?? [];
+    ranges.set(match.group, [...alike, own]);
     own.change.connect(() => {
-      for (const other of ranges.get(one.group)) {
+      for (const other of ranges.get(match.group)) {
         if (other.start !== own.start || other.end !== own.end) {
           other.setv({start: own.start, end: own.end});
         }
@@ -26,9 +26,9 @@
     return own;
   }
 
-  function source(one) {
-    const data = {time: numbers(one.time), measured: numbers(one.measured), simulated: numbers(one.simulated)};
-    if (one.start) data.start = numbers(one.start);
+  function source(match) {
+    const data = {time: numbers(match.time), measured: numbers(match.measured), simulated: numbers(match.simulated)};
+    if (match.start) data.start = numbers(match.start);
     data.residual = data.simulated.map((value, k) => MILLI * (value - data.measured[k]));
     return new Bokeh.ColumnDataSource({data});
   }
@@ -59,12 +59,12 @@
     plot.add_tools(new Bokeh.HoverTool({renderers: [renderer], mode: "vline", tooltips}));
   }
 
-  function draw(one, place) {
-    const from = source(one), time = {field: "time"}, shared = range(one);
-    const upper = panel(shared, 300, one.label);
-    const names = ["measured", ...(one.start ? ["start"] : []), "simulated"];
+  function draw(match, place) {
+    const from = source(match), time = {field: "time"}, shared = range(match);
+    const upper = panel(shared, 300, match.label);
+    const names = ["measured", ...(match.start ? ["start"] : []), "simulated"];
     upper.scatter(time, {field: "measured"}, {source: from, size: 3, color: COLOURS.measured, line_color: null});
-    if (one.start) {
+    if (match.start) {
       upper.line(time, {field: "start"}, {source: from, color: COLOURS.start, line_dash: "dashed", line_width: 1.5});
     }
     const line = upper.line(time, {field: "simulated"}, {source: from, color: COLOURS.simulated, line_width: 2});
@@ -77,16 +77,16 @@
     return Bokeh.Plotting.show(new Bokeh.Column({children: [upper, lower], sizing_mode: "stretch_width"}), place);
   }
 
-  async function enliven(one) {
-    const figure = document.getElementById(one.key);
-    const place = document.getElementById(`${one.key}-live`);
+  async function enliven(match) {
+    const figure = document.getElementById(match.key);
+    const place = document.getElementById(`${match.key}-live`);
     place.hidden = false;
     try {
-      await draw(one, place);
+      await draw(match, place);
       figure.classList.add("alive");
     } catch (fault) {
       place.hidden = true;
-      console.warn(`${one.key} stays a drawing`, fault);
+      console.warn(`${match.key} stays a drawing`, fault);
     }
   }
 
@@ -94,13 +94,13 @@
   function fold() {
     const every = [...document.querySelectorAll("details.long")];
     let shut = [];
-    for (const one of every) one.open = false;
+    for (const details of every) details.open = false;
     window.addEventListener("beforeprint", () => {
-      shut = every.filter((one) => !one.open);
-      for (const one of shut) one.open = true;
+      shut = every.filter((details) => !details.open);
+      for (const details of shut) details.open = true;
     });
     window.addEventListener("afterprint", () => {
-      for (const one of shut) one.open = false;
+      for (const details of shut) details.open = false;
     });
   }
 
@@ -109,7 +109,7 @@
     if (typeof Bokeh === "undefined") return;
     Bokeh.logger?.set_level?.("warn");
     const every = JSON.parse(document.getElementById("samples").textContent);
-    for (const one of every) await enliven(one);
+    for (const match of every) await enliven(match);
     for (const hint of document.querySelectorAll(".hint")) hint.hidden = touch || every.length === 0;
     document.documentElement.dataset.ready = "true";
   }
