@@ -90,8 +90,9 @@ def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:
         beyond = int(np.count_nonzero(measured & ~channel.kept))
         if beyond:
             samples = np.count_nonzero(measured)
+            verb = "is" if beyond == 1 else "are"
             yield (
-                f"{beyond} of {samples} samples of {channel.signal} of {name} are left out as "
+                f"{beyond} of {samples} samples of {channel.signal} of {name} {verb} left out as "
                 "outliers"
             )
 

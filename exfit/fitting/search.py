@@ -99,7 +99,7 @@ def refuse_unfit(case: Case, problem: FitProblem) -> None:
         measured = channel.measured[channel.kept]
         if np.all(measured == measured[0]):
             level = f"{channel.signal} is {measured[0]:g} pu throughout"
-            raise CaseError([f"{case.path}: record: {level}: it shows no test"])
+            raise CaseError([f"{case.path}: record: {level}: there is no step in it"])
     with np.errstate(over="ignore"):
         start = problem.compressed(residuals.start)
         square = float(start @ start)

@@ -42,12 +42,15 @@ def test_spikes_that_a_robust_loss_bears_are_no_misfit(tmp_path):
         assert any("times the scatter" in note for note in found.notes) == noted
 
 
-def test_how_many_samples_are_left_out_as_outliers_is_noted(tmp_path):
+@pytest.mark.parametrize(("every", "words"), [(60, "10 of {}"), (600, "1 of {}")])
+def test_how_many_samples_are_left_out_as_outliers_is_noted(tmp_path, every, words):
     shown = synthetic(tmp_path, TEST, TIME)["vt"]
-    shown[::60] += 0.02
+    shown[::every] += 0.02
     shown[30:35] = np.nan
     write(tmp_path / "record.csv", t=TIME, vt=shown)
     channel = {"vt": {"column": "vt", "outliers": 8}}
     found = fit(case_of(one(TEST, channel, free=["KA"], gaps="skip"), tmp_path))
-    note = f"10 of {len(TIME) - 5} samples of vt of record.csv are left out as outliers"
+    verb = "is" if every == 600 else "are"
+    count = words.format(len(TIME) - 5)
+    note = f"{count} samples of vt of record.csv {verb} left out as outliers"
     assert note in found.notes
