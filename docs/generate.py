@@ -87,7 +87,7 @@ def _inner(value: Any, sections: Mapping[str, Schema]) -> list[str]:
 
 
 def _kind(section: Schema) -> str:
-    """Return what tells a section from the others in its place: its type, or its first key."""
+    """Return what distinguishes a section from others in its place: its type, or its first key."""
     kind = section["properties"].get("type", {}).get("const")
     return str(kind or section["required"][0])
 

@@ -8,12 +8,13 @@ import yaml
 from places import CONFIGS
 from records import UNIT, case_of, found_in, recording, several
 
-from exfit.analysis.experiment_design import NOISE, identify
+from exfit.analysis.experiment_design import identify
 from exfit.case.load import load_case
 from exfit.errors import CaseError
+from exfit.signals import NOISE
 from exfit.workflows import fit
 
-# exciters of several kinds, and two parameters of each that a small step tells apart
+# exciters of several kinds, and two parameters of each that a small step distinguishes
 EXCITERS = {
     "ac1a": {"KA": 400.0, "TE": 0.8},
     "ac8b": {"KPR": 80.0, "TE": 1.2},

@@ -11,9 +11,9 @@ import yaml
 
 import exfit
 from exfit import cli
-from exfit.cli.fitting import STRATEGIES
 from exfit.models import MACHINE_NAMES, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
+from exfit.util.strategies import STRATEGIES
 
 SHELLS = ("bash", "zsh", "fish")
 CASE = {

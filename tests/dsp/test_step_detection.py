@@ -72,27 +72,27 @@ def recorded(reference, step=STEP, rate=100.0, seed=0, size=0.0, **dirt):
 def test_the_step_of_a_sample_record_is_found_within_three_samples(record):
     sign, share = RECORDS[record]
     columns = read_columns(SAMPLES / f"{record}.csv", ["t", "vt"])
-    onset = find_step(columns["t"], columns["vt"])
-    assert onset.at == pytest.approx(STEP_AT, abs=0.03)
-    assert onset.size == pytest.approx(sign * STEP, rel=share)
+    detected = find_step(columns["t"], columns["vt"])
+    assert detected.at == pytest.approx(STEP_AT, abs=0.03)
+    assert detected.size == pytest.approx(sign * STEP, rel=share)
     before = columns["vt"][columns["t"] < STEP_AT]
-    assert onset.level == pytest.approx(np.mean(before), abs=1e-4)
+    assert detected.level == pytest.approx(np.mean(before), abs=1e-4)
 
 
 def test_on_load_the_instant_is_found_and_the_size_is_that_of_the_voltage():
     columns = read_columns(SAMPLES / "ac8b_on_line.csv", ["t", "vt"])
-    onset = find_step(columns["t"], columns["vt"])
-    assert onset.at == pytest.approx(STEP_AT, abs=0.03)
-    assert onset.size == pytest.approx(0.018, rel=0.02)  # the reference stepped by 0.02 pu
+    detected = find_step(columns["t"], columns["vt"])
+    assert detected.at == pytest.approx(STEP_AT, abs=0.03)
+    assert detected.size == pytest.approx(0.018, rel=0.02)  # the reference stepped by 0.02 pu
 
 
 @every_reference
 @pytest.mark.parametrize("step", [0.02, -0.05, 0.1])
 def test_without_noise_the_step_is_found_within_two_samples(reference, step):
-    onset = find_step(*recorded(reference, step))
-    assert onset.at == pytest.approx(STEP_AT, abs=0.02)
-    assert onset.size == pytest.approx(step, rel=0.003)
-    assert onset.level == pytest.approx(1.0, abs=1e-6)
+    detected = find_step(*recorded(reference, step))
+    assert detected.at == pytest.approx(STEP_AT, abs=0.02)
+    assert detected.size == pytest.approx(step, rel=0.003)
+    assert detected.level == pytest.approx(1.0, abs=1e-6)
 
 
 DIRT = {
@@ -108,35 +108,37 @@ DIRT = {
 @pytest.mark.parametrize("dirt", DIRT)
 def test_what_a_recorder_does_moves_the_step_little(reference, dirt):
     for seed, step in enumerate([0.02, -0.05, 0.1]):
-        onset = find_step(*recorded(reference, step, seed=seed, **DIRT[dirt]))
+        detected = find_step(*recorded(reference, step, seed=seed, **DIRT[dirt]))
         # what the shape of the rise errs by, and three standard errors
-        assert abs(onset.at - STEP_AT) <= 0.025 + 3.0 * onset.spread
-        assert onset.spread < 0.02
-        assert onset.size == pytest.approx(step, rel=0.01)
+        assert abs(detected.at - STEP_AT) <= 0.025 + 3.0 * detected.spread
+        assert detected.spread < 0.02
+        assert detected.size == pytest.approx(step, rel=0.01)
 
 
 @every_reference
 def test_the_spread_is_what_noise_leaves_open(reference):
-    onsets = [find_step(*recorded(reference, seed=seed, size=3e-4)) for seed in range(12)]
-    spread = np.mean([onset.spread for onset in onsets])
+    detected_steps = [find_step(*recorded(reference, seed=seed, size=3e-4)) for seed in range(12)]
+    spread = np.mean([detected.spread for detected in detected_steps])
     # 12 values tell their own spread to a factor of 1.6 in 99 of 100 cases
-    assert np.std([onset.at for onset in onsets], ddof=1) == pytest.approx(spread, rel=0.65)
+    assert np.std([detected.at for detected in detected_steps], ddof=1) == pytest.approx(
+        spread, rel=0.65
+    )
 
 
 @every_reference
 @pytest.mark.parametrize(("step", "worst"), [(0.02, 0.15), (-0.05, 0.08), (0.1, 0.05)])
 def test_large_noise_is_survived(reference, step, worst):
     for seed in range(3):
-        onset = find_step(*recorded(reference, step, seed=seed, size=1e-3, spikes=True))
-        assert onset.at == pytest.approx(STEP_AT, abs=worst)
-        assert onset.size == pytest.approx(step, rel=0.03)
+        detected = find_step(*recorded(reference, step, seed=seed, size=1e-3, spikes=True))
+        assert detected.at == pytest.approx(STEP_AT, abs=worst)
+        assert detected.size == pytest.approx(step, rel=0.03)
 
 
 @pytest.mark.parametrize("rate", [20.0, 50.0, 500.0, 5000.0])
 def test_the_rate_of_sampling_does_not_matter(rate):
     for reference in REFERENCES[:3]:
-        onset = find_step(*recorded(reference, rate=rate, size=1e-4))
-        assert onset.at == pytest.approx(STEP_AT, abs=0.03)
+        detected = find_step(*recorded(reference, rate=rate, size=1e-4))
+        assert detected.at == pytest.approx(STEP_AT, abs=0.03)
 
 
 def test_the_unit_of_the_signal_and_the_origin_of_time_do_not_matter():
@@ -159,9 +161,9 @@ def test_of_several_steps_the_first_is_found_with_its_own_size(reference, steps)
     vt = 1.0 + np.random.default_rng(5).normal(0.0, 1e-4, time.size)
     for step, at in zip(steps, (3.0, 13.0), strict=True):
         vt = vt + response(time, reference, step, at)
-    onset = find_step(time, vt)
-    assert onset.at == pytest.approx(3.0, abs=0.04)
-    assert onset.size == pytest.approx(steps[0], rel=0.01)
+    detected = find_step(time, vt)
+    assert detected.at == pytest.approx(3.0, abs=0.04)
+    assert detected.size == pytest.approx(steps[0], rel=0.01)
 
 
 @every_reference
@@ -174,18 +176,18 @@ def test_all_steps_are_found_in_their_order_and_no_others(reference, steps):
     instants = 3.0 + 10.0 * np.arange(len(steps))
     for step, at in zip(steps, instants, strict=True):
         vt = vt + response(time, reference, step, at)
-    onsets = find_steps(time, vt)
-    assert [onset.at for onset in onsets] == pytest.approx(instants, abs=0.04)
-    assert [onset.size for onset in onsets] == pytest.approx(steps, rel=0.03)
-    assert onsets[0] == find_step(time, vt)
+    detected_steps = find_steps(time, vt)
+    assert [detected.at for detected in detected_steps] == pytest.approx(instants, abs=0.04)
+    assert [detected.size for detected in detected_steps] == pytest.approx(steps, rel=0.03)
+    assert detected_steps[0] == find_step(time, vt)
 
 
 def test_a_slow_drift_before_the_step_is_not_the_step():
     time = np.arange(0.0, 20.0, 0.01)
     vt = 1.0 + 2e-3 * np.exp(-time) + response(time, "reference_ac1a", 0.05, 5.0)
-    onset = find_step(time, vt + np.random.default_rng(6).normal(0.0, 1e-4, time.size))
-    assert onset.at == pytest.approx(5.0, abs=0.02)
-    assert onset.size == pytest.approx(0.05, rel=0.01)
+    detected = find_step(time, vt + np.random.default_rng(6).normal(0.0, 1e-4, time.size))
+    assert detected.at == pytest.approx(5.0, abs=0.02)
+    assert detected.size == pytest.approx(0.05, rel=0.01)
 
 
 TIME = np.arange(0.0, 10.0, 0.01)
@@ -195,9 +197,9 @@ def test_a_jump_between_two_samples_is_placed_between_them():
     jump = np.where(TIME < 3.0, 1.0, 1.05) + np.random.default_rng(7).normal(0.0, 1e-4, TIME.size)
     fast = 1.05 - 0.05 * np.exp(-np.maximum(TIME - 3.0, 0.0) / 0.02)
     for vt in (jump, fast, fast + np.random.default_rng(8).normal(0.0, 1e-4, TIME.size)):
-        onset = find_step(TIME, vt)
-        assert onset.at == pytest.approx(3.0, abs=0.015)
-        assert onset.spread <= 0.015
+        detected = find_step(TIME, vt)
+        assert detected.at == pytest.approx(3.0, abs=0.015)
+        assert detected.spread <= 0.015
 
 
 def test_spikes_at_the_ends_are_no_step():
@@ -239,8 +241,8 @@ def test_where_there_is_no_step_it_is_said(case):
 
 
 def test_a_step_soon_after_the_start_is_found():
-    onset = find_step(TIME, 1.0 + response(TIME, "reference_ac1a", 0.05, 0.2))
-    assert onset.at == pytest.approx(0.2, abs=0.02)
+    detected = find_step(TIME, 1.0 + response(TIME, "reference_ac1a", 0.05, 0.2))
+    assert detected.at == pytest.approx(0.2, abs=0.02)
 
 
 @settings(deadline=None, derandomize=True, max_examples=200)
@@ -254,9 +256,9 @@ def test_whatever_is_recorded_gives_an_onset_within_it_or_a_sentence(samples, re
     samples = np.r_[np.full(rest, samples[0]), samples]
     time = 0.1 * np.arange(len(samples))
     try:
-        onset = find_step(time, samples)
+        detected = find_step(time, samples)
     except ValueError:
         return
-    assert time[9] <= onset.at <= time[-1]
-    assert onset.size != 0.0
-    assert 0.0 <= onset.spread <= time[-1]
+    assert time[9] <= detected.at <= time[-1]
+    assert detected.size != 0.0
+    assert 0.0 <= detected.spread <= time[-1]
