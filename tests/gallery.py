@@ -90,9 +90,7 @@ class Run:
         return Path("runs") / f"{name}-{command}"
 
 
-FIT, BOTH, FIELD = (
-    f"configs/{name}.yaml" for name in ("ac1a_typical", "ac1a_both", "field_record")
-)
+FIT, FIELD = (f"configs/{name}.yaml" for name in ("ac1a_typical", "field_record"))
 RECORD = FILE.relative_to(ROOT).as_posix()
 RUNS = (  # in the order of the page
     Run(
