@@ -102,6 +102,9 @@ def fit(
     setups, problem = fitted(case)
     residuals, counter = problem.residuals, SimulationCounter()
     unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
+    used = [*setups, *unseen]
+    # before the search: whoever edits the case meanwhile changes nothing of this fit
+    hashes, case_text = input_hashes(case, used), _text_of(case)
     history: list[Iteration] = []
 
     def announce(line: estimate.SolverIteration) -> None:
@@ -116,7 +119,6 @@ def fit(
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
     analysis = analysed(case, problem, best, fine, unseen)
-    used = [*setups, *unseen]
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
     return FitResult(
@@ -152,13 +154,13 @@ def fit(
         notes=tuple(fit_notes(case, residuals, best, setups, comparisons, analysis)),
         validation=analysis.validation,
         versions=versions(),
-        inputs=input_hashes(case, used),
+        inputs=hashes,
         strategy_given=method != case.estimate.strategy,
         parts=tuple(parts_of(case)),
         tests=tuple(tests_of(case, used)),
         behaviour=analysis.behaviour,
         files=input_names(case, used),
-        case_text=_text_of(case),
+        case_text=case_text,
     )
 
 

@@ -1,6 +1,7 @@
 """The cases of configs/ end to end: what they must find, and how well."""
 
 import json
+from hashlib import sha256
 
 import numpy as np
 import pytest
@@ -223,3 +224,22 @@ def test_an_interruption_before_the_second_jacobian_is_reported_without_a_note_o
     found = fit(case("first_order"), None, interrupt)
     assert found.interrupted
     assert [note for note in found.notes if "effect" in note] == []
+
+
+@pytest.mark.parametrize("changed", ["edited", "removed"])
+def test_a_case_that_is_changed_during_its_fit_leaves_the_fit_as_it_was(tmp_path, changed):
+    path = tmp_path / "case.yaml"
+    text = (ROOT / "configs" / "first_order.yaml").read_text(encoding="utf-8")
+    path.write_text(text.replace("../sample_data", str(ROOT / "sample_data")), encoding="utf-8")
+    before = path.read_text(encoding="utf-8")
+
+    def change(_):
+        if changed == "edited":
+            path.write_text(before + "# a line more\n", encoding="utf-8")
+        else:
+            path.unlink(missing_ok=True)
+
+    result = fit(path, progress=change)
+    assert result.success
+    assert result.case_text == before
+    assert result.inputs["case"] == sha256(before.encode()).hexdigest()
