@@ -218,9 +218,10 @@ def _phase_groups(
     """Yield the three-phase voltages among the columns."""
     for group in three_phases(tuple(samples), units):
         waves = {mains_frequency(time, samples[name]) is not None for name in group}
-        if len(waves) == 1:
-            effective = _effective(samples, group)
-            level = float(np.nanmedian(effective[: max(len(effective) // 10, 1)]))
+        effective = _effective(samples, group)
+        measured = effective[np.isfinite(effective)]  # where a sample of no phase is missing
+        if len(waves) == 1 and len(measured):
+            level = float(np.median(measured[: max(len(effective) // 10, 1)]))
             yield InspectedPhases(group, "waveform" if waves == {True} else "rms", level)
 
 
