@@ -285,6 +285,7 @@ def test_the_strategies_of_the_page_are_those_of_a_case():
 # ---- Python
 
 
+@pytest.mark.long  # and by the build of the documentation
 def test_the_notebook_runs(monkeypatch):
     monkeypatch.chdir(DOCS)
     cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]

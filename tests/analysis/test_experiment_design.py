@@ -21,6 +21,10 @@ EXCITERS = {
     "dc1a": {"KA": 46.0, "TE": 0.46},
     "st1a": {"KA": 190.0, "TC": 1.0},
 }
+BY_DEFAULT = ("ac1a", "st1a")
+EACH = [
+    pytest.param(name, marks=[] if name in BY_DEFAULT else [pytest.mark.long]) for name in EXCITERS
+]
 VT = {"vt": 1e-4}
 OFF_LINE = {signal: NOISE[signal] for signal in ("vt", "efd", "ifd")}
 SMALL = 1e-4  # pu, of the reference: no limit is met, and what is quadratic is 1e-4 of it
@@ -73,7 +77,7 @@ def plans(design):
     return {one.label: one.confidence for one in design.plans}
 
 
-@pytest.mark.parametrize("name", EXCITERS)
+@pytest.mark.parametrize("name", EACH)
 def test_where_the_response_is_linear_twice_the_step_halves_the_errors(plain, name):
     small, twice = (
         errors(identify(plain(name, step), VT).own.confidence) for step in (SMALL, 2.0 * SMALL)
@@ -82,13 +86,13 @@ def test_where_the_response_is_linear_twice_the_step_halves_the_errors(plain, na
     assert small / twice == pytest.approx(2.0, rel=2e-3)
 
 
-@pytest.mark.parametrize("name", EXCITERS)
+@pytest.mark.parametrize("name", EACH)
 def test_a_step_down_determines_as_much_as_one_up_where_the_response_is_linear(plain, name):
     up, down = (errors(identify(plain(name, step), VT).own.confidence) for step in (SMALL, -SMALL))
     assert up == pytest.approx(down, rel=2e-3)
 
 
-@pytest.mark.parametrize("name", EXCITERS)
+@pytest.mark.parametrize("name", EACH)
 def test_errors_grow_with_the_noise(plain, name):
     case = plain(name)
     quiet, noisy = (identify(case, {"vt": level}) for level in (1e-4, 3e-4))
@@ -100,7 +104,7 @@ def test_errors_grow_with_the_noise(plain, name):
         assert errors(other) == pytest.approx(3.0 * errors(one), rel=EXACT)
 
 
-@pytest.mark.parametrize("name", EXCITERS)
+@pytest.mark.parametrize("name", EACH)
 def test_more_signals_and_more_time_are_never_worse(plain, name):
     design = identify(plain(name), {})
     own, others = errors(design.own.confidence), {k: errors(v) for k, v in plans(design).items()}
@@ -111,7 +115,7 @@ def test_more_signals_and_more_time_are_never_worse(plain, name):
     assert (others["+ all"] < own).any()
 
 
-@pytest.mark.parametrize("name", EXCITERS)
+@pytest.mark.parametrize("name", EACH)
 def test_a_step_as_large_as_the_own_one_determines_the_same(plain, name):
     design = identify(plain(name, 0.05), {})
     assert errors(plans(design)["5 %"]) == pytest.approx(errors(design.own.confidence), rel=EXACT)

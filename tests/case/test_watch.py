@@ -88,6 +88,7 @@ def watched(*arguments):
             process.kill()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="sends a signal of POSIX")
 def test_every_change_is_fitted_a_fault_waits_and_ctrl_c_ends_with_0(place):
     with watched() as run:

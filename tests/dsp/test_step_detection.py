@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from places import REFERENCE, SAMPLES
@@ -245,7 +245,6 @@ def test_a_step_soon_after_the_start_is_found():
     assert detected.at == pytest.approx(0.2, abs=0.02)
 
 
-@settings(deadline=None, derandomize=True, max_examples=200)
 @given(
     st.integers(20, 60).flatmap(
         lambda count: arrays(float, count, elements=st.sampled_from([0.0, 0.1, 0.9, 1.0, 1.1]))

@@ -6,7 +6,7 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from known_minima import CERTIFIED, KNOWN, TEXTBOOK, Case, random_problem, rosenbrock
 from scipy.optimize import least_squares as scipy_least_squares
@@ -176,7 +176,6 @@ def test_a_variable_without_room_stays(jac):
     n=st.integers(1, 7),
     deficiency=st.integers(0, 3),
 )
-@settings(max_examples=150, deadline=None, derandomize=True)
 def test_the_bounded_linear_problem_meets_its_optimality_conditions(seed, n, deficiency):
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((n, n))

@@ -5,6 +5,7 @@ import random
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from records import config, several
 from records import recording as recorded
 
@@ -14,7 +15,7 @@ from exfit.errors import ExfitError
 from exfit.results.io import VERSION, load_result, result_text
 from exfit.results.thinning import MOST_ROWS, thinned
 
-DAMAGES = 400  # random ones of a file
+DAMAGES = 2 * settings.default.max_examples  # random ones of a file
 
 
 @pytest.fixture(scope="module")
