@@ -252,6 +252,7 @@ def test_every_model_is_named(name):
     assert {*MODELS, *MACHINES, *STABILISERS} <= set(re.findall(r"\w+", PAGES[name]))
 
 
+@pytest.mark.long
 def test_a_fit_writes_the_files_of_the_table_and_no_others(tmp_path):
     result = workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))
     run_folder.write_fit(result, tmp_path / "run", figures=True)

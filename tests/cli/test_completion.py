@@ -15,6 +15,8 @@ from exfit.models import MACHINE_NAMES, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.util.strategies import STRATEGIES
 
+pytestmark = pytest.mark.long  # a shell is started for each answer
+
 SHELLS = ("bash", "zsh", "fish")
 CASE = {
     "plant": {"type": "open-circuit", "machine": "GENROU", "free": {"Tpd0": {}}},
@@ -47,7 +49,7 @@ complete -C {line}
 """
 
 
-@pytest.fixture(params=[SHELLS[0], *(pytest.param(s, marks=pytest.mark.long) for s in SHELLS[1:])])
+@pytest.fixture(params=SHELLS)
 def shell(request):
     """Skip a shell that is not installed."""
     if shutil.which(request.param) is None:

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from known_minima import CERTIFIED, KNOWN, TEXTBOOK, beale, random_problem, rosenbrock
 
@@ -48,7 +48,7 @@ def for_every_run(law):
         method=st.sampled_from(EVERY_METHOD),
         jac=st.sampled_from(["2-point", "3-point", "exact"]),
     )
-    return settings(max_examples=60, deadline=None, derandomize=True)(given_runs(law))
+    return given_runs(law)
 
 
 @pytest.mark.parametrize("method", [method for method in SAFE_METHODS if method != "robust"])

@@ -188,7 +188,7 @@ def partners(definition, random):
     return records
 
 
-@settings(max_examples=20, derandomize=True, deadline=None)
+@settings(max_examples=settings.default.max_examples // 3, derandomize=True, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def each_case_holds_the_numbers_of_its_file(definition, seed):
     random = np.random.default_rng(seed)

@@ -27,6 +27,8 @@ from exfit.output import plots
 from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 
+pytestmark = pytest.mark.long  # every figure of the documentation is drawn
+
 PICTURES = [picture.name for run in RUNS for picture in run.pictures]
 LARGEST, TOGETHER = 60_000, 600_000  # bytes: a page that opens at once
 

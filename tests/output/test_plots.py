@@ -133,7 +133,7 @@ def test_an_overlay_has_a_panel_and_a_panel_of_errors_for_each_signal(signals, s
     assert figure.get_suptitle() == "bump"
 
 
-@pytest.mark.parametrize("iterations", [0, 40])
+@pytest.mark.parametrize("iterations", [pytest.param(0, marks=pytest.mark.long), 40])
 @pytest.mark.parametrize("phases", [("gn",), ("lm", "dgn")])
 def test_convergence_shows_cost_gradient_and_damping_of_every_phase(phases, iterations):
     figure = plots.convergence(result(iterations=iterations, phases=phases))
