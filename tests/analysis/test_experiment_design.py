@@ -21,7 +21,7 @@ EXCITERS = {
     "dc1a": {"KA": 46.0, "TE": 0.46},
     "st1a": {"KA": 190.0, "TC": 1.0},
 }
-BY_DEFAULT = ("ac1a", "st1a")
+BY_DEFAULT = ("ac1a",)
 EACH = [
     pytest.param(name, marks=[] if name in BY_DEFAULT else [pytest.mark.long]) for name in EXCITERS
 ]

@@ -843,7 +843,7 @@ def test_an_unknown_model_is_reported_with_the_known_ones(run, workplace):
     )
 
 
-CHECKED = ("ac1a_typical", "ac8b_on_line", "machine_playback")  # by default: a plant each
+CHECKED = ("ac8b_on_line", "machine_playback")  # by default: a plant each
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,10 @@ def test_the_code_of_a_fit_that_did_not_converge_stays_where_its_output_is_lost(
     assert code == 3
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-8"])
+@pytest.mark.parametrize(
+    "encoding",
+    ["cp1252", *(pytest.param(other, marks=pytest.mark.long) for other in ("ascii", "utf-8"))],
+)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_an_encoding_that_lacks_characters_ends_no_command(run, name, encoding):
     out = io.BytesIO()
