@@ -79,7 +79,6 @@ def copy(tmp_path):
     return Copy(tmp_path)
 
 
-@pytest.mark.long
 def test_a_signal_is_one_row_and_an_output_of_its_plant(copy):
     """The error of the control, put out by the plant of a model alone, and recorded with noise."""
     plant = "exfit/plants/alone.py"

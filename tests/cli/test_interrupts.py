@@ -20,7 +20,7 @@ def before(tmp_path_factory):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends a signal of POSIX")
-@pytest.mark.parametrize("while_writing", [pytest.param(False, marks=pytest.mark.long), True])
+@pytest.mark.parametrize("while_writing", [False, True])
 def test_an_interruption_leaves_a_whole_result_and_no_temporary_file(
     before, tmp_path, while_writing
 ):
@@ -37,7 +37,7 @@ def test_an_interruption_leaves_a_whole_result_and_no_temporary_file(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends a signal of POSIX")
-@pytest.mark.parametrize("while_writing", [pytest.param(False, marks=pytest.mark.long), True])
+@pytest.mark.parametrize("while_writing", [False, True])
 def test_a_kill_leaves_a_whole_result_and_the_next_fit_removes_the_rest(
     before, tmp_path, while_writing
 ):

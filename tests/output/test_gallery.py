@@ -33,7 +33,6 @@ PICTURES = [picture.name for run in RUNS for picture in run.pictures]
 LARGEST, TOGETHER = 60_000, 600_000  # bytes: a page that opens at once
 
 
-@pytest.mark.long
 def test_every_picture_is_what_its_command_makes():
     """All in one test: parallel workers would draw them once each."""
     pictures = drawn()

@@ -36,9 +36,11 @@ FLAGS = (
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 CASES = (
     "ac1a_typical",
-    *(pytest.param(n, marks=pytest.mark.long) for n in ("ac8b_unit1", "ac8b_on_line", "several")),
+    "ac8b_unit1",
+    "ac8b_on_line",
+    "several",
 )
-WIDTHS = (390, pytest.param(1280, marks=pytest.mark.long))  # of a telephone and of a desk, px
+WIDTHS = (390, 1280)  # of a telephone and of a desk, px
 BLANK = 0.02  # spread of the pixels, of white: a page of text and lines has ten times that
 WHEEL = -400.0  # towards the reader
 
@@ -175,7 +177,6 @@ def test_no_part_of_a_report_is_blank(opened, width):
         assert spread(overlay.screenshot()) > BLANK
 
 
-@pytest.mark.long
 def test_dragging_zooms_all_panels_of_a_record_alike(opened):
     page = opened("ac1a_typical")
     before = ranges(page)
@@ -190,7 +191,6 @@ def test_dragging_zooms_all_panels_of_a_record_alike(opened):
     assert after[2:] == before[2:]
 
 
-@pytest.mark.long
 def test_the_signals_of_a_record_are_zoomed_together(opened):
     page = opened("ac8b_on_line")
     before = ranges(page)
@@ -221,7 +221,6 @@ def test_the_wheel_zooms_with_ctrl_and_scrolls_without(opened):
     assert after[1] - after[0] < before[1] - before[0]
 
 
-@pytest.mark.long
 def test_pointing_at_an_overlay_shows_its_values(opened):
     page = opened("ac1a_typical")
     x, y = middle(page)
@@ -249,7 +248,6 @@ def test_without_scripts_every_drawing_is_seen(opened, name):
     assert page.locator(".hint").first.is_hidden()
 
 
-@pytest.mark.long
 def test_a_report_prints_to_pages_with_its_drawings_and_whole_history(opened, tmp_path):
     page = opened("ac1a_typical")
     assert page.locator(".history").is_hidden()

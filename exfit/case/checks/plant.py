@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from exfit.case.checks.model import part_faults
 from exfit.case.checks.node import ContentNode
-from exfit.case.parts import Parts, kind_of, network_part
+from exfit.case.parts import Parts, kind_of, network_part, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
 
@@ -28,7 +28,7 @@ def stabiliser_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> It
         return
     if kind.has_exciter and not kind.has_machine:
         yield section.fault(f"not allowed with plant {kind.name}: nothing feeds it")
-    kinds = (kind, *(kind_of(plant.content) for plant in plants_of_records(content)))
+    kinds = (kind, *map(kind_of, plants_of_records(content.content).values()))
     on_load = any(kind.on_load for kind in kinds)
     if kind.closed_loop and not on_load and section.at("free").content:
         yield section.at("free").fault("on open circuit a stabiliser does not act")
@@ -42,19 +42,10 @@ def stabiliser_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> It
 
 def plants_of_records_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of the plants that records have in place of the case's."""
-    for plant in plants_of_records(content):
+    for place in plants_of_records(content.content):
+        plant = content.at(*place)
         network = plant.at("network")
         if not kind.closed_loop:
             yield plant.fault(f"not allowed with plant {kind.name}")
         elif kind_of(plant.content).on_load and network.is_section:
             yield from part_faults(content, network_part(network.content, network.place), {}, {})
-
-
-def plants_of_records(content: ContentNode) -> list[ContentNode]:
-    """Return the plants that records have in place of the case's."""
-    return [
-        recording.at("plant")
-        for key in ("records", "validate")
-        for recording in content.at(key).entries
-        if "plant" in recording
-    ]
