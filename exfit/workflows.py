@@ -21,7 +21,7 @@ from exfit.analysis.case_description import (
     tests_of,
     values_by_part,
 )
-from exfit.analysis.diagnostics import typical_notes
+from exfit.analysis.diagnostics import typical_notes, unphysical_notes
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.iteration_responses import (
     LiveResponse,
@@ -277,11 +277,13 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         response = setup.response(values)
         comparison = compare_with_record(setup, "record", values) if setup.channels else None
         notes = [] if comparison is None else record_notes(setup, comparison)
-        return SimulationResult(response, comparison, (*simulation_notes(case, response), *notes))
+        return SimulationResult(
+            response, comparison, (*simulation_notes(case, values, response), *notes)
+        )
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     response = with_enough_substeps(simulator, at, case.path).response(at)
-    return SimulationResult(response, None, tuple(simulation_notes(case, response)))
+    return SimulationResult(response, None, tuple(simulation_notes(case, values, response)))
 
 
 def _changes(case: Case, values: ValuesOrResult | None) -> Values:
@@ -291,9 +293,10 @@ def _changes(case: Case, values: ValuesOrResult | None) -> Values:
     return changed_values(case, values or {}, "values")
 
 
-def simulation_notes(case: Case, response: Response) -> Iterator[str]:
-    """Yield which values are typical, and whether the machine falls out of step."""
+def simulation_notes(case: Case, values: Values, response: Response) -> Iterator[str]:
+    """Yield which values are typical or not physical, and whether the machine falls out of step."""
     yield from typical_notes(case)
+    yield from unphysical_notes(case, values)
     delta = response.signals.get("delta")
     if delta is not None and np.max(np.abs(delta)) > np.pi:
         at = float(response.time[np.argmax(np.abs(delta) > np.pi)])

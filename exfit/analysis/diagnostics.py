@@ -1,16 +1,19 @@
 """What a reader of a fit must know beside its numbers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
+from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import Residuals, noise_of
 from exfit.fitting.system import system_of
 from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.inference.wording import listed
+from exfit.models.blocks import SHORTEST
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
 from exfit.simulation.kernels import parameters_used
@@ -33,6 +36,8 @@ def notes(
     """Yield the notes on what a fit found; ``compared`` has sub-steps enough for its response."""
     values = residuals.values(solution.x)
     yield from typical_notes(case)
+    yield from search_range_notes(case)
+    yield from unphysical_notes(case, values)
     for experiment, comparison in zip(residuals.experiments, compared, strict=True):
         simulator, at = experiment.with_inputs(values), experiment.parameters(values)
         for signal, change in simulator.step_errors(at, experiment.signals).items():
@@ -159,6 +164,35 @@ def unsteady_notes(
                 f"{signal} moves by {drift:.2g} pu before {steady:g} s, where the record should be "
                 "at rest: the values that the fit starts from are uncertain"
             )
+
+
+def search_range_notes(case: Case) -> Iterator[str]:
+    """Yield which free parameters are held, and which the bounds let leave their data sheets."""
+    for name in case.held():
+        yield (
+            f"{name} = 0: its lag or lead is bypassed, so that {name} is held at 0 and not fitted; "
+            f"to fit it, start from at least {SHORTEST:g} s"
+        )
+    rows = case.rows()
+    beyond = [
+        name
+        for name, free in case.free().items()
+        if name in rows
+        and not all(map(rows[name].is_physical, search_bounds(free.min, free.max, rows[name])))
+    ]
+    if beyond:
+        yield (
+            f"{listed(beyond)} may leave the range of the data sheet, where values are not "
+            "physical: there is no bound, or one beyond it"
+        )
+
+
+def unphysical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
+    """Yield the values that lie outside the range of their data sheet."""
+    for name, row in case.rows().items():
+        if not row.is_physical(values[name]):
+            text = f"{name} = {values[name]:.4g} is not physical"
+            yield f"{text}: its data sheet's range is {row.physical_range}"
 
 
 def typical_notes(case: Case) -> Iterator[str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.analysis.diagnostics import typical_notes
+from exfit.analysis.diagnostics import search_range_notes, typical_notes
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.problem import free_parameters
@@ -86,7 +86,7 @@ def check(case: Case) -> Check:
         step=first.step,
         step_error=error,
         drift=drift,
-        notes=tuple(typical_notes(case)),
+        notes=(*typical_notes(case), *search_range_notes(case)),
     )
 
 

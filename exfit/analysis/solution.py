@@ -99,11 +99,8 @@ def fitted_parameters(
 
     ``why`` is the reason where there is no ``uncertainty``.
     """
-    rows = {
-        part.prefix + row.symbol: (row.unit, row.meaning)
-        for part in case.parts.all
-        for row in part.sheet
-    }
+    rows = case.rows()
+    described = {name: (row.unit, row.meaning) for name, row in rows.items()}
     of_records = {
         nuisance.name: (nuisance.unit, nuisance.meaning)
         for experiment in residuals.experiments
@@ -112,7 +109,7 @@ def fitted_parameters(
 
     def fitted(parameter: FreeParameter) -> FittedParameter:
         name = parameter.name
-        unit, meaning = (of_records | rows).get(name, ("", "used by ties"))
+        unit, meaning = (of_records | described).get(name, ("", "used by ties"))
         unknown = Uncertainty(None, None, None, why)
         own = unknown if uncertainty is None else uncertainty.confidence.parameters[name]
         return FittedParameter(
@@ -127,6 +124,7 @@ def fitted_parameters(
             why=own.why,
             unit=unit,
             meaning=meaning,
+            physical=name not in rows or rows[name].is_physical(values[name]),
         )
 
     return {parameter.name: fitted(parameter) for parameter in residuals.free}

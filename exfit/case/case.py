@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from exfit.case.assembly import CheckedContent, check_content, plain_content
+from exfit.case.bounds import is_held
 from exfit.case.given_records import with_record_sections
 from exfit.case.parts import Part, Parts, with_network
 from exfit.case.schema import (
@@ -28,6 +29,7 @@ from exfit.case.schema import (
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
 from exfit.errors import CaseError
+from exfit.models.sheet import Parameter
 from exfit.plants import KINDS, PlantKind
 from exfit.records.record import Record
 from exfit.util.text import Place, dotted, near
@@ -197,7 +199,25 @@ class Case:
         return self.ties.apply({**values, **helpers})
 
     def free(self) -> dict[str, FreeSection]:
-        """Return the free parameters, as the system names them."""
+        """Return the free parameters, as the system names them, without those that are held."""
+        held = self.held()
+        given = self._free_as_given()
+        return {name: free for name, free in given.items() if name not in held}
+
+    def held(self) -> tuple[str, ...]:
+        """Return the time constants that are given as free and start from 0.
+
+        Their blocks are bypassed, so that they stay at 0.
+        """
+        rows = self.rows()
+        given = self._free_as_given()
+        return tuple(name for name, free in given.items() if is_held(free.start, rows.get(name)))
+
+    def rows(self) -> dict[str, Parameter]:
+        """Return the row of the data sheet of every parameter, as the system names it."""
+        return {part.prefix + row.symbol: row for part in self.parts.all for row in part.sheet}
+
+    def _free_as_given(self) -> dict[str, FreeSection]:
         own = {
             part.prefix + symbol: free
             for part in self.parts.all
@@ -216,7 +236,7 @@ class Case:
 
     def units(self) -> dict[str, str]:
         """Return the unit of every parameter."""
-        return {part.prefix + row.symbol: row.unit for part in self.parts.all for row in part.sheet}
+        return {name: row.unit for name, row in self.rows().items()}
 
     def _fixed(self, part: Part) -> Mapping[str, float | str]:
         given: Mapping[str, float | str] = _at(self, part.fixed)

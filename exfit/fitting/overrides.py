@@ -18,10 +18,10 @@ from exfit.util.text import near
 def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[str, float]:
     """Return changes of values by name: KA, machine.Tpd0, or what is found about a record.
 
-    Raises CaseError, naming ``place``, for a name that the case does not have, a value that its
-    data sheet excludes, or values that contradict each other.
+    Raises CaseError, naming ``place``, for a name that the case does not have, a value that the
+    equations exclude, or values that contradict each other.
     """
-    rows = {part.prefix + row.symbol: row for part in case.parts.all for row in part.sheet}
+    rows = case.rows()
     faults = [*_wrong_names(case, given, rows), *_outside(rows, given)]
     if not faults:
         try:
@@ -49,11 +49,11 @@ def _wrong_names(
 
 
 def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:
-    """Yield the values that lie outside the range of their data sheet."""
+    """Yield the values that the equations exclude."""
     for name, value in values.items():
-        row = rows.get(name)
-        if row is not None and not row.low <= value <= row.high:
-            yield f"{name}: {value:g} lies outside {row.low:g} ... {row.high:g}"
+        fault = rows[name].range_fault(value) if name in rows else None
+        if fault is not None:
+            yield f"{name}: {fault}"
 
 
 def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:

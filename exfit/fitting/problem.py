@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.dsp.robust_loss import LOSSES
 from exfit.errors import CaseError
@@ -58,12 +59,12 @@ def robust_of(case: Case) -> Robust | None:
 
 def free_parameters(case: Case, setups: Sequence[ExperimentSetup] = ()) -> list[FreeParameter]:
     """Return the free parameters of a case, then what is found about its records."""
+    rows = case.rows()
     shared = [
         FreeParameter(
             name,
             section.start,
-            section.min,
-            section.max,
+            *search_bounds(section.min, section.max, rows.get(name)),
             section.scale == "log",
             None if section.prior is None else Prior(section.prior.mean, section.prior.sigma),
         )

@@ -151,7 +151,7 @@ def linearisation(
         units=("",) * len(free),
         values=np.array([values[parameter.name] for parameter in free]),
         logarithmic=np.array([parameter.logarithmic for parameter in free]),
-        width=np.array([parameter.high - parameter.low for parameter in free]),
+        width=np.array([parameter.width for parameter in free]),
         held=tuple(parameter.bound(values[parameter.name]) for parameter in free),
         errors=errors,
         jacobian=slopes / slopes_of(residuals, theta),

@@ -185,8 +185,8 @@ def pi(
 
 def pi_rest(y: Signal, KP: Signal, KI: Signal) -> tuple[Signal, Signal]:
     """Return the input and the integral that hold a PI at y, whichever of its gains is zero."""
-    integrates = KI > 0.0
-    return where(integrates, 0.0, y / where(integrates, 1.0, KP)), where(integrates, y, 0.0)
+    idle = zero(KI)
+    return where(idle, y / where(idle, KP, 1.0), 0.0), where(idle, 0.0, y)
 
 
 def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Signal = 0.0) -> Signal:

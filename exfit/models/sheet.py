@@ -2,15 +2,18 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf, isfinite
 from typing import Any, Literal, NamedTuple
 
 from exfit.errors import ModelError
+
+Limits = tuple[float, float]
 
 FREE: Literal["free"] = "free"  # ends the row of a parameter that a bump test is fitted for
 
 
 class Parameter(NamedTuple):
-    """One row of a data sheet; ``low`` and ``high`` bound every value it may take.
+    """One row of a data sheet; between ``low`` and ``high`` lie its physical values.
 
     ``free`` says that a fit of a bump test finds it, unless the case says otherwise. Fixed are, as
     a rule, limits and saturation, which a small step hardly reaches; the transducer, which is
@@ -28,9 +31,45 @@ class Parameter(NamedTuple):
     meaning: str
     free: bool = False
 
+    @property
+    def is_time(self) -> bool:
+        """Whether it is a time constant."""
+        return self.unit == "s"
+
+    @property
+    def domain(self) -> Limits:
+        """The range in which the equations hold, at least ``low`` to ``high``.
+
+        A gain or factor (its name begins with K) may have any size, and any sign unless the sheet
+        begins above 0: then it is divided by. A time constant may be as long as it likes. Whatever
+        else there is, as a voltage or the saturation, ends where its sheet does.
+        """
+        if self.is_time:
+            return self.low, inf
+        if self.symbol.upper().startswith("K"):
+            return (self.low if self.low > 0.0 else -inf), inf
+        return self.low, self.high
+
+    def is_physical(self, value: float) -> bool:
+        """Return whether a value lies in the range of the sheet."""
+        return self.low <= value <= self.high
+
+    def range_fault(self, value: float) -> str | None:
+        """Return why the equations exclude a value, None where they do not."""
+        low, high = self.domain
+        if isfinite(value) and low <= value <= high:
+            return None
+        if value < low and high == inf:
+            return f"{value:g} is below {low:g} {self.unit}, the least that the equations allow"
+        return f"{value:g} lies outside {self.physical_range}, its data sheet's range"
+
+    @property
+    def physical_range(self) -> str:
+        """The range of the sheet, in words."""
+        return f"{self.low:g} ... {self.high:g} {self.unit}"
+
 
 Sheet = tuple[Parameter, ...]
-Limits = tuple[float, float]
 Row = tuple[str, float, str, Limits, str] | tuple[str, float, str, Limits, str, Literal["free"]]
 
 

@@ -53,12 +53,14 @@ class FittedParameter:
     """A free parameter after a fit; ``of_record`` where it belongs to a record, not to the unit.
 
     ``interval`` holds the true value with 95 % confidence; where it is None, ``why`` is the reason.
+    ``min`` and ``max`` are infinite where there is no bound; ``physical`` says whether the value
+    lies in the range of its data sheet.
     """
 
     value: float
     start: float
-    min: float
-    max: float
+    min: Annotated[float, -inf]
+    max: Annotated[float, inf]
     at_bound: Literal["min", "max"] | None = None
     of_record: bool = False
     std_error: float | None = None
@@ -66,6 +68,7 @@ class FittedParameter:
     why: str | None = None
     unit: str = ""
     meaning: str = ""
+    physical: bool = True
 
     @property
     def stderr(self) -> float | None:

@@ -267,7 +267,7 @@ def test_what_follows_a_value_that_is_set_keeps_to_its_data_sheet(tmp_path):
     free["TE0"] = free.pop("TE")
     content["parameters"]["fixed"] |= {"TE": "=0.9*TE0", "VRMIN": "=-VAMAX"}
     case = case_of(content, tmp_path)
-    with pytest.raises(CaseError, match=r"--set: TE: -1\.8 lies outside"):
+    with pytest.raises(CaseError, match=r"--set: TE: -1\.8 is below 0\.01 s"):
         changed_values(case, {"TE0": -2.0}, "--set")
     with pytest.raises(CaseError, match="--set: TE0: nan is not a finite number"):
         changed_values(case, {"TE0": np.nan}, "--set")

@@ -35,6 +35,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from noise_faults([content, *several], kind)
     yield from repeated_names(several)
     yield from _estimate_faults(content)
+    yield from _starts_faults(content, parts)
 
 
 def _single_record_faults(content: ContentNode) -> Iterator[Fault]:
@@ -81,3 +82,16 @@ def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
         and estimate.content.get("loss", "least-squares") == "least-squares"
     ):
         yield estimate.at("loss_scale").fault("only with estimate.loss: huber or soft-l1")
+
+
+def _starts_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
+    """Yield the bounds that are missing where starts are spread between them."""
+    starts = content.at("estimate", "starts").number
+    if starts is None or starts <= 1.0:
+        return
+    for part in parts.all:
+        for _, parameter in () if part.free is None else content.at(*part.free).sections:
+            for bound in ("min", "max"):
+                if parameter.is_section and bound not in parameter:
+                    text = f"is missing: estimate.starts spreads {starts:g} starts over the bounds"
+                    yield parameter.at(bound).fault(text)

@@ -2,9 +2,10 @@
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from math import inf
+from math import inf, isfinite
 from typing import Any
 
+from exfit.case.bounds import is_held, search_bounds
 from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.messages import PERCENT
@@ -97,34 +98,55 @@ def _unknown_symbols(given: ContentNode, symbols: Collection[str], owner: str) -
 def _outside_sheet(given: ContentNode, rows: Mapping[str, Parameter]) -> Iterator[Fault]:
     for symbol, value in given.numbers.items():
         row = rows.get(symbol)
-        if row is not None and not row.low <= value <= row.high:
+        if row is not None and not row.is_physical(value):
             limits = f"{show(row.low)} ... {show(row.high)} {row.unit}"
             text = f"{show(value)} lies outside {limits}, its data sheet's range"
             yield given.at(symbol).fault(text)
 
 
 def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]:
-    """Yield the faults of one free parameter: its bounds, its start, its scale, its prior."""
+    """Yield the faults of one free parameter: its bounds, its start, its scale, its prior.
+
+    Its bounds and its start may leave the range of the data sheet where the equations allow it.
+    """
     yield from bound_faults(section)
-    low = section.at("min").number
-    logarithmic = section.content.get("scale", "log") == "log"
-    if low is not None and low <= 0 and logarithmic:
-        text = f"{show(low)} is not above 0, as scale: log needs; or scale: linear"
-        yield section.at("min").fault(text)
     yield from _prior_faults(section.at("prior"))
     if row is not None:
-        yield from _outside_sheet(section, dict.fromkeys(("start", "min", "max"), row))
-        if row.unit == "s":
-            yield from _bypass_faults(section)
+        for key in ("start", "min", "max"):
+            value = section.at(key).number
+            if value is not None and (text := row.range_fault(value)) is not None:
+                yield section.at(key).fault(text)
+    if is_held(section.at("start").number, row):
+        return
+    yield from _scale_faults(section, row)
+    if row is not None and row.is_time:
+        yield from _bypass_faults(section)
+
+
+def _scale_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]:
+    """Yield what the scale of a search lacks: a bound above 0, or a size by which to search."""
+    start, low, high = (section.at(key).number for key in ("start", "min", "max"))
+    lowest, highest = search_bounds(low, high, row)
+    if section.content.get("scale", "log") == "linear":
+        if start == 0.0 and not isfinite(highest - lowest) and lowest in (0.0, -inf):
+            yield section.at("start").fault("0 gives no size by which to search: give min and max")
+    elif low is not None and low <= 0.0:
+        text = f"{show(low)} is not above 0, as scale: log needs; or scale: linear"
+        yield section.at("min").fault(text)
+    elif lowest <= 0.0 and "min" not in section:
+        text = "is missing: scale: log needs a min above 0; without a lower bound: scale: linear"
+        yield section.at("min").fault(text)
 
 
 def _bypass_faults(time: ContentNode) -> Iterator[Fault]:
     """Yield a time constant whose bounds lie on both sides of the shortest one."""
-    low, high = time.at("min").number, time.at("max").number
+    start, low, high = (time.at(key).number for key in ("start", "min", "max"))
+    limit = f"{show(SHORTEST)} s, below which the block is bypassed"
     if low is not None and low < SHORTEST <= (inf if high is None else high):
-        limit = f"{show(SHORTEST)} s, below which the block is bypassed"
         text = f"{show(low)} is below {limit}; a free time must not cross it"
         yield time.at("min").fault(text)
+    elif "min" not in time and start is not None and start < SHORTEST:
+        yield time.at("start").fault(f"{show(start)} is below {limit}; give a min as well")
 
 
 def _prior_faults(prior: ContentNode) -> Iterator[Fault]:

@@ -108,8 +108,12 @@ class FreeSection(Section):
     """A parameter that is fitted."""
 
     start: Number = Field(description="Start value.")
-    min: Number = Field(description="Lower bound.")
-    max: Number = Field(description="Upper bound.")
+    min: Number | None = Field(
+        default=None, description="Lower bound; default: as far as the equations allow."
+    )
+    max: Number | None = Field(
+        default=None, description="Upper bound; default: as far as the equations allow."
+    )
     scale: Literal["log", "linear"] = Field(
         default="log", description="Scale on which it is fitted; log requires min > 0."
     )

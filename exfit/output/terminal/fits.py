@@ -1,6 +1,6 @@
 """The result of a fit."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from rich.console import Console
 from rich.table import Table
@@ -8,7 +8,7 @@ from rich.text import Text
 
 from exfit.output.terminal.comparisons import comparisons
 from exfit.output.terminal.terminal import error_of, notes, number, plain_table, unresolved
-from exfit.results.model import FitResult, Minima
+from exfit.results.model import FitResult, FittedParameter, Minima
 
 MOST_MINIMA = 5  # columns that fit beside each other
 
@@ -52,8 +52,8 @@ def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
     numbers = ("start", *former, "fitted", "95 % interval", "error")
     table = plain_table("parameter", *numbers, "unit", "", numbers=numbers)
     for name, parameter in result.parameters.items():
-        style = "yellow" if parameter.at_bound else ""
-        mark = f"on its {parameter.at_bound}" if parameter.at_bound else ""
+        mark = ", ".join(_marks(parameter))
+        style = "yellow" if mark else ""
         interval, error = "-", "-"
         if result.knowledge is not None:
             uncertainty = result.knowledge.confidence.parameters[name]
@@ -65,6 +65,14 @@ def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
         values = (number(parameter.start), *old, number(parameter.value))
         table.add_row(name, *values, interval, error, parameter.unit, mark, style=style)
     return table
+
+
+def _marks(parameter: FittedParameter) -> Iterator[str]:
+    """Yield what must be seen beside a value."""
+    if parameter.at_bound:
+        yield f"on its {parameter.at_bound}"
+    if not parameter.physical:
+        yield "not physical"
 
 
 def minima(console: Console, search: Minima, parameters: Iterable[str]) -> None:

@@ -1,0 +1,26 @@
+"""How far a fit may move a parameter: between its bounds, or as far as its equations allow."""
+
+from math import inf
+
+from exfit.models.blocks import SHORTEST
+from exfit.models.sheet import Limits, Parameter
+
+
+def search_bounds(low: float | None, high: float | None, row: Parameter | None) -> Limits:
+    """Return the bounds of a free parameter, given those that the case has.
+
+    A missing one is the limit of the equations, which may be infinite; a time constant stays where
+    its block is not bypassed. Without a data sheet there is no limit.
+    """
+    lowest, highest = (-inf, inf) if row is None else row.domain
+    if row is not None and row.is_time:
+        lowest = max(lowest, SHORTEST)
+    return lowest if low is None else low, highest if high is None else high
+
+
+def is_held(start: float | None, row: Parameter | None) -> bool:
+    """Return whether a free parameter is a time constant of 0, whose block is bypassed.
+
+    The response does not depend on it there, so that no fit can leave that value.
+    """
+    return row is not None and row.is_time and row.low == 0.0 and start == 0.0

@@ -1,0 +1,158 @@
+"""Fits without bounds: what they find, and that they say what is not physical."""
+
+import json
+from math import inf
+
+import numpy as np
+import pytest
+import yaml
+from cases import FIRST_ORDER, TIME, TRUTH
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from records import TEST, UNIT, case_of, one, write
+from records import TIME as SAMPLES
+
+from exfit.case.case import Case
+from exfit.errors import CaseError
+from exfit.fitting.build import build_experiments
+from exfit.fitting.overrides import changed_values, read_parameters
+from exfit.fitting.parameters import FreeParameter
+from exfit.records.record import Record
+from exfit.results.io import load_result, result_text
+from exfit.results.tables import parameter_file
+from exfit.workflows import check, fit, profile, simulate
+
+NOISE = 1e-5  # pu: far below what KD = -0.3 does to vt
+NEGATIVE = {**UNIT, "KD": -0.3}
+ROUNDING = 1e-9  # relative, of a value through its scale and back
+
+finite = st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1e-6)
+
+
+@settings(max_examples=50)
+@given(start=finite, below=st.none() | st.floats(0.1, 1e3), above=st.none() | st.floats(0.1, 1e3))
+def test_every_parameter_has_a_size_by_which_to_search(start, below, above):
+    low = -inf if below is None else start - below
+    high = inf if above is None else start + above
+    parameter = FreeParameter("x", start, low, high, logarithmic=False)
+    assert 0.0 < parameter.width < inf
+    for value in (start, start + 0.05, start - 0.05):
+        assert abs(parameter.value(parameter.scaled(value)) - value) <= ROUNDING * (1 + abs(value))
+    assert parameter.bound(start) is None
+    assert [parameter.value(parameter.scaled(bound)) for bound in (low, high)] == [low, high]
+    if below is not None and above is not None:
+        assert parameter.width == high - low
+
+
+def unit_with(free, values, folder):
+    """Write the response of a unit, with noise; return the case that fits ``free`` to it."""
+    write(folder / "record.csv", t=SAMPLES, vt=SAMPLES)
+    truth = case_of(one(TEST), folder)
+    rng = np.random.default_rng(4)
+    (setup,) = build_experiments(truth)
+    vt = setup.with_enough_substeps({**truth.values(), **values}).response(
+        {**truth.values(), **values}
+    )
+    noisy = vt.signals["vt"] + NOISE * rng.standard_normal(len(SAMPLES))
+    write(folder / "record.csv", t=SAMPLES, vt=noisy)
+    content = one(TEST, free=["TA", "TE", "KD"])
+    content["parameters"]["free"] |= free
+    return content
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """Return the folder of a unit whose KD is negative, its case, and the fit without bounds."""
+    folder = tmp_path_factory.mktemp("unit")
+    free = {
+        "TA": {"start": 0.02},
+        "TE": {"start": 1.0, "scale": "linear"},
+        "KD": {"start": 0.36, "scale": "linear"},
+    }
+    content = unit_with(free, NEGATIVE, folder)
+    return folder, content, fit(case_of(content, folder))
+
+
+def test_a_fit_without_bounds_finds_a_value_outside_the_data_sheet(found):
+    _, _, result = found
+    for name, parameter in result.parameters.items():
+        assert parameter.std_error is not None
+        assert abs(parameter.value - NEGATIVE[name]) < 4.0 * parameter.std_error, name
+    assert result.parameters["KD"].value < -0.25
+    assert not result.parameters["KD"].physical
+    assert result.parameters["TE"].physical
+
+
+def test_it_says_what_is_not_physical(found):
+    _, _, result = found
+    (outside,) = [note for note in result.notes if "is not physical" in note]
+    assert outside.startswith("KD = -0.3")
+    assert "0 ... 100 pu" in outside
+    assert any("TA, TE and KD may leave the range" in note for note in result.notes)
+
+
+def test_bounds_within_the_data_sheet_need_no_word(found):
+    folder, content, _ = found
+    bounded = {**content, "parameters": {**content["parameters"]}}
+    bounded["parameters"]["free"] = one(TEST, free=["TA", "TE", "KD"])["parameters"]["free"]
+    case = case_of(bounded, folder)
+    assert not [note for note in check(case).notes if "physical" in note]
+    result = fit(case)
+    assert result.parameters["KD"].at_bound == "min"
+    assert not [note for note in result.notes if "physical" in note]
+
+
+def test_a_missing_bound_is_null_in_the_file_and_infinite_in_python(found, tmp_path):
+    _, _, result = found
+    text = result_text(result)
+    parameter = json.loads(text)["parameters"]["KD"]
+    assert (parameter["min"], parameter["max"], parameter["physical"]) == (None, None, False)
+    (tmp_path / "result.json").write_text(text)
+    read = load_result(tmp_path).parameters
+    assert (read["KD"].min, read["KD"].max) == (-inf, inf)
+    assert (read["TE"].min, read["TE"].max) == (0.01, inf)
+    assert read == dict(result.parameters)
+
+
+def test_its_parameters_are_taken_up_by_a_simulation_which_says_so(found, tmp_path):
+    folder, content, result = found
+    case = case_of(content, folder)
+    path = tmp_path / "parameters.yaml"
+    path.write_text(parameter_file(result))
+    simulated = simulate(case, read_parameters(case, path))
+    assert simulated.comparison is not None
+    assert abs(simulated.comparison.rmse - result.rmse) <= 1e-6 * result.rmse
+    assert any(note.startswith("KD = -0.3") for note in simulated.notes)
+
+
+def test_what_the_equations_exclude_is_refused_as_a_value_too(found):
+    folder, content, _ = found
+    case = case_of(content, folder)
+    assert changed_values(case, {"KD": -1.0}, "--set") == {"KD": -1.0}
+    for name, value in (("TE", -1.0), ("KA", 0.0), ("KD", inf), ("KD", np.nan)):
+        with pytest.raises(CaseError, match=f"--set: {name}: "):
+            changed_values(case, {name: value}, "--set")
+
+
+def test_a_profile_goes_where_the_bounds_would_have_stopped_it(found):
+    folder, content, result = found
+    (of_gain,) = profile(case_of(content, folder), "KD").profiles
+    interval = result.parameters["KD"].interval
+    assert of_gain.low is not None
+    assert of_gain.high is not None
+    # the response is close to linear over so small an interval: profile and linear theory agree
+    width = interval[1] - interval[0]
+    assert np.allclose([of_gain.low, of_gain.high], interval, atol=0.1 * width)
+
+
+@pytest.mark.parametrize("strategy", ["dgn", "lm", "lm-then-dgn", "robust", "auto"])
+def test_bounds_that_are_never_met_do_not_matter(strategy):
+    ends = []
+    for bounds in ({}, {"min": 1e-3, "max": 1e3}):
+        content = yaml.safe_load(yaml.safe_dump(FIRST_ORDER))
+        for name in ("k", "a"):
+            scale = {"scale": "linear"} if not bounds else {}
+            content["parameters"]["free"][name] = {"start": 1.0, **bounds, **scale}
+        case = Case.from_dict(content, Record.from_arrays(TIME, {"vt": TRUTH}))
+        ends.append([parameter.value for parameter in fit(case, strategy).parameters.values()])
+    assert np.allclose(*ends, rtol=1e-5)  # the record is noiseless: both end at k = 4, a = 2
