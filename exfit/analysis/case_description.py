@@ -4,7 +4,16 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from exfit.case.case import Case
 from exfit.case.parts import Part
-from exfit.case.schema import BumpTest, ChannelSection, PhasesSection, Unknown, start_value
+from exfit.case.schema import (
+    SIGNALS_OF_A_TEST,
+    BumpTest,
+    ChannelSection,
+    PhasesSection,
+    Reference,
+    ReferenceTable,
+    Unknown,
+    start_value,
+)
 from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import NETWORK
 from exfit.records.reading import file_hash
@@ -116,13 +125,26 @@ def _events(test: BumpTest) -> Iterator[str]:
     """Yield what was done to the unit, in words."""
     if test.vt0 is not None:
         yield f"vt0 {_given(test.vt0, 'g', 'pu')}"
-    for signal in ("vref", "vs", "E"):
-        for step in getattr(test, signal):
-            yield f"{signal} {_given(step.step, '+g', 'pu')} at {_given(step.at, 'g', 's')}"
+    for signal in SIGNALS_OF_A_TEST:
+        yield from _reference(signal, getattr(test, signal))
+    for event in test.E:
+        yield f"E {event.step:+g} pu at {event.at:g} s"
     for switch in test.network:
         values = {name: getattr(switch, name) for name in ("R", "X", "E")}
         changes = (f"{name} {value:g} pu" for name, value in values.items() if value is not None)
         yield f"network switched at {switch.at:g} s: {', '.join(changes)}"
+
+
+def _reference(signal: str, given: Reference) -> Iterator[str]:
+    """Yield what the reference, or the stabiliser's signal, did."""
+    if isinstance(given, ReferenceTable):
+        (start, first), (end, last) = given.table[0], given.table[-1]
+        rows = f"{len(given.table)} rows, {start:g} ... {end:g} s"
+        yield f"{signal} by a table of {rows}, from {first:g} to {last:g} pu"
+        return
+    for event in given:
+        change = f"{signal} {_given(event.step, '+g', 'pu')} at {_given(event.at, 'g', 's')}"
+        yield change if event.ramp is None else f"{change}, in a ramp of {event.ramp:g} s"
 
 
 def _channel(signal: str, entry: ChannelSection | PhasesSection) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
+from exfit.case.schema import SIGNALS_OF_A_TEST
 from exfit.dsp.noise import noise as noise_of
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments, planned
@@ -230,17 +231,16 @@ def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
 
 
 def _scaled(experiment: Experiment, size: float) -> Experiment:
-    """Return a test whose first step of the reference has a given size, others in proportion."""
-    steps = experiment.simulator.inputs.steps
-    first = next((step.step for step in steps if step.signal == "vref"), None)
-    if first is None:
-        return experiment
-    share = size / abs(first)
-    scaled = tuple(
-        step._replace(step=share * step.step) if step.signal in ("vref", "vs") else step
-        for step in steps
-    )
+    """Return a test whose first move of the reference has a given size, others in proportion."""
     simulator = experiment.simulator
+    moves = simulator.inputs.moves("vref")
+    if not moves:
+        return experiment
+    share = size / moves[0].largest
+    scaled = tuple(
+        step._replace(step=share * step.step) if step.signal in SIGNALS_OF_A_TEST else step
+        for step in simulator.inputs.steps
+    )
     return replace(experiment, simulator=simulator.with_inputs(scaled, simulator.delay))
 
 

@@ -1,12 +1,21 @@
 """The steps of a test as its record shows them, for a fit that finds their instants or sizes."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from math import inf
 
 import numpy as np
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, FindableStep, RecordFile, Recording, Unknown, start_value
+from exfit.case.schema import (
+    SIGNALS_OF_A_TEST,
+    BumpTest,
+    FindableStep,
+    RecordFile,
+    Recording,
+    Unknown,
+    start_value,
+)
 from exfit.dsp.filtering import outliers
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
@@ -27,22 +36,29 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
     test = recording.test
     channel = recording.record.channels.get("vt")
     limit = None if channel is None else channel.outliers
-    steps = tuple(
-        _bounded(f"{place}.vref[{k}]", step, record, limit) for k, step in enumerate(test.vref)
-    )
+    if isinstance(test.vref, tuple):
+        steps = tuple(
+            _bounded(f"{place}.vref[{k}]", step, record, limit) for k, step in enumerate(test.vref)
+        )
+        _refuse_wrong_order(f"{place}.vref", steps)
+        test = test.model_copy(update={"vref": steps})
+    return test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
+
+
+def _refuse_wrong_order(place: str, steps: Sequence[FindableStep]) -> None:
+    """Raise CaseError where the record shows a step after the one that follows it."""
     instants = [start_value(step.at) or 0.0 for step in steps]
     for k, (before, at) in enumerate(pairwise(instants), 1):
         if at <= before:
             text = f"{at:g} s is not after {before:.4g} s, where the record shows the step before"
-            raise CaseError([f"{place}.vref[{k}].at: {text}"])
-    test = test.model_copy(update={"vref": steps})
-    return test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
+            raise CaseError([f"{place}[{k}].at: {text}"])
 
 
 def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | None:
     """Return until when a record is at rest, s: until the earliest instant that it may show."""
     delay = _lowest(file.delay)
-    unknown = [step.at for step in (*test.vref, *test.vs) if isinstance(step.at, Unknown)]
+    events = (event for signal in SIGNALS_OF_A_TEST for event in test.events(signal))
+    unknown = [event.at for event in events if isinstance(event.at, Unknown)]
     if test.steady_until is not None or not (unknown or delay < 0.0):
         return test.steady_until
     earliest = min([*test.instants, *map(_lowest, unknown)]) if test.instants else inf

@@ -1,9 +1,16 @@
 """The steps of a test, as the simulation takes them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, StepSection, Switch, Unknown, start_value
+from exfit.case.schema import (
+    SIGNALS_OF_A_TEST,
+    BumpTest,
+    StepSection,
+    Switch,
+    Unknown,
+    start_value,
+)
 from exfit.errors import CaseError
 from exfit.plants import NETWORK
 from exfit.simulation.inputs import InputStep
@@ -17,16 +24,7 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
     ``values`` are those of the network at the start. Raises CaseError where the source would lose
     its voltage.
     """
-    steps = [
-        InputStep(
-            start_value(step.at) or 0.0,
-            start_value(step.step) or 0.0,
-            signal,
-            isinstance(step.at, Unknown),
-        )
-        for signal in ("vref", "vs")
-        for step in getattr(test, signal)
-    ]
+    steps = [*_of_signals(test)]
     now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
     events: list[StepSection | Switch] = [*test.E, *test.network]
     for event in sorted(events, key=lambda event: event.at):
@@ -39,6 +37,14 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
             text = f"at {event.at:g} s the source falls to {now['E']:g} pu; it must stay above 0"
             raise CaseError([f"{case.path}: test: {text}"])
     return sorted(steps, key=lambda step: step.at)
+
+
+def _of_signals(test: BumpTest) -> Iterator[InputStep]:
+    """Yield the steps and ramps of the reference and of the stabiliser's signal."""
+    for signal in SIGNALS_OF_A_TEST:
+        for event in test.events(signal):
+            at, step = start_value(event.at) or 0.0, start_value(event.step) or 0.0
+            yield InputStep(at, step, signal, isinstance(event.at, Unknown), event.ramp or 0.0)
 
 
 def _step_of(event: StepSection | Switch, name: str, level: float | None) -> float | None:

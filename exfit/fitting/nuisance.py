@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
-from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
+from exfit.case.schema import SIGNALS_OF_A_TEST, SINGLE, BumpTest, RecordFile, Recording, Unknown
 from exfit.fitting.experiment import Nuisance
 from exfit.fitting.parameters import FreeParameter
 from exfit.signals import SIGNALS
@@ -30,7 +30,7 @@ def names_of(recording: Recording) -> tuple[str, ...]:
     """Return the names of all that a fit finds about a record."""
     test, file = recording.test, recording.record
     steps = [
-        InputStep(0.0, 0.0, signal) for signal in ("vref", "vs") for _ in getattr(test, signal)
+        InputStep(0.0, 0.0, signal) for signal in SIGNALS_OF_A_TEST for _ in test.events(signal)
     ]
     return tuple(
         nuisance.name for nuisance, _ in _with_sections(prefix_of(recording), test, file, steps)
@@ -57,9 +57,9 @@ def _with_sections(
 def _of_steps(
     prefix: str, test: BumpTest, steps: Sequence[InputStep], shift: bool
 ) -> Iterator[tuple[Nuisance, Unknown]]:
-    for signal in ("vref", "vs"):
+    for signal in SIGNALS_OF_A_TEST:
         places = [place for place, change in enumerate(steps) if change.signal == signal]
-        for number, (place, step) in enumerate(zip(places, getattr(test, signal), strict=True)):
+        for number, (place, step) in enumerate(zip(places, test.events(signal), strict=True)):
             which = f"{prefix}{signal}{number + 1 if number else ''}"
             if isinstance(step.at, Unknown):
                 yield Nuisance(f"{which}.at", "shift" if shift else "at", place), step.at

@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import (
+    SIGNALS_OF_A_TEST,
     BumpTest,
     ChannelSection,
     PhasesSection,
     RecordFile,
     Recording,
+    ReferenceTable,
     TimeColumn,
     Unknown,
     start_value,
 )
-from exfit.errors import RecordError
+from exfit.errors import CaseError, RecordError
 from exfit.records.clock import Clock
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
@@ -112,6 +114,7 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
                 f"{path}: holds {show(start)} ... {show(end)} s, "
                 f"but {case.path} has a step at {show(at)} s"
             )
+    _refuse_short_tables(case, test, (float(start), float(end)), path)
     steady = test.steady
     if steady is not None and steady > end:
         raise RecordError(
@@ -124,6 +127,20 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
             f"{path}: begins at {show(start)} s, with {what}: nothing before it shows "
             f"vt0, and {case.path} does not give it"
         )
+
+
+def _refuse_short_tables(
+    case: Case, test: BumpTest, covered: tuple[float, float], path: Path
+) -> None:
+    """Raise CaseError where a table does not cover a test from its start to its end (s)."""
+    for signal in SIGNALS_OF_A_TEST:
+        reference = getattr(test, signal)
+        if isinstance(reference, ReferenceTable):
+            first, last = reference.table[0][0], reference.table[-1][0]
+            if not first <= covered[0] <= covered[1] <= last:
+                rows, whole = (f"{show(a)} ... {show(b)} s" for a, b in ((first, last), covered))
+                text = f"{rows} does not cover the test, {whole} of {path}: add a row"
+                raise CaseError([f"{case.path}: {signal}.table: {text}"])
 
 
 def clock_of(record: RecordFile) -> Clock:

@@ -14,6 +14,7 @@ from exfit.results.comparisons import (
     judged_of,
     match_of,
 )
+from exfit.simulation.inputs import Inputs
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -66,7 +67,7 @@ def compare_with_record(
 
 
 def _features(setup: ExperimentSetup, signal: Array, values: Values) -> Features | None:
-    """Return the features of the first step of the reference that the record holds."""
+    """Return the features of the first move of the reference that the record holds."""
     kept = np.isfinite(signal)
     time = setup.record.time[kept]
     simulator = setup.experiment.with_inputs(values)
@@ -74,6 +75,7 @@ def _features(setup: ExperimentSetup, signal: Array, values: Values) -> Features
     inside = [change for change in steps if change.at >= time[0]]
     if not inside or inside[0].signal != "vref":
         return None
-    later = [change.at for change in inside if change.at > inside[0].at]
+    first = Inputs(float(time[0]), float(time[-1]), tuple(inside)).moves("vref")[0]
+    later = [change.at for change in inside if change.at > first.end]
     until = later[0] if later else float(time[-1])
     return features(time, signal[kept], inside[0].at, until)

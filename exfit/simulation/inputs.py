@@ -15,43 +15,70 @@ from exfit.simulation.grid import ON_GRID, GridSegment
 Array = NDArray[np.float64]
 
 MOST_STEPS = 1e7  # three hours at 1 ms
+PAUSE = 1e-9  # s: steps and ramps that follow one another sooner are one move
 
 
 class InputStep(NamedTuple):
     """A step of an input, by default of the reference: when (s) and by how much (pu).
 
-    It falls on the grid exactly, and divides it; or, ``smooth``, it leaves the grid as it is, and
-    is averaged over it with a linear B-spline. A fit may move the instant of a smooth one: the area
-    under the input, which an exact step between grid points would lose or gain, stays that of the
-    step wherever its instant lies, and follows it with a continuous derivative; so does the cost.
+    With a ``ramp`` (s) it is made in a line that ends so much later. It falls on the grid exactly,
+    and divides it; or, ``smooth``, it leaves the grid as it is, and is averaged over it with a
+    linear B-spline. A fit may move the instant of a smooth one: the area under the input, which an
+    exact step between grid points would lose or gain, stays that of the step wherever its instant
+    lies, and follows it with a continuous derivative; so does the cost.
     """
 
     at: float
     step: float
     signal: str = "vref"
     smooth: bool = False
+    ramp: float = 0.0
+
+    @property
+    def end(self) -> float:
+        """The instant from which on it is complete, s."""
+        return self.at + self.ramp
 
     def share(self, part: GridSegment) -> Array:
         """Return how much of the step the grid points (n + 1,) of a segment have seen."""
+        if not self.smooth and self.ramp:
+            way: Array = (part.times - self.at) / self.ramp
+            return way.clip(0.0, 1.0)
         if not self.smooth:
             return np.full(part.steps + 1, 1.0 if self.at <= part.start else 0.0)
-        share, (near, x) = np.zeros(part.steps + 1), self._near(part)
-        share[near], share[near.stop :] = 0.5 + x - 0.5 * x * np.abs(x), 1.0
-        return share
+        begun = _steps_after(self.at, part)
+        if not self.ramp:
+            return _mean_of_step(begun)
+        done = _steps_after(self.end, part)
+        rising = (_mean_of_line(begun) - _mean_of_line(done)) * (part.step / self.ramp)
+        rising[done >= 1.0] = 1.0
+        return rising
 
     def share_slope(self, part: GridSegment) -> Array:
         """Return the derivative of ``share`` to the instant, 1/s; only a smooth step has it."""
         if not self.smooth:
             raise ValueError(f"the step of {self.signal} at {self.at:g} s is not smooth: it stays")
-        slope, (near, x) = np.zeros(part.steps + 1), self._near(part)
-        slope[near] = (np.abs(x) - 1.0) / part.step
-        return slope
+        begun = _steps_after(self.at, part)
+        if not self.ramp:
+            return np.where(np.abs(begun) < 1.0, (np.abs(begun) - 1.0) / part.step, 0.0)
+        done = _steps_after(self.end, part)
+        return (_mean_of_step(done) - _mean_of_step(begun)) / self.ramp
 
-    def _near(self, part: GridSegment) -> tuple[slice, Array]:
-        """Return the grid points less than a step from the instant, and how far beyond it."""
-        position = (self.at - part.start) / part.step
-        first, stop = np.clip(math.floor(position) + np.array([0, 2]), 0, part.steps + 1)
-        return slice(first, stop), np.arange(first, stop) - position
+
+def _steps_after(at: float, part: GridSegment) -> Array:
+    """Return by how many steps the grid points (n + 1,) of a segment lie after an instant."""
+    return np.arange(part.steps + 1.0) - (at - part.start) / part.step
+
+
+def _mean_of_step(x: Array) -> Array:
+    """Return the mean of a unit step over a linear B-spline, x of its half-widths after it."""
+    return np.where(np.abs(x) < 1.0, 0.5 + x - 0.5 * x * np.abs(x), np.where(x > 0.0, 1.0, 0.0))
+
+
+def _mean_of_line(x: Array) -> Array:
+    """Return that of a line that rises from there by one in each half-width: its integral."""
+    corner = 1.0 / 6.0 + 0.5 * x + 0.5 * x**2 - np.abs(x) ** 3 / 6.0
+    return np.where(np.abs(x) < 1.0, corner, np.maximum(x, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +99,8 @@ class Inputs:
     recorded: RecordedInputs | None = None
 
     def level(self, signal: str, at: float) -> float:
-        """Return the sum of an input's exact steps at an instant; each counts from its own on."""
-        made = (c.step for c in self.steps if c.signal == signal and not c.smooth and c.at <= at)
+        """Return the sum of an input's exact steps at an instant; each counts when complete."""
+        made = (c.step for c in self.steps if c.signal == signal and not c.smooth and c.end <= at)
         return sum(made, start=0.0)
 
     def input(self, signal: str, part: GridSegment) -> Array:
@@ -82,9 +109,35 @@ class Inputs:
         if self.recorded is not None and signal in self.recorded.signals:
             u += np.interp(part.times, self.recorded.time, self.recorded.signals[signal])
         for change in self.steps:
-            if change.smooth and change.signal == signal:
+            rising = change.at <= part.start < change.end
+            if change.signal == signal and (change.smooth or rising):
                 u += change.step * change.share(part)
         return u
+
+    def moves(self, signal: str) -> list["Move"]:
+        """Return the moves of an input in order: what follows without a pause is one."""
+        moves: list[Move] = []
+        for change in self.steps:
+            if change.signal == signal:
+                if moves and change.at - moves[-1].end < PAUSE:
+                    moves[-1] = moves[-1].with_step(change)
+                else:
+                    moves.append(Move(change.at, change.end, change.step, abs(change.step)))
+        return moves
+
+
+class Move(NamedTuple):
+    """What an input does from ``start`` to ``end`` (s): by how much it changes, and at most."""
+
+    start: float
+    end: float
+    change: float
+    largest: float
+
+    def with_step(self, step: InputStep) -> "Move":
+        """Return the move that goes on with a step."""
+        change = self.change + step.step
+        return Move(self.start, step.end, change, max(self.largest, abs(change)))
 
 
 @dataclass(frozen=True)
@@ -112,7 +165,7 @@ def grid_segments(inputs: Inputs, step: float) -> list[GridSegment]:
             f"simulation.step: {step:g} s divides {inputs.end - inputs.start:g} s into more than "
             f"{MOST_STEPS:.0e} steps"
         )
-    exact = (change.at for change in inputs.steps if not change.smooth)
+    exact = (at for change in inputs.steps if not change.smooth for at in (change.at, change.end))
     instants = {at for at in exact if inputs.start < at < inputs.end}
     result = []
     for start, end in pairwise([inputs.start, *sorted(instants), inputs.end]):

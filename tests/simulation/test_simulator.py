@@ -243,6 +243,19 @@ def test_tangents_are_exact_with_sub_steps_two_smooth_steps_and_two_inputs():
     assert_exact(off_grid, values, directions, ("vt", "efd", "vref"))
 
 
+def test_tangents_are_exact_with_a_smooth_ramp_and_an_exact_one(model):
+    steps = (InputStep(0.50037, 3e-4, smooth=True, ramp=0.4), InputStep(1.2, -1e-4, ramp=0.1))
+    simulator = Simulator(system_of(model), Inputs(0.0, 2.0, steps), BETWEEN, 1e-3)
+    name = sorted(parameters_used(simulator.system))[0]
+    directions = (
+        Direction(steps={0: (1.0, 0.0)}),
+        Direction(steps={0: (0.0, 0.1)}),
+        Direction(steps={1: (0.0, 0.1)}),
+        Direction({name: 0.1}, {0: (0.5, 0.01), 1: (0.0, 0.02)}, delay=-0.7),
+    )
+    assert_exact(simulator, lively_values(model), directions)
+
+
 def test_a_direction_that_moves_several_parameters_is_the_sum_of_theirs():
     values, names = lively_values("AC1A"), ("KA", "TE", "machine.Tpd0")
     simulator = Simulator(system_of("AC1A"), UP, CLOCK, 1e-3)
@@ -273,16 +286,25 @@ def test_the_derivative_to_an_instant_adds_up_across_grid_points():
 
 
 @laws
-@given(st.floats(0.1, 2.9), st.floats(-0.1, 0.1), st.sampled_from([0.05, 0.01, 1e-3]))
-def test_the_area_under_a_smooth_step_is_that_of_the_exact_one(at, size, step):
-    inputs = Inputs(0.0, 3.0, (InputStep(at, size, smooth=True),))
+@given(
+    st.floats(0.1, 2.3),
+    st.floats(-0.1, 0.1),
+    st.sampled_from([0.05, 0.01, 1e-3]),
+    st.sampled_from([0.0, 1e-6, 1e-3, 0.0123, 0.6]),
+)
+def test_the_area_under_a_smooth_step_is_that_of_the_exact_one(at, size, step, ramp):
+    inputs = Inputs(0.0, 3.0, (InputStep(at, size, smooth=True, ramp=ramp),))
     (part,) = grid_segments(inputs, step)
     u = inputs.input("vref", part)
     area = part.step * (u.sum() - (u[0] + u[-1]) / 2.0)
-    assert area == pytest.approx(size * (3.0 - at), abs=1e-13)
-    away = np.abs(part.times - at) >= 1.001 * part.step
-    assert (u[away] == np.where(part.times > at, size, 0.0)[away]).all()
-    assert (np.diff(u) * size >= 0.0).all()
+    assert area == pytest.approx(size * (3.0 - at - ramp / 2.0), abs=1e-12)
+    near = 1.001 * part.step
+    before, behind = part.times < at - near, part.times > at + ramp + near
+    assert (u[before] == 0.0).all()
+    assert (u[behind] == size).all()
+    within = (part.times > at + near) & (part.times < at + ramp - near)
+    assert u[within] == pytest.approx(size * (part.times[within] - at) / ramp, abs=1e-12)
+    assert (np.diff(u) * size >= -1e-18).all()
 
 
 @pytest.mark.parametrize("at", [-5.0, -0.01, 3.01, 9.0])
@@ -293,6 +315,44 @@ def test_a_smooth_step_outside_the_test_is_over_or_never_comes(at):
     assert (inputs.input("vref", part) == (0.05 if at < 0.0 else 0.0)).all()
     assert (change.share_slope(part) == 0.0).all()
     assert inputs.level("vref", 10.0) == 0.0
+
+
+def test_a_ramp_is_the_limit_of_many_small_steps(model):
+    """Each in the middle of its share of the ramp: they miss it by the square of its length."""
+    values = lively_values(model)
+    ramp = samples(model, values, Inputs(0.0, 2.0, (InputStep(0.5, 3e-4, ramp=0.4),)))
+    errors = []
+    for count in (8, 16):
+        middles = 0.5 + 0.4 * (np.arange(count) + 0.5) / count
+        stairs = Inputs(0.0, 2.0, tuple(InputStep(float(at), 3e-4 / count) for at in middles))
+        errors.append(np.abs(samples(model, values, stairs) - ramp)[CLOCK > 1.0].max())
+    assert errors[0] > 1e-10
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_the_response_to_a_ramp_is_the_integral_of_that_to_a_step():
+    """k/(s + a) in closed form, the corners between grid points of 1 ms, exact and smooth."""
+    k, a, at, ramp = 4.0, 2.0, 0.50037, 0.5
+    integral = [np.maximum(CLOCK - corner, 0.0) for corner in (at, at + ramp)]
+    ways = [k / a * (t - (1.0 - np.exp(-a * t)) / a) for t in integral]
+    expected = (ways[0] - ways[1]) / ramp
+    for smooth, error in ((False, 1e-12), (True, 2e-6)):
+        inputs = Inputs(0.0, 2.0, (InputStep(at, 1.0, smooth=smooth, ramp=ramp),))
+        got = samples("FIRST_ORDER", {"k": k, "a": a, "vt0": 0.0}, inputs)[:, 0]
+        assert np.abs(got - expected).max() < error
+
+
+def test_what_follows_without_a_pause_is_one_move():
+    steps = (
+        InputStep(0.5, 0.02, ramp=0.5),
+        InputStep(0.8, 0.1, "vs"),
+        InputStep(1.0, -0.05),
+        InputStep(1.0, 0.01, ramp=0.2),
+        InputStep(1.5, 0.03),
+    )
+    first, second = Inputs(0.0, 2.0, steps).moves("vref")
+    assert first == pytest.approx((0.5, 1.2, -0.02, 0.03))
+    assert second == pytest.approx((1.5, 1.5, 0.03, 0.03))
 
 
 def test_a_smooth_step_nears_the_exact_one_with_the_square_of_the_step(model):

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from exfit.case.checks.node import ContentNode
+from exfit.case.checks.reference import moves_of, table_faults
 from exfit.case.yaml import Fault
 from exfit.plants import EVENTS, PlantKind
 from exfit.util.text import show
@@ -12,6 +13,9 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
     """Yield the faults of a test; ``network`` is that of its plant."""
     for name in EVENTS:
         yield from _step_faults(test, name)
+        yield from table_faults(test.at(name), test.at("duration").number)
+        for place, at in moves_of(test.at(name)):
+            yield from _place_faults(place, at, test.at("duration").number)
         if name in test and name not in kind.events:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
     for switch in test.at("network").entries:
@@ -34,6 +38,7 @@ def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
             at = event.at("at").start
             if at is not None:
                 yield event.at("at"), at
+        yield from moves_of(test.at(name))
 
 
 def missing_without_record(test: ContentNode) -> Iterator[Fault]:
@@ -78,7 +83,7 @@ def _voltage_faults(vt0: ContentNode) -> Iterator[Fault]:
 
 def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
     """Yield steps that change nothing, are out of order, or outside the duration."""
-    before: float | None = None
+    before: ContentNode | None = None
     for step in test.at(name).entries:
         if step.at("step").start == 0:
             yield step.at("step").fault("0 is not a step")
@@ -86,14 +91,22 @@ def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
             yield step.fault("changes nothing: give R, X or E")
         at = step.at("at").start
         if at is not None:
-            yield from _instant_faults(step.at("at"), at, before, test.at("duration").number)
-        before = at
+            yield from _order_faults(step.at("at"), at, before)
+            yield from _place_faults(step.at("at"), at, test.at("duration").number)
+        before = step
 
 
-def _instant_faults(
-    place: ContentNode, at: float, before: float | None, end: float | None
-) -> Iterator[Fault]:
-    if before is not None and at <= before:
-        yield place.fault(f"{show(at)} s is not after {show(before)} s, the step before")
+def _order_faults(place: ContentNode, at: float, before: ContentNode | None) -> Iterator[Fault]:
+    """Yield a step that is not after the one before, or before the end of the ramp before."""
+    start = None if before is None else before.at("at").start
+    ramp = None if before is None else before.at("ramp").number
+    if start is not None and at <= start:
+        yield place.fault(f"{show(at)} s is not after {show(start)} s, the step before")
+    elif start is not None and ramp is not None and at < start + ramp:
+        text = f"{show(at)} s is before {show(start + ramp)} s, where the ramp before ends"
+        yield place.fault(text)
+
+
+def _place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[Fault]:
     if end is not None and not 0 <= at < end:
         yield place.fault(f"{show(at)} s lies outside 0 ... {show(end)} s, the duration")

@@ -1,6 +1,6 @@
 """What contradicts itself in the values of a record or its test that a fit is to find."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
@@ -23,6 +23,7 @@ def nuisance_faults(
             yield value.fault(f"not allowed with plant {kind.name}: the record drives it")
         elif value.at("start").text == "auto":
             yield from _automatic_faults(value.at("start"), record, has_record)
+    yield from _ramp_faults(test.at("vref").entries)
     yield from _level_faults(test, record.at("channels", "vt"))
     delay = record.at("delay")
     if kind.plays_back and (delay.number or 0.0) != 0.0:
@@ -47,6 +48,14 @@ def _automatic_faults(start: ContentNode, record: ContentNode, has_record: bool)
         yield start.fault("auto needs a record")
     elif "vt" not in record.at("channels"):
         yield start.fault("auto needs vt in the record")
+
+
+def _ramp_faults(steps: Sequence[ContentNode]) -> Iterator[Fault]:
+    for step in steps:
+        automatic = "auto" in (step.at(key, "start").text for key in AUTOMATIC)
+        if automatic and "ramp" in step:
+            text = "auto finds a step: of a ramp give start, min and max of at and step"
+            yield step.at("ramp").fault(text)
 
 
 def _level_faults(test: ContentNode, vt: ContentNode) -> Iterator[Fault]:

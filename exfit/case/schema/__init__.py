@@ -16,10 +16,19 @@ from exfit.case.schema.records import (
     Recording,
     TimeColumn,
 )
-from exfit.case.schema.tests import BumpTest, FindableStep, StepSection, Switch
+from exfit.case.schema.tests import (
+    SIGNALS_OF_A_TEST,
+    BumpTest,
+    FindableStep,
+    Reference,
+    ReferenceTable,
+    StepSection,
+    Switch,
+)
 from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
 
 __all__ = [
+    "SIGNALS_OF_A_TEST",
     "SINGLE",
     "BumpTest",
     "CaseDocument",
@@ -37,6 +46,8 @@ __all__ = [
     "Plant",
     "RecordFile",
     "Recording",
+    "Reference",
+    "ReferenceTable",
     "SaturationName",
     "SimulationSection",
     "Stabiliser",

@@ -1,6 +1,9 @@
 """The sections of the case file about a test: what was done to the unit."""
 
-from pydantic import Field
+from itertools import pairwise
+from typing import Annotated, Any
+
+from pydantic import Discriminator, Field, Tag
 
 from exfit.case.schema.values import (
     Findable,
@@ -11,6 +14,8 @@ from exfit.case.schema.values import (
     start_value,
 )
 
+MOST_ROWS = 1000  # of a table; a longer one is a file
+
 
 class StepSection(Section):
     """A step of a signal."""
@@ -20,10 +25,52 @@ class StepSection(Section):
 
 
 class FindableStep(Section):
-    """A step of a signal, whose time and size may be fitted."""
+    """A step or ramp of a signal, whose time and size may be fitted."""
 
     at: Findable = Field(description="Time, s; or {start, min, max} to fit it.")
     step: Findable = Field(description="Change, pu, not zero; or {start, min, max} to fit it.")
+    ramp: Positive | None = Field(
+        default=None,
+        description="Time that the change takes, in a line, s; default: it is a step.",
+    )
+
+    @property
+    def end(self) -> float | None:
+        """The instant from which on it is complete, s; None where the record shows it."""
+        at = start_value(self.at)
+        return None if at is None else at + (self.ramp or 0.0)
+
+
+class ReferenceTable(Section):
+    """A signal as a table: lines between its rows."""
+
+    table: tuple[tuple[Number, Number], ...] = Field(
+        min_length=2,
+        max_length=MOST_ROWS,
+        description="Rows [time in s, value in pu], from the start of the test to its end or "
+        "beyond; a time that is given twice is a step. Only changes from the first value act.",
+    )
+
+    @property
+    def events(self) -> tuple[FindableStep, ...]:
+        """Its steps and ramps in order of time."""
+        return tuple(
+            FindableStep(at=at, step=then - value, ramp=end - at if end > at else None)
+            for (at, value), (end, then) in pairwise(self.table)
+            if then != value
+        )
+
+
+def _kind_of_reference(value: Any) -> str:
+    return "[table]" if isinstance(value, dict | ReferenceTable) else "[steps]"
+
+
+Reference = Annotated[
+    Annotated[tuple[FindableStep, ...], Field(min_length=1), Tag("[steps]")]
+    | Annotated[ReferenceTable, Tag("[table]")],
+    Discriminator(_kind_of_reference),
+]
+SIGNALS_OF_A_TEST = ("vref", "vs")  # which a test changes by steps, ramps and tables
 
 
 class Switch(Section):
@@ -38,7 +85,7 @@ class Switch(Section):
 
 
 class BumpTest(Section):
-    """The test: the steps that were made."""
+    """The test: what was done to the unit."""
 
     vt0: Findable | None = Field(
         default=None,
@@ -55,11 +102,13 @@ class BumpTest(Section):
         default=None,
         description="End of the steady state in the record, s; default: the first step.",
     )
-    vref: tuple[FindableStep, ...] = Field(
-        default=(), min_length=1, description="Steps of the reference, in order of time."
+    vref: Reference = Field(
+        default=(),
+        description="The reference: steps and ramps in order of time, or a table.",
     )
-    vs: tuple[FindableStep, ...] = Field(
-        default=(), min_length=1, description="Steps of the stabiliser's signal, in order of time."
+    vs: Reference = Field(
+        default=(),
+        description="The signal at the stabiliser's input of the exciter, given like vref.",
     )
     E: tuple[StepSection, ...] = Field(
         default=(),
@@ -73,10 +122,16 @@ class BumpTest(Section):
         default=None, description="Length of the simulation, s; only if there is no record."
     )
 
+    def events(self, signal: str) -> tuple[FindableStep, ...]:
+        """Return the steps and ramps of vref or vs; those of a table in order of time."""
+        given: tuple[FindableStep, ...] | ReferenceTable = getattr(self, signal)
+        return given.events if isinstance(given, ReferenceTable) else given
+
     @property
     def instants(self) -> tuple[float, ...]:
         """The times of all events that are given as numbers, s, in order."""
-        instants = {start_value(step.at) for step in (*self.vref, *self.vs)}
+        events = (event for signal in SIGNALS_OF_A_TEST for event in self.events(signal))
+        instants = {start_value(event.at) for event in events}
         instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
         return tuple(sorted(at for at in instants if at is not None))
 
