@@ -114,19 +114,19 @@ class Inputs:
                 u += change.step * change.share(part)
         return u
 
-    def moves(self, signal: str) -> list["Move"]:
+    def moves(self, signal: str) -> list["InputMove"]:
         """Return the moves of an input in order: what follows without a pause is one."""
-        moves: list[Move] = []
+        moves: list[InputMove] = []
         for change in self.steps:
             if change.signal == signal:
                 if moves and change.at - moves[-1].end < PAUSE:
                     moves[-1] = moves[-1].with_step(change)
                 else:
-                    moves.append(Move(change.at, change.end, change.step, abs(change.step)))
+                    moves.append(InputMove(change.at, change.end, change.step, abs(change.step)))
         return moves
 
 
-class Move(NamedTuple):
+class InputMove(NamedTuple):
     """What an input does from ``start`` to ``end`` (s): by how much it changes, and at most."""
 
     start: float
@@ -134,10 +134,10 @@ class Move(NamedTuple):
     change: float
     largest: float
 
-    def with_step(self, step: InputStep) -> "Move":
+    def with_step(self, step: InputStep) -> "InputMove":
         """Return the move that goes on with a step."""
         change = self.change + step.step
-        return Move(self.start, step.end, change, max(self.largest, abs(change)))
+        return InputMove(self.start, step.end, change, max(self.largest, abs(change)))
 
 
 @dataclass(frozen=True)
