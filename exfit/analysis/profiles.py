@@ -139,7 +139,10 @@ def _minimum(
     case: Case, problem: FitProblem, progress: Callable[[estimate.Progress], None]
 ) -> estimate.Result:
     """Return the fit of a case; raises KeyboardInterrupt where it was interrupted."""
-    best, minima = search(case, problem, case.estimate.strategy, lambda _: None, progress)
+    options = case.estimate.to_the_minimum()
+    best, minima = search(
+        case, problem, options.strategy, lambda _: None, progress, options=options
+    )
     if best.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
         raise KeyboardInterrupt
     return best

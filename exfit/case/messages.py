@@ -48,6 +48,7 @@ WORDS: Mapping[str, Callable[[str, Data], str]] = {
     ),
     "greater_than": lambda value, limits: f"{value} is not above {limits['gt']:g}",
     "greater_than_equal": lambda value, limits: f"{value} is below {limits['ge']:g}",
+    "less_than": lambda value, limits: f"{value} is not below {limits['lt']:g}",
     "less_than_equal": lambda value, limits: f"{value} is above {limits['le']}",
 }
 

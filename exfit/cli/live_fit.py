@@ -29,7 +29,7 @@ def fit_live(
         with terminal.ProgressBar(console).running() as progress:
             result = workflows.fit(case, strategy, search_progress=progress)
     else:
-        title, most = terminal.task(case, strategy), case.estimate.iterations
+        title, most = terminal.task(case, strategy), case.estimate.most_iterations
         with terminal.LiveIterations(console, title, most).running() as shown:
             result = workflows.fit(case, strategy, shown, live=shown.live)
     try:

@@ -3,36 +3,49 @@
 Arrays in, result out: minimise f(x) = 1/2 sum(fun(x)^2) over low <= x <= high.
 
 One loop (`run`) serves all methods. In each iteration a *search* (`gauss_newton`, `trust_region`)
-tries points that the linear model fun(x + d) = fun(x) + J d proposes (`linear`). That linear
+tries points that the linear model fun(x + d) = fun(x) + J d proposes (`linear`). Each has its
+settings (`searches`); `damping_ratio` is Levenberg-Marquardt as a textbook has it. That linear
 problem is itself solved within the bounds (`bounded`), by an active set that starts afresh every
 time: a variable rests on a bound exactly as long as the model wants it there. Directions that J
 does not see at all are left alone; those it sees weakly are taken in full, but no variable moves
-farther than recent steps have proved good.
+farther than recent steps have proved good, unless a search takes the full step.
 
 Based on it are the search from many starts (`multistart`) and the profiles of single parameters
 (`profile`), both in threads.
 
 Sources: Levenberg 1944; Marquardt 1963; Armijo 1966; Moré 1978 (the Levenberg-Marquardt
-algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10.
+algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10; Kelley 1999,
+Iterative methods for optimization, chapters 2 and 3.
 """
 
 from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
+from exfit.estimate.damping_ratio import RatioDamping
+from exfit.estimate.gauss_newton import LineSearch
 from exfit.estimate.profile import CostProfile, ProfileEnd, profile, profiles
+from exfit.estimate.search import to_half, to_parabola
+from exfit.estimate.searches import Searches
 from exfit.estimate.solver import least_squares
 from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart
+from exfit.estimate.trust_region import TrustRegion
 
 __all__ = [
     "STATUS",
     "CostProfile",
+    "LineSearch",
     "LocalMinimum",
     "MultistartResult",
     "ProfileEnd",
     "Progress",
+    "RatioDamping",
     "Result",
+    "Searches",
     "SolverIteration",
     "Stop",
+    "TrustRegion",
     "least_squares",
     "multistart",
     "profile",
     "profiles",
+    "to_half",
+    "to_parabola",
 ]

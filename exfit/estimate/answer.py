@@ -21,8 +21,16 @@ class Stop(Enum):
     INTERRUPTED = "interrupted: this is the best point seen until then"
     JACOBIAN = "the Jacobian is not finite here"
     STALLED = "no trial lowers the cost visibly, although the linear model promises a lower one"
-    FULL_STEP = "the full Gauss-Newton step did not lower the cost"
-    ILL_CONDITIONED = "the Jacobian is too ill-conditioned for full Gauss-Newton steps"
+    FULL_STEP = (
+        "the full Gauss-Newton step did not lower the cost: "
+        "strategy dgn shortens such steps, lm-then-dgn finds a better start first"
+    )
+    ILL_CONDITIONED = (
+        "the Jacobian is too ill-conditioned for full Gauss-Newton steps: "
+        "use strategy dgn or lm-then-dgn"
+    )
+    MATCH = "the curves differ by less than the tolerance given: the search went no farther"
+    FLAT = "the gradient fell below the tolerance given: the search went no farther"
     TRUSTED = "a full Gauss-Newton step fits the trust region and proved good"  # only inside
 
 
@@ -32,6 +40,8 @@ STATUS = {
     Stop.STEP: 3,
     Stop.KINK: 4,
     Stop.CREEPING: 5,
+    Stop.MATCH: 6,
+    Stop.FLAT: 7,
     Stop.ITERATIONS: 0,
     Stop.INTERRUPTED: -1,
     Stop.JACOBIAN: -2,
@@ -56,6 +66,8 @@ class SolverIteration:
     inner          trials rejected before: reductions of lambda, shrinkings of the trust region
     nfev, njev     calls of fun (those for differences included) and Jacobians, until now
     quality        gain ratio: decrease of the cost over the decrease that the model promised
+    capped         whether the step that was tried first was held back: dgn by its cap, lm by its
+                   damping; it was then not the full Gauss-Newton step; None at a start
     """
 
     number: int
@@ -69,17 +81,19 @@ class SolverIteration:
     nfev: int
     njev: int
     quality: float
+    capped: bool | None = None
 
 
 @dataclass(frozen=True)
 class Result:
     """The best point seen and how it was reached; fun (M,), jac (M, N), grad (N,) belong to x.
 
-    status: 1 gradient, 2 floor, 3 step, 4 kink, 5 creeping (converged); 0 iteration limit;
-    -1 interrupted, -2 Jacobian not finite, -3 stalled, -4 full step failed, -5 ill-conditioned
-    (not converged).
+    status: 1 gradient, 2 floor, 3 step, 4 kink, 5 creeping (converged); 6 match, 7 flat (ended at
+    a tolerance given, perhaps before a minimum); 0 iteration limit; -1 interrupted, -2 Jacobian not
+    finite, -3 stalled, -4 full step failed, -5 ill-conditioned (not converged).
     message is the sentence, stop the member of Stop. optimality is the largest component of the
-    projected gradient. After an interruption jac and grad may be nan.
+    projected gradient; promise is the decrease of the cost that the linear model at x still
+    promises. After an interruption jac, grad and promise may be nan.
     """
 
     x: Array
@@ -88,6 +102,7 @@ class Result:
     jac: Array
     grad: Array
     optimality: float
+    promise: float
     nfev: int
     njev: int
     nit: int

@@ -1,4 +1,4 @@
-"""Gauss-Newton, in full steps (gn) or damped by shortening them (dgn)."""
+"""Gauss-Newton, in full steps (gn) or damped by capping and shortening them (dgn)."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -8,7 +8,7 @@ import numpy as np
 from exfit.estimate.answer import Stop
 from exfit.estimate.linear import LinearModel, solve
 from exfit.estimate.problem import Problem
-from exfit.estimate.search import MOST_TRIALS, Move, gain_ratio, shorten
+from exfit.estimate.search import ARMIJO, Cut, Move, gain_ratio, shorten, to_parabola
 
 WORST_CONDITION = 1e8  # beyond it a full Gauss-Newton step is a guess
 LEAST_REACH = 0.3
@@ -17,35 +17,47 @@ GOOD = 0.25  # gain ratio from which the model was right about the length
 
 @dataclass(frozen=True)
 class FullStep:
-    """Gauss-Newton: the full step or nothing."""
+    """Gauss-Newton: the full step or nothing; ``retries``: a first one that fails is shortened."""
 
+    retries: bool = False
     phase: str = "gn"
 
     def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
-        """Take the full step."""
+        """Take the full step, the first one shortened once where that is necessary."""
         if linear.singular[0] > WORST_CONDITION * linear.singular[linear.rank - 1]:
             return Move(None, 1.0, 0, stop=Stop.ILL_CONDITIONED), self
-        trial = problem.evaluate(linear.full.target)
-        decrease = linear.point.cost - trial.cost
-        if not decrease > 0.0:
-            return Move(None, 1.0, 1, stop=Stop.FULL_STEP), self
-        return Move(trial, 1.0, 0, gain_ratio(decrease, linear.full.promise)), self
+        full, length, once = linear.full, 1.0, replace(self, retries=False)
+        for rejections in range(2 if self.retries else 1):
+            trial = problem.evaluate(full.at(length))
+            decrease = linear.point.cost - trial.cost
+            if decrease > 0.0:
+                quality = gain_ratio(decrease, full.promised(length))
+                return Move(trial, length, rejections, quality), once
+            length *= to_parabola(-decrease, length * full.slope)
+        return Move(None, 1.0, rejections + 1, stop=Stop.FULL_STEP), once
 
 
 @dataclass(frozen=True)
 class LineSearch:
-    """Damped Gauss-Newton: the step within reach, shortened until Armijo's rule holds.
+    """Damped Gauss-Newton: a step, shortened until Armijo's rule holds.
 
-    The reach (in units of each variable) keeps the badly determined directions at bay: without
-    it one such direction makes the whole step so long that lambda must be tiny for all.
+    Capped, the step is the best of the linear model that moves no variable farther than the reach
+    (in units of each variable, a trust region), which grows after good steps. It keeps the badly
+    determined directions at bay: without it one such direction makes the whole step so long that
+    lambda must be tiny for all. Not capped it is the full Gauss-Newton step: with ``to_half`` as
+    its cut that is the damped Gauss-Newton method of Kelley 1999, section 2.3.
     """
 
+    capped: bool = True
+    cut: Cut = to_parabola
+    armijo: float = ARMIJO
     reach: float = 1.0
     phase: str = "dgn"
 
     def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
         """Try lambda = 1, then less."""
-        move = shorten(problem, linear, solve(linear, reach=self.reach), MOST_TRIALS)
+        step = solve(linear, reach=self.reach) if self.capped else linear.full
+        move = shorten(problem, linear, step, armijo=self.armijo, cut=self.cut)
         if move.point is None:
             return move, self
         moved = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))

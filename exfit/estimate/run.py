@@ -11,6 +11,7 @@ from exfit.estimate.arrays import Array
 from exfit.estimate.linear import LinearModel, blind, linearise
 from exfit.estimate.problem import Point, Problem
 from exfit.estimate.search import Move, Search
+from exfit.estimate.searches import Searches
 from exfit.estimate.stopping import Rules
 
 
@@ -31,9 +32,14 @@ class SearchRun:
     """A search from its start to its end, perhaps in several phases."""
 
     def __init__(
-        self, problem: Problem, rules: Rules, callback: Callable[[SolverIteration], object] | None
+        self,
+        problem: Problem,
+        rules: Rules,
+        searches: Searches,
+        callback: Callable[[SolverIteration], object] | None,
     ) -> None:
         self.problem, self.rules, self.callback = problem, rules, callback
+        self.searches = searches
         self.history: list[SolverIteration] = []
         self.iterations = 0
         self.best: LinearModel | None = None
@@ -59,7 +65,7 @@ class SearchRun:
         if not self.history or not np.array_equal(self.history[-1].x, linear.point.x):
             self.announce(search.phase, linear)
         first = len(self.history) - 1
-        for _ in range(self.rules.max_iterations):
+        for _ in range(self.rules.most_iterations(search.phase)):
             stop = self.rules.at_rest(linear)
             if stop is not None:
                 return Outcome(linear, stop)
@@ -97,6 +103,7 @@ class SearchRun:
             nfev=self.problem.nfev,
             njev=self.problem.njev,
             quality=move.quality,
+            capped=move.capped if before else None,
         )
         self.history.append(line)
         if self.callback is not None:
@@ -132,6 +139,7 @@ class SearchRun:
             jac=linear.jacobian,
             grad=linear.gradient,
             optimality=float(np.max(abs(linear.projected))),
+            promise=linear.full.promise if linear.finite else nan,
             nfev=self.problem.nfev,
             njev=self.problem.njev,
             nit=self.iterations,

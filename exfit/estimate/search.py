@@ -1,8 +1,11 @@
 """What a search is, and the shortening of a step that searches share."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Protocol, Self
+
+import numpy as np
 
 from exfit.estimate.answer import Stop
 from exfit.estimate.arrays import EPS
@@ -11,17 +14,24 @@ from exfit.estimate.problem import Point, Problem
 
 ARMIJO = 1e-4  # share of the promised decrease that makes a trial good enough
 MOST_TRIALS = 60
+SAME = 1e-9  # units: a step that differs by less is the same
+
+Cut = Callable[[float, float], float]
 
 
 @dataclass(frozen=True)
 class Move:
-    """What one iteration came to: a better point, or a reason to stop, or both."""
+    """What one iteration came to: a better point, or a reason to stop, or both.
+
+    ``capped``: the step that was tried first was not the full Gauss-Newton step.
+    """
 
     point: Point | None
     damping: float
     inner: int
     quality: float = nan
     stop: Stop | None = None
+    capped: bool = False
 
 
 class Search(Protocol):
@@ -40,23 +50,13 @@ def gain_ratio(decrease: float, promise: float) -> float:
     return decrease / promise if promise > 0.0 else nan
 
 
-def shorten(problem: Problem, linear: LinearModel, step: DampedStep, trials: int) -> Move:
-    """Shorten the step until Armijo's rule holds or its promise can no longer be seen.
-
-    Source: Armijo 1966.
-    """
-    cost, length, reductions = linear.point.cost, 1.0, 0
-    while reductions < trials and -length * step.slope > EPS * cost:
-        trial = problem.evaluate(step.at(length))
-        if trial.cost < cost and trial.cost <= cost + ARMIJO * length * step.slope:
-            quality = gain_ratio(cost - trial.cost, step.promised(length))
-            return Move(trial, length, reductions, quality)
-        length *= shortened(trial.cost - cost, length * step.slope)
-        reductions += 1
-    return Move(None, length, reductions, stop=Stop.STALLED)
+def held_back(linear: LinearModel, step: DampedStep) -> bool:
+    """Return whether a step is another than the full Gauss-Newton step."""
+    apart = abs(step.target - linear.full.target)
+    return bool(np.any(apart > SAME * linear.box.unit))
 
 
-def shortened(rise: float, slope: float) -> float:
+def to_parabola(rise: float, slope: float) -> float:
     """Return by how much to shorten a trial: to the minimum of the parabola, 0.2 ... 0.5.
 
     Source: Dennis & Schnabel 1983, section 6.3.2. slope: of the whole trial step.
@@ -65,3 +65,32 @@ def shortened(rise: float, slope: float) -> float:
     if not (isfinite(curvature) and curvature > 0.0):
         return 0.2
     return min(0.5, max(0.2, -0.5 * slope / curvature))
+
+
+def to_half(rise: float, slope: float) -> float:
+    """Return one half, whatever a trial came to."""
+    return 0.5
+
+
+def shorten(
+    problem: Problem,
+    linear: LinearModel,
+    step: DampedStep,
+    trials: int = MOST_TRIALS,
+    armijo: float = ARMIJO,
+    cut: Cut = to_parabola,
+) -> Move:
+    """Shorten the step until Armijo's rule holds or its promise can no longer be seen.
+
+    Source: Armijo 1966.
+    """
+    cost, length, reductions = linear.point.cost, 1.0, 0
+    capped = held_back(linear, step)
+    while reductions < trials and -length * step.slope > EPS * cost:
+        trial = problem.evaluate(step.at(length))
+        if trial.cost < cost and trial.cost <= cost + armijo * length * step.slope:
+            quality = gain_ratio(cost - trial.cost, step.promised(length))
+            return Move(trial, length, reductions, quality, capped=capped)
+        length *= cut(trial.cost - cost, length * step.slope)
+        reductions += 1
+    return Move(None, length, reductions, stop=Stop.STALLED, capped=capped)

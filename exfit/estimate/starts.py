@@ -1,6 +1,6 @@
 """Many starts over the bounds, each refined to a minimum, and the distinct minima they lead to."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, inf, log2, nan
 from threading import Event
@@ -12,7 +12,9 @@ from exfit.estimate.answer import Progress, Result, SolverIteration, Stop
 from exfit.estimate.arrays import Array
 from exfit.estimate.box import checked
 from exfit.estimate.problem import Function, exact, half_square, residuals_at
+from exfit.estimate.searches import USUAL, Searches
 from exfit.estimate.solver import least_squares
+from exfit.estimate.stopping import MOST_ITERATIONS
 from exfit.estimate.threads import side_by_side, until
 from exfit.util.strategies import DEFAULT_STRATEGY
 
@@ -71,12 +73,15 @@ def multistart(
     seed: int = SEED,
     watch: Watch = lambda _: None,
     method: str = DEFAULT_STRATEGY,
-    max_iterations: int = 100,
+    max_iterations: int | Mapping[str, int] = MOST_ITERATIONS,
     gtol: float = 1e-8,
+    gtol_absolute: float | None = None,
     ftol: float = 1e-8,
     xtol: float = 1e-10,
     x_scale: ArrayLike | None = None,
     good_enough: float | None = None,
+    matches: Callable[[Array], bool] | None = None,
+    searches: Searches = USUAL,
 ) -> MultistartResult:
     """Minimise f(x) = 1/2 sum(fun(x)^2) from ``count`` starts spread over finite bounds (N,).
 
@@ -117,10 +122,13 @@ def multistart(
             method,
             max_iterations=max_iterations,
             gtol=gtol,
+            gtol_absolute=gtol_absolute,
             ftol=ftol,
             xtol=xtol,
             x_scale=x_scale,
             good_enough=good_enough,
+            matches=matches,
+            searches=searches,
         )
         if result.stop is Stop.INTERRUPTED:
             cut_short.append(result)

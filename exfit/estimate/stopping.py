@@ -1,6 +1,6 @@
 """When to stop, and why."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan, sqrt
 from typing import Self
@@ -16,22 +16,31 @@ from exfit.estimate.search import Move
 LULL = 10  # iterations
 CREEP = 1e-6  # of the cost: less than the noise of any record leaves open
 KINK = 1e-3  # of the cost: what a derivative from one side may promise at a minimum
+MOST_ITERATIONS = 100  # of a phase for which nothing is given
 
 
 @dataclass(frozen=True)
 class Rules:
     """The tolerances, of which `least_squares` says what they mean, and what they refer to."""
 
-    max_iterations: int
+    max_iterations: int | Mapping[str, int]
     gtol: float
     ftol: float
     xtol: float
+    gtol_absolute: float | None = None
+    matches: Callable[[Array], bool] | None = None
     first_cost: float = nan
     first_gradient: float = nan
 
     def starting_at(self, start: LinearModel) -> Self:
         """Return the rules that measure by the start."""
         return replace(self, first_cost=start.point.cost, first_gradient=start.gradient_norm)
+
+    def most_iterations(self, phase: str) -> int:
+        """Return how many iterations a phase may have."""
+        if isinstance(self.max_iterations, int):
+            return self.max_iterations
+        return self.max_iterations.get(phase, MOST_ITERATIONS)
 
     def at_rest(self, linear: LinearModel) -> Stop | None:
         """Return why there is nothing to gain from a point, if so."""
@@ -41,7 +50,18 @@ class Rules:
         flat = linear.gradient_norm <= self.gtol * self.first_gradient + TINY
         if flat and (full.promise <= self.ftol * cost or cost <= self.gtol**2 * self.first_cost):
             return Stop.GRADIENT
-        return Stop.STEP if self.tiny(full.target, full.origin, linear.box) else None
+        if self.tiny(full.target, full.origin, linear.box):
+            return Stop.STEP
+        return self.good_enough(linear)
+
+    def good_enough(self, linear: LinearModel) -> Stop | None:
+        """Return which tolerance of the user's own a point is within, if any."""
+        if self.matches is not None and self.matches(linear.point.residuals):
+            return Stop.MATCH
+        if self.gtol_absolute is None:
+            return None
+        flat = linear.gradient_norm <= self.gtol * self.first_gradient + self.gtol_absolute
+        return Stop.FLAT if flat else None
 
     def after(self, before: LinearModel, linear: LinearModel, move: Move) -> Stop | None:
         """Return why to stop after an iteration, if so."""

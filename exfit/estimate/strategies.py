@@ -4,31 +4,32 @@ from collections.abc import Callable
 from math import sqrt
 
 from exfit.estimate.answer import Stop
-from exfit.estimate.gauss_newton import FullStep, LineSearch
+from exfit.estimate.gauss_newton import FullStep
 from exfit.estimate.linear import LinearModel
 from exfit.estimate.run import Outcome, SearchRun
 from exfit.estimate.search import Search
-from exfit.estimate.trust_region import TrustRegion
+from exfit.estimate.searches import Searches
 
 Strategy = Callable[[SearchRun, LinearModel, float | None], Outcome]
 
 
-def alone(search: Search) -> Strategy:
+def alone(search: Callable[[Searches], Search]) -> Strategy:
     """Return the strategy that is one method from start to end."""
-    return lambda run, start, _: run.descend(search, start)
+    return lambda run, start, _: run.descend(search(run.searches), start)
 
 
 def lm_then_dgn(run: SearchRun, start: LinearModel, _: float | None) -> Outcome:
     """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on."""
-    outcome = relay(run, start, TrustRegion(hand_over=True), LineSearch())
+    lm, dgn = run.searches.lm, run.searches.dgn
+    outcome = relay(run, start, lm.handing_over(), dgn)
     if outcome.stop is not Stop.STALLED:
         return outcome
-    return run.descend(TrustRegion(), outcome.linear)
+    return run.descend(lm, outcome.linear)
 
 
 def robust(run: SearchRun, start: LinearModel, _: float | None) -> Outcome:
     """Go on with lm where gn quits."""
-    return relay(run, start, FullStep(), TrustRegion())
+    return relay(run, start, FullStep(), run.searches.lm)
 
 
 def relay(run: SearchRun, start: LinearModel, first: Search, second: Search) -> Outcome:
@@ -41,7 +42,7 @@ def relay(run: SearchRun, start: LinearModel, first: Search, second: Search) -> 
 
 def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Outcome:
     """Try dgn; where that is not good enough, lm and dgn from the same start."""
-    first = run.descend(LineSearch(), start)
+    first = run.descend(run.searches.dgn, start)
     if matches(first, good_enough):
         return first
     second = lm_then_dgn(run, start, good_enough)
@@ -57,9 +58,9 @@ def matches(outcome: Outcome, good_enough: float | None) -> bool:
 
 
 STRATEGIES: dict[str, Strategy] = {
-    "gn": alone(FullStep()),
-    "dgn": alone(LineSearch()),
-    "lm": alone(TrustRegion()),
+    "gn": alone(lambda searches: searches.gn),
+    "dgn": alone(lambda searches: searches.dgn),
+    "lm": alone(lambda searches: searches.lm),
     "lm-then-dgn": lm_then_dgn,
     "auto": auto,
     "robust": robust,

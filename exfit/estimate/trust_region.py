@@ -10,7 +10,7 @@ from exfit.estimate.answer import Stop
 from exfit.estimate.arrays import EPS, TINY, Array
 from exfit.estimate.linear import DampedStep, LinearModel, solve
 from exfit.estimate.problem import Problem
-from exfit.estimate.search import ARMIJO, MOST_TRIALS, Move, gain_ratio, shorten, shortened
+from exfit.estimate.search import ARMIJO, MOST_TRIALS, Move, gain_ratio, shorten, to_parabola
 
 FIRST_RADIUS = 100.0  # as MINPACK; in units of x_scale the first radius is 1
 BAD, PROVED, GOOD = 0.25, 0.5, 0.75  # gain ratios that shrink, hand over, enlarge
@@ -29,32 +29,44 @@ class TrustRegion:
     still. So after two steps in a row that gained less than a tenth of what the full step
     promises, the next one is the full step, shortened a few times at most; if that
     fails, it is tried half as often.
+
+    ``first`` is the first radius in units of each variable, where these are given.
     """
 
+    first: float = 1.0
+    armijo: float = ARMIJO
     radius: float = inf
     hand_over: bool = False
     timid: int = 0
     patience: int = PATIENCE
     phase: str = "lm"
 
+    def handing_over(self) -> Self:
+        """Return the search that ends where full Gauss-Newton steps prove good."""
+        return replace(self, hand_over=True)
+
     def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
         """Shrink the radius until a trial lowers the cost, and enlarge it after a good one."""
         if self.timid < self.patience:
-            return self.within(problem, linear, 0)
-        move = shorten(problem, linear, solve(linear, reach=1.0), BOLD_TRIALS)
+            return self.within(problem, linear)
+        move = shorten(problem, linear, solve(linear, reach=1.0), BOLD_TRIALS, self.armijo)
         if move.point is None:
             wary = replace(self, timid=0, patience=2 * self.patience)
-            return wary.within(problem, linear, move.inner)
+            second, search = wary.within(problem, linear, move.inner)
+            return replace(second, capped=move.capped), search
         radius = max(self.radius, linear.scaled_length(move.point.x))
         return replace(move, damping=0.0), replace(self, timid=0, patience=PATIENCE, radius=radius)
 
-    def within(self, problem: Problem, linear: LinearModel, spent: int) -> tuple[Move, Self]:
+    def within(self, problem: Problem, linear: LinearModel, spent: int = 0) -> tuple[Move, Self]:
         """Return the best move that the trust region allows."""
         cost, search = linear.point.cost, self
         if self.radius == inf:
-            search = replace(self, radius=first_radius(problem, linear))
+            search = replace(self, radius=first_radius(problem, linear, self.first))
+        capped = False
         for rejections in range(spent, spent + MOST_TRIALS):
             nu = damping(linear, search.radius)
+            if rejections == spent:
+                capped = nu > 0.0
             step = solve(linear, nu)
             if not step.promise > EPS * cost:
                 break
@@ -62,12 +74,13 @@ class TrustRegion:
             decrease = cost - trial.cost
             search = search.resized(linear, step, nu, decrease)
             quality = gain_ratio(decrease, step.promise)
-            if quality > ARMIJO:
+            if quality > self.armijo:
                 trusted = self.hand_over and nu == 0.0 and quality > PROVED
                 timid = self.timid + 1 if decrease < TIMID * linear.full.promise else 0
-                move = Move(trial, nu, rejections, quality, Stop.TRUSTED if trusted else None)
+                stop = Stop.TRUSTED if trusted else None
+                move = Move(trial, nu, rejections, quality, stop, capped)
                 return move, replace(search, timid=timid)
-        return Move(None, nu, rejections, stop=Stop.STALLED), search
+        return Move(None, nu, rejections, stop=Stop.STALLED, capped=capped), search
 
     def resized(self, linear: LinearModel, step: DampedStep, nu: float, decrease: float) -> Self:
         """Return the search with the radius that the trial suggests."""
@@ -77,15 +90,15 @@ class TrustRegion:
             return replace(self, radius=max(self.radius, 2.0 * length))
         if quality > BAD:
             return self
-        share = shortened(-decrease, step.slope) if decrease < 0.0 else 0.5
+        share = to_parabola(-decrease, step.slope) if decrease < 0.0 else 0.5
         return replace(self, radius=share * min(self.radius, 10.0 * length))
 
 
-def first_radius(problem: Problem, linear: LinearModel) -> float:
+def first_radius(problem: Problem, linear: LinearModel, first: float) -> float:
     """Return the radius to begin with, no longer than the full step."""
     full = linear.scaled_length(linear.full.target)
     size = float(np.linalg.norm(linear.scale * linear.box.unit))
-    return min(1.0 if problem.scaled else FIRST_RADIUS * size, max(full, TINY))
+    return min(first * (1.0 if problem.scaled else FIRST_RADIUS * size), max(full, TINY))
 
 
 def damping(linear: LinearModel, radius: float) -> float:

@@ -46,7 +46,8 @@ def residuals_of(
     values = case.values() if start is None else start
     fixed = {name: value for name, value in values.items() if name not in names}
     experiments = [setup.experiment for setup in setups]
-    return Residuals(experiments, free, fixed, case.ties, robust_of(case))
+    step = case.estimate.difference_step
+    return Residuals(experiments, free, fixed, case.ties, robust_of(case), step)
 
 
 def robust_of(case: Case) -> Robust | None:

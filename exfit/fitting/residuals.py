@@ -55,7 +55,8 @@ class Residuals:
     """Residuals of all records, one behind the other, over the scaled parameters (N,).
 
     ``fixed`` holds every value that is neither free nor follows others by ``ties``. A set that
-    cannot be simulated has infinite residuals. ``counter`` counts the simulations that they cost.
+    cannot be simulated has infinite residuals. ``difference_step`` is that of `central`, `forward`
+    and `backward` in scaled parameters. ``counter`` counts the simulations that all of it costs.
     """
 
     experiments: Sequence[Experiment]
@@ -63,6 +64,7 @@ class Residuals:
     fixed: Mapping[str, float]
     ties: Ties = field(default_factory=Ties)
     robust: Robust | None = None
+    difference_step: float | None = None
     counter: SimulationCounter | None = None
 
     @cached_property
@@ -101,6 +103,17 @@ class Residuals:
         """The standard deviation of a weighted error, by the noise of the records."""
         deviations = [channel.weight * noise_of(channel) for channel in self.channels]
         return float(np.sqrt(np.mean(np.square(deviations))))
+
+    def match(self, residuals: Array, rmse: float) -> bool:
+        """Return whether no channel of any record has a root mean square error above ``rmse``.
+
+        ``residuals`` (samples + priors,) are weighted; those of priors do not count.
+        """
+        errors = np.split(residuals[: self.count], np.cumsum(self.sizes)[:-1])
+        return all(
+            float(own @ own) <= channel.samples * rmse**2
+            for own, channel in zip(errors, self.channels, strict=True)
+        )
 
     def values(self, theta: Array) -> dict[str, float]:
         """Return every value by name."""
@@ -167,15 +180,16 @@ class Residuals:
 
     def central(self, theta: Array) -> Array:
         """Return the Jacobian by central differences, all 2 N runs side by side."""
-        return self.differences(theta, -CENTRAL_STEP, CENTRAL_STEP)
+        step = self.difference_step or CENTRAL_STEP
+        return self.differences(theta, -step, step)
 
     def forward(self, theta: Array) -> Array:
         """Return the Jacobian by forward differences."""
-        return self.differences(theta, 0.0, ONE_SIDED_STEP)
+        return self.differences(theta, 0.0, self.difference_step or ONE_SIDED_STEP)
 
     def backward(self, theta: Array) -> Array:
         """Return the Jacobian by backward differences."""
-        return self.differences(theta, -ONE_SIDED_STEP, 0.0)
+        return self.differences(theta, -(self.difference_step or ONE_SIDED_STEP), 0.0)
 
     def differences(self, theta: Array, below: float, above: float) -> Array:
         """Return difference quotients over [theta + below, theta + above] within the bounds.

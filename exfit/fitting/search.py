@@ -1,17 +1,20 @@
 """The search for the parameters of a case."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 
 from exfit import estimate
 from exfit.case.case import Case
+from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.residuals import JACOBIANS, SimulationCounter
 from exfit.fitting.setup import ExperimentSetup
 
+CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
@@ -39,17 +42,19 @@ def search(
     announce: Callable[[estimate.SolverIteration], None],
     progress: Callable[[estimate.Progress], None],
     counter: SimulationCounter | None = None,
+    options: Estimate | None = None,
 ) -> tuple[estimate.Result, estimate.MultistartResult | None]:
     """Return the best point found from the start of a case, or from all its starts.
 
-    ``counter`` counts the simulations of the search alone.
+    ``counter`` counts the simulations of the search alone; ``options`` are by default the case's.
     """
-    options = case.estimate
+    options = options or case.estimate
     residuals = problem.compressed.counted_by(counter)
     priors = len(residuals.priors)
     share = (residuals.samples + priors) / (residuals.count + priors)
     good_enough = options.good_enough.rmse * np.sqrt(share)
     jacobian = JACOBIANS[options.jacobian](residuals)
+    matches = None if options.stop is None else partial(residuals.match, rmse=options.stop.rmse)
     if options.starts == 1:
         result = estimate.least_squares(
             residuals,
@@ -57,11 +62,14 @@ def search(
             jac=jacobian,
             bounds=residuals.bounds,
             method=method,
-            max_iterations=options.iterations,
+            max_iterations=options.most_iterations,
             gtol=options.tolerance.gradient,
+            gtol_absolute=options.tolerance.gradient_absolute,
             xtol=options.tolerance.step,
             x_scale=UNIT,
             good_enough=good_enough,
+            matches=matches,
+            searches=searches_of(options),
             callback=announce,
         )
         return result, None
@@ -75,11 +83,14 @@ def search(
         refine=options.refine,
         watch=progress,
         method=method,
-        max_iterations=options.iterations,
+        max_iterations=options.most_iterations,
         gtol=options.tolerance.gradient,
+        gtol_absolute=options.tolerance.gradient_absolute,
         xtol=options.tolerance.step,
         x_scale=UNIT,
         good_enough=good_enough,
+        matches=matches,
+        searches=searches_of(options),
     )
     best = minima.best
     if best is None:
@@ -87,6 +98,18 @@ def search(
     for line in best.history:
         announce(line)
     return best, minima
+
+
+def searches_of(options: Estimate) -> estimate.Searches:
+    """Return the searches with the settings of a case."""
+    dgn = estimate.LineSearch(
+        capped=options.dgn.step == "capped", cut=CUTS[options.dgn.cut], armijo=options.armijo
+    )
+    by_ratio = estimate.RatioDamping(
+        options.lm.nu, options.lm.nu_min, options.lm.increase, options.lm.decrease
+    )
+    by_radius = estimate.TrustRegion(options.lm.radius / UNIT, options.armijo)
+    return estimate.Searches(dgn=dgn, lm=by_ratio if options.lm.update == "ratio" else by_radius)
 
 
 def refuse_unfit(case: Case, problem: FitProblem) -> None:

@@ -15,7 +15,7 @@ from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
 WHOLE_FIT = "result.json"
-VERSION = 2  # of the file; a file without a version is of the first
+VERSION = 3  # of the file; a file without a version is of the first
 
 
 def result_text(result: FitResult) -> str:
@@ -26,7 +26,7 @@ def result_text(result: FitResult) -> str:
 def load_result(path: str | PathLike[str]) -> FitResult:
     """Return a fit, given its result.json or the folder that holds it.
 
-    A file of the version before is read as far as it goes. Raises ExfitError where the file cannot
+    A file of an earlier version is read as far as it goes. Raises ExfitError where the file cannot
     be read, or is no result of a fit: with the place in it, and what is wrong there.
     """
     source = result_file(Path(path))

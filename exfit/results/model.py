@@ -31,9 +31,13 @@ class Iteration:
 
     f = 1/2 sum of squared residuals; ``gradient_norm`` of its gradient over the scaled parameters;
     ``damping`` is nu of Levenberg-Marquardt or the step length of Gauss-Newton; ``inner`` counts
-    the trials that were rejected before; ``nfev`` and ``njev`` count residuals and Jacobians until
-    now.
+    the trials that were rejected: cuts of a step, increases of nu; ``nfev`` and ``njev`` count
+    residuals and Jacobians until now. ``capped``: the step that was tried first was held back (by
+    the cap of dgn, by the damping of lm), and so was not the full Gauss-Newton step; None at a
+    start, and in results of an earlier version.
     """
+
+    DERIVED: ClassVar = {"trials": "trials"}
 
     number: int
     phase: str
@@ -46,6 +50,12 @@ class Iteration:
     njev: int
     quality: Annotated[float, nan]
     values: Mapping[str, float]
+    capped: bool | None = None
+
+    @property
+    def trials(self) -> int:
+        """How many points were tried: those that were rejected and the one that was accepted."""
+        return self.inner + (self.step_norm > 0.0)
 
 
 @dataclass(frozen=True)

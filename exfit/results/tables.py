@@ -85,6 +85,8 @@ def history_table(result: FitResult) -> str:
         "nfev",
         "njev",
         "quality",
+        "capped",
+        "trials",
     )
     writer.writerow([*first, *result.parameters])
     for line in result.history:
@@ -97,10 +99,17 @@ def history_table(result: FitResult) -> str:
                 *(f"{number:.{DIGITS}g}" for number in numbers),
                 *counts,
                 f"{line.quality:.4g}",
+                yes_or_no(line.capped),
+                line.trials,
                 *(f"{line.values[name]:.{DIGITS}g}" for name in result.parameters),
             ]
         )
     return out.getvalue()
+
+
+def yes_or_no(value: bool | None) -> str:
+    """Return a truth in a word, none where it is not known."""
+    return "" if value is None else "yes" if value else "no"
 
 
 def parameter_file(result: FitResult) -> str:

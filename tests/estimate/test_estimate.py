@@ -14,6 +14,7 @@ from scipy.optimize import least_squares as scipy_least_squares
 from exfit import estimate
 from exfit.estimate import least_squares
 from exfit.estimate.bounded import bounded_minimum
+from exfit.estimate.damping_ratio import RatioDamping
 from exfit.estimate.gauss_newton import FullStep, LineSearch
 from exfit.estimate.strategies import STRATEGIES
 from exfit.estimate.trust_region import TrustRegion
@@ -207,24 +208,31 @@ def test_the_package_offers_what_its_users_name():
     assert set(estimate.__all__) == {
         "STATUS",
         "CostProfile",
+        "LineSearch",
         "LocalMinimum",
         "MultistartResult",
         "ProfileEnd",
         "Progress",
+        "RatioDamping",
         "Result",
+        "Searches",
         "SolverIteration",
         "Stop",
+        "TrustRegion",
         "least_squares",
         "multistart",
         "profile",
         "profiles",
+        "to_half",
+        "to_parabola",
     }
     assert all(hasattr(estimate, name) for name in estimate.__all__)
     assert list(signature(least_squares).parameters)[:5] == ["fun", "x0", "jac", "bounds", "method"]
 
 
 def test_every_search_has_a_phase_with_a_name():
-    assert {search.phase for search in (FullStep(), LineSearch(), TrustRegion())} == {*PHASES}
+    searches = (FullStep(), LineSearch(), TrustRegion(), RatioDamping())
+    assert {search.phase for search in searches} == {*PHASES}
 
 
 def test_every_strategy_with_a_name_has_its_function():

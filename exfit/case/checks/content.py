@@ -14,6 +14,14 @@ from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
 
+LM_UPDATES = {
+    "radius": "radius",
+    "nu": "ratio",
+    "nu_min": "ratio",
+    "increase": "ratio",
+    "decrease": "ratio",
+}  # settings of Levenberg-Marquardt by the update that uses them
+
 
 def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[Fault]:
     """Yield the faults of a case file's content beyond its form.
@@ -73,7 +81,20 @@ def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
     """Yield settings that nothing uses."""
     if "accept" in content and not content.at("validate").entries:
         yield content.at("accept").fault("there is no validation to judge")
-    estimate = content.at("estimate")
+    yield from _search_faults(content.at("estimate"))
+
+
+def _search_faults(estimate: ContentNode) -> Iterator[Fault]:
+    """Yield settings of the search that nothing uses."""
+    jacobian = estimate.content.get("jacobian", "exact")
+    if "difference_step" in estimate and jacobian == "exact":
+        differences = "central, forward or backward"
+        yield estimate.at("difference_step").fault(f"only with estimate.jacobian: {differences}")
+    lm = estimate.at("lm")
+    update = lm.content.get("update", "radius")
+    for key, needed in LM_UPDATES.items():
+        if key in lm and update in LM_UPDATES.values() and update != needed:
+            yield lm.at(key).fault(f"only with estimate.lm.update: {needed}")
     starts = estimate.at("starts").number
     if "refine" in estimate and (starts is None or starts <= 1.0):
         yield estimate.at("refine").fault("only with more than one of estimate.starts")

@@ -1,8 +1,9 @@
 """The sections of the case file about the fit: its parameters, its search, its simulation."""
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import BaseModel, Discriminator, Field, Tag
 
 from exfit.case.schema.values import (
     Count,
@@ -10,6 +11,7 @@ from exfit.case.schema.values import (
     Frozen,
     Given,
     NotNegative,
+    Number,
     Positive,
     Section,
     nothing,
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 else:
     Strategy = Literal[tuple(STRATEGIES)]
 
+MOST_ITERATIONS = 100  # of a phase, by default
+MOST_DIFFERENCE = 0.1  # a tenth of a parameter: beyond it no difference is a derivative
 MOST_STARTS = 1_000_000  # a day of simulations; their points alone fill 100 MB
 
 
@@ -39,7 +43,14 @@ class Parameters(Section):
 class Tolerance(Section):
     """Limits at which the search has converged."""
 
-    gradient: NotNegative = Field(default=1e-8, description="Limit on the scaled gradient.")
+    gradient: NotNegative = Field(
+        default=1e-8, description="Limit on the norm of the gradient, as a share of its first one."
+    )
+    gradient_absolute: NotNegative | None = Field(
+        default=None,
+        description="Ends the search where the norm of the gradient is below gradient times its "
+        "first one plus this value, even if a step still promises a lower cost; default: not used.",
+    )
     step: NotNegative = Field(default=1e-10, description="Limit on the relative step.")
 
 
@@ -47,6 +58,78 @@ class Limit(Section):
     """A limit on the difference between simulated and measured signals."""
 
     rmse: Positive = Field(description="Root mean square error, pu.")
+
+
+class Stop(Section):
+    """A match at which the search ends, even before it reaches a minimum."""
+
+    rmse: Positive = Field(
+        description="Root mean square of the weighted error, pu, that no channel of any record "
+        "exceeds; the weight of vt is 1."
+    )
+
+
+class DgnSection(Section):
+    """Settings of damped Gauss-Newton."""
+
+    step: Literal["capped", "full"] = Field(
+        default="capped",
+        description="First trial: the best step within a cap on each parameter's change, which "
+        "follows the steps that proved good (a trust region); or the full Gauss-Newton step.",
+    )
+    cut: Literal["parabola", "half"] = Field(
+        default="parabola",
+        description="How a step that fails Armijo's rule is shortened: to the minimum of a "
+        "parabola, 0.2 to 0.5 of it, or to its half.",
+    )
+
+
+class LmSection(Section):
+    """Settings of Levenberg-Marquardt."""
+
+    update: Literal["radius", "ratio"] = Field(
+        default="radius",
+        description="What the damping follows: the radius of a trust region, or, as in textbooks, "
+        "the ratio of achieved to promised decrease.",
+    )
+    radius: Positive = Field(
+        default=0.5,
+        description="Largest first step, in scaled parameters; on the log scale 0.5 is a factor "
+        "of 1.6. update: radius only.",
+    )
+    nu: NotNegative | None = Field(
+        default=None,
+        description="Damping at the start; default: the norm of the gradient there. "
+        "update: ratio only.",
+    )
+    nu_min: Positive = Field(
+        default=1e-3,
+        description="Least damping after an increase; a lower one counts as 0. update: ratio only.",
+    )
+    increase: Annotated[Number, Field(gt=1)] = Field(
+        default=2.0, description="Factor on the damping after a poor trial. update: ratio only."
+    )
+    decrease: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.5, description="Factor on the damping after a good trial. update: ratio only."
+    )
+
+
+class Iterations(Section):
+    """Largest number of iterations in each phase."""
+
+    gn: Count = Field(default=MOST_ITERATIONS, description="Gauss-Newton.")
+    dgn: Count = Field(default=MOST_ITERATIONS, description="Damped Gauss-Newton.")
+    lm: Count = Field(default=MOST_ITERATIONS, description="Levenberg-Marquardt.")
+
+
+def _is_mapping(value: Any) -> str:
+    return "[phases]" if isinstance(value, dict | BaseModel) else "[number]"
+
+
+IterationLimit = Annotated[
+    Annotated[Count, Tag("[number]")] | Annotated[Iterations, Tag("[phases]")],
+    Discriminator(_is_mapping),
+]
 
 
 class Estimate(Section):
@@ -58,12 +141,33 @@ class Estimate(Section):
     jacobian: Literal["exact", "central", "forward", "backward"] = Field(
         default="exact", description="Derivatives: exact, or by differences."
     )
-    iterations: Count = Field(
-        default=100, description="Largest number of iterations in each phase of the strategy."
+    difference_step: Annotated[Number, Field(gt=0, le=MOST_DIFFERENCE)] | None = Field(
+        default=None,
+        description="Step h of the differences, in scaled parameters: on the log scale a share of "
+        "the parameter, on the linear scale of the width of its bounds; default: 6.1e-6, and "
+        "1.5e-8 for forward and backward.",
+    )
+    iterations: IterationLimit = Field(
+        default=MOST_ITERATIONS,
+        description="Largest number of iterations in each phase of the strategy: one number, or "
+        "one for each phase, such as {lm: 20, dgn: 20}.",
     )
     tolerance: Tolerance = Field(
         default_factory=Tolerance, description="Limits at which the search has converged."
     )
+    stop: Stop | None = Field(
+        default=None,
+        description="Match at which the search ends, even before a minimum; default: none.",
+    )
+    armijo: Annotated[Number, Field(gt=0, lt=0.5)] = Field(
+        default=1e-4,
+        description="Share of the promised decrease of the cost that a trial must achieve: "
+        "Armijo's constant of dgn; lm with update: radius uses it, too.",
+    )
+    dgn: DgnSection = Field(
+        default_factory=DgnSection, description="Settings of damped Gauss-Newton."
+    )
+    lm: LmSection = Field(default_factory=LmSection, description="Settings of Levenberg-Marquardt.")
     good_enough: Limit = Field(
         default_factory=lambda: Limit(rmse=2e-4),
         description="Error below which strategy auto accepts a match; default: rmse 2e-4.",
@@ -84,6 +188,17 @@ class Estimate(Section):
     refine: Count | None = Field(
         default=None, description="Number of the best starts that are fitted; default: all."
     )
+
+    @property
+    def most_iterations(self) -> int | Mapping[str, int]:
+        """The largest number of iterations in each phase: one for all, or by phase."""
+        limit = self.iterations
+        return limit if isinstance(limit, int) else limit.model_dump(exclude_unset=True)
+
+    def to_the_minimum(self) -> Self:
+        """Return the same settings, under which no search ends before it reaches a minimum."""
+        tolerance = self.tolerance.model_copy(update={"gradient_absolute": None})
+        return self.model_copy(update={"stop": None, "tolerance": tolerance})
 
 
 class SimulationSection(Section):

@@ -1,7 +1,7 @@
 """A search while it runs."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
 
@@ -15,27 +15,30 @@ from exfit.case.case import Case
 from exfit.estimate import Progress
 from exfit.output.terminal.sketch import LEAST_HEIGHT, LEAST_WIDTH, sketched
 from exfit.results.model import Iteration
+from exfit.results.tables import yes_or_no
 
 MOST_ITERATIONS = 12  # shown at a time
 FEWEST_ITERATIONS = 4  # beside a plot
-HISTORY_WIDTH = 63  # characters of the history
+HISTORY_WIDTH = 70  # characters of the history
 BETWEEN_COLUMNS = 2  # characters between the history and a plot beside it
 OTHER_LINES = 5  # beside the history: title, what is hidden, names of columns, progress, cursor
 PLOT_HEIGHTS = (20, 14)  # lines of a plot beside the history and below it
 PLOT_WIDTH = 100  # characters at most
 SHARE_OF_TIME = 0.03  # of the time of a fit: so much may be spent on showing it
-FORMATS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>5}", "{:>5}")
-HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "inner", "nfev")
+FORMATS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>6}", "{:>5}", "{:>5}")
+HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "capped", "inner", "nfev")
 
 
 class LiveIterations:
     """Shows the iterations of a fit as they come: a live table, or lines in a file or pipe.
 
     A terminal with room for it has a plot of the response beside the table or below it. ``most`` is
-    the largest number of iterations of a phase.
+    the largest number of iterations of a phase, or of each phase by name.
     """
 
-    def __init__(self, console: Console, title: str, most: int | None = None) -> None:
+    def __init__(
+        self, console: Console, title: str, most: int | Mapping[str, int] | None = None
+    ) -> None:
         self.console, self.title, self.most = console, title, most
         self.lines: list[Iteration] = []
         self._sketch: LiveResponse | None = None
@@ -122,11 +125,18 @@ class LiveIterations:
 
     def _progress(self) -> Text:
         first, last = self.lines[0], self.lines[-1]
-        limit = "" if self.most is None else f" (at most {self.most} a phase)"
+        limit = "" if self.most is None else f" (at most {_most(self.most)})"
         share = last.cost / first.cost if first.cost > 0.0 else 1.0
         cost = f"cost {last.cost:.4e}, {100.0 * share:.3g} % of the start's"
         text = f"iteration {last.number}{limit}: {cost}"
         return Text(text, style="dim")
+
+
+def _most(iterations: int | Mapping[str, int]) -> str:
+    """Return how many iterations there may be, in words."""
+    if isinstance(iterations, int):
+        return f"{iterations} a phase"
+    return ", ".join(f"{count} {phase}" for phase, count in iterations.items())
 
 
 def _joined(lines: Iterable[Text]) -> Text:
@@ -154,6 +164,7 @@ def _cells(line: Iteration) -> tuple[str, ...]:
         f"{line.gradient_norm:.2e}",
         f"{line.step_norm:.2e}",
         f"{line.damping:.2e}" if line.damping == line.damping else "-",
+        yes_or_no(line.capped) or "-",
         str(line.inner),
         str(line.nfev),
     )

@@ -1,0 +1,19 @@
+"""The searches that the strategies are made of."""
+
+from dataclasses import dataclass, field
+
+from exfit.estimate.damping_ratio import RatioDamping
+from exfit.estimate.gauss_newton import FullStep, LineSearch
+from exfit.estimate.trust_region import TrustRegion
+
+
+@dataclass(frozen=True)
+class Searches:
+    """One search for each phase, with its settings."""
+
+    gn: FullStep = field(default_factory=lambda: FullStep(retries=True))
+    dgn: LineSearch = field(default_factory=LineSearch)
+    lm: TrustRegion | RatioDamping = field(default_factory=TrustRegion)
+
+
+USUAL = Searches()
