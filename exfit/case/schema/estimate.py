@@ -60,15 +60,6 @@ class Limit(Section):
     rmse: Positive = Field(description="Root mean square error, pu.")
 
 
-class Stop(Section):
-    """A match at which the search ends, even before it reaches a minimum."""
-
-    rmse: Positive = Field(
-        description="Root mean square of the weighted error, pu, that no channel of any record "
-        "exceeds; the weight of vt is 1."
-    )
-
-
 class DgnSection(Section):
     """Settings of damped Gauss-Newton."""
 
@@ -155,9 +146,10 @@ class Estimate(Section):
     tolerance: Tolerance = Field(
         default_factory=Tolerance, description="Limits at which the search has converged."
     )
-    stop: Stop | None = Field(
+    stop: Limit | None = Field(
         default=None,
-        description="Match at which the search ends, even before a minimum; default: none.",
+        description="Ends the search, even before a minimum, where the weighted error of no "
+        "channel of any record exceeds this; the weight of vt is 1. Default: never.",
     )
     armijo: Annotated[Number, Field(gt=0, lt=0.5)] = Field(
         default=1e-4,
