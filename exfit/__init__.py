@@ -22,6 +22,7 @@ from exfit.errors import (
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.fleet.fits import fit_all
     from exfit.records.record import Record
     from exfit.results.io import load_result
     from exfit.results.model import FitResult
@@ -52,6 +53,7 @@ __all__ = [
     "__version__",
     "check",
     "fit",
+    "fit_all",
     "identify",
     "load_case",
     "load_result",
@@ -67,6 +69,7 @@ _MODULES = {
     "Record": "exfit.records.record",
     "check": "exfit.workflows",
     "fit": "exfit.workflows",
+    "fit_all": "exfit.fleet.fits",
     "identify": "exfit.workflows",
     "load_case": "exfit.workflows",
     "load_result": "exfit.results.io",

@@ -97,7 +97,7 @@ def fit(
     """
     began = clock.perf_counter()
     case = loaded(case)
-    method = _checked_strategy(strategy or case.estimate.strategy)
+    method = checked_strategy(strategy or case.estimate.strategy)
     start = case.values()
     setups, problem = fitted(case)
     residuals, counter = problem.residuals, SimulationCounter()
@@ -164,7 +164,7 @@ def fit(
     )
 
 
-def _checked_strategy(strategy: str) -> str:
+def checked_strategy(strategy: str) -> str:
     """Return a strategy, or raise CaseError where there is none of this name."""
     if strategy not in STRATEGIES:
         raise CaseError([f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}"])

@@ -86,11 +86,14 @@ class Run:
         _, command, first, *_ = self.command.split()
         if command == "compare":
             return Path("runs") / command
+        if self.command.count(".yaml") > 1:
+            return Path("runs") / "fits"
         name = Path(first).name if command == "inspect" else Path(first).stem
         return Path("runs") / f"{name}-{command}"
 
 
-FIT, FIELD = (f"configs/{name}.yaml" for name in ("ac1a_typical", "field_record"))
+CASES = ("ac1a_typical", "ac8b_unit2", "field_record")
+FIT, UNIT, FIELD = (f"configs/{name}.yaml" for name in CASES)
 RECORD = FILE.relative_to(ROOT).as_posix()
 RUNS = (  # in the order of the page
     Run(
@@ -131,6 +134,10 @@ RUNS = (  # in the order of the page
     Run(
         f"exfit simulate {FIT}",
         (Picture("response.png", "every signal and state", "response.png"),),
+    ),
+    Run(
+        f"exfit fit {FIT} {UNIT} --strategy dgn --strategy lm",
+        (Picture("fits.png", "two cases, each with two strategies", "fits.png"),),
     ),
     Run(
         "exfit compare runs/ac1a_typical-simulate runs/ac1a_typical-fit sample_data/ac1a_up.csv",

@@ -279,7 +279,7 @@ def test_the_tables_of_keys_are_those_of_the_schema():
 
 def test_the_strategies_of_the_page_are_those_of_a_case():
     cells = first_column(PAGES["docs/case_file.md"], "## Strategies")
-    (option,) = (it for it in main.commands["fit"].params if it.name == "strategy")
+    (option,) = (it for it in main.commands["fit"].params if it.name == "strategies")
     assert sorted(cell.strip("`") for cell in cells) == sorted(option.type.choices)
 
 

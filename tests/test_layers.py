@@ -35,6 +35,7 @@ MAY_IMPORT = {
 MAY_IMPORT["analysis"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["exchange"] = {"results", "case", "models"}
 MAY_IMPORT["workflows"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
+MAY_IMPORT["fleet"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
 MAY_IMPORT["output"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["__main__"] = {"cli"}

@@ -56,7 +56,7 @@ def noises(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
 
 def _case(ctx: click.Context) -> Path | None:
     """Return the case that is given already; the shell leaves a home folder as it is typed."""
-    case = ctx.params.get("case")
+    case = ctx.params.get("case") or next(iter(ctx.params.get("cases") or ()), None)
     if case is None:
         # behind an option that still lacks its value, click has not yet named the arguments
         case = next((word for word in ctx.args if not word.startswith("-")), None)

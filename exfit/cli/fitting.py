@@ -10,11 +10,13 @@ from exfit.cli.options import (
     NOT_CONVERGED,
     Output,
     case_argument,
+    cases_argument,
     load,
     output_options,
     print_json,
     warn,
 )
+from exfit.cli.several_fits import fit_several
 from exfit.util.strategies import EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
@@ -23,39 +25,54 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@case_argument
+@cases_argument
 @click.option(
     "--strategy",
+    "strategies",
     type=click.Choice([*STRATEGIES]),
-    help=f"Strategy in place of that of the case. {EXPLAINED}.",
+    multiple=True,
+    help=f"Strategy in place of that of the case; may be repeated. {EXPLAINED}.",
 )
 @click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
 @output_options
-def fit(case: Path, strategy: str | None, watch: bool, output: Output) -> None:
-    """Fit the free parameters of CASE to its records.
+def fit(cases: tuple[Path, ...], strategies: tuple[str, ...], watch: bool, output: Output) -> None:
+    """Fit the free parameters of each CASE to its records.
 
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
     runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad
     input; 3: not converged, no match at all, or a validation beyond the limit that the case
     accepts.
 
+    Several cases, or several strategies, are all checked first, then fitted one after the other,
+    every case with every strategy: each fit has a folder CASE-STRATEGY in runs/fits, or in DIR,
+    and fits.csv, fits.json and fits.png there show them side by side. Ctrl-C ends them and keeps
+    what is done. Exit code 3: not all are done and well.
+
     With --watch it fits again when CASE, its model file or one of its records changes, and shows
     the former values beside the new ones; a case with a fault waits for the next change. Ctrl-C
     ends that with exit code 0.
     """
+    several = len(cases) > 1 or len(strategies) > 1
+    if watch and several:
+        raise click.UsageError("--watch fits one case with one strategy.")
+    if several:
+        fit_several(cases, strategies, output)
+        return
+    (case,), strategy = cases, strategies[0] if strategies else None
     if watch:
         if not output.shown:
             raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
         fit_again_and_again(case, output.folder(f"{case.stem}-fit"), strategy, output.figures)
         return
+    from exfit.results.side_by_side import CONVERGED, outcome_of
+
     loaded = load(case)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
         result = fit_live(loaded, folder, strategy, output.figures)
     else:
         result = _fit(loaded, folder, strategy, output)
-    converged = result.success and not result.interrupted
-    if not (converged and result.accepted and result.describes):
+    if outcome_of(result) != CONVERGED:
         raise SystemExit(NOT_CONVERGED)
 
 

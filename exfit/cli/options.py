@@ -18,6 +18,9 @@ NOT_CONVERGED = 3
 NAMED_AFTER_RECORDS = ("fit", "validate")  # commands that name files so
 
 case_argument = click.argument("case", type=click.Path(path_type=Path))
+cases_argument = click.argument(
+    "cases", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="CASE..."
+)
 parameters_option = click.option(
     "--parameters",
     type=click.Path(path_type=Path),

@@ -12,6 +12,7 @@ from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
 from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.fleet.fits import FitSeries
 from exfit.records.inspection import Inspection
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
@@ -42,6 +43,13 @@ def of_fit(result: FitResult) -> Drawings:
         drawings["starts.png"] = partial(plots.waterfall, result.minima, result.name)
     drawings |= of_comparisons([*(() if single else result.comparisons), *result.validation])
     return drawings
+
+
+def of_series(series: FitSeries) -> Drawings:
+    """Return the figure of the fits of several cases with several strategies."""
+    from exfit.output import plots
+
+    return {"fits.png": partial(plots.fit_series, series)}
 
 
 def of_uncertainty(uncertainty: UncertaintyAnalysis, name: str) -> Drawings:

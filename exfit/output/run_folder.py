@@ -16,11 +16,13 @@ from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
+from exfit.fleet.fits import FitSeries
 from exfit.output import run_figures
 from exfit.records.inspection import Inspection
 from exfit.results.comparisons import Comparison
 from exfit.results.io import WHOLE_FIT, result_text
 from exfit.results.model import FitResult
+from exfit.results.side_by_side import results_table
 from exfit.results.tables import (
     DIGITS,
     comparison_table,
@@ -42,7 +44,8 @@ PARAMETERS = "parameters.yaml"
 ITERATIONS = "iterations.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
 INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
-MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT)
+SERIES = "fits.json"
+MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT, SERIES)
 # what a command may write that could be an input too, beside files that are named after records
 NUMBERS = {
     "fit": (PARAMETERS, "history.csv", RESPONSE, ITERATIONS, WHOLE_FIT),
@@ -51,6 +54,7 @@ NUMBERS = {
     "profile": ("profile.csv", PROFILES),
     "identify": (DESIGN,),
     "compare": ("compare.csv", AGREEMENT),
+    "fits": ("fits.csv", SERIES),
 }
 # what a fit may write, beside the files that are named after records
 FILES_OF_FIT = (
@@ -106,6 +110,25 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> tuple[str, ...]
         with suppress(ExfitError):  # a cache that cannot be written keeps nothing
             write(_last_parameters(result.case), numbers[PARAMETERS])
     return _draw(folder / WHOLE_FIT, partial(run_figures.of_fit, result)) if figures else ()
+
+
+def write_series(series: FitSeries, folder: Path, figures: bool) -> tuple[str, ...]:
+    """Write the table of a series of fits as CSV and JSON, and their overlays.
+
+    Of each case the values of the fit with the lowest cost are remembered as those of its last fit.
+    """
+    runs = {run.name: (run.case_name, run.result) for run in series.runs}
+    with deferred_interrupts():
+        write_together(
+            folder,
+            {"fits.csv": results_table(runs), SERIES: to_json(series.to_dict())},
+            ["fits.png"],
+        )
+        for fits in series.by_case.values():
+            lowest = min((run.result for run in fits), key=lambda result: result.cost)
+            with suppress(ExfitError):
+                write(_last_parameters(lowest.case), parameter_file(lowest))
+    return _draw(folder / SERIES, partial(run_figures.of_series, series)) if figures else ()
 
 
 def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:

@@ -1,6 +1,7 @@
 """Figures of results: functions that return one, and touch nothing else."""
 
 from exfit.output.plots.agreement import agreement
+from exfit.output.plots.fit_series import fit_series
 from exfit.output.plots.iterations import iterations
 from exfit.output.plots.overlays import overlay
 from exfit.output.plots.records import inspection
@@ -13,6 +14,7 @@ __all__ = [
     "agreement",
     "convergence",
     "correlation",
+    "fit_series",
     "inspection",
     "iterations",
     "overlay",

@@ -4,6 +4,7 @@ from exfit.output.terminal.agreement import agreement
 from exfit.output.terminal.catalogue import catalogue, machine, model
 from exfit.output.terminal.checks import check
 from exfit.output.terminal.comparisons import comparisons
+from exfit.output.terminal.fit_series import SeriesProgress, fit_series
 from exfit.output.terminal.fits import fit
 from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
 from exfit.output.terminal.records import inspection
@@ -13,6 +14,7 @@ from exfit.output.terminal.uncertainty import design, profiles
 __all__ = [
     "LiveIterations",
     "ProgressBar",
+    "SeriesProgress",
     "again",
     "agreement",
     "catalogue",
@@ -21,6 +23,7 @@ __all__ = [
     "console",
     "design",
     "fit",
+    "fit_series",
     "inspection",
     "machine",
     "model",

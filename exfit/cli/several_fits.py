@@ -1,0 +1,101 @@
+"""Fits of several cases with several strategies, one after the other."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from exfit.cli.options import (
+    NOT_CONVERGED,
+    Interruption,
+    Output,
+    load,
+    print_json,
+    refuse_own_files,
+    warn,
+)
+from exfit.errors import CaseError, ExfitError
+
+if TYPE_CHECKING:
+    from exfit.fleet.fits import FitRun, FitSeries, PlannedFit
+
+SERIES = "fits"  # the folder of a series by default
+
+
+def fit_several(cases: Sequence[Path], strategies: Sequence[str], output: Output) -> None:
+    """Fit every case with every strategy, write the files of each fit and those of all.
+
+    Raises ExfitError with the faults of all cases before the first fit begins, and with those of
+    fits that failed when all else is done; SystemExit where not all fits are done and well.
+    """
+    from exfit.fleet.fits import planned
+    from exfit.output import run_folder
+
+    folder = output.folder(SERIES)
+    plan = planned(cases, strategies, load)
+    _refuse_own_files(plan, folder)
+    series = _shown(plan, folder, output) if output.shown else _quiet(plan, folder, output)
+    if not series.runs and series.interrupted:
+        raise Interruption("no fit is done")
+    try:
+        missing = run_folder.write_series(series, folder, output.figures)
+    finally:  # whatever becomes of the files
+        if output.as_json:
+            print_json(series.to_dict())
+        elif output.shown:
+            _show(series)
+    warn(missing)
+    if output.shown:
+        from exfit.output import terminal
+
+        terminal.written(terminal.console(), folder)
+    if series.failed:
+        raise ExfitError("\n".join(f"{name}: {fault}" for name, fault in series.failed.items()))
+    if not series.all_converged:
+        raise SystemExit(NOT_CONVERGED)
+
+
+def _quiet(plan: "Sequence[PlannedFit]", folder: Path, output: Output) -> "FitSeries":
+    """Run the fits and write their files, without a word."""
+    from exfit.fleet.fits import run_all
+    from exfit.output import run_folder
+
+    def finished(run: "FitRun") -> None:
+        warn(run_folder.write_fit(run.result, folder / run.name, output.figures))
+
+    return run_all(plan, finished=finished)
+
+
+def _shown(plan: "Sequence[PlannedFit]", folder: Path, output: Output) -> "FitSeries":
+    """Run the fits and write their files, and show how far they are."""
+    from exfit.fleet.fits import run_all
+    from exfit.output import run_folder, terminal
+
+    with terminal.SeriesProgress(terminal.console(), plan).running() as progress:
+
+        def finished(run: "FitRun") -> None:
+            progress.finished(run)
+            warn(run_folder.write_fit(run.result, folder / run.name, output.figures))
+
+        return run_all(plan, progress, finished)
+
+
+def _show(series: "FitSeries") -> None:
+    from exfit.output import terminal
+
+    terminal.fit_series(terminal.console(), series)
+
+
+def _refuse_own_files(plan: "Sequence[PlannedFit]", folder: Path) -> None:
+    """Raise CaseError where results would replace files of a case, or cannot be written."""
+    from exfit.output import run_folder
+
+    faults: dict[str, None] = {}
+    for fit in plan:
+        try:
+            run_folder.refuse_unwritable(folder / fit.name)
+            refuse_own_files(fit.case, folder / fit.name, "fit")
+            refuse_own_files(fit.case, folder, SERIES)
+        except ExfitError as fault:
+            faults[str(fault)] = None
+    if faults:
+        raise CaseError(faults)

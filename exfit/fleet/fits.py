@@ -1,0 +1,236 @@
+"""Fits of several cases with several strategies, one after the other."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from exfit import estimate, workflows
+from exfit.case.case import Case
+from exfit.errors import CaseError, ExfitError
+from exfit.fitting.build import build_experiment
+from exfit.fitting.search import fitted
+from exfit.results.model import FitResult, Iteration
+from exfit.results.side_by_side import CONVERGED, outcome_of
+from exfit.util.typed import plain
+from exfit.workflows import CaseOrPath
+
+Progress = Iteration | estimate.Progress
+
+
+@dataclass(frozen=True)
+class PlannedFit:
+    """A fit that has still to run: the name that no other of its series has, case and strategy.
+
+    ``case_name`` is that of the case, which no other case of the series has.
+    """
+
+    case_name: str
+    case: Case
+    strategy: str
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class FitRun:
+    """A fit of a series: its name, that of its case, and its result."""
+
+    name: str
+    case_name: str
+    result: FitResult
+
+
+@dataclass(frozen=True, eq=False)
+class FitSeries:
+    """The fits of several cases with several strategies, in the order of the cases.
+
+    ``failed`` holds the error of each fit that could not be run or written, by its name;
+    ``not_run`` names those that an interruption left out.
+    """
+
+    runs: tuple[FitRun, ...]
+    failed: dict[str, str]
+    not_run: tuple[str, ...]
+    interrupted: bool
+
+    @property
+    def results(self) -> dict[str, FitResult]:
+        """The results by the names of the fits."""
+        return {run.name: run.result for run in self.runs}
+
+    @property
+    def by_case(self) -> dict[str, tuple[FitRun, ...]]:
+        """The fits of each case, by its name."""
+        names = dict.fromkeys(run.case_name for run in self.runs)
+        return {name: tuple(run for run in self.runs if run.case_name == name) for name in names}
+
+    @property
+    def all_converged(self) -> bool:
+        """Whether all fits were run, and each converged and is accepted."""
+        done = not (self.failed or self.not_run or self.interrupted)
+        return done and all(outcome_of(result) == CONVERGED for result in self.results.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of all fits as plain data, as ``exfit fit --json`` prints them."""
+        return {
+            "runs": [
+                {
+                    "name": run.name,
+                    "case_name": run.case_name,
+                    "outcome": outcome_of(run.result),
+                    "result": run.result.to_dict(),
+                }
+                for run in self.runs
+            ],
+            "failed": plain(self.failed),
+            "not_run": list(self.not_run),
+            "interrupted": self.interrupted,
+        }
+
+
+def _ignore_progress(_: PlannedFit, __: Progress) -> None:
+    """Ignore how far a fit is."""
+
+
+def _ignore_run(_: FitRun) -> None:
+    """Ignore that a fit has ended."""
+
+
+def fit_all(
+    cases: Iterable[CaseOrPath],
+    strategies: Iterable[str] = (),
+    progress: Callable[[PlannedFit, Progress], None] = _ignore_progress,
+    finished: Callable[[FitRun], None] = _ignore_run,
+) -> FitSeries:
+    """Fit every case with every strategy; all cases are checked before the first fit.
+
+    Args:
+        cases: cases, or the paths of their files.
+        strategies: of the estimator; none: the own strategy of each case.
+        progress: called with the fit that runs and its iteration, or how far its search from many
+            starts is.
+        finished: called with every fit that has ended, so that its files can be written.
+
+    A KeyboardInterrupt ends the series: it has the fits that were done, and the best point of the
+    one that was running. Raises CaseError with the faults of all cases.
+
+    Example:
+        >>> series = exfit.fit_all(["a.yaml", "b.yaml"], ["dgn", "lm"])
+        >>> {name: result.cost for name, result in series.results.items()}
+    """
+    return run_all(planned([*cases], [*strategies]), progress, finished)
+
+
+def planned(
+    cases: Sequence[CaseOrPath],
+    strategies: Sequence[str],
+    load: Callable[[Any], Case] = workflows.loaded,
+) -> tuple[PlannedFit, ...]:
+    """Return the fits of every case with every strategy, or with its own where none is given.
+
+    Cases and records are read; raises CaseError with the faults of all of them.
+    """
+    read: list[Case] = []
+    files = [case for case in cases if not isinstance(case, Case)]
+    faults = [
+        *_repeated("case", files, [Path(file).resolve() for file in files]),
+        *_repeated("strategy", strategies, strategies),
+    ]
+    for strategy in strategies:
+        faults += _faults(workflows.checked_strategy, strategy)
+    for case in cases:
+        faults += _faults(lambda source: read.append(_ready(load(source))), case)
+    if faults:
+        raise CaseError(faults)
+    names = distinct_names([case.path for case in read])
+    combinations = [
+        (name, case, strategy)
+        for name, case in zip(names, read, strict=True)
+        for strategy in strategies or [case.estimate.strategy]
+    ]
+    runs = _numbered([f"{name}-{strategy}" for name, _, strategy in combinations])
+    return tuple(
+        PlannedFit(*combination, run) for combination, run in zip(combinations, runs, strict=True)
+    )
+
+
+def run_all(
+    plan: Sequence[PlannedFit],
+    progress: Callable[[PlannedFit, Progress], None] = _ignore_progress,
+    finished: Callable[[FitRun], None] = _ignore_run,
+) -> FitSeries:
+    """Run planned fits one after the other; one that fails keeps no other from running."""
+    runs: list[FitRun] = []
+    failed: dict[str, str] = {}
+    interrupted = False
+    try:
+        for fit in plan:
+            shown = partial(progress, fit)
+            try:
+                result = workflows.fit(fit.case, fit.strategy, shown, shown)
+                runs.append(FitRun(fit.name, fit.case_name, result))
+                finished(runs[-1])
+            except ExfitError as fault:
+                failed[fit.name] = str(fault)
+                continue
+            if result.interrupted:
+                interrupted = True
+                break
+    except KeyboardInterrupt:
+        interrupted = True
+    done = {*failed, *(run.name for run in runs)}
+    return FitSeries(
+        tuple(runs), failed, tuple(fit.name for fit in plan if fit.name not in done), interrupted
+    )
+
+
+def distinct_names(paths: Sequence[Path]) -> list[str]:
+    """Return the stem of each path, behind the name of its folder where several have one stem.
+
+    What is the same even so is numbered; capitals make no difference, as on some disks.
+    """
+    stems = Counter(path.stem.casefold() for path in paths)
+    return _numbered(
+        f"{path.absolute().parent.name}-{path.stem}"
+        if stems[path.stem.casefold()] > 1
+        else path.stem
+        for path in paths
+    )
+
+
+def _numbered(names: Iterable[str]) -> list[str]:
+    """Return names with a number behind each that repeats an earlier one."""
+    taken: dict[str, str] = {}
+    for name in names:
+        candidate, number = name, 1
+        while candidate.casefold() in taken:
+            number += 1
+            candidate = f"{name}-{number}"
+        taken[candidate.casefold()] = candidate
+    return [*taken.values()]
+
+
+def _ready(case: Case) -> Case:
+    """Return a case whose records have been read; raises ExfitError where no fit could begin."""
+    fitted(case)
+    start = case.values()
+    for recording in case.validations:
+        build_experiment(case, recording, start)
+    return case
+
+
+def _faults(check: Callable[[Any], object], subject: object) -> list[str]:
+    try:
+        check(subject)
+    except ExfitError as fault:
+        return str(fault).splitlines()
+    return []
+
+
+def _repeated(kind: str, given: Sequence[object], identities: Sequence[object]) -> Iterator[str]:
+    """Yield what is given more than once, whatever it is called."""
+    for identity, count in Counter(identities).items():
+        if count > 1:
+            yield f"{kind} {given[identities.index(identity)]}: given {count} times"

@@ -1,0 +1,126 @@
+"""Results of fits beside each other, as many at a time as the terminal has room for."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from rich.console import Console
+
+from exfit.output.terminal.terminal import number, plain_table
+from exfit.results.model import FitResult
+from exfit.results.side_by_side import ParameterValue, parameters_beside
+
+COST = "f"  # label of its row
+BETWEEN_COLUMNS = 2  # characters
+ON_BOUND, UNRESOLVED, FIXED = "*", "?", "="  # behind a value
+MARKS = {
+    ON_BOUND: "on a bound",
+    UNRESOLVED: "not determined by the record",
+    FIXED: "fixed",
+}
+
+
+class Row(NamedTuple):
+    """A line of a table: its label, its unit, and a cell for each result."""
+
+    label: str
+    unit: str
+    cells: tuple[str, ...]
+
+
+HEAD = Row("", "unit", ())
+
+
+def side_by_side(
+    console: Console, results: Mapping[str, FitResult], start: bool = False, models: bool = False
+) -> None:
+    """Show the parameters and figures of results, by their headings.
+
+    The ``start`` that they share is a column of its own; ``models`` are lines above the others.
+    """
+    fits = [*results.values()]
+    parameters = [*_parameters(fits)]
+    rows = [*(_models(fits) if models else ()), *parameters, *_figures(fits)]
+    headings = [*results]
+    if start:
+        first = _start(fits[0])
+        rows = [row._replace(cells=(first.get(row.label, ""), *row.cells)) for row in rows]
+        headings = ["start", *headings]
+    _tables(console, headings, rows)
+    shown = {mark for row in parameters for cell in row.cells for mark in MARKS if mark in cell}
+    if shown:
+        legend = ", ".join(f"{mark} {words}" for mark, words in MARKS.items() if mark in shown)
+        console.print(legend, style="dim", markup=False)
+
+
+def _start(fit: FitResult) -> dict[str, str]:
+    """Return what a fit started from, by the labels of the rows."""
+    values = {name: f"{number(parameter.start)} " for name, parameter in fit.parameters.items()}
+    return {**values, COST: f"{fit.start_cost:.3e} "}
+
+
+def _tables(console: Console, headings: Sequence[str], rows: Sequence[Row]) -> None:
+    """Show rows as tables below each other, each with as many columns as fit."""
+    for columns in _packed(headings, rows, console.width):
+        names = [headings[k] for k in columns]
+        table = plain_table("", "unit", *names, numbers=names)
+        for row in rows:
+            table.add_row(row.label, row.unit, *(row.cells[k] for k in columns))
+        console.print(table)
+        if columns[-1] != len(headings) - 1:
+            console.print()
+
+
+def _packed(headings: Sequence[str], rows: Sequence[Row], width: int) -> Iterator[range]:
+    """Yield the places of as many columns at a time as a terminal has room for, at least one."""
+    labels = max(len(row.label) for row in rows) + max(len(row.unit) for row in (*rows, HEAD))
+    widths = [
+        max(len(heading), *(len(row.cells[k]) for row in rows)) + BETWEEN_COLUMNS
+        for k, heading in enumerate(headings)
+    ]
+    first, taken = 0, labels + BETWEEN_COLUMNS
+    for k, column in enumerate(widths):
+        if k > first and taken + column > width:
+            yield range(first, k)
+            first, taken = k, labels + BETWEEN_COLUMNS
+        taken += column
+    yield range(first, len(widths))
+
+
+def _models(fits: Sequence[FitResult]) -> Iterator[Row]:
+    yield Row("model", "", tuple(f"{fit.model} " for fit in fits))
+    yield Row("strategy", "", tuple(f"{fit.strategy} " for fit in fits))
+    yield Row("f at the start", "pu²", tuple(f"{fit.start_cost:.3e} " for fit in fits))
+
+
+def _parameters(fits: Sequence[FitResult]) -> Iterator[Row]:
+    units = {name: parameter.unit for fit in fits for name, parameter in fit.parameters.items()}
+    for name, values in parameters_beside(fits).items():
+        yield Row(name, units[name], tuple(map(_cell, values)))
+
+
+def _cell(value: ParameterValue | None) -> str:
+    """Return a value with its mark; all are aligned, with room for one behind each."""
+    if value is None:
+        return ""
+    if not value.fitted:
+        return number(value.value) + FIXED
+    mark = ON_BOUND if value.at_bound else " " if value.resolved else UNRESOLVED
+    return number(value.value) + mark
+
+
+def _figures(fits: Sequence[FitResult]) -> Iterator[Row]:
+    yield Row(COST, "pu²", tuple(f"{fit.cost:.3e} " for fit in fits))
+    yield Row("rmse", "pu", tuple(f"{fit.rmse:.3e} " for fit in fits))
+    yield Row("fit", "%", tuple(f"{fit.comparison.fit_percent:.2f} " for fit in fits))
+    for name in dict.fromkeys(match.name for fit in fits for match in fit.validation):
+        yield Row(f"rmse {name}", "pu", tuple(_validation(fit, name) for fit in fits))
+    yield Row("iterations", "", tuple(f"{fit.nit} " for fit in fits))
+    yield Row("residuals", "", tuple(f"{fit.nfev} " for fit in fits))
+    yield Row("Jacobians", "", tuple(f"{fit.njev} " for fit in fits))
+    yield Row("simulations", "", tuple(f"{fit.simulations} " for fit in fits))
+    yield Row("time", "s", tuple(f"{fit.seconds:.2f} " for fit in fits))
+
+
+def _validation(fit: FitResult, name: str) -> str:
+    matches = [match for match in fit.validation if match.name == name]
+    return f"{matches[0].rmse:.3e} " if matches else ""
