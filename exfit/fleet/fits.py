@@ -137,11 +137,9 @@ def planned(
     faults = [
         *_repeated("case", files, [Path(file).resolve() for file in files]),
         *_repeated("strategy", strategies, strategies),
+        *_faults(workflows.checked_strategy, strategies),
+        *_faults(lambda source: read.append(_ready(load(source))), cases),
     ]
-    for strategy in strategies:
-        faults += _faults(workflows.checked_strategy, strategy)
-    for case in cases:
-        faults += _faults(lambda source: read.append(_ready(load(source))), case)
     if faults:
         raise CaseError(faults)
     names = distinct_names([case.path for case in read])
@@ -221,12 +219,13 @@ def _ready(case: Case) -> Case:
     return case
 
 
-def _faults(check: Callable[[Any], object], subject: object) -> list[str]:
-    try:
-        check(subject)
-    except ExfitError as fault:
-        return str(fault).splitlines()
-    return []
+def _faults(check: Callable[[Any], object], subjects: Iterable[object]) -> Iterator[str]:
+    """Yield the lines of what a check raises for each subject."""
+    for subject in subjects:
+        try:
+            check(subject)
+        except ExfitError as fault:
+            yield from str(fault).splitlines()
 
 
 def _repeated(kind: str, given: Sequence[object], identities: Sequence[object]) -> Iterator[str]:

@@ -128,7 +128,8 @@ def write_series(series: FitSeries, folder: Path, figures: bool) -> tuple[str, .
             lowest = min((run.result for run in fits), key=lambda result: result.cost)
             with suppress(ExfitError):
                 write(_last_parameters(lowest.case), parameter_file(lowest))
-    return _draw(folder / SERIES, partial(run_figures.of_series, series)) if figures else ()
+    drawings = partial(run_figures.of_series, series)
+    return _draw(folder / SERIES, drawings) if figures and series.runs else ()
 
 
 def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:

@@ -16,7 +16,8 @@ DIGITS = 9  # significant digits of a number in the table
 class ParameterValue(NamedTuple):
     """A parameter of one of several results: its value, and whether it was fitted there.
 
-    ``at_bound`` is the bound that it lies on, ``resolved`` whether the record determines it.
+    ``at_bound`` is the bound that it lies on; it is not ``resolved`` where the record does not
+    determine it.
     """
 
     value: float
@@ -59,7 +60,8 @@ def _value(result: FitResult, values: Mapping[str, float], name: str) -> Paramet
     parameter = result.parameters.get(name)
     if parameter is None:
         return ParameterValue(values[name], False, None, True)
-    return ParameterValue(parameter.value, True, parameter.at_bound, parameter.interval is not None)
+    resolved = result.knowledge is None or parameter.interval is not None
+    return ParameterValue(parameter.value, True, parameter.at_bound, resolved)
 
 
 def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
@@ -67,35 +69,52 @@ def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:
 
     What a run does not have is blank.
     """
-    fits = [result for _, result in results.values()]
+    fits = [fit for _, fit in results.values()]
     parameters = parameters_beside(fits)
-    validations = dict.fromkeys(match.name for fit in fits for match in fit.validation)
-    header = [
-        *("run", "case", "model", "strategy", "outcome", "message", "f_start", "f", "rmse"),
-        *("fit_percent", "iterations", "nfev", "njev", "simulations", "seconds"),
-        *(f"rmse {name}" for name in validations),
-        *parameters,
-        *("at_bound", "unresolved"),
+    figures = [{"run": run, "case": case, **_figures(fit)} for run, (case, fit) in results.items()]
+    validations = [
+        {f"rmse {match.name}": _number(match.rmse) for match in fit.validation} for fit in fits
     ]
+    rows = [
+        {**row, **rmses, **_values({name: column[k] for name, column in parameters.items()})}
+        for k, (row, rmses) in enumerate(zip(figures, validations, strict=True))
+    ]
+    header = dict.fromkeys(
+        name for part in (figures, validations, rows) for row in part for name in row
+    )
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(header)
-    for k, (run, (case, fit)) in enumerate(results.items()):
-        rmses = {match.name: match.rmse for match in fit.validation}
-        own = {name: column[k] for name, column in parameters.items()}
-        writer.writerow(
-            [
-                *(run, case, fit.model, fit.strategy, outcome_of(fit), fit.message),
-                *map(_number, (fit.start_cost, fit.cost, fit.rmse, fit.comparison.fit_percent)),
-                *(fit.nit, fit.nfev, fit.njev, fit.simulations, f"{fit.seconds:.3f}"),
-                *(_number(rmses.get(name)) for name in validations),
-                *("" if value is None else _number(value.value) for value in own.values()),
-                " ".join(name for name, value in own.items() if value and value.at_bound),
-                " ".join(name for name, value in own.items() if value and not value.resolved),
-            ]
-        )
+    writer = csv.DictWriter(out, [*header], restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     return out.getvalue()
 
 
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.{DIGITS}g}"
+def _figures(fit: FitResult) -> dict[str, str]:
+    return {
+        "model": fit.model,
+        "strategy": fit.strategy,
+        "outcome": outcome_of(fit),
+        "message": fit.message,
+        "f_start": _number(fit.start_cost),
+        "f": _number(fit.cost),
+        "rmse": _number(fit.rmse),
+        "fit_percent": _number(fit.comparison.fit_percent),
+        "iterations": f"{fit.nit}",
+        "nfev": f"{fit.nfev}",
+        "njev": f"{fit.njev}",
+        "simulations": f"{fit.simulations}",
+        "seconds": f"{fit.seconds:.3f}",
+    }
+
+
+def _values(values: Mapping[str, ParameterValue | None]) -> dict[str, str]:
+    own = {name: value for name, value in values.items() if value is not None}
+    return {
+        **{name: _number(own[name].value) if name in own else "" for name in values},
+        "at_bound": " ".join(name for name, value in own.items() if value.at_bound),
+        "unresolved": " ".join(name for name, value in own.items() if not value.resolved),
+    }
+
+
+def _number(value: float) -> str:
+    return f"{value:.{DIGITS}g}"

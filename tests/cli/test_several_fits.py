@@ -13,6 +13,8 @@ from cases import FIRST_ORDER, TIME, TRUTH
 from matplotlib.figure import Figure
 from rich.console import Console
 
+from exfit import workflows
+from exfit.errors import ExfitError
 from exfit.output import plots, run_folder, terminal
 
 BOTH = ("--strategy", "dgn", "--strategy", "lm")
@@ -125,6 +127,20 @@ def test_a_folder_that_cannot_be_written_costs_no_other_fit(run, monkeypatch):
     assert "a-dgn: " in ran.err
     assert Path("runs/fits/a-lm/result.json").is_file()
     assert [*json.loads(Path("runs/fits/fits.json").read_text())["failed"]] == ["a-dgn"]
+
+
+def test_where_no_fit_could_be_run_the_faults_are_all_that_is_shown(run, monkeypatch):
+    def failing(*_):
+        raise ExfitError("the record has gone")
+
+    monkeypatch.setattr(workflows, "fit", failing)
+    ran = run("fit", case_file("a.yaml"), *BOTH)
+    assert ran.code == 1
+    assert ran.err.splitlines() == [
+        f"{start}a-{name}: the record has gone"
+        for start, name in (("Error: ", "dgn"), ("       ", "lm"))
+    ]
+    assert sorted(path.name for path in Path("runs/fits").iterdir()) == ["fits.csv", "fits.json"]
 
 
 def test_the_fit_with_the_lowest_cost_is_the_last_fit_of_its_case(run):

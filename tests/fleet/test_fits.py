@@ -121,6 +121,7 @@ def test_a_fit_that_fails_keeps_no_other_from_running():
     good = planned([case_file("c.yaml", record=other_record())], ["lm"])
     series = run_all([*plan, *good])
     assert [*series.failed] == ["a-lm", "b-lm"]
+    assert run_all(plan).results == {}
     assert [*series.results] == ["c-lm"]
     assert not series.all_converged
 

@@ -76,7 +76,8 @@ def fit_series(console: Console, series: FitSeries) -> None:
 
     How each fit ended stands below its table, and last what was not run.
     """
-    _tables(console, series)
+    if series.runs:
+        _tables(console, series)
     console.print()
     for name in series.failed:
         console.print(Text.assemble(f"{name}: ", ("failed", "bold red")), soft_wrap=True)

@@ -1,6 +1,6 @@
 """Results of fits beside each other, as many at a time as the terminal has room for."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from rich.console import Console
@@ -28,6 +28,24 @@ class Row(NamedTuple):
 
 
 HEAD = Row("", "unit", ())
+Figure = tuple[str, str, Callable[[FitResult], str]]  # label, unit, and what a result has there
+MODEL: tuple[Figure, ...] = (
+    ("model", "", lambda fit: fit.model),
+    ("strategy", "", lambda fit: fit.strategy),
+    ("f at the start", "pu²", lambda fit: f"{fit.start_cost:.3e}"),
+)
+MATCH: tuple[Figure, ...] = (
+    (COST, "pu²", lambda fit: f"{fit.cost:.3e}"),
+    ("rmse", "pu", lambda fit: f"{fit.rmse:.3e}"),
+    ("fit", "%", lambda fit: f"{fit.comparison.fit_percent:.2f}"),
+)
+EFFORT: tuple[Figure, ...] = (
+    ("iterations", "", lambda fit: f"{fit.nit}"),
+    ("residuals", "", lambda fit: f"{fit.nfev}"),
+    ("Jacobians", "", lambda fit: f"{fit.njev}"),
+    ("simulations", "", lambda fit: f"{fit.simulations}"),
+    ("time", "s", lambda fit: f"{fit.seconds:.2f}"),
+)
 
 
 def side_by_side(
@@ -39,7 +57,7 @@ def side_by_side(
     """
     fits = [*results.values()]
     parameters = [*_parameters(fits)]
-    rows = [*(_models(fits) if models else ()), *parameters, *_figures(fits)]
+    rows = [*(_rows(MODEL, fits) if models else ()), *parameters, *_figures(fits)]
     headings = [*results]
     if start:
         first = _start(fits[0])
@@ -86,10 +104,10 @@ def _packed(headings: Sequence[str], rows: Sequence[Row], width: int) -> Iterato
     yield range(first, len(widths))
 
 
-def _models(fits: Sequence[FitResult]) -> Iterator[Row]:
-    yield Row("model", "", tuple(f"{fit.model} " for fit in fits))
-    yield Row("strategy", "", tuple(f"{fit.strategy} " for fit in fits))
-    yield Row("f at the start", "pu²", tuple(f"{fit.start_cost:.3e} " for fit in fits))
+def _rows(figures: Sequence[Figure], fits: Sequence[FitResult]) -> Iterator[Row]:
+    """Yield a line for each figure; all cells end with the room that a mark takes."""
+    for label, unit, text in figures:
+        yield Row(label, unit, tuple(f"{text(fit)} " for fit in fits))
 
 
 def _parameters(fits: Sequence[FitResult]) -> Iterator[Row]:
@@ -109,16 +127,10 @@ def _cell(value: ParameterValue | None) -> str:
 
 
 def _figures(fits: Sequence[FitResult]) -> Iterator[Row]:
-    yield Row(COST, "pu²", tuple(f"{fit.cost:.3e} " for fit in fits))
-    yield Row("rmse", "pu", tuple(f"{fit.rmse:.3e} " for fit in fits))
-    yield Row("fit", "%", tuple(f"{fit.comparison.fit_percent:.2f} " for fit in fits))
+    yield from _rows(MATCH, fits)
     for name in dict.fromkeys(match.name for fit in fits for match in fit.validation):
         yield Row(f"rmse {name}", "pu", tuple(_validation(fit, name) for fit in fits))
-    yield Row("iterations", "", tuple(f"{fit.nit} " for fit in fits))
-    yield Row("residuals", "", tuple(f"{fit.nfev} " for fit in fits))
-    yield Row("Jacobians", "", tuple(f"{fit.njev} " for fit in fits))
-    yield Row("simulations", "", tuple(f"{fit.simulations} " for fit in fits))
-    yield Row("time", "s", tuple(f"{fit.seconds:.2f} " for fit in fits))
+    yield from _rows(EFFORT, fits)
 
 
 def _validation(fit: FitResult, name: str) -> str:
