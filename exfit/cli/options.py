@@ -19,7 +19,7 @@ NAMED_AFTER_RECORDS = ("fit", "validate")  # commands that name files so
 
 case_argument = click.argument("case", type=click.Path(path_type=Path))
 cases_argument = click.argument(
-    "cases", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="CASE..."
+    "cases", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="CASE [CASE]..."
 )
 parameters_option = click.option(
     "--parameters",

@@ -438,7 +438,8 @@ def test_a_validation_beyond_its_limit_ends_with_3(run):
 
 
 @pytest.mark.parametrize(
-    "given", [["fit"], ["fit", "a", "b"], ["fit", "a", "--strategy", "x"], ["none"], ["fit", "-z"]]
+    "given",
+    [["fit"], ["simulate", "a", "b"], ["fit", "a", "--strategy", "x"], ["none"], ["fit", "-z"]],
 )
 def test_wrong_usage_ends_with_2(run, given):
     ran = run(*given)
