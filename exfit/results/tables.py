@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import kept_rows
+from exfit.inference import ParameterEffect
 from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.model import FitResult
 from exfit.util.text import yaml_number
@@ -110,6 +111,19 @@ def history_table(result: FitResult) -> str:
 def yes_or_no(value: bool | None) -> str:
     """Return a truth in a word, none where it is not known."""
     return "" if value is None else "yes" if value else "no"
+
+
+def effects_table(effects: Sequence[ParameterEffect]) -> str:
+    """Return what 1 % of each parameter does to the records as CSV, the strongest first."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    labels = [*effects[0].rms] if effects else []
+    columns = [f"{label.replace(' ', '_')}_rms" for label in labels]
+    writer.writerow(["parameter", *columns, "of_noise"])
+    for effect in effects:
+        numbers = (*effect.rms.values(), effect.of_noise)
+        writer.writerow([effect.parameter, *(f"{number:.{DIGITS}g}" for number in numbers)])
+    return out.getvalue()
 
 
 def parameter_file(result: FitResult) -> str:
