@@ -136,14 +136,11 @@ def parameter_file(result: FitResult) -> str:
         *([f"model_sha256: {result.inputs['model']}"] if "model" in result.inputs else []),
         "parameters:",
     ]
-    of_records = {name: p for name, p in result.parameters.items() if p.of_record}
-    for name, value in result.values.items():
-        # the other values of machine, network and stabiliser are as the case has them
-        if name not in of_records and (name in result.parameters or name in result.values_of("")):
-            lines.append(f"  {name}: {yaml_number(value)}  # {_origin(result, name)}")
-    if of_records:
+    for name, value in result.own_values.items():
+        lines.append(f"  {name}: {yaml_number(value)}  # {_origin(result, name)}")
+    if result.of_records:
         lines += ["records:  # identified with the parameters"]
-        lines += [f"  {name}: {yaml_number(p.value)}" for name, p in of_records.items()]
+        lines += [f"  {name}: {yaml_number(value)}" for name, value in result.of_records.items()]
     return "\n".join(lines) + "\n"
 
 
