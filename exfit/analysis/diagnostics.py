@@ -27,6 +27,7 @@ FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are ot
 FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 MUCH_WORSE = 3.0  # than the fit
+NEAR_MINIMUM = 0.1  # standard errors: what errors and intervals in two digits do not show
 MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 
 
@@ -55,6 +56,27 @@ def notes(
                 f"the response needs {comparison.substeps} sub-steps along its way, {used} were "
                 f"taken: set simulation.step to {step:.2g}"
             )
+
+
+def tolerance_notes(residuals: Residuals, solution: estimate.Result) -> Iterator[str]:
+    """Yield how far from a minimum a search ended that a tolerance of the case ended.
+
+    No parameter lies farther from the minimum of the linear model than z of its standard errors,
+    where z^2 is twice the decrease that the model promises, in variances of the residuals.
+    """
+    if solution.stop not in (estimate.Stop.MATCH, estimate.Stop.FLAT):
+        return
+    ended = "the search ended at a tolerance of the case, not at a minimum"
+    freedom = max(1, residuals.samples - len(solution.x))
+    variance = max(2.0 * solution.cost / freedom, np.finfo(float).tiny)
+    distance = float(np.sqrt(2.0 * max(solution.promise, 0.0) / variance))
+    if distance <= NEAR_MINIMUM:
+        yield f"{ended}, but within {NEAR_MINIMUM:g} standard errors of it"
+    else:
+        yield (
+            f"{ended}: parameters may be {distance:.2g} standard errors away from it, "
+            "and the errors and intervals assume that they are there"
+        )
 
 
 def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from exfit.cli import completion
 from exfit.cli.options import (
     NOT_CONVERGED,
     Output,
@@ -14,7 +15,6 @@ from exfit.cli.options import (
     output_options,
     parameters_option,
     print_json,
-    set_option,
     warn,
 )
 from exfit.errors import CaseError
@@ -22,7 +22,14 @@ from exfit.errors import CaseError
 
 @click.command()
 @case_argument
-@set_option
+@click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="KA=400",
+    help="Value of a parameter.",
+    shell_complete=completion.assigned_parameters,
+)
 @parameters_option
 @file_options
 def simulate(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
-from exfit.fitting.residuals import JACOBIANS, SimulationCounter
+from exfit.fitting.residuals import JACOBIANS, Residuals, SimulationCounter
 from exfit.fitting.setup import ExperimentSetup
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
@@ -50,11 +51,8 @@ def search(
     """
     options = options or case.estimate
     residuals = problem.compressed.counted_by(counter)
-    priors = len(residuals.priors)
-    share = (residuals.samples + priors) / (residuals.count + priors)
-    good_enough = options.good_enough.rmse * np.sqrt(share)
     jacobian = JACOBIANS[options.jacobian](residuals)
-    matches = None if options.stop is None else partial(residuals.match, rmse=options.stop.rmse)
+    settings = _settings(options, residuals)
     if options.starts == 1:
         result = estimate.least_squares(
             residuals,
@@ -62,15 +60,8 @@ def search(
             jac=jacobian,
             bounds=residuals.bounds,
             method=method,
-            max_iterations=options.most_iterations,
-            gtol=options.tolerance.gradient,
-            gtol_absolute=options.tolerance.gradient_absolute,
-            xtol=options.tolerance.step,
-            x_scale=UNIT,
-            good_enough=good_enough,
-            matches=matches,
-            searches=searches_of(options),
             callback=announce,
+            **settings,
         )
         return result, None
     minima = estimate.multistart(
@@ -83,14 +74,7 @@ def search(
         refine=options.refine,
         watch=progress,
         method=method,
-        max_iterations=options.most_iterations,
-        gtol=options.tolerance.gradient,
-        gtol_absolute=options.tolerance.gradient_absolute,
-        xtol=options.tolerance.step,
-        x_scale=UNIT,
-        good_enough=good_enough,
-        matches=matches,
-        searches=searches_of(options),
+        **settings,
     )
     best = minima.best
     if best is None:
@@ -98,6 +82,23 @@ def search(
     for line in best.history:
         announce(line)
     return best, minima
+
+
+def _settings(options: Estimate, residuals: Residuals) -> dict[str, Any]:
+    """Return the settings of a search, by the names that `exfit.estimate` has for them."""
+    priors = len(residuals.priors)
+    share = (residuals.samples + priors) / (residuals.count + priors)
+    stop = options.stop
+    return {
+        "max_iterations": options.most_iterations,
+        "gtol": options.tolerance.gradient,
+        "gtol_absolute": options.tolerance.gradient_absolute,
+        "xtol": options.tolerance.step,
+        "x_scale": UNIT,
+        "good_enough": options.good_enough.rmse * np.sqrt(share),
+        "matches": None if stop is None else partial(residuals.match, rmse=stop.rmse),
+        "searches": searches_of(options),
+    }
 
 
 def searches_of(options: Estimate) -> estimate.Searches:

@@ -13,7 +13,7 @@ __all__ = ["Figure", "fit_figure", "fit_html"]
 TABLE = """\
 <div>
 <p><b>{{ result.model }}</b> fitted to {{ records }}:
-{{ "converged" if result.success else "not converged" }} ({{ result.message }}),
+{{ result.outcome }} ({{ result.message }}),
 rmse {{ "%.3g" | format(result.rmse) }} pu, fit {{ "%.2f" | format(fit_percent) }} %</p>
 <table>
 <thead><tr>

@@ -76,6 +76,20 @@ def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, reco
             assert ours == pytest.approx(all_, rel=AGREE, abs=AGREE * np.max(np.abs(all_)))
 
 
+def test_a_match_of_the_curves_is_that_of_all_samples(tmp_path):
+    """Each channel by itself: the larger root mean square decides."""
+    every = residuals(dense_case(tmp_path))
+    few = compressed(every)
+    whole, short = every(every.start), few(every.start)
+    ends = np.cumsum(every.sizes)
+    parts = np.split(whole[: every.count], ends[:-1])
+    limit = max(float(np.sqrt(np.mean(part**2))) for part in parts)
+    assert len(parts) == len(CHANNELS)
+    for factor, matches in ((1.0 + 1e-9, True), (1.0 - 1e-9, False)):
+        assert every.match(whole, factor * limit) is matches
+        assert few.match(short, factor * limit) is matches
+
+
 def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
     case = dense_case(tmp_path, sections={"estimate": {"strategy": "auto"}})
     ours = fit(case)

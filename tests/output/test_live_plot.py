@@ -129,6 +129,12 @@ def test_a_plot_stands_where_there_is_room_for_it(size, where):
     assert "iteration 29 (at most 100 a phase)" in text
 
 
+def test_the_limit_of_iterations_is_shown_for_each_phase():
+    watch = watching(screen(100, 24), sketch=None)
+    watch.most = {"lm": 20, "dgn": 15}
+    assert "iteration 29 (at most 20 lm, 15 dgn): cost" in watch.picture().plain
+
+
 def test_no_column_of_the_history_is_cut_in_two():
     for width in range(20, 80):
         text = watching(screen(width, 12), sketch=None).picture().plain

@@ -88,6 +88,20 @@ def test_a_file_of_a_later_version_is_refused(saved):
             load_result(written(saved, version=version))
 
 
+def test_a_file_of_the_version_before_does_not_know_which_steps_were_capped(saved):
+    _, content = saved
+    history = [
+        {key: value for key, value in line.items() if key not in ("capped", "trials")}
+        for line in content["history"]
+    ]
+    assert {line["capped"] for line in content["history"]} >= {None, False}
+    back = load_result(written(saved, version=2, history=history))
+    assert {line.capped for line in back.history} == {None}
+    assert [line.trials for line in back.history] == [line["trials"] for line in content["history"]]
+    with pytest.raises(ExfitError, match=r"history\[0\]\.capped: missing"):
+        load_result(written(saved, history=history))
+
+
 def test_no_damage_ends_in_a_traceback(saved):
     """Values of another kind, missing keys, cut files: ExfitError with the file, or no harm."""
     path, _ = saved

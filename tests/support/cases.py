@@ -27,7 +27,6 @@ FILES_OF_A_FIT = {
     "iterations.png",
     "convergence.png",
     "trajectories.png",
-    "sensitivities.csv",
     "sensitivity.png",
     "correlation.png",
     "down-step.csv",

@@ -1,0 +1,167 @@
+"""The search of a case: what its settings under `estimate` do."""
+
+import numpy as np
+import pytest
+from records import case_of, config, several
+from records import recording as recorded
+
+from exfit.analysis.profiles import profile
+from exfit.estimate import STATUS, Stop
+from exfit.fitting.search import fitted, search
+from exfit.results.model import AT_TOLERANCE
+from exfit.util.text import to_json
+from exfit.workflows import fit
+
+ignore = lambda _: None  # noqa: E731
+
+
+def searched(folder, content, **settings):
+    """Return the residuals of a case, and where its search ends under some settings."""
+    content = {**content, "estimate": settings}
+    case = case_of(content, folder)
+    problem = fitted(case)[1]
+    return problem.residuals, search(case, problem, case.estimate.strategy, ignore, ignore)[0]
+
+
+def rms(residuals, theta):
+    """Return the root mean square of the weighted error of each channel of each record."""
+    ends = np.cumsum(residuals.sizes)[:-1]
+    return [np.sqrt(np.mean(own**2)) for own in np.split(residuals(theta)[: residuals.count], ends)]
+
+
+@pytest.mark.parametrize("prior", [False, True])
+def test_the_search_stops_where_the_curves_of_all_records_match(tmp_path, prior):
+    limit = 2e-4
+    content = several(recorded("up"), recorded("down"))
+    if prior:  # far off, so that its residual alone is beyond the limit
+        content["parameters"]["free"]["KD"]["prior"] = {"mean": 0.1, "std": 0.02}
+    residuals, result = searched(tmp_path, content, stop={"rmse": limit})
+    assert result.stop is Stop.MATCH
+    assert max(rms(residuals, result.history[-1].x)) <= limit
+    assert all(max(rms(residuals, line.x)) > limit for line in result.history[:-1])
+    assert result.promise > 0.0
+
+
+def test_a_start_that_matches_is_the_result(tmp_path):
+    _, result = searched(tmp_path, config("ac1a_typical"), stop={"rmse": 1.0})
+    assert (result.nit, result.nfev, result.stop) == (0, 1, Stop.MATCH)
+
+
+def test_a_fit_that_ends_at_a_tolerance_says_so_and_how_far_from_a_minimum(tmp_path):
+    content = config("first_order")
+    far, near = ({"stop": {"rmse": limit}} for limit in (1e-2, 1e-5))
+    for settings, words in ((far, "standard errors away"), (near, "but within 0.1 standard")):
+        result = fit(case_of({**content, "estimate": settings}, tmp_path))
+        assert result.success
+        assert result.outcome == "ended at a tolerance"
+        assert any(words in note for note in result.notes)
+    whole = fit(case_of(content, tmp_path))
+    assert whole.outcome == "converged"
+    assert not any("tolerance of the case" in note for note in whole.notes)
+
+
+def test_the_results_know_the_status_of_a_tolerance():
+    assert {STATUS[Stop.MATCH], STATUS[Stop.FLAT]} == {*AT_TOLERANCE}
+
+
+def test_the_gradient_ends_the_search_as_the_thesis_says(tmp_path):
+    relative, absolute = 1e-3, 1e-5
+    tolerance = {"gradient": relative, "gradient_absolute": absolute}
+    _, result = searched(tmp_path, config("ac1a_typical"), tolerance=tolerance)
+    norms = [line.gradient_norm for line in result.history]
+    limit = relative * norms[0] + absolute
+    assert result.stop is Stop.FLAT
+    assert norms[-1] <= limit < min(norms[:-1])
+    _, guarded = searched(tmp_path, config("ac1a_typical"), tolerance={"gradient": relative})
+    assert guarded.stop is not Stop.FLAT
+    assert guarded.nit > result.nit
+
+
+def test_each_phase_has_its_own_limit_of_iterations(tmp_path):
+    settings = {"lm": {"update": "ratio"}, "iterations": {"lm": 4, "dgn": 3}}
+    _, result = searched(tmp_path, config("ac1a_typical"), **settings)
+    assert [line.phase for line in result.history[1:]] == ["lm"] * 4 + ["dgn"] * 3
+    assert result.stop is Stop.ITERATIONS
+
+
+def test_a_phase_without_a_limit_of_its_own_has_the_usual_one(tmp_path):
+    content = config("first_order")
+    limited = searched(tmp_path, content, iterations={"gn": 1})[1]
+    assert limited.nit == searched(tmp_path, content)[1].nit > 1
+
+
+def test_a_radius_limits_the_first_step_of_levenberg_marquardt(tmp_path):
+    for radius in (0.1, 0.2):
+        settings = {"strategy": "lm", "iterations": 1, "lm": {"radius": radius}}
+        _, result = searched(tmp_path, config("ac1a_typical"), **settings)
+        assert result.history[1].step_norm == pytest.approx(radius, rel=0.1)  # Moré's slack
+
+
+def test_the_default_settings_written_out_are_the_default(tmp_path):
+    written = {
+        "armijo": 1e-4,
+        "dgn": {"step": "capped", "cut": "parabola"},
+        "lm": {"update": "radius", "radius": 0.5},
+        "iterations": {"gn": 100, "dgn": 100, "lm": 100},
+        "tolerance": {"gradient": 1e-8, "step": 1e-10},
+    }
+    _, result = searched(tmp_path, config("ac1a_typical"), **written)
+    _, usual = searched(tmp_path, config("ac1a_typical"))
+    assert to_json([list(line.x) for line in result.history]) == to_json(
+        [list(line.x) for line in usual.history]
+    )
+
+
+@pytest.mark.parametrize("step", ["capped", "full"])
+def test_only_a_capped_step_is_called_capped(tmp_path, step):
+    settings = {"strategy": "dgn", "dgn": {"step": step}}
+    _, result = searched(tmp_path, config("ac1a_typical"), **settings)
+    capped = [line.capped for line in result.history]
+    assert capped[0] is None
+    assert {*capped[1:]} == ({True, False} if step == "capped" else {False})
+
+
+def test_the_cut_of_a_step_is_its_half_or_lies_at_the_parabola(tmp_path):
+    lengths = {}
+    for cut in ("half", "parabola"):
+        settings = {"strategy": "dgn", "dgn": {"step": "full", "cut": cut}}
+        _, result = searched(tmp_path, config("ac1a_typical"), **settings)
+        shortened = [line for line in result.history if line.inner]
+        assert shortened
+        lengths[cut] = [(line.damping, line.inner) for line in shortened]
+    assert all(damping == 0.5**inner for damping, inner in lengths["half"])
+    assert all(0.2**inner <= damping <= 0.5**inner for damping, inner in lengths["parabola"])
+    assert any(damping != 0.5**inner for damping, inner in lengths["parabola"])
+
+
+STARTS = [
+    "ac1a_typical",
+    "ac8b_unit2",
+    *(
+        pytest.param(name, marks=pytest.mark.long)
+        for name in (
+            "ac1a_good",
+            "ac1a_low",
+            "ac1a_high",
+            "ac8b_unit1",
+            "ac8b_unit1_ka_free",
+            "ac8b_unit2_ka_free",
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_gauss_newton_moves_from_every_start_of_the_thesis(tmp_path, name):
+    _, result = searched(tmp_path, config(name), strategy="gn")
+    assert result.cost < 0.95 * result.history[0].cost
+    assert result.history[1].inner <= 1
+    if not result.success:
+        assert "strategy dgn" in result.message
+
+
+def test_the_profiles_are_about_a_minimum_whatever_ends_a_fit(tmp_path):
+    content = config("first_order")
+    usual = profile(case_of(content, tmp_path), ["k"], ignore)
+    stop = {**content, "estimate": {"stop": {"rmse": 0.1}}}
+    assert profile(case_of(stop, tmp_path), ["k"], ignore).cost == usual.cost
