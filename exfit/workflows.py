@@ -23,6 +23,7 @@ from exfit.analysis.case_description import (
 )
 from exfit.analysis.diagnostics import typical_notes, unphysical_notes
 from exfit.analysis.experiment_design import Design
+from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
 from exfit.analysis.iteration_responses import (
     LiveResponse,
     live_response,
@@ -46,7 +47,6 @@ from exfit.case.record_section import record_section
 from exfit.case.schema import SINGLE, Recording
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
-from exfit.fitting.overrides import changed_values
 from exfit.fitting.recordings import read_section
 from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
@@ -61,9 +61,7 @@ from exfit.util.strategies import STRATEGIES
 from exfit.util.text import near
 
 Array = NDArray[np.float64]
-Values = Mapping[str, float]
 CaseOrPath = Case | str | PathLike[str]
-ValuesOrResult = Values | FitResult
 
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
 
@@ -78,6 +76,7 @@ def fit(
     progress: Callable[[Iteration], None] = _ignore,
     search_progress: Callable[[estimate.Progress], None] = _ignore,
     live: Callable[[LiveResponse], None] | None = None,
+    values: ValuesOrResult | None = None,
 ) -> FitResult:
     """Fit the free parameters of a case to its records, and validate the result on its others.
 
@@ -88,6 +87,8 @@ def fit(
             best. A KeyboardInterrupt, raised in it too, ends the search with the best point so far.
         search_progress: called with how far a search from many starts is.
         live: called before ``progress`` with the response of that iteration.
+        values: in place of those of the case, by name, or those of an earlier fit: of a free
+            parameter its start. The result says which.
 
     Raises ExfitError for input that cannot be used.
 
@@ -96,7 +97,7 @@ def fit(
         >>> result.parameters["KA"].value
     """
     began = clock.perf_counter()
-    case = loaded(case)
+    case = with_values(loaded(case, values), values)
     method = checked_strategy(strategy or case.estimate.strategy)
     start = case.values()
     setups, problem = fitted(case)
@@ -155,6 +156,7 @@ def fit(
         validation=analysis.validation,
         versions=versions(),
         inputs=hashes,
+        given_values=given_values(case),
         strategy_given=method != case.estimate.strategy,
         parts=tuple(parts_of(case)),
         tests=tuple(tests_of(case, used)),
@@ -271,7 +273,7 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
     """
     case = loaded(case, values)
-    values = values_of(case, _changes(case, values))
+    values = values_of(case, changes_of(case, values))
     if case.recordings:
         setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
         response = setup.response(values)
@@ -286,14 +288,7 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
     return SimulationResult(response, None, tuple(simulation_notes(case, values, response)))
 
 
-def _changes(case: Case, values: ValuesOrResult | None) -> Values:
-    """Return changes of values by name: of a fit all that it has, of others the checked ones."""
-    if isinstance(values, FitResult):
-        return values.values
-    return changed_values(case, values or {}, "values")
-
-
-def simulation_notes(case: Case, values: Values, response: Response) -> Iterator[str]:
+def simulation_notes(case: Case, values: Mapping[str, float], response: Response) -> Iterator[str]:
     """Yield which values are typical or not physical, and whether the machine falls out of step."""
     yield from typical_notes(case)
     yield from unphysical_notes(case, values)
@@ -326,7 +321,7 @@ def validate(
         unseen = [_in_place_of([*unseen, *fitted], case, Path(record))]
     if not fitted + unseen:
         raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
-    values = values_of(case, _changes(case, values))
+    values = values_of(case, changes_of(case, values))
     setups = [
         build_experiment(case, recording, values).with_enough_substeps(values)
         for recording in fitted

@@ -37,6 +37,8 @@ def input_hashes(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str
     ``setups`` are those of the fitted records, then of the validations.
     """
     hashes = {"case": file_hash(case.path)} if case.from_file else {}
+    if case.parameter_file is not None:
+        hashes["parameters"] = file_hash(case.parameter_file)
     if case.model is not None and case.model.endswith(".py"):
         hashes["model"] = file_hash(case.folder / case.model)
     records = (setup.record.sha256 for setup in setups)
@@ -49,6 +51,7 @@ def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]
     return {
         "case": case.path.name,
         "model": (case.folder / (case.model or "")).name,
+        "parameters": "" if case.parameter_file is None else case.parameter_file.name,
         **dict(zip(labelled_records(case), records, strict=True)),
     }
 

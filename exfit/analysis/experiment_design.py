@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.analysis.diagnostics import search_range_notes
 from exfit.case.case import Case
 from exfit.case.schema import SIGNALS_OF_A_TEST
 from exfit.dsp.noise import noise as noise_of
@@ -57,6 +58,7 @@ class Design:
     own: UncertaintyAnalysis
     plans: tuple[Plan, ...]
     noise: Mapping[str, float]
+    notes: tuple[str, ...] = ()
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -68,6 +70,7 @@ class Design:
         return {
             "noise": dict(self.noise),
             **plain(self.own),
+            "notes": list(self.notes),
             "plans": {plan.label: plain(plan.confidence) for plan in self.plans},
         }
 
@@ -100,6 +103,7 @@ def identify(case: Case, noise: Mapping[str, float]) -> Design:
         uncertainty_after(own),
         tuple(plans),
         _noise_by_signal(case, own, levels),
+        tuple(search_range_notes(case)),
     )
 
 

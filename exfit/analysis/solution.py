@@ -20,6 +20,7 @@ from exfit.analysis.diagnostics import (
     validation_notes,
     voltage_notes,
 )
+from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.case.case import Case
 from exfit.case.schema import Unknown
@@ -204,6 +205,7 @@ def fit_notes(
     """Yield what must be known beside the numbers of a fit."""
     if not best.success:
         yield "the search did not end at a minimum: the errors and intervals assume that it did"
+    yield from given_value_notes(case)
     yield from tolerance_notes(residuals, best)
     yield from notes(case, residuals, best, comparisons)
     for setup, comparison in zip(setups, comparisons, strict=True):

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from exfit.case.assembly import CheckedContent, check_content, plain_content
 from exfit.case.bounds import is_held
@@ -30,9 +30,21 @@ from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
 from exfit.errors import CaseError
 from exfit.models.sheet import Parameter
-from exfit.plants import KINDS, PlantKind
+from exfit.plants import KINDS, NETWORK, PlantKind
 from exfit.records.record import Record
 from exfit.util.text import Place, dotted, near
+
+
+class GivenValue(NamedTuple):
+    """A value in place of one of the case file: the one there, and who gave it.
+
+    ``before`` is None for what starts from the record. ``source`` is a file of parameters, or an
+    option.
+    """
+
+    value: float
+    before: float | None
+    source: Path | str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +53,8 @@ class Case:
 
     The sections are those of the case file. ``path`` is that file. For a case made in Python
     (``from_file`` is false) ``path`` is the folder of its files and the name that messages use.
-    ``given_records`` holds, by name, the records that were given as arrays instead of files.
+    ``given_records`` holds, by name, the records that were given as arrays instead of files,
+    ``given_values`` the values of parameters that were given in place of those of the sections.
     """
 
     path: Path
@@ -62,6 +75,7 @@ class Case:
     parts: Parts
     ties: Ties
     given_records: Mapping[str, Record] = field(default_factory=dict)
+    given_values: Mapping[str, GivenValue] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the name, what is studied, and the free parameters, in one line."""
@@ -133,10 +147,34 @@ class Case:
             )
         return replace(self, given_records={**self.given_records, name: record})
 
+    def with_values(self, values: Mapping[str, float], source: Path | str) -> "Case":
+        """Return the case with other values: fixed ones, and starts of those that are free.
+
+        A value that followed others no longer does. ``source`` says who gave the values. Names
+        and values are not checked.
+        """
+        own = self.values()
+        earlier = self.given_values
+        given = {
+            name: GivenValue(
+                value, earlier[name].before if name in earlier else own.get(name), source
+            )
+            for name, value in values.items()
+            if value != own.get(name)
+        }
+        ties = {name: tie for name, tie in self.ties.by_name.items() if name not in given}
+        return replace(self, ties=Ties(ties), given_values={**earlier, **given})
+
     @property
     def folder(self) -> Path:
         """The folder to which the paths in the file are relative."""
         return self.path.parent
+
+    @property
+    def parameter_file(self) -> Path | None:
+        """The file that gave values in place of those of the case, if one did."""
+        sources = (given.source for given in self.given_values.values())
+        return next((source for source in sources if isinstance(source, Path)), None)
 
     @property
     def subject(self) -> str:
@@ -182,12 +220,18 @@ class Case:
             self,
             plant=section(**own, **dict(plant)),
             parts=with_network(self.parts, plant.given if on_load else None),
+            given_values={
+                name: given
+                for name, given in self.given_values.items()
+                if not name.startswith(NETWORK)
+            },
         )
 
     def values(self) -> dict[str, float]:
         """Return every parameter of the parts, as the system names them: typical, fixed, start.
 
-        What follows others comes out of them; helpers that only such arithmetic uses come last.
+        What was given in place of these counts. What follows others comes out of them; helpers
+        that only such arithmetic uses come last.
         """
         values: dict[str, float] = {}
         for part in self.parts.all:
@@ -196,7 +240,9 @@ class Case:
             values |= {part.prefix + symbol: value for symbol, value in resolved.items()}
         helpers = {name: free.start for name, free in self._helpers(self.parameters.free).items()}
         helpers |= numbers_of(self._helpers(self.parameters.fixed))
-        return self.ties.apply({**values, **helpers})
+        values |= helpers
+        given = {name: each.value for name, each in self.given_values.items() if name in values}
+        return self.ties.apply({**values, **given})
 
     def free(self) -> dict[str, FreeSection]:
         """Return the free parameters, as the system names them, without those that are held."""
@@ -223,7 +269,14 @@ class Case:
             for part in self.parts.all
             for symbol, free in self._free(part).items()
         }
-        return {**own, **self._helpers(self.parameters.free)}
+        sections = {**own, **self._helpers(self.parameters.free)}
+        starts = {
+            name: given.value for name, given in self.given_values.items() if name in sections
+        }
+        return {
+            name: section.model_copy(update={"start": starts[name]}) if name in starts else section
+            for name, section in sections.items()
+        }
 
     def typical(self) -> tuple[str, ...]:
         """Return the parameters that the file does not give, as the system names them."""
@@ -232,6 +285,7 @@ class Case:
             for part in self.parts.all
             for row in part.sheet
             if row.symbol not in {**self._fixed(part), **self._free(part)}
+            and part.prefix + row.symbol not in self.given_values
         )
 
     def units(self) -> dict[str, str]:

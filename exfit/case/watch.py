@@ -12,9 +12,12 @@ Stamp = tuple[int, int] | None
 Stamps = Mapping[Path, Stamp]
 
 
-def stamps_of(case: Path) -> Stamps:
-    """Return when each file of a case was changed, and how long it is; None where there is none."""
-    return {path: _stamp(path) for path in files_of(case)}
+def stamps_of(case: Path, beside: Iterable[Path] = ()) -> Stamps:
+    """Return when each file of a case, and beside it, was changed, and how long it is.
+
+    None where there is none.
+    """
+    return {path: _stamp(path) for path in (*files_of(case), *beside)}
 
 
 def changed(before: Stamps) -> tuple[Path, ...]:

@@ -8,12 +8,15 @@ import click
 from exfit.cli.live_fit import fit_again_and_again, fit_live
 from exfit.cli.options import (
     NOT_CONVERGED,
+    Given,
     Output,
     case_argument,
     cases_argument,
     load,
     output_options,
+    parameters_option,
     print_json,
+    set_option,
     warn,
 )
 from exfit.cli.several_fits import fit_several
@@ -33,9 +36,18 @@ if TYPE_CHECKING:
     multiple=True,
     help=f"Strategy in place of that of the case; may be repeated. {EXPLAINED}.",
 )
+@set_option
+@parameters_option
 @click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
 @output_options
-def fit(cases: tuple[Path, ...], strategies: tuple[str, ...], watch: bool, output: Output) -> None:
+def fit(
+    cases: tuple[Path, ...],
+    strategies: tuple[str, ...],
+    changes: tuple[str, ...],
+    parameters: Path | None,
+    watch: bool,
+    output: Output,
+) -> None:
     """Fit the free parameters of each CASE to its records.
 
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
@@ -43,30 +55,36 @@ def fit(cases: tuple[Path, ...], strategies: tuple[str, ...], watch: bool, outpu
     input; 3: not converged, no match at all, or a validation beyond the limit that the case
     accepts.
 
+    --set overrides --parameters, and both override the case: they give the start of a free
+    parameter, and the value of another. The result says which values they changed.
+
     Several cases, or several strategies, are all checked first, then fitted one after the other,
     every case with every strategy: each fit has a folder CASE-STRATEGY in runs/fits, or in DIR,
     and fits.csv, fits.json and fits.png there show them side by side. Ctrl-C ends them and keeps
     what is done. Exit code 3: not all are done and well.
 
-    With --watch it fits again when CASE, its model file or one of its records changes, and shows
-    the former values beside the new ones; a case with a fault waits for the next change. Ctrl-C
-    ends that with exit code 0.
+    With --watch it fits again when CASE, its model file, one of its records or the file of
+    --parameters changes, and shows the former values beside the new ones; a case with a fault
+    waits for the next change. Ctrl-C ends that with exit code 0.
     """
+    given = Given(parameters, changes)
     several = len(cases) > 1 or len(strategies) > 1
     if watch and several:
         raise click.UsageError("--watch fits one case with one strategy.")
     if several:
-        fit_several(cases, strategies, output)
+        fit_several(cases, given, strategies, output)
         return
     (case,), strategy = cases, strategies[0] if strategies else None
     if watch:
         if not output.shown:
             raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
-        fit_again_and_again(case, output.folder(f"{case.stem}-fit"), strategy, output.figures)
+        fit_again_and_again(
+            case, given, output.folder(f"{case.stem}-fit"), strategy, output.figures
+        )
         return
     from exfit.results.side_by_side import CONVERGED, outcome_of
 
-    loaded = load(case)
+    loaded = given.load(case)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
         result = fit_live(loaded, folder, strategy, output.figures)

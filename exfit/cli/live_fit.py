@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exfit.cli.options import Refusal, load, refuse_own_files, warn
+from exfit.cli.options import Given, Refusal, refuse_own_files, warn
 from exfit.cli.streams import output_is_lost
 from exfit.errors import ExfitError
 
@@ -42,8 +42,10 @@ def fit_live(
     return result
 
 
-def fit_again_and_again(case: Path, folder: Path, strategy: str | None, plots: bool) -> None:
-    """Fit a case, and again whenever a file of it changes, until Ctrl-C.
+def fit_again_and_again(
+    case: Path, given: Given, folder: Path, strategy: str | None, plots: bool
+) -> None:
+    """Fit a case, and again whenever a file of it or of its given values changes, until Ctrl-C.
 
     Raises ExfitError where there is no such file, or no place for the results: a change of the
     case would not help.
@@ -57,9 +59,9 @@ def fit_again_and_again(case: Path, folder: Path, strategy: str | None, plots: b
     console, before = terminal.console(), None
     with suppress(KeyboardInterrupt):
         while True:
-            stamps = stamps_of(case)
+            stamps = stamps_of(case, given.files)
             try:
-                loaded = load(case)
+                loaded = given.load(case)
                 refuse_own_files(loaded, folder, "fit")
                 before = fit_live(loaded, folder, strategy, plots, before)
             except ExfitError as fault:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from exfit.cli import completion
 from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
@@ -26,6 +27,14 @@ parameters_option = click.option(
     type=click.Path(path_type=Path),
     metavar="FILE",
     help="Values from the parameters.yaml of a fit.",
+)
+set_option = click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="KA=400",
+    help="Value of a parameter.",
+    shell_complete=completion.assigned_parameters,
 )
 file_option = click.option(
     "-o",
@@ -121,9 +130,39 @@ def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
     from exfit.output import run_folder
 
     recordings = (*case.recordings, *case.validations)
-    files = [case.path, *(case.folder / recording.record.file for recording in recordings)]
+    files = [
+        case.path,
+        *(case.folder / recording.record.file for recording in recordings),
+        *filter(None, [case.parameter_file]),
+    ]
     names = [recording.name for recording in recordings] if command in NAMED_AFTER_RECORDS else ()
     run_folder.refuse_inputs(command, files, folder, names)
+
+
+@dataclass(frozen=True)
+class Given:
+    """Values given beside a case: a file of parameters, and those of --set over it."""
+
+    parameters: Path | None
+    changes: tuple[str, ...]
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that they are read from."""
+        return () if self.parameters is None else (self.parameters,)
+
+    def load(self, case: Path) -> "Case":
+        """Return the case of a file with these values in place of its own.
+
+        Raises CaseError with all faults of the case, or for values that it cannot start from.
+        """
+        from exfit.fitting.overrides import fitted_model_hash, read_parameters, with_given_values
+
+        path = self.parameters
+        loaded = load(case, fitted_model_hash(path) if path else "")
+        if path:
+            loaded = with_given_values(loaded, read_parameters(loaded, path), path)
+        return with_given_values(loaded, assignments(self.changes, "--set"), "--set")
 
 
 def load(case: Path, model_sha256: str = "") -> "Case":

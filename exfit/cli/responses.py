@@ -4,7 +4,6 @@ from pathlib import Path
 
 import click
 
-from exfit.cli import completion
 from exfit.cli.options import (
     NOT_CONVERGED,
     Output,
@@ -15,6 +14,7 @@ from exfit.cli.options import (
     output_options,
     parameters_option,
     print_json,
+    set_option,
     warn,
 )
 from exfit.errors import CaseError
@@ -22,14 +22,7 @@ from exfit.errors import CaseError
 
 @click.command()
 @case_argument
-@click.option(
-    "--set",
-    "changes",
-    multiple=True,
-    metavar="KA=400",
-    help="Value of a parameter.",
-    shell_complete=completion.assigned_parameters,
-)
+@set_option
 @parameters_option
 @file_options
 def simulate(

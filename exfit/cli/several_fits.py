@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from exfit.cli.options import (
     NOT_CONVERGED,
+    Given,
     Interruption,
     Output,
-    load,
     print_json,
     refuse_own_files,
     warn,
@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 SERIES = "fits"  # the folder of a series by default
 
 
-def fit_several(cases: Sequence[Path], strategies: Sequence[str], output: Output) -> None:
+def fit_several(
+    cases: Sequence[Path], given: Given, strategies: Sequence[str], output: Output
+) -> None:
     """Fit every case with every strategy, write the files of each fit and those of all.
 
     Raises ExfitError with the faults of all cases before the first fit begins, and with those of
@@ -31,7 +33,7 @@ def fit_several(cases: Sequence[Path], strategies: Sequence[str], output: Output
     from exfit.output import run_folder
 
     folder = output.folder(SERIES)
-    plan = planned(cases, strategies, load)
+    plan = planned(cases, strategies, given.load)
     _refuse_own_files(plan, folder)
     series = _shown(plan, folder, output) if output.shown else _quiet(plan, folder, output)
     if not series.runs and series.interrupted:

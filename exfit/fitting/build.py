@@ -54,7 +54,23 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         nuisances,
         recording.name,
     )
-    return ExperimentSetup(case.path, test, record, experiment, free)
+    starts = tuple(_with_given_start(case, parameter) for parameter in free)
+    return ExperimentSetup(case.path, test, record, experiment, starts)
+
+
+def _with_given_start(case: Case, parameter: FreeParameter) -> FreeParameter:
+    """Return what is found about a record, with the start that was given, if one was.
+
+    Raises CaseError where that lies out of its bounds.
+    """
+    given = case.given_values.get(parameter.name)
+    if given is None:
+        return parameter
+    if not parameter.low <= given.value <= parameter.high:
+        limits = f"{parameter.low:g} ... {parameter.high:g}"
+        text = f"{parameter.name}: {given.value:g} lies outside its bounds {limits} in {case.path}"
+        raise CaseError([f"{given.source}: {text}"])
+    return replace(parameter, start=given.value)
 
 
 def _network_values(view: Case) -> dict[str, float]:

@@ -5,6 +5,7 @@ from math import isclose, isfinite
 from pathlib import Path
 from typing import Any
 
+from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
@@ -33,6 +34,23 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
     if faults:
         raise CaseError(f"{place}: {fault}" for fault in faults)
     return dict(given)
+
+
+def with_given_values(case: Case, given: Mapping[str, float], source: Path | str) -> Case:
+    """Return the case with other fixed values, and other starts of what is free.
+
+    Raises CaseError, naming ``source``, as `changed_values` does, and for a start out of bounds.
+    """
+    changed = case.with_values(changed_values(case, given, str(source)), source)
+    faults, rows = [], case.rows()
+    for name, section in changed.free().items():
+        low, high = search_bounds(section.min, section.max, rows.get(name))
+        if name in given and not low <= section.start <= high:
+            limits = f"{low:g} ... {high:g} in {case.path}"
+            faults.append(f"{source}: {name}: {section.start:g} lies outside its bounds {limits}")
+    if faults:
+        raise CaseError(faults)
+    return changed
 
 
 def _wrong_names(
@@ -101,11 +119,19 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
     texts += _no_numbers("records", about)
     if texts:
         raise CaseError(f"{path}: {text}" for text in texts)
+    return taken_over(case, parameters, about, str(path))
+
+
+def taken_over(
+    case: Case, parameters: Mapping[str, float], about: Mapping[str, float], place: str
+) -> dict[str, float]:
+    """Return the changes that values of an earlier fit, and its values ``about`` records, make.
+
+    As `read_parameters` does; raises CaseError, naming ``place``, as `changed_values` does.
+    """
     names = _of_records(case)
     of_records = {name: value for name, value in about.items() if name in names}
-    return _without_agreeing_ties(
-        case, changed_values(case, {**parameters, **of_records}, str(path))
-    )
+    return _without_agreeing_ties(case, changed_values(case, {**parameters, **of_records}, place))
 
 
 def _without_agreeing_ties(case: Case, given: Mapping[str, float]) -> dict[str, float]:

@@ -15,9 +15,11 @@ from exfit.inference import (
     Confidence,
     Identifiability,
     Linearisation,
+    ParameterEffect,
     PriorRow,
     ResidualBlock,
     confidence,
+    effects,
     identifiability,
     rises,
 )
@@ -44,7 +46,8 @@ class UncertaintyAnalysis:
     """Confidence and identifiability at the solution.
 
     ``nonlinear`` names the parameters over whose intervals the response is not linear;
-    ``sensitivity`` is that of each channel; ``rises`` is by how much the cost rises from its
+    ``sensitivity`` is that of each channel over time, ``effects`` ranks the parameters by it;
+    ``rises`` is by how much the cost rises from its
     minimum to the ends of each profile's interval, empty where that is not stored.
     """
 
@@ -53,6 +56,7 @@ class UncertaintyAnalysis:
     confidence: Confidence
     identifiability: Identifiability
     nonlinear: tuple[str, ...] = field(default=(), metadata={KEY: "not_linear"})
+    effects: tuple[ParameterEffect, ...] = field(default=(), metadata={KEY: "sensitivities"})
     sensitivity: tuple[Sensitivity, ...] = field(default=(), metadata=IN_FILE)
     rises: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
 
@@ -99,6 +103,7 @@ def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> 
     return UncertaintyAnalysis(
         confidence=intervals,
         identifiability=identifiability(linear, intervals),
+        effects=effects(linear, intervals.noise),
         sensitivity=tuple(sensitivity(problem, theta, linear)),
         rises=rises(linear, intervals),
     )

@@ -1,7 +1,8 @@
 """What a least-squares fit determines of its parameters, and what it does not.
 
 Arrays in, results out: a `Linearisation` of the fit at its minimum gives `confidence` (standard
-errors, intervals) and `identifiability` (what can move together unseen, and what to fix).
+errors, intervals), `identifiability` (what can move together unseen, and what to fix) and `effects`
+(which parameter matters first).
 """
 
 from exfit.inference.combinations import WEAK, Combination, SignalChange
@@ -18,6 +19,7 @@ from exfit.inference.fixings import Fixing
 from exfit.inference.identifiability import Identifiability, identifiability
 from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
 from exfit.inference.noise import Noise
+from exfit.inference.sensitivity import ParameterEffect, effects
 
 __all__ = [
     "LEVEL",
@@ -30,11 +32,13 @@ __all__ = [
     "Identifiability",
     "Linearisation",
     "Noise",
+    "ParameterEffect",
     "PriorRow",
     "ResidualBlock",
     "SignalChange",
     "Uncertainty",
     "confidence",
+    "effects",
     "identifiability",
     "rises",
 ]

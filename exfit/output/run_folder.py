@@ -26,6 +26,7 @@ from exfit.results.side_by_side import results_table
 from exfit.results.tables import (
     DIGITS,
     comparison_table,
+    effects_table,
     history_table,
     iteration_responses_table,
     parameter_file,
@@ -41,18 +42,18 @@ from exfit.workflows import SimulationResult
 Array = NDArray[np.float64]
 
 PARAMETERS = "parameters.yaml"
-ITERATIONS = "iterations.csv"
+ITERATIONS, SENSITIVITIES = "iterations.csv", "sensitivities.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
 INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
 SERIES = "fits.json"
 MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT, SERIES)
 # what a command may write that could be an input too, beside files that are named after records
 NUMBERS = {
-    "fit": (PARAMETERS, "history.csv", RESPONSE, ITERATIONS, WHOLE_FIT),
+    "fit": (PARAMETERS, "history.csv", RESPONSE, ITERATIONS, SENSITIVITIES, WHOLE_FIT),
     "simulate": (RESPONSE,),
     "validate": (VALIDATION,),
     "profile": ("profile.csv", PROFILES),
-    "identify": (DESIGN,),
+    "identify": (DESIGN, SENSITIVITIES),
     "compare": ("compare.csv", AGREEMENT),
     "fits": ("fits.csv", SERIES),
 }
@@ -60,6 +61,7 @@ NUMBERS = {
 FILES_OF_FIT = (
     ITERATIONS,
     RESPONSE,
+    SENSITIVITIES,
     "overlay.png",
     "iterations.png",
     "convergence.png",
@@ -145,6 +147,8 @@ def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
         if match.iteration_responses is not None:
             name = ITERATIONS if match.name == SINGLE else f"{match.name}-{ITERATIONS}"
             yield name, iteration_responses_table(match.iteration_responses)
+    if result.knowledge is not None:
+        yield SENSITIVITIES, effects_table(result.knowledge.effects)
     yield WHOLE_FIT, result_text(result)
 
 
@@ -246,8 +250,11 @@ def write_profiles(profiles: Profiles, folder: Path, figures: bool) -> tuple[str
 
 
 def write_design(design: Design, folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write what a planned test would show as JSON and as figures."""
-    numbers = {DESIGN: to_json(design.as_json())}
+    """Write what a planned test would show as JSON, its sensitivities as CSV, and figures."""
+    numbers = {
+        SENSITIVITIES: effects_table(design.own.effects),
+        DESIGN: to_json(design.as_json()),
+    }
     write_together(folder, numbers, ["sensitivity.png", "correlation.png"])
     drawings = partial(run_figures.of_design, design)
     return _draw(folder / DESIGN, drawings) if figures else ()

@@ -16,6 +16,19 @@ class SheetRow(NamedTuple):
     meaning: str = ""
 
 
+class GivenInPlace(NamedTuple):
+    """A value that a fit had in place of one of its case; ``start`` where it is a start value.
+
+    ``in_case`` is None for a start that would be taken from the record. ``source`` is a file of
+    parameters, or an option.
+    """
+
+    value: float
+    in_case: float | None
+    start: bool
+    source: str
+
+
 class NetworkParameter(NamedTuple):
     """A parameter of the network of one record."""
 

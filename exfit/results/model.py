@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
-from exfit.results.description import Behaviour, PartDescription, RecordedTest
+from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
 from exfit.util.typed import IN_FILE, KEY, plain
 
 if TYPE_CHECKING:
@@ -137,7 +137,8 @@ class FitResult:
     ``cost`` is what the fit made small, ``comparisons`` are with each record,
     ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
     what identifies the unit and the test. ``inputs`` is the SHA-256 of every file by its label,
-    ``files`` its name. ``behaviour`` is None in results of an earlier version.
+    ``files`` its name. ``given_values`` are those in place of the case's. ``behaviour`` is None in
+    results of an earlier version.
     """
 
     DERIVED: ClassVar = {
@@ -179,6 +180,7 @@ class FitResult:
     validation: tuple[Comparison, ...]
     versions: Mapping[str, str]
     inputs: Mapping[str, str]
+    given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)
     strategy_given: bool = field(default=True, metadata=IN_FILE)
     parts: tuple[PartDescription, ...] = field(default=(), metadata=IN_FILE)
@@ -221,6 +223,20 @@ class FitResult:
             every |= {f"{kind}.{symbol}": value for symbol, value in own.items()}
         others = {name: value for name, value in every.items() if name not in self.parameters}
         return {**others, **{name: parameter.value for name, parameter in self.parameters.items()}}
+
+    @property
+    def own_values(self) -> dict[str, float]:
+        """The values of the unit that another case may take over: all of the exciter, fitted ones.
+
+        The others, of machine, network and stabiliser, are as the case has them.
+        """
+        own = {**self.parameters, **self.values_of("")}.keys() - self.of_records.keys()
+        return {name: value for name, value in self.values.items() if name in own}
+
+    @property
+    def of_records(self) -> dict[str, float]:
+        """What the fit found about its records: instants and sizes of steps, levels, delays."""
+        return {name: each.value for name, each in self.parameters.items() if each.of_record}
 
     def values_of(self, prefix: str) -> dict[str, float]:
         """Return the values of one part by symbol; the exciter's prefix is empty."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import kept_rows
+from exfit.inference import ParameterEffect
 from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.model import FitResult
 from exfit.util.text import yaml_number
@@ -112,6 +113,19 @@ def yes_or_no(value: bool | None) -> str:
     return "" if value is None else "yes" if value else "no"
 
 
+def effects_table(effects: Sequence[ParameterEffect]) -> str:
+    """Return what 1 % of each parameter does to the records as CSV, the strongest first."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    labels = [*effects[0].rms] if effects else []
+    columns = [f"{label.replace(' ', '_')}_rms" for label in labels]
+    writer.writerow(["parameter", *columns, "of_noise"])
+    for effect in effects:
+        numbers = (*effect.rms.values(), effect.of_noise)
+        writer.writerow([effect.parameter, *(f"{number:.{DIGITS}g}" for number in numbers)])
+    return out.getvalue()
+
+
 def parameter_file(result: FitResult) -> str:
     """Return the values as YAML, to be read back by simulate and validate."""
     state = "interrupted" if result.interrupted else result.message
@@ -122,14 +136,11 @@ def parameter_file(result: FitResult) -> str:
         *([f"model_sha256: {result.inputs['model']}"] if "model" in result.inputs else []),
         "parameters:",
     ]
-    of_records = {name: p for name, p in result.parameters.items() if p.of_record}
-    for name, value in result.values.items():
-        # the other values of machine, network and stabiliser are as the case has them
-        if name not in of_records and (name in result.parameters or name in result.values_of("")):
-            lines.append(f"  {name}: {yaml_number(value)}  # {_origin(result, name)}")
-    if of_records:
+    for name, value in result.own_values.items():
+        lines.append(f"  {name}: {yaml_number(value)}  # {_origin(result, name)}")
+    if result.of_records:
         lines += ["records:  # identified with the parameters"]
-        lines += [f"  {name}: {yaml_number(p.value)}" for name, p in of_records.items()]
+        lines += [f"  {name}: {yaml_number(value)}" for name, value in result.of_records.items()]
     return "\n".join(lines) + "\n"
 
 

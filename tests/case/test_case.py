@@ -274,7 +274,7 @@ def test_a_case_can_be_written_out_again():
 
 
 def test_a_case_has_every_section_of_the_document():
-    own = {"path", "from_file", "parts", "ties", "given_records"}
+    own = {"path", "from_file", "parts", "ties", "given_records", "given_values"}
     assert {field.name for field in fields(Case)} - own == {*CaseDocument.model_fields}
 
 

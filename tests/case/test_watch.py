@@ -128,6 +128,26 @@ def test_every_change_is_fitted_a_fault_waits_and_ctrl_c_ends_with_0(place):
         assert run.process.returncode == 0
 
 
+def test_given_values_hold_in_every_fit_and_their_file_is_watched(place, monkeypatch, capsys):
+    def change_once(stamps):
+        assert Path("values.yaml") in stamps
+        if "k: 5.0" in Path("values.yaml").read_text():
+            raise KeyboardInterrupt
+        replace_by("values.yaml", "parameters: {k: 5.0, a: 2.0}\n")
+        return (Path("values.yaml"),)
+
+    replace_by("values.yaml", "parameters: {k: 3.0, a: 2.0}\n")
+    monkeypatch.setattr(watch, "changed", change_once)
+    given = ["--parameters", "values.yaml", "--set", "a=1.5"]
+    with pytest.raises(SystemExit) as ended:
+        cli.main(args=["fit", "case.yaml", "--watch", "--no-plots", *given], prog_name="exfit")
+    assert ended.value.code == 0
+    printed = capsys.readouterr().out
+    assert re.findall(r"^k +(\S+)", printed, re.M) == ["3", "5"]
+    assert re.findall(r"^a +(\S+)", printed, re.M) == ["1.5", "1.5"]
+    assert printed.count("note: the fit starts from k") == 2
+
+
 @pytest.mark.parametrize("option", ["--json", "--quiet"])
 def test_watching_in_silence_is_refused(place, option, capsys):
     with pytest.raises(SystemExit) as ended:

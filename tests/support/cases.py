@@ -27,6 +27,7 @@ FILES_OF_A_FIT = {
     "iterations.png",
     "convergence.png",
     "trajectories.png",
+    "sensitivities.csv",
     "sensitivity.png",
     "correlation.png",
     "down-step.csv",

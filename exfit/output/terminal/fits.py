@@ -1,13 +1,22 @@
 """The result of a fit."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from exfit.inference import ParameterEffect
 from exfit.output.terminal.comparisons import comparisons
-from exfit.output.terminal.terminal import error_of, notes, number, plain_table, unresolved
+from exfit.output.terminal.terminal import (
+    NO_BREAK,
+    error_of,
+    notes,
+    number,
+    plain_table,
+    remarks,
+    unresolved,
+)
 from exfit.results.model import FitResult, FittedParameter, Minima
 
 MOST_MINIMA = 5  # columns that fit beside each other
@@ -40,10 +49,18 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
         minima(console, result.minima, result.parameters)
     if result.knowledge is not None:
         console.print()
+        remarks(console, "sensitivity:", ranking(result.knowledge.effects))
         unresolved(console, result.knowledge.sentences)
     notes(console, result.notes)
     if result.validation or several:
         comparisons(console, [*result.comparisons, *result.validation])
+
+
+def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
+    """Yield in one sentence which parameter matters first."""
+    ranked = (f"{effect.parameter}{NO_BREAK}{number(effect.of_noise, 2)}" for effect in effects)
+    if effects:
+        yield f"1 % of each moves the response by, in units of the noise: {', '.join(ranked)}"
 
 
 def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:

@@ -66,12 +66,12 @@ def error_of(uncertainty: Uncertainty, of_record: bool = False) -> str:
 
 def notes(console: Console, texts: Iterable[str]) -> None:
     """Show what must be known beside the numbers."""
-    _remarks(console, "note:", texts)
+    remarks(console, "note:", texts)
 
 
 def unresolved(console: Console, texts: Iterable[str]) -> None:
     """Show what the records do not determine."""
-    _remarks(console, "unresolved:", texts)
+    remarks(console, "unresolved:", texts)
 
 
 def percent(share: float) -> str:
@@ -79,7 +79,7 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
 
 
-def _remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
+def remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
     """Show sentences one below the other, each behind its kind; no figure leaves its unit."""
     indent = " " * (len(kind) + 1)
     for text in texts:

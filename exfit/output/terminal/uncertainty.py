@@ -1,9 +1,12 @@
 """How well parameters are determined: profiles, and planned tests."""
 
+from collections.abc import Sequence
+
 from rich.console import Console
 
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
+from exfit.inference import ParameterEffect
 from exfit.output.terminal.terminal import error_of, notes, number, plain_table, unresolved
 
 
@@ -45,4 +48,19 @@ def design(console: Console, result: Design) -> None:
         table.add_row(name, *(error_of(confidence.parameters[name]) for confidence in tests))
     console.print(table)
     console.print()
+    effects(console, result.own.effects)
+    console.print()
     unresolved(console, result.sentences)
+    notes(console, result.notes)
+
+
+def effects(console: Console, ranked: Sequence[ParameterEffect]) -> None:
+    """Show what 1 % of each parameter does to the records, the strongest first."""
+    labels = [*ranked[0].rms] if ranked else []
+    heads = [*(f"{label} (pu)" for label in labels), "of noise"]
+    table = plain_table("parameter", *heads, numbers=heads)
+    for effect in ranked:
+        changes = (f"{change:.2e}" for change in effect.rms.values())
+        table.add_row(effect.parameter, *changes, number(effect.of_noise, 2))
+    console.print("change for 1 % of each parameter, rms over the test, the strongest first")
+    console.print(table)

@@ -6,7 +6,7 @@ import numpy as np
 
 from exfit.dsp.decimation import envelope
 from exfit.fitting.uncertainty import Sensitivity
-from exfit.inference import Correlation
+from exfit.inference import Correlation, ParameterEffect
 from exfit.output.report.charts import Chart, Panel, Series
 from exfit.output.report.layout import BINS, LEVEL, MILLI, TALL, TIME, line_style
 from exfit.results.model import FitResult
@@ -19,6 +19,7 @@ class IdentifiabilityView:
     """What the records determine; ``unresolved`` says whether they leave something so."""
 
     unresolved: bool
+    effects: tuple[ParameterEffect, ...]
     sensitivity: tuple[Chart, ...]
     correlation: Correlation
 
@@ -32,7 +33,10 @@ def identifiability(result: FitResult) -> IdentifiabilityView | None:
         sensitivity(f"moved-{k}", channel) for k, channel in enumerate(uncertainty.sensitivity)
     )
     return IdentifiabilityView(
-        bool(uncertainty.sentences), tuple(charts), uncertainty.confidence.correlation
+        bool(uncertainty.sentences),
+        uncertainty.effects,
+        tuple(charts),
+        uncertainty.confidence.correlation,
     )
 
 

@@ -1,21 +1,26 @@
 """How the report is made again: from which files, by what."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from exfit import __version__
+from exfit.results.description import GivenInPlace
 from exfit.results.model import FitResult
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """How the report is made again; ``inputs`` has the file's name and hash by its label."""
+    """How the report is made again; ``inputs`` has the file's name and hash by its label.
+
+    ``given`` are the values in place of those of ``case``, the text of the case file.
+    """
 
     fit: tuple[str, ...]
     options: tuple[str, ...]
     versions: Mapping[str, str]
     inputs: Mapping[str, tuple[str, str]]
     case: str
+    given: Mapping[str, GivenInPlace]
 
 
 def reproduction(result: FitResult) -> Reproduction:
@@ -25,10 +30,19 @@ def reproduction(result: FitResult) -> Reproduction:
         versions["exfit that made this report"] = __version__
     return Reproduction(
         fit=("exfit", "fit", str(result.case)),
-        options=("--strategy", result.strategy) if result.strategy_given else (),
+        options=tuple(_options(result)),
         versions=versions,
         inputs={
             label: (result.files.get(label, "–"), sha256) for label, sha256 in result.inputs.items()
         },
         case=result.case_text,
+        given=result.given_values,
     )
+
+
+def _options(result: FitResult) -> Iterator[str]:
+    """Yield the options of the fit; each given value by itself: its file may be gone."""
+    if result.strategy_given:
+        yield from ("--strategy", result.strategy)
+    for name, given in result.given_values.items():
+        yield from ("--set", f"{name}={given.value!r}")
