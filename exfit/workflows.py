@@ -119,7 +119,7 @@ def fit(
     values = residuals.values(best.x)
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
-    analysis = analysed(case, problem, best, fine, unseen)
+    analysis = analysed(case, problem, best, fine, comparisons, unseen)
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
     return FitResult(
@@ -327,10 +327,9 @@ def validate(
         for recording in fitted
     ]
     others = [build_experiment(case, recording, values) for recording in unseen]
-    return [
-        *(compare_with_record(setup, setup.name, values) for setup in setups),
-        *(validation_of(case, *aligned(case, setup, values)) for setup in others),
-    ]
+    comparisons = [compare_with_record(setup, setup.name, values) for setup in setups]
+    validated = (aligned(case, setup, values) for setup in others)
+    return [*comparisons, *(validation_of(case, comparisons, *pair) for pair in validated)]
 
 
 def _in_place_of(recordings: Sequence[Recording], case: Case, file: Path) -> Recording:

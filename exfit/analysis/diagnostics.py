@@ -26,7 +26,6 @@ FAR_FROM_START = 0.01  # of vt0: beyond the noise of a record
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
 FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 UNSTEADY = 6.0  # standard errors between both halves of what is called steady
-MUCH_WORSE = 3.0  # than the fit
 NEAR_MINIMUM = 0.1  # standard errors: what errors and intervals in two digits do not show
 MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 
@@ -121,20 +120,6 @@ def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:
             yield (
                 f"{beyond} of {samples} samples of {channel.signal} of {name} {verb} left out as "
                 "outliers"
-            )
-
-
-def validation_notes(
-    fitted: Sequence[Comparison], validations: Sequence[Comparison]
-) -> Iterator[str]:
-    """Yield on which records the response does not hold."""
-    worst = max(comparison.rmse for comparison in fitted)
-    for comparison in validations:
-        if comparison.rmse > MUCH_WORSE * worst:
-            times = comparison.rmse / worst
-            yield (
-                f"on {comparison.name} the error is {times:.1f} times that of the fit: "
-                "the fitted record does not determine what matters there"
             )
 
 

@@ -17,7 +17,6 @@ from exfit.analysis.diagnostics import (
     outlier_notes,
     tolerance_notes,
     unsteady_notes,
-    validation_notes,
     voltage_notes,
 )
 from exfit.analysis.given_values import given_value_notes
@@ -33,6 +32,7 @@ from exfit.fitting.search import UNIT, names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import Uncertainty
+from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour
@@ -44,6 +44,10 @@ Values = Mapping[str, float]
 INTERRUPTED_AFTERWARDS = (
     "interrupted after the search: intervals, or comparisons with records that were not fitted, "
     "are missing"
+)
+NOTHING_TO_ACCEPT = (
+    "accept: this case has no record under validate to judge; `exfit validate CASE --record FILE` "
+    "judges one"
 )
 
 
@@ -70,11 +74,13 @@ def analysed(
     problem: FitProblem,
     best: estimate.Result,
     setups: Sequence[ExperimentSetup],
+    fitted: Sequence[Comparison],
     unseen: Sequence[ExperimentSetup],
 ) -> Analysis:
     """Return how well the best point is determined, how it does on ``unseen`` records, and more.
 
-    ``setups`` have sub-steps enough. An interruption ends it with what was done by then.
+    ``setups`` have sub-steps enough, ``fitted`` are the comparisons with their records. An
+    interruption ends it with what was done by then.
     """
     values = problem.residuals.values(best.x)
     interrupted, unfinished = best.stop is estimate.Stop.INTERRUPTED, False
@@ -83,7 +89,7 @@ def analysed(
         if not interrupted:
             uncertainty = uncertainty_of_solution(problem, best.x, setups)
         validated = [aligned(case, setup, values) for setup in unseen]
-        validation += [validation_of(case, *pair) for pair in validated]
+        validation += [validation_of(case, fitted, *pair) for pair in validated]
         behaviour = behaviour_of(setups, values, validated)
     except KeyboardInterrupt:  # what the search came to stays
         interrupted = unfinished = True
@@ -203,6 +209,9 @@ def fit_notes(
     analysis: Analysis,
 ) -> Iterator[str]:
     """Yield what must be known beside the numbers of a fit."""
+    yield from (match.reason for match in analysis.validation if match.reason)
+    if case.accept is not None and not case.validations:
+        yield NOTHING_TO_ACCEPT
     if not best.success:
         yield "the search did not end at a minimum: the errors and intervals assume that it did"
     yield from given_value_notes(case)
@@ -216,7 +225,6 @@ def fit_notes(
             yield from voltage_notes(comparison)
         yield from record_notes(setup, comparison)
         yield from outlier_notes(setup.record.source.name, setup.channels)
-    yield from validation_notes(comparisons, analysis.validation)
     if analysis.uncertainty is not None:
         yield from misfit_notes(residuals, analysis.uncertainty)
     yield from skipped_response_notes(comparisons)
@@ -249,11 +257,14 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[Experim
     return fine, values
 
 
-def validation_of(case: Case, setup: ExperimentSetup, values: Values) -> Comparison:
-    """Return how `aligned` values do on a record that was not fitted."""
-    limit = None if case.accept is None else case.accept.rmse
+def validation_of(
+    case: Case, fitted: Sequence[Comparison], setup: ExperimentSetup, values: Values
+) -> Comparison:
+    """Return how `aligned` values do on a record that was not fitted, judged by ``fitted`` ones."""
     of_record = {parameter.name: values[parameter.name] for parameter in setup.free}
-    return compare_with_record(setup, setup.name, values, None, limit, of_record)
+    comparison = compare_with_record(setup, setup.name, values, of_record=of_record)
+    accept = None if case.accept is None else case.accept.rmse
+    return judged(comparison, fitted, setup.channels, accept)
 
 
 def record_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:

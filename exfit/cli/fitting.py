@@ -52,8 +52,9 @@ def fit(
 
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
     runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad
-    input; 3: not converged, no match at all, or a validation beyond the limit that the case
-    accepts.
+    input; 3: not converged, no match at all, or a validation that is not accepted: beyond the
+    limit of accept in the case, without it no better than a constant or beyond 3 times the error
+    of the fit.
 
     --set overrides --parameters, and both override the case: they give the start of a free
     parameter, and the value of another. The result says which values they changed.

@@ -100,7 +100,7 @@ def validate(
 
         console = terminal.console()
         console.print(f"values of {parameters or 'the last fit'}", soft_wrap=True, markup=False)
-        terminal.comparisons(console, comparisons)
+        terminal.validation(console, comparisons)
         console.print()
         terminal.written(console, folder)
     if not all(comparison.accepted for comparison in comparisons):

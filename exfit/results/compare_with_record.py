@@ -11,7 +11,6 @@ from exfit.results.comparisons import (
     Comparison,
     Overlay,
     StepFeatures,
-    judged_of,
     match_of,
 )
 from exfit.simulation.inputs import Inputs
@@ -25,13 +24,12 @@ def compare_with_record(
     name: str,
     values: Values,
     start: Values | None = None,
-    limit: float | None = None,
     of_record: Values | None = None,
 ) -> Comparison:
     """Return the response to the values, and to the ``start`` values, beside the record.
 
-    The setup has sub-steps enough for both; ``limit`` is the largest rmse to be accepted, in pu;
-    ``of_record`` what was found about the record itself.
+    The setup has sub-steps enough for both; ``of_record`` is what was found about the record
+    itself. The comparison is not judged.
     """
     at = setup.with_start_values(values)
     samples, substeps = setup.experiment.samples(at)
@@ -51,13 +49,12 @@ def compare_with_record(
         name=name,
         record=setup.record.source.name,
         cost=0.5 * float(errors @ errors),
-        accepted=limit is None or channels[judged_of(channels)].rmse <= limit,
+        accepted=True,
         channels=channels,
         features=StepFeatures(
             measured=None if vt is None else _features(setup, vt.measured, at),
             simulated=None if vt is None else _features(setup, vt.simulated, at),
         ),
-        limit=limit,
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,
         substeps=substeps,

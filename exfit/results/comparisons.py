@@ -104,8 +104,9 @@ class Comparison:
     ``record`` is the name of its file, ``cost`` that of the weighted residuals of all signals.
     ``channels`` says how well each signal matches, ``overlays`` holds its samples at ``time`` (M,)
     in s: of a result that is read back they are thinned, and missing in files of an earlier
-    version. ``limit`` is the largest rmse (pu) that the case accepts, ``of_record`` what a
-    validation found about its own record. ``rmse``, ``max_error`` and ``fit_percent`` are those of
+    version. ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse
+    (pu) that is accepted, ``reason`` why it is not accepted, and ``of_record`` what was found about
+    the record itself. ``rmse``, ``max_error`` and ``fit_percent`` are those of
     vt, or of the first signal where there is no vt.
     """
 
@@ -122,6 +123,8 @@ class Comparison:
     channels: Mapping[str, Match]
     features: StepFeatures
     limit: float | None = None
+    reason: str = ""
+    validation: bool = False
     of_record: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
     sha256: str = field(default="", metadata=IN_FILE)
     substeps: int = field(default=0, metadata=IN_FILE)

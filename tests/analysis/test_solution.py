@@ -30,6 +30,7 @@ def test_a_validation_is_aligned_without_moving_the_unit(tmp_path):
     (before,), (after,) = plain.validation, found.validation
     assert after.rmse == pytest.approx(before.rmse, rel=0.05)
     setup = build_experiment(case, case.validations[0], found.values)
-    assert validation_of(case, *aligned(case, setup, found.values)).rmse == after.rmse
+    pair = aligned(case, setup, found.values)
+    assert validation_of(case, found.comparisons, *pair).rmse == after.rmse
     unaligned = compare_with_record(setup.with_enough_substeps(found.values), "start", found.values)
     assert unaligned.rmse > 10 * after.rmse

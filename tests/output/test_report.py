@@ -289,7 +289,7 @@ def test_a_pole_of_the_first_order_system_is_what_was_fitted(fits, pages):
 @pytest.mark.parametrize(
     ("accept", "down", "word"),
     [
-        (None, True, "Converged"),
+        (None, True, "Accepted"),
         (None, False, "Converged"),
         (10 * NOISE, True, "Accepted"),
         (NOISE / 10, True, "Not accepted"),
@@ -300,7 +300,7 @@ def test_the_verdict_is_that_of_the_validation(tmp_path, accept, down, word):
     run = first_order(tmp_path / "case", **sections, **({} if down else {"validate": None}))
     judged = verdict(load_result(run))
     assert judged.word == word
-    assert judged.good is (None if accept is None else word == "Accepted")
+    assert judged.good is (word == "Accepted" if down else None)
     assert "every parameter determined" in judged.sentence
     if not down:
         assert "no record for a validation" in Page(page_of(run)).text

@@ -79,13 +79,7 @@ def _recording_faults(
 
 def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
     """Yield settings that nothing uses."""
-    if "accept" in content and not content.at("validate").entries:
-        yield content.at("accept").fault("there is no validation to judge")
-    yield from _search_faults(content.at("estimate"))
-
-
-def _search_faults(estimate: ContentNode) -> Iterator[Fault]:
-    """Yield settings of the search that nothing uses."""
+    estimate = content.at("estimate")
     jacobian = estimate.content.get("jacobian", "exact")
     if "difference_step" in estimate and jacobian == "exact":
         differences = "central, forward or backward"

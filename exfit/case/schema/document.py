@@ -63,5 +63,8 @@ class CaseDocument(Section):
     )
     accept: Limit | None = Field(
         default=None,
-        description="Limit of the error of a validation; beyond it the exit code is 3.",
+        description="Limit of the error on records that were not fitted, which then judges alone; "
+        "beyond it the exit code is 3. Default: such a record must be matched better than by a "
+        "constant, with an rmse of at most 3 times that of the fit, or 3 times the noise of the "
+        "record where that is larger.",
     )

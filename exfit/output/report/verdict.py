@@ -62,18 +62,13 @@ def _judged(result: FitResult) -> tuple[str, str, bool | None]:
 
 
 def _validated(validation: Sequence[Comparison]) -> tuple[str, str, bool | None]:
-    beyond = [match.name for match in validation if not match.accepted]
+    reasons = [match.reason or match.name for match in validation if not match.accepted]
     limits = [match.limit for match in validation if match.limit is not None]
-    limit = f" {limits[0]:g} pu" if limits else ""
-    if beyond:
-        of = limit or " of the case"
-        return "Not accepted", f"beyond rmse{of} on {listed(beyond)}", False
+    if reasons:
+        return "Not accepted", "; ".join(reasons), False
     if not validation:
         return "Converged", "no record was kept for a validation", None
-    if not limits:
-        return "Converged", "the case sets no limit for its validations", None
-    return (
-        "Accepted",
-        f"the search converged, and every validation is within rmse{limit}",
-        True,
-    )
+    if len(limits) < len(validation):
+        return "Converged", "nothing limits the error of its validations", None
+    limit = f"{max(limits):.2e} pu"
+    return "Accepted", f"converged, and every validation is within its limit, rmse {limit}", True

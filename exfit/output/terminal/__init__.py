@@ -3,7 +3,7 @@
 from exfit.output.terminal.agreement import agreement
 from exfit.output.terminal.catalogue import catalogue, machine, model
 from exfit.output.terminal.checks import check
-from exfit.output.terminal.comparisons import comparisons
+from exfit.output.terminal.comparisons import comparisons, validation
 from exfit.output.terminal.fit_series import SeriesProgress, fit_series
 from exfit.output.terminal.fits import fit
 from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
@@ -30,6 +30,7 @@ __all__ = [
     "notes",
     "profiles",
     "task",
+    "validation",
     "waiting",
     "written",
 ]

@@ -1,12 +1,12 @@
 """Records beside simulations."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from rich.console import Console
 from rich.table import Table
 
 from exfit.dsp.features import LABELS, Features
-from exfit.output.terminal.terminal import number, plain_table
+from exfit.output.terminal.terminal import number, plain_table, remarks
 from exfit.results.comparisons import Comparison
 
 BETWEEN_COLUMNS = 2  # characters
@@ -23,12 +23,21 @@ def comparisons(console: Console, all_of_them: Sequence[Comparison]) -> None:
         ):
             console.print()
             console.print(_feature_table(beside))
-    for comparison in all_of_them:
-        if not comparison.accepted:
-            console.print(
-                f"[bold red]not accepted[/] {comparison.name}: rmse {comparison.rmse:.3e} exceeds "
-                f"{comparison.limit:.3e}"
-            )
+
+
+def rejections(console: Console, all_of_them: Iterable[Comparison]) -> None:
+    """Show which records that were not fitted the response does not hold on, and why."""
+    remarks(console, "not accepted:", (match.reason for match in all_of_them), "bold red")
+
+
+def validation(console: Console, all_of_them: Sequence[Comparison]) -> None:
+    """Show a validation: what is not accepted, which records were fitted, and each match."""
+    rejections(console, all_of_them)
+    for role, chosen in (("fitted, not judged:", False), ("validated:", True)):
+        records = [f"{m.name} ({m.record})" for m in all_of_them if m.validation is chosen]
+        if records:
+            console.print(f"{role} {', '.join(records)}", soft_wrap=True, markup=False)
+    comparisons(console, all_of_them)
 
 
 def _beside_each_other(

@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from exfit.inference import ParameterEffect
-from exfit.output.terminal.comparisons import comparisons
+from exfit.output.terminal.comparisons import comparisons, rejections
 from exfit.output.terminal.terminal import (
     NO_BREAK,
     error_of,
@@ -33,6 +33,7 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     outcome = result.outcome if result.success else result.outcome.upper()
     style = "green" if result.success else "bold red"
     console.print(Text.assemble((outcome, style), f": {result.message}"))
+    rejections(console, result.validation)
     several = len(result.comparisons) > 1
     figures = f"cost {result.start_cost:.4e} -> {result.cost:.4e}"
     if not several:
@@ -51,7 +52,8 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
         console.print()
         remarks(console, "sensitivity:", ranking(result.knowledge.effects))
         unresolved(console, result.knowledge.sentences)
-    notes(console, result.notes)
+    reasons = [match.reason for match in result.validation]
+    notes(console, (text for text in result.notes if text not in reasons))
     if result.validation or several:
         comparisons(console, [*result.comparisons, *result.validation])
 

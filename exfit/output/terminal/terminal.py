@@ -79,10 +79,10 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
 
 
-def remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
+def remarks(console: Console, kind: str, texts: Iterable[str], style: str = "yellow") -> None:
     """Show sentences one below the other, each behind its kind; no figure leaves its unit."""
     indent = " " * (len(kind) + 1)
-    for text in texts:
+    for text in filter(None, texts):
         whole = UNBROKEN.sub(lambda part: part[0].replace(" ", NO_BREAK), text)
         lines = textwrap.fill(
             whole,
@@ -93,4 +93,4 @@ def remarks(console: Console, kind: str, texts: Iterable[str]) -> None:
             break_on_hyphens=False,
         )
         sentence = lines.replace(NO_BREAK, " ").removeprefix(indent)
-        console.print(Text.assemble((kind, "yellow"), " ", sentence), soft_wrap=True)
+        console.print(Text.assemble((kind, style), " ", sentence), soft_wrap=True)

@@ -1,0 +1,90 @@
+"""Whether a fit holds on a record that was not fitted."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from exfit.fitting.experiment import Channel
+from exfit.fitting.residuals import noise_of
+from exfit.results.comparisons import Comparison
+
+MUCH_WORSE = 3.0  # times the error of the fit, or the noise of the record where that is larger
+WHITE_NOISE_SEED = 0
+
+
+def judged(
+    validation: Comparison,
+    fitted: Sequence[Comparison],
+    channels: Sequence[Channel],
+    accept: float | None = None,
+) -> Comparison:
+    """Return a validation with its verdict: the limit of its rmse, and why it is not accepted.
+
+    Args:
+        validation: the comparison with a record that was not fitted.
+        fitted: those with the records of the fit.
+        channels: those of the validation's record; they give its noise.
+        accept: the limit of the case (pu), which judges alone. Without it a validation must match
+            better than a constant would, and its rmse must not exceed three times the largest one
+            of the fit in the same signal, or three times the noise of its own record where that is
+            larger: no model comes below the noise.
+    """
+    limit = _largest_error(validation, fitted, channels) if accept is None else accept
+    reason = _why_not(validation, fitted, limit, accept is not None)
+    return replace(validation, validation=True, limit=limit, accepted=not reason, reason=reason)
+
+
+def _largest_error(
+    validation: Comparison, fitted: Sequence[Comparison], channels: Sequence[Channel]
+) -> float | None:
+    """Return the largest rmse (pu) that is accepted; None where no fit has an error to compare."""
+    fit_error = _error_of_fit(validation, fitted)
+    if fit_error is None:
+        return None
+    noise = next(_noise(each) for each in channels if each.signal == validation.judged_by)
+    return MUCH_WORSE * max(fit_error, noise)
+
+
+def _error_of_fit(validation: Comparison, fitted: Sequence[Comparison]) -> float | None:
+    """Return the largest rmse (pu) of the fit in the signal that a validation is judged by."""
+    signal = validation.judged_by
+    errors = [match.channels[signal].rmse for match in fitted if signal in match.channels]
+    return max(errors, default=None)
+
+
+def _noise(channel: Channel) -> float:
+    """Return the standard deviation (pu) of a channel's noise, after its filter if it has one."""
+    noise = noise_of(channel)
+    if channel.filtering is None or channel.filtering.filter is None:
+        return noise
+    white = np.random.default_rng(WHITE_NOISE_SEED).standard_normal(len(channel.measured))
+    return noise * float(np.std(channel.filtered(white)))
+
+
+def _why_not(
+    validation: Comparison, fitted: Sequence[Comparison], limit: float | None, given: bool
+) -> str:
+    """Return why a validation is not accepted, "" where it is; ``given``: the case sets the limit.
+
+    An error that is not a number is not accepted.
+    """
+    name, rmse = validation.name, validation.rmse
+    within = limit is None or rmse <= limit
+    if given:
+        text = f"on {name} the error, rmse {rmse:.3e} pu, exceeds the limit of accept, {limit:g} pu"
+        return "" if within else text
+    if not validation.judged.describes:
+        return (
+            f"the response matches {name} no better than a constant would: check the sign, size "
+            "and instant of its step, and whether it is a record of this unit"
+        )
+    if within:
+        return ""
+    fit_error = _error_of_fit(validation, fitted)
+    times = np.inf if not fit_error else rmse / fit_error
+    return (
+        f"on {name} the error is {times:.1f} times that of the fit, more than {MUCH_WORSE:g} "
+        "times: the fitted record does not determine what matters there, or the record is of "
+        "another unit or test"
+    )
