@@ -22,6 +22,7 @@ from exfit.analysis.diagnostics import (
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.case.case import Case
+from exfit.case.saturation import MEANINGS
 from exfit.case.schema import Unknown
 from exfit.errors import SimulationError
 from exfit.fitting.nonlinearity import nonlinear_parameters
@@ -117,7 +118,7 @@ def fitted_parameters(
 
     def fitted(parameter: FreeParameter) -> FittedParameter:
         name = parameter.name
-        unit, meaning = (of_records | described).get(name, ("", "used by ties"))
+        unit, meaning = (of_records | described).get(name, ("", MEANINGS.get(name, "used by ties")))
         unknown = Uncertainty(None, None, None, why)
         own = unknown if uncertainty is None else uncertainty.confidence.parameters[name]
         return FittedParameter(

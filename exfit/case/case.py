@@ -285,7 +285,7 @@ class Case:
             for part in self.parts.all
             for row in part.sheet
             if row.symbol not in {**self._fixed(part), **self._free(part)}
-            and part.prefix + row.symbol not in self.given_values
+            and part.prefix + row.symbol not in {**self.given_values, **self.ties.by_name}
         )
 
     def units(self) -> dict[str, str]:

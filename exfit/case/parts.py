@@ -7,6 +7,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+from exfit.case.saturation import saturation_ties
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
 from exfit.case.yaml import Fault
 from exfit.errors import ModelError
@@ -188,6 +189,9 @@ def _tied(data: Data, parts: Parts) -> Iterator[tuple[str, Place, str]]:
         for symbol, value in section.items():
             if is_tie(value):
                 yield prefix + symbol, (*place, symbol), value
+    for part in parts.all:
+        if part.kind == "exciter":
+            yield from saturation_ties(data, part.sheet)
 
 
 def exciter_part(model: Model, exponential: bool) -> Part:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
-from math import inf, isfinite
+from math import exp, inf, isfinite
 
 from exfit.case.yaml import DECIMAL
 
@@ -19,7 +19,7 @@ Slopes = dict[str, float]
 
 MOST_CHARACTERS = 200  # characters; no text so short is nested too deep to be walked
 NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_.+\-*/() ]")
-USED = "only numbers, names, + - * / ** and parentheses are allowed"
+USED = "only numbers, names, + - * / **, exp() and parentheses are allowed"
 
 
 class TieError(ValueError):
@@ -77,7 +77,7 @@ def parse(text: str) -> Tie:
     """Return the tie that a text beginning with = stands for.
 
     Raises TieError, which names the offending piece, for anything but numbers, names (dotted ones
-    such as machine.Tpd0 too), + - * /, ** with an exponent without names, and parentheses.
+    such as machine.Tpd0 too), + - * /, ** with an exponent without names, exp(), and parentheses.
     """
     if len(text) > MOST_CHARACTERS:
         start = text[:20]
@@ -147,7 +147,10 @@ def _names(node: ast.expr, text: str) -> Iterator[str]:
         case ast.Constant(value=int() | float() as number) if DECIMAL.fullmatch(_piece(node, text)):
             if not isfinite(float(number)):
                 raise TieError(f"{text}: {_piece(node, text)} is not finite")
-        case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=inner):
+        case (
+            ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=inner)
+            | ast.Call(func=ast.Name("exp"), args=[inner], keywords=[])
+        ):
             yield from _names(inner, text)
         case ast.BinOp(left=left, op=ast.Pow(), right=right):
             yield from _names(left, text)
@@ -185,6 +188,9 @@ def _dual(node: ast.expr, values: Values, slopes: Mapping[str, Slopes]) -> tuple
             return -x, {name: -slope for name, slope in dx.items()}
         case ast.UnaryOp(operand=inner):
             return _dual(inner, values, slopes)
+        case ast.Call(args=[inner]):
+            x, dx = _dual(inner, values, slopes)
+            return exp(x), {name: exp(x) * slope for name, slope in dx.items()}
         case ast.BinOp(left=left, op=op, right=right):
             x, dx = _dual(left, values, slopes)
             y, dy = _dual(right, values, slopes)

@@ -351,7 +351,7 @@ MEANING = {
     ),
     "tie that ends": ((*FIXED, "VAMIN"), "=", (*FIXED, "VAMIN"), "ends too soon"),
     "tie that cannot be read": ((*FIXED, "VAMIN"), "=-VAMAX)", (*FIXED, "VAMIN"), "cannot be read"),
-    "function in a tie": ((*FIXED, "VAMIN"), "=exp(2)", (*FIXED, "VAMIN"), "is not arithmetic"),
+    "function in a tie": ((*FIXED, "VAMIN"), "=log(2)", (*FIXED, "VAMIN"), "is not arithmetic"),
     "unknown name in a tie": (
         (*FIXED, "VAMIN"),
         "=-VAMX",

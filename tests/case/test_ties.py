@@ -124,6 +124,8 @@ def test_slopes_are_the_differences_of_exact_rational_values(bodies):
             {"machine.Tpd0": 0.5, "KE": -0.75},
         ),
         ("=1/3", {}, {}),
+        ("=3*exp(2*KE)", {"KE": 0.0}, {"KE": 6.0}),
+        ("=exp(0)/KE", {"KE": 2.0}, {"KE": -0.25}),
     ],
 )
 def test_slopes_of_known_laws(text, at, slopes):

@@ -10,6 +10,12 @@ from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.messages import PERCENT
 from exfit.case.parts import Part, Parts, helpers_of, places_of_ties, used_by_ties
+from exfit.case.saturation import (
+    CONSTANTS,
+    has_saturation,
+    place_of_points,
+    saturation_faults,
+)
 from exfit.case.ties import TieError, Ties, is_tie
 from exfit.case.yaml import Fault
 from exfit.models.blocks import SHORTEST
@@ -25,6 +31,8 @@ def parameter_faults(content: ContentNode, parts: Parts, ties: Ties) -> Iterator
     helpers = [name for name in helpers_of(content.content, parts) if name in used]
     for part in parts.all:
         yield from part_faults(content, part, tied, helpers)
+        if part.kind == "exciter" and has_saturation(part.sheet):
+            yield from saturation_faults(content)
 
 
 def _tied_values(
@@ -68,13 +76,13 @@ def part_faults(
 ) -> Iterator[Fault]:
     """Yield the faults of what the file gives for one part, and of its free parameters."""
     section, free = _sections_of(content, part)
-    tied = {name.removeprefix(part.prefix): value for name, value in tied.items()}
+    tied = _of_part(part, tied)
     fixed = {
         symbol: tied.get(symbol, value) if is_tie(value) else value
         for symbol, value in section.content.items()
     }
     rows = {row.symbol: row for row in part.sheet}
-    allowed = [*rows, *helpers] if part.kind == "exciter" else [*rows]
+    allowed = [*rows, *_further(part, helpers)]
     values = ContentNode(part.fixed, fixed)
     yield from _unknown_symbols(values, allowed, part.name)
     yield from _outside_sheet(values, rows)
@@ -83,10 +91,25 @@ def part_faults(
         if symbol in fixed:
             yield parameter.fault("both fixed and free")
         yield from _free_faults(parameter, rows.get(symbol))
-    places = {symbol: (*part.fixed, symbol) for symbol in fixed}
+    # what follows without standing in the file is checked where it comes from
+    places = dict.fromkeys(tied, place_of_points(content))
+    places |= {symbol: (*part.fixed, symbol) for symbol in fixed}
     places |= {symbol: parameter.at("start").place for symbol, parameter in free.sections}
     whole = part.fixed[:1] if part.kind == "exciter" else part.fixed
-    yield from _placed(whole, places, part.check(_readable(part, fixed, _starts(free))))
+    yield from _placed(whole, places, part.check(_readable(part, tied, fixed, _starts(free))))
+
+
+def _of_part(part: Part, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values of a part by symbol."""
+    symbols = {part.prefix + symbol: symbol for symbol in part.symbols}
+    return {symbols[name]: value for name, value in values.items() if name in symbols}
+
+
+def _further(part: Part, helpers: Collection[str]) -> tuple[str, ...]:
+    """Return the names that may be given with the parameters of a part."""
+    if part.kind != "exciter":
+        return ()
+    return (*helpers, *(CONSTANTS if has_saturation(part.sheet) else ()))
 
 
 def _unknown_symbols(given: ContentNode, symbols: Collection[str], owner: str) -> Iterator[Fault]:

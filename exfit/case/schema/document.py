@@ -27,7 +27,9 @@ class CaseDocument(Section):
         "plant machine-playback.",
     )
     saturation: SaturationName = Field(
-        default="quadratic", description="Form of the exciter's saturation curve."
+        default="quadratic",
+        description="Form of the exciter's saturation curve, given by E1, SE1, E2, SE2 or, if "
+        "it is exponential, by AEX and BEX.",
     )
     plant: Annotated[Plant, Field(discriminator="type")] = Field(
         description="The plant: what surrounds the exciter during the test."

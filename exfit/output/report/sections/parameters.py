@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from exfit.case.saturation import MEANINGS
 from exfit.results.description import PartDescription, SheetRow
 from exfit.results.model import FitResult, FittedParameter
 
@@ -63,9 +64,8 @@ def _sheet(result: FitResult, part: PartDescription) -> Mapping[str, SheetRow]:
 def _helpers(result: FitResult) -> Iterator[FixedGroup]:
     """Yield what is listed among the exciter's parameters and is none of them."""
     own = {symbol for part in result.parts if not part.prefix for symbol in _sheet(result, part)}
-    row = SheetRow(meaning="used by ties")
     rows = (
-        _fixed(result, "", name, value, row)
+        _fixed(result, "", name, value, SheetRow(meaning=MEANINGS.get(name, "used by ties")))
         for name, value in result.fixed.items()
         if name not in own
     )
