@@ -8,7 +8,7 @@ PHASES: Mapping[str, str] = {
     "gn": "Gauss-Newton",
 }
 STRATEGIES: Mapping[str, str] = {
-    "gn": "Gauss-Newton with full steps; only a first one that fails is shortened, once",
+    "gn": "Gauss-Newton with full steps (a first one that fails is shortened once)",
     "dgn": "damped Gauss-Newton: each step capped, then shortened until Armijo's rule holds",
     "lm": "Levenberg-Marquardt",
     "lm-then-dgn": "lm to reach a better start, then dgn, and lm again where that stalls",
