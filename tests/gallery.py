@@ -140,7 +140,8 @@ RUNS = (  # in the order of the page
         (Picture("fits.png", "two cases, each with two strategies", "fits.png"),),
     ),
     Run(
-        "exfit compare runs/ac1a_typical-simulate runs/ac1a_typical-fit sample_data/ac1a_up.csv",
+        "exfit compare runs/ac1a_typical-simulate runs/ac1a_typical-fit "
+        "--record sample_data/ac1a_up.csv",
         (Picture("compare.png", "two responses and a record", "compare.png"),),
     ),
 )

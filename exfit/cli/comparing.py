@@ -1,5 +1,6 @@
 """The command compare."""
 
+from math import isfinite, nan
 from pathlib import Path
 
 import click
@@ -12,47 +13,80 @@ from exfit.cli.options import (
 )
 from exfit.errors import ExfitError
 
+FEWEST_CURVES = 2  # without a record
 
-@click.command(short_help="Compare two responses, from any program.")
-@click.argument("a", type=click.Path(path_type=Path))
-@click.argument("b", type=click.Path(path_type=Path))
-@click.argument("record", type=click.Path(path_type=Path), required=False)
+
+@click.command(short_help="Compare responses, from any program.")
+@click.argument(
+    "curves",
+    type=click.Path(path_type=Path),
+    nargs=-1,
+    required=True,
+    metavar="CURVE [CURVE]...",
+)
+@click.option(
+    "--record",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Measured curve: the reference in place of the first CURVE.",
+)
 @click.option(
     "--columns",
     multiple=True,
     metavar="vt=VOLT",
     help="Column of a signal, in the files that have it; may be repeated.",
 )
-@click.option("--time", metavar="COLUMN", help="Column of the time, s, in the files that have it.")
 @click.option(
-    "--shift", type=float, default=0.0, metavar="S", help="Seconds added to the time of B."
+    "--time",
+    multiple=True,
+    metavar="COLUMN",
+    help="Column of the time, s, in the files that have it; may be repeated.",
+)
+@click.option(
+    "--align",
+    is_flag=True,
+    help="Move the clocks so that the detected steps are together, at that of the reference.",
+)
+@click.option(
+    "--shift",
+    "shifts",
+    multiple=True,
+    metavar="B=S",
+    help="Seconds added to the time of a curve; without a name, to that of B. May be repeated.",
 )
 @click.option("--step", "step_at", type=float, metavar="S", help="Instant of the step, s.")
 @output_options
 def compare(
-    a: Path,
-    b: Path,
+    curves: tuple[Path, ...],
     record: Path | None,
     columns: tuple[str, ...],
-    time: str | None,
-    shift: float,
+    time: tuple[str, ...],
+    align: bool,
+    shifts: tuple[str, ...],
     step_at: float | None,
     output: Output,
 ) -> None:
-    """Compare the responses A and B, and both with RECORD.
+    """Compare any number of responses, and all with a record.
 
-    Each is the folder or the result.json of a fit or a simulation, or a CSV file of any program.
-    The signals that A and B have are compared over the time that both cover, on the finer of their
-    clocks. Writes compare.json, compare.csv and compare.png to runs/compare, or
-    to DIR.
+    Each CURVE is the folder or the result.json of a fit or a simulation, or a CSV file of any
+    program; they are named A, B, C and so on. The signals of A are compared over the time that all
+    cover, on the finest of their clocks. The differences are those from A and from the record; f is half
+    the sum of their squares. Clocks that differ are reported, and moved with --align or --shift.
+    Parameters of fits are shown side by side. Writes compare.json, compare.csv and compare.png to
+    runs/compare, or to DIR; with a record compare-record.csv too.
     """
-    from exfit.analysis.comparison import ColumnChoice
+    if len(curves) < FEWEST_CURVES and record is None:
+        raise click.UsageError("One CURVE alone can be compared only with a --record.")
+    if align and shifts:
+        raise click.UsageError("--align moves all clocks: not together with --shift.")
     from exfit.analysis.comparison import compare as compared
+    from exfit.analysis.curves import ColumnChoice
     from exfit.output import run_folder
 
     folder = output.folder("compare")
-    run_folder.refuse_inputs("compare", [a, b, *([record] if record else ())], folder)
-    agreement = compared(a, b, record, ColumnChoice(_columns(columns), time), shift, step_at)
+    run_folder.refuse_inputs("compare", [*curves, *([record] if record else ())], folder)
+    choice = ColumnChoice(_columns(columns), time)
+    agreement = compared(curves, record, choice, _shifts(shifts), align, step_at)
     warn(run_folder.write_agreement(agreement, folder, output.figures))
     if output.as_json:
         print_json(agreement.as_json())
@@ -64,12 +98,30 @@ def compare(
         terminal.written(console, folder)
 
 
-def _columns(texts: tuple[str, ...]) -> dict[str, str]:
+def _shifts(texts: tuple[str, ...]) -> dict[str, float]:
+    """Return the seconds of --shift B=0.5 by curve; raises ExfitError for other text."""
+    shifts: dict[str, float] = {}
+    for text in texts:
+        name, given, seconds = text.rpartition("=")
+        curve = name.strip() if given else "B"
+        try:
+            shift = float(seconds)
+        except ValueError:
+            shift = nan
+        if not isfinite(shift):
+            raise ExfitError(f"--shift {text}: not of the form B=0.5, in seconds")
+        if curve in shifts:
+            raise ExfitError(f"--shift {text}: the time of {curve} is shifted twice")
+        shifts[curve] = shift
+    return shifts
+
+
+def _columns(texts: tuple[str, ...]) -> dict[str, list[str]]:
     """Return the columns of --columns vt=VOLT by signal; raises ExfitError for other text."""
-    columns = {}
+    columns: dict[str, list[str]] = {}
     for text in texts:
         signal, given, column = (part.strip() for part in text.partition("="))
         if not (signal and given and column):
             raise ExfitError(f"--columns {text}: not of the form vt=VOLT")
-        columns[signal] = column
+        columns.setdefault(signal, []).append(column)
     return columns

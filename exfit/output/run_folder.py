@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.comparison import Agreement
+from exfit.analysis.curves import RECORD
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
@@ -45,7 +46,7 @@ PARAMETERS = "parameters.yaml"
 ITERATIONS, SENSITIVITIES = "iterations.csv", "sensitivities.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
 INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
-SERIES = "fits.json"
+SERIES, AT_RECORD = "fits.json", "compare-record.csv"
 MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT, SERIES)
 # what a command may write that could be an input too, beside files that are named after records
 NUMBERS = {
@@ -54,7 +55,7 @@ NUMBERS = {
     "validate": (VALIDATION,),
     "profile": ("profile.csv", PROFILES),
     "identify": (DESIGN, SENSITIVITIES),
-    "compare": ("compare.csv", AGREEMENT),
+    "compare": ("compare.csv", AT_RECORD, AGREEMENT),
     "fits": ("fits.csv", SERIES),
 }
 # what a fit may write, beside the files that are named after records
@@ -280,27 +281,45 @@ def write_simulation(
 
 
 def write_agreement(agreement: Agreement, folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write how two responses differ as JSON, their samples on each clock, and a figure."""
+    """Write how responses differ as JSON, their samples on their clocks, and a figure."""
+    record = record_table(agreement)
     numbers = {
         "compare.csv": agreement_table(agreement),
+        **({} if record is None else {AT_RECORD: record}),
         AGREEMENT: to_json(agreement.as_json()),
     }
-    write_together(folder, numbers, ["compare.png"])
+    write_together(folder, numbers, ["compare.png", AT_RECORD])
     drawings = partial(run_figures.of_agreement, agreement)
     return _draw(folder / AGREEMENT, drawings) if figures else ()
 
 
 def agreement_table(agreement: Agreement) -> str:
-    """Return both responses and their difference on their common clock, as CSV."""
-    header, columns = ["t"], [agreement.between[0].time]
-    for difference in agreement.between:
-        header += [
-            f"{difference.signal}_A",
-            f"{difference.signal}_B",
-            f"{difference.signal}_difference",
-        ]
-        columns += [*difference.values, difference.error]
-    return table(header, columns)
+    """Return the responses and their differences from the first on their common clock, as CSV."""
+    columns = {"t": agreement.time}
+    several = len({entry.second for entry in agreement.between}) > 1
+    for signal in agreement.signals:
+        own = [entry for entry in agreement.between if entry.signal == signal]
+        if not agreement.between:
+            columns[f"{signal}_A"] = agreement.curves[0].signals[signal]
+        columns |= {f"{signal}_A": entry.values[0] for entry in own}
+        columns |= {f"{signal}_{entry.second}": entry.values[1] for entry in own}
+        for entry in own:
+            name = f"{signal}_{entry.second}_difference" if several else f"{signal}_difference"
+            columns[name] = entry.error
+    return table([*columns], [*columns.values()])
+
+
+def record_table(agreement: Agreement) -> str | None:
+    """Return the record and the responses at its instants, as CSV; None without a record."""
+    compared = [entry for entry in agreement.differences if entry.first == RECORD]
+    if not compared:
+        return None
+    columns = {"t": compared[0].time}
+    for signal in agreement.signals:
+        own = [entry for entry in compared if entry.signal == signal]
+        columns |= {f"{signal}_{RECORD}": entry.values[0] for entry in own}
+        columns |= {f"{signal}_{entry.second}": entry.values[1] for entry in own}
+    return table([*columns], [*columns.values()])
 
 
 def last_fit(case: Path) -> Path | None:

@@ -6,13 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import FIRST_ORDER, TIME, TRUTH
 
+import exfit
 from exfit import cli
-from exfit.analysis.comparison import ColumnChoice, compare
+from exfit.analysis.comparison import compare
+from exfit.analysis.curves import ColumnChoice
 from exfit.errors import RecordError
-from exfit.output import plots
+from exfit.output import plots, run_folder
 
-BY_NAME = ColumnChoice({})
+BY_NAME = ColumnChoice()
 LAG = 0.25  # s
 AT, SIZE = 1.0, 0.05
 
@@ -66,7 +69,7 @@ def of(found, signal="vt", first="A", second="B"):
 
 def test_a_response_does_not_differ_from_itself():
     a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
-    one = of(compare(a, a, None, BY_NAME))
+    one = of(compare([a, a], None, BY_NAME))
     assert (one.rms, one.largest[0], one.interpolation) == (0.0, 0.0, 0.0)
 
 
@@ -74,7 +77,7 @@ def test_a_response_does_not_differ_from_itself():
 def test_an_offset_is_the_difference_on_any_two_clocks(step):
     a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
     b = write("b.csv", t=clock(step), vt=rise(clock(step)) + 0.003)
-    one = of(compare(a, b, None, BY_NAME))
+    one = of(compare([a, b], None, BY_NAME))
     assert len(one.time) == pytest.approx(10.0 / min(step, 0.01), abs=2)
     assert one.rms == pytest.approx(0.003, abs=one.interpolation + 1e-9)
     assert one.largest[0] == pytest.approx(0.003, abs=one.interpolation + 1e-9)
@@ -87,7 +90,7 @@ def test_the_stated_error_of_interpolation_is_more_than_the_true_one():
     time, fine = clock(0.05), clock(0.001)
     a = write("a.csv", t=time, vt=np.sin(time))
     b = write("b.csv", t=fine, vt=np.sin(fine))
-    one = of(compare(a, b, None, BY_NAME))
+    one = of(compare([a, b], None, BY_NAME))
     assert 0.0 < np.max(np.abs(one.error)) < one.interpolation
 
 
@@ -96,7 +99,7 @@ def test_the_rms_is_over_time_whatever_the_samples():
     uneven = np.concatenate([np.linspace(0.0, 0.1, 500), np.linspace(0.11, 1.0, 90)])
     a = write("a.csv", t=uneven, vt=np.ones(len(uneven)))
     b = write("b.csv", t=uneven, vt=1.0 + uneven)
-    one = of(compare(a, b, None, BY_NAME))
+    one = of(compare([a, b], None, BY_NAME))
     assert one.rms == pytest.approx(3.0**-0.5, rel=1e-4)  # of the trapezoids
     assert one.largest == pytest.approx((1.0, 1.0))
 
@@ -107,27 +110,30 @@ def test_the_largest_difference_has_its_sign_and_its_instant(side):
     bump = side * (0.03 * np.exp(-((time - 4.0) ** 2)) - 0.01 * np.exp(-((time - 8.0) ** 2)))
     a = write("a.csv", t=time, vt=np.ones(len(time)))
     b = write("b.csv", t=time, vt=1.0 + bump)
-    assert of(compare(a, b, None, BY_NAME)).largest == pytest.approx((0.03 * side, 4.0), rel=1e-6)
+    assert of(compare([a, b], None, BY_NAME)).largest == pytest.approx((0.03 * side, 4.0), rel=1e-6)
 
 
 def test_nothing_is_compared_beyond_what_both_cover():
     a = write("a.csv", t=clock(0.01, 4.0, -1.0), vt=rise(clock(0.01, 4.0, -1.0)))
     b = write("b.csv", t=clock(0.02, 9.0, 0.5), vt=rise(clock(0.02, 9.0, 0.5)))
-    one = of(compare(a, b, None, BY_NAME))
+    one = of(compare([a, b], None, BY_NAME))
     assert (one.time[0], one.time[-1]) == pytest.approx((0.5, 4.0))
     assert np.isfinite(one.error).all()
+
+
+def proposed(note):
+    return float(note.partition("--shift B=")[2].split()[0])
 
 
 def test_a_shift_puts_two_clocks_together_and_is_proposed():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time))
     b = write("b.csv", t=time, vt=rise(time, at=3.0))
-    (note,) = compare(a, b, None, BY_NAME).notes
-    proposed = float(note.partition("--shift ")[2].split()[0])
-    assert proposed == pytest.approx(AT - 3.0, abs=2e-3)  # the time of a fifth of a sample
-    (note,) = compare(a, b, None, BY_NAME, shift=-1.2).notes
-    assert float(note.partition("--shift ")[2].split()[0]) == pytest.approx(proposed, abs=2e-3)
-    found = compare(a, b, None, BY_NAME, shift=-2.0)
+    (note,) = compare([a, b], None, BY_NAME).notes
+    assert proposed(note) == pytest.approx(AT - 3.0, abs=1e-4)
+    (note,) = compare([a, b], None, BY_NAME, {"B": -1.2}).notes
+    assert proposed(note) == pytest.approx(AT - 3.0, abs=1e-4)
+    found = compare([a, b], None, BY_NAME, {"B": -2.0})
     assert found.notes == ()
     assert of(found).rms == pytest.approx(0.0, abs=1e-9)
 
@@ -137,7 +143,7 @@ def test_final_values_are_the_means_of_the_last_twentieth():
     ripple = 0.01 * np.sin(2.0 * np.pi * time / 0.1)  # five periods of it
     a = write("a.csv", t=time, vt=np.ones(len(time)) + ripple)
     b = write("b.csv", t=time, vt=np.full(len(time), 1.05))
-    assert of(compare(a, b, None, BY_NAME)).finals == pytest.approx((1.0, 1.05), abs=1e-4)
+    assert of(compare([a, b], None, BY_NAME)).finals == pytest.approx((1.0, 1.05), abs=1e-4)
 
 
 def test_final_values_are_of_the_time_that_both_show():
@@ -147,7 +153,7 @@ def test_final_values_are_of_the_time_that_both_show():
     for name, vt in (("a", falls), ("b", np.where(time < 8.0, 1.01, np.nan))):
         rows = (f"{t:.9g},{'' if np.isnan(y) else y}" for t, y in zip(time, vt, strict=True))
         Path(f"{name}.csv").write_text("\n".join(["t,vt", *rows]) + "\n")
-    found = of(compare(Path("a.csv"), Path("b.csv"), None, BY_NAME))
+    found = of(compare([Path("a.csv"), Path("b.csv")], None, BY_NAME))
     assert found.finals == pytest.approx((1.0, 1.01))
 
 
@@ -156,11 +162,11 @@ def test_features_stand_beside_each_other_with_the_step_found():
     time = clock(0.002)
     a = write("a.csv", t=time, vt=rise(time))
     b = write("b.csv", t=time, vt=rise(time, lag=2.0 * LAG))
-    found = compare(a, b, None, BY_NAME)
+    found = compare([a, b], None, BY_NAME)
     assert found.step_at == pytest.approx(AT, abs=0.05)  # by the shape of the rise
     assert found.features["A"].rise_time == pytest.approx(3.3579 * LAG, rel=1e-3)
     assert found.features["B"].rise_time == pytest.approx(2.0 * 3.3579 * LAG, rel=1e-3)
-    given = compare(a, b, None, BY_NAME, step_at=AT)
+    given = compare([a, b], None, BY_NAME, step_at=AT)
     assert given.step_at == AT
 
 
@@ -169,14 +175,14 @@ def test_features_are_of_the_time_before_the_first_ends():
     short, long = clock(0.01, 5.0), clock(0.01, 9.0)
     a = write("a.csv", t=short, vt=rise(short))
     b = write("b.csv", t=long, vt=rise(long) + np.where(long > 5.5, 0.02, 0.0))
-    found = compare(a, b, None, BY_NAME).features
+    found = compare([a, b], None, BY_NAME).features
     assert found["B"].final_value == pytest.approx(found["A"].final_value, abs=1e-9)
 
 
 def test_without_a_step_there_are_no_features():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=np.ones(len(time)))
-    found = compare(a, a, None, BY_NAME)
+    found = compare([a, a], None, BY_NAME)
     assert found.features == {}
     assert found.step_at is None
 
@@ -188,7 +194,7 @@ def test_a_record_is_never_interpolated():
     b = write("b.csv", t=time, vt=rise(time) + 0.001)
     measured = rise(coarse) + 1e-3 * rng.standard_normal(len(coarse))
     record = write("record.csv", t=coarse, vt=measured)
-    found = compare(a, b, record, BY_NAME)
+    found = compare([a, b], record, BY_NAME)
     one = of(found, first="record", second="A")
     np.testing.assert_allclose(one.time, coarse)
     np.testing.assert_allclose(one.values[0], measured, rtol=0, atol=1e-11)
@@ -200,10 +206,10 @@ def test_all_signals_in_common_are_compared_and_no_others():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time), efd=2 * rise(time), ifd=time, VA=time)
     b = write("b.csv", t=time, vt=rise(time), efd=2 * rise(time) + 0.1, q=time, VA=time)
-    found = compare(a, b, None, BY_NAME)
+    found = compare([a, b], None, BY_NAME)
     assert [one.signal for one in found.between] == ["vt", "efd"]
     assert of(found, "efd").rms == pytest.approx(0.1)
-    asked = compare(a, b, None, ColumnChoice({"VA": "VA"}))
+    asked = compare([a, b], None, ColumnChoice({"VA": ["VA"]}))
     assert "VA" in [one.signal for one in asked.between]
 
 
@@ -213,9 +219,9 @@ def test_a_fit_is_compared_with_an_export_of_another_program():
     Path("fit/result.json").write_text("{}")
     export = {"Time(s)": time, "VOLT 1 [GEN]": rise(time), "EFD": time}
     b = write("psse.csv", **export)
-    asked = ColumnChoice({"vt": "VOLT 1 [GEN]"})
+    asked = ColumnChoice({"vt": ["VOLT 1 [GEN]"]})
     for fit in (Path("fit"), Path("fit/result.json"), Path("fit/response.csv")):
-        found = compare(fit, b, Path("fit/response.csv"), asked)
+        found = compare([fit, b], Path("fit/response.csv"), asked)
         assert of(found).rms == 0.0
         assert of(found, first="record").finals[0] == pytest.approx(2.05, abs=1e-6)
 
@@ -225,15 +231,15 @@ def test_a_column_of_time_is_named_where_it_has_a_name_of_its_own():
     a = write("a.csv", t=time, vt=rise(time))
     b = write("b.csv", vt=rise(time), sec=time)
     with pytest.raises(RecordError, match=r"b\.csv: no column seems .*--time .*'vt', 'sec'"):
-        compare(a, b, None, BY_NAME)
-    assert of(compare(a, b, None, ColumnChoice({}, "sec"))).rms == 0.0
+        compare([a, b], None, BY_NAME)
+    assert of(compare([a, b], None, ColumnChoice({}, ["sec"]))).rms == 0.0
 
 
 def test_of_instants_that_repeat_the_last_row_is_taken():
     """A simulator writes the instant of a step twice: before and after it."""
     a = write("a.csv", t=[0, 1, 1, 2], vt=[1, 1, 2, 2])
     b = write("b.csv", t=[0, 1, 2], vt=[1, 2, 2])
-    found = compare(a, b, None, BY_NAME)
+    found = compare([a, b], None, BY_NAME)
     assert of(found).rms == 0.0
     assert any("1 instants repeat" in note for note in found.notes)
 
@@ -243,7 +249,7 @@ def test_nothing_is_read_across_a_gap():
     gappy = np.where((time > 4.0) & (time < 5.0), np.nan, time)
     a = write("a.csv", t=time, vt=gappy)
     b = write("b.csv", t=fine, vt=fine)
-    one = of(compare(a, b, None, BY_NAME))
+    one = of(compare([a, b], None, BY_NAME))
     inside = (one.time > 4.0 + 1e-6) & (one.time < 5.0 - 1e-6)
     assert np.isnan(one.error[inside]).all()
     assert np.isfinite(one.error[~inside]).all()
@@ -288,7 +294,7 @@ def test_wrong_files_are_refused(run):
         ((a, b, "--columns", "vt=VOLT"), ["no file has a column 'VOLT'", f"{b} has 't', 'vt'"]),
         ((a, b, "--time", "sec"), ["no file has a column 'sec'"]),
         ((a, b, "--columns", "vt"), ["--columns vt: not of the form vt=VOLT"]),
-        ((a, b, write("r.csv", t=[0, 1], x=[0, 1])), ["r.csv: none of the signals vt"]),
+        ((a, b, "--record", write("r.csv", t=[0, 1], x=[0, 1])), ["r.csv: no signal in common"]),
     ):
         code, out, err = run(*arguments)
         assert (code, out) == (1, ""), arguments
@@ -300,10 +306,15 @@ def test_the_command_writes_its_files_and_says_what_they_hold(run):
     time = clock(0.01)
     a, b = good()
     b = write("b.csv", t=time, vt=rise(time) + 0.002)
-    code, out, _ = run(a, b, a)
+    code, out, _ = run(a, b, "--record", a)
     assert code == 0
     place = Path("runs/compare")
-    assert {path.name for path in place.iterdir()} == {"compare.csv", "compare.json", "compare.png"}
+    assert {path.name for path in place.iterdir()} == {
+        "compare.csv",
+        "compare-record.csv",
+        "compare.json",
+        "compare.png",
+    }
     header, *rows = csv.reader((place / "compare.csv").read_text().splitlines())
     assert header == ["t", "vt_A", "vt_B", "vt_difference"]
     assert {row[3] for row in rows} == {"0.002"}
@@ -312,7 +323,7 @@ def test_the_command_writes_its_files_and_says_what_they_hold(run):
     assert "B - A" in out
     assert "2.000e-03" in out
     assert max(map(len, out.splitlines())) <= 80
-    code, printed, _ = run(a, b, a, "--json", "--no-plots", "-o", "other")
+    code, printed, _ = run(a, b, "--record", a, "--json", "--no-plots", "-o", "other")
     assert json.loads(printed) == stored
     assert not Path("other/compare.png").exists()
     assert run(a, b, "--quiet", "--no-plots")[:2] == (0, "")
@@ -323,15 +334,30 @@ def test_the_figure_has_a_panel_and_a_panel_of_differences_for_each_signal(recor
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time), efd=rise(time))
     b = write("b.csv", t=time, vt=rise(time) + 1e-3, efd=rise(time))
-    figure = plots.agreement(compare(a, b, a if record else None, BY_NAME))
+    figure = plots.agreement(compare([a, b], a if record else None, BY_NAME))
     assert plots.png(figure)
     assert len(figure.axes) == 4
     curves, differences = figure.axes[:2]
     labels = [text.get_text() for text in curves.get_legend().get_texts()]
-    assert labels == (["record", "A", "B"] if record else ["A", "B"])
+    of_zero, of_b = ", f = 0.00e+00 pu²", ", f = 5.00e-04 pu²"  # half of 1001 times 1e-6
+    expected = ["record", f"A{of_zero}", f"B{of_b}"] if record else ["A", f"B{of_b}"]
+    assert labels == expected
     assert "vt" in curves.get_ylabel()
     assert len(differences.lines) == (4 if record else 2)  # with zero
     assert figure.axes[-1].get_xlabel() == "time (s)"
+
+
+def test_of_many_responses_the_differences_from_the_reference_are_drawn():
+    time = clock(0.01)
+    sources = [write(f"{k}.csv", t=time, vt=rise(time) + 1e-3 * k) for k in range(6)]
+    for record, first in ((None, "A"), (sources[0], "record")):
+        curves, differences = plots.agreement(compare(sources, record)).axes
+        lines = curves.lines if record is None else curves.lines[1:]  # the record lies below
+        assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == len(sources)
+        widths = [line.get_linewidth() for line in lines]
+        assert widths == sorted(widths, reverse=True)  # what lies on top hides nothing
+        labels = [text.get_text() for text in differences.get_legend().get_texts()]
+        assert [label.split(" - ")[1] for label in labels] == [first] * len(labels)
 
 
 def test_a_column_that_its_file_says_is_not_per_unit_is_refused(run):
@@ -345,3 +371,181 @@ def test_a_column_that_its_file_says_is_not_per_unit_is_refused(run):
         assert "pu" in err
     other = write("other.csv", **{"t": [t for t, _ in rows], "U [pu]": [1.0, 1.0, 1.05]})
     assert run(a, other, "--columns", "vt=U [pu]")[0] == 0
+
+
+# ---- any number of responses, their f, and their clocks
+
+
+def noisy(time, seed=1):
+    return rise(time) + 1e-4 * np.random.default_rng(seed).standard_normal(len(time))
+
+
+def test_f_is_half_the_sum_of_squares_over_the_samples_of_the_record():
+    """Of every second sample it is about half as large; the rmse stays."""
+    time = clock(0.01)
+    sources = [write(f"{k}.csv", t=time, vt=rise(time) + 1e-3 * k) for k in range(3)]
+    measured = noisy(time)
+    whole = compare(sources, write("record.csv", t=time, vt=measured))
+    half = compare(sources, write("half.csv", t=time[::2], vt=measured[::2]))
+    for k, name in enumerate("ABC"):
+        errors = rise(time) + 1e-3 * k - measured
+        entry, fewer = (of(each, first="record", second=name) for each in (whole, half))
+        assert entry.f == pytest.approx(0.5 * float(errors @ errors), rel=1e-6)  # 12 digits
+        assert (entry.count, fewer.count) == (1001, 501)
+        assert entry.rmse == pytest.approx(np.sqrt(2.0 * entry.f / 1001))
+        assert fewer.rmse == pytest.approx(entry.rmse, rel=0.1)
+        assert of(half, first="record", second=name).f == pytest.approx(0.5 * entry.f, rel=0.2)
+    assert [entry.second for entry in whole.from_reference] == ["A", "B", "C"]
+    assert [entry.second for entry in whole.between] == ["B", "C"]
+
+
+def test_without_a_record_the_first_is_the_reference():
+    time = clock(0.01)
+    sources = [write(f"{k}.csv", t=time, vt=rise(time) + 1e-3 * k) for k in range(3)]
+    found = compare(sources)
+    assert [(entry.first, entry.second) for entry in found.from_reference] == [
+        ("A", "B"),
+        ("A", "C"),
+    ]
+    assert of(found, second="C").f == pytest.approx(0.5 * 1001 * 4e-6)
+    assert of(found, second="C").fit_percent == pytest.approx(
+        100.0 * (1.0 - 2e-3 / np.std(rise(time))), abs=1e-3
+    )
+
+
+def test_all_are_compared_over_the_time_that_all_cover():
+    """Else the f of one that ends early would be of fewer samples."""
+    long, short = clock(0.01, 10.0), clock(0.02, 4.0, 0.5)
+    sources = [
+        write("a.csv", t=long, vt=rise(long)),
+        write("b.csv", t=long, vt=rise(long) + 0.001),
+        write("c.csv", t=short, vt=rise(short)),
+    ]
+    found = compare(sources, write("record.csv", t=long, vt=noisy(long)))
+    assert {entry.count for entry in found.from_reference} == {351}
+    assert {len(entry.time) for entry in found.between} == {351}
+
+
+def test_one_response_is_compared_with_a_record(run):
+    time = clock(0.01)
+    a, record = write("a.csv", t=time, vt=rise(time)), write("r.csv", t=time, vt=noisy(time))
+    code, out, _ = run(a, "--record", record)
+    assert code == 0
+    assert "A - record" in out
+    header, *rows = csv.reader(Path("runs/compare/compare-record.csv").read_text().splitlines())
+    assert header == ["t", "vt_record", "vt_A"]
+    assert len(rows) == 1001
+    assert run(a)[0] == 2
+    run(a, a, "--no-plots")
+    assert not Path("runs/compare/compare-record.csv").exists()  # of a former comparison
+
+
+def test_more_responses_than_letters_have_names():
+    a = write("a.csv", t=clock(0.1), vt=rise(clock(0.1)))
+    names = [curve.name for curve in compare([a] * 28).curves]
+    assert (names[0], names[25:]) == ("A", ["Z", "AA", "AB"])
+
+
+@pytest.mark.parametrize("at", [0.7, 3.0])
+def test_aligned_clocks_have_their_steps_together(at):
+    """Known to the match of the same shape; noise of 1e-4 leaves less than a millisecond."""
+    time = clock(0.01, 15.0)
+    record = write("record.csv", t=time, vt=noisy(time))
+    a = write("a.csv", t=time, vt=rise(time, at=at))
+    b = write("b.csv", t=time, vt=rise(time))
+    found = compare([a, b], record, align=True)
+    shifts = {curve.name: curve.shift for curve in found.curves}
+    assert shifts == {"A": pytest.approx(AT - at, abs=1e-3), "B": 0.0, "record": 0.0}
+    assert of(found, first="record", second="A").rmse == pytest.approx(1e-4, rel=0.1)
+    (note,) = found.notes
+    assert "A is shifted by" in note
+    (proposed,) = compare([a, b], record).notes
+    assert f"f = {of(found, first='record', second='A').f:.2e}" in proposed
+    assert "--align" in proposed
+
+
+@pytest.mark.parametrize("lag", [LAG, 2.0 * LAG])
+def test_clocks_that_are_one_are_not_moved_whatever_the_shape(lag):
+    """What is detected differs by some of the rise: that is no difference of clocks."""
+    time = clock(0.01)
+    a, b = (write(f"{k}.csv", t=time, vt=rise(time, lag=k)) for k in (LAG, lag))
+    found = compare([a, b], align=True)
+    assert [curve.shift for curve in found.curves] == [0.0, 0.0]
+    assert found.notes == ()
+
+
+def test_what_cannot_be_aligned_or_shifted_is_refused(run):
+    time = clock(0.01)
+    a, b = good()
+    flat = write("flat.csv", t=time, vt=np.ones(len(time)))
+    for arguments, code, words in (
+        ((a, flat, "--align"), 1, ["--align: B, flat.csv", "no step", "--shift"]),
+        ((a, b, "--align", "--shift", "1"), 2, ["--align", "--shift"]),
+        ((a, b, "--shift", "C=1"), 1, ["--shift C", "known: A, B"]),
+        ((a, b, "--shift", "B=soon"), 1, ["--shift B=soon: not of the form B=0.5"]),
+        ((a, b, "--shift", "1", "--shift", "B=2"), 1, ["shifted twice"]),
+        ((a, b, "--shift", "nan"), 1, ["not of the form"]),
+    ):
+        ended, out, err = run(*arguments)
+        assert (ended, out) == (code, ""), arguments
+        for word in words:
+            assert word in err
+    code, out, _ = run(a, b, a, "--shift", "1", "--shift", "C=-0.5", "--no-plots", "--json")
+    shifts = {name: curve["shift"] for name, curve in json.loads(out)["curves"].items()}
+    assert (code, shifts) == (0, {"A": 0.0, "B": 1.0, "C": -0.5})
+
+
+def test_each_file_is_read_by_the_column_that_it_has(run):
+    time = clock(0.01)
+    sources = [
+        write("a.csv", t=time, V_t=rise(time)),
+        write("b.csv", **{"t": time, "VOLT 1": rise(time)}),
+        write("both.csv", **{"t": time, "V_t": rise(time), "VOLT 1": rise(time)}),
+    ]
+    names = ("--columns", "vt=V_t", "--columns", "vt=VOLT 1", "--no-plots")
+    assert run(*sources[:2], *names)[0] == 0
+    code, _, err = run(*sources, *names)
+    assert code == 1
+    assert "both.csv: has several of the columns given: 'V_t', 'VOLT 1'" in err
+
+
+@pytest.fixture(scope="module")
+def fits(tmp_path_factory):
+    """Return the folders of two fits of one record: with both parameters, and with one fixed."""
+    folder = tmp_path_factory.mktemp("fits")
+    samples = TRUTH + 1e-3 * np.random.default_rng(5).standard_normal(len(TIME))
+    record = exfit.Record.from_arrays(TIME, {"vt": samples})
+    free = FIRST_ORDER["parameters"]["free"]
+    fixed = {"free": {"k": free["k"]}, "fixed": {"a": 2.0}}
+    for name, parameters in (("both", FIRST_ORDER["parameters"]), ("one", fixed)):
+        case = exfit.Case.from_dict({**FIRST_ORDER, "parameters": parameters}, record, name=name)
+        run_folder.write_fit(exfit.fit(case), folder / name, figures=False)
+    write(folder / "record.csv", t=TIME, vt=samples)
+    return folder
+
+
+def test_the_f_of_a_fit_is_its_cost_and_parameters_are_side_by_side(run, fits):
+    code, printed, _ = run(fits / "both", fits / "one", "--record", fits / "record.csv", "--json")
+    assert code == 0
+    stored = json.loads(printed)
+    f = {entry["difference"]: entry["f"] for entry in stored["differences"]}
+    for name, folder in (("A", "both"), ("B", "one")):
+        cost = exfit.load_result(fits / folder).cost
+        assert f[f"{name} - record"] == pytest.approx(cost, rel=1e-5)  # of nine digits
+        assert stored["results"][name]["f"] == cost
+    code, out, _ = run(fits / "both", fits / "one/result.json", fits / "record.csv", "--no-plots")
+    assert code == 0
+    rows = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
+    assert rows["strategy"][1:] == ["lm-then-dgn", "lm-then-dgn"]
+    assert rows["a"][-1] == "2="
+    assert "= fixed" in out
+    assert max(map(len, out.splitlines())) <= 80 + len(str(fits))
+
+
+def test_a_result_that_cannot_be_read_costs_its_parameters_only(fits):
+    time = clock(0.01)
+    write("fit/response.csv", t=time, vt_simulated=rise(time))
+    Path("fit/result.json").write_text("{}")
+    found = compare([Path("fit"), fits / "both"], None, BY_NAME)
+    assert [*found.results] == ["B"]
+    assert any("A: its parameters are not shown: fit/result.json" in note for note in found.notes)

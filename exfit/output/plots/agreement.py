@@ -1,73 +1,117 @@
-"""Two responses on one axis, with their differences below."""
+"""Responses on one axis, with their differences below."""
+
+from pathlib import Path
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.analysis.comparison import Agreement, Curve, Difference
+from exfit.analysis.comparison import Agreement
+from exfit.analysis.curves import RECORD, Curve
+from exfit.analysis.differences import Difference
 from exfit.dsp.decimation import envelope
-from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import (
+    COLORS,
+    MEASURED,
+    MILLI,
+    SIMULATED,
+    START,
+    STYLES,
+    WIDTH,
+    tidy,
+)
 from exfit.signals import label_of
 
-LINES = {"A": (START, "-"), "B": (SIMULATED, "--")}
+OF_TWO = ((START, "-"), (SIMULATED, "--"))
+WIDTHS = (2.6, 2.2, 1.8, 1.4)  # points: curves that coincide are seen around each other
+TAKEN = (COLORS[0], START, SIMULATED)  # the first of the colours is a blue, too
 
 
 def agreement(compared: Agreement) -> Figure:
-    """Return the signals of two responses, with a record where there is one, and the differences.
+    """Return the signals of responses, with a record where there is one, and the differences.
 
-    The differences from a record are drawn too.
+    Of many responses only the differences from the reference are drawn: the record, or the first.
     """
-    signals = [difference.signal for difference in compared.between]
-    count = len(signals)
-    figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * count), layout="constrained")
+    signals = compared.signals
+    responses = [curve for curve in compared.curves if not curve.measured]
+    looks = _looks([curve.name for curve in responses])
+    figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * len(signals)), layout="constrained")
     axes = figure.subplots(
-        2 * count, 1, sharex=True, height_ratios=[3.0, 1.3] * count, squeeze=False
+        2 * len(signals), 1, sharex=True, height_ratios=[3.0, 1.3] * len(signals), squeeze=False
     )[:, 0]
-    for k, (signal, between) in enumerate(zip(signals, compared.between, strict=True)):
-        _curves(axes[2 * k], compared.curves, between)
-        own = [each for each in compared.differences if each.signal == signal]
-        _differences(axes[2 * k + 1], own)
+    for k, signal in enumerate(signals):
+        _curves(axes[2 * k], compared, signal, looks)
+        two = len(responses) <= len(OF_TWO)
+        drawn = compared.differences if two else compared.from_reference
+        _differences(axes[2 * k + 1], [each for each in drawn if each.signal == signal], looks)
     axes[-1].set_xlabel("time (s)")
     figure.align_ylabels()
-    names = [
-        f"{curve.name}: {curve.path.parent.name}/{curve.path.name}" for curve in compared.curves
-    ]
-    figure.suptitle("\n".join(names), fontsize=10)
+    figure.suptitle("\n".join(map(_title, compared.curves)), fontsize=10)
     return figure
 
 
-def _curves(axes: Axes, curves: tuple[Curve, ...], between: Difference) -> None:
-    begin, end = between.time[0], between.time[-1]
-    # the record is drawn below the lines
-    for curve in sorted(curves, key=lambda curve: curve.name in LINES):
-        if between.signal not in curve.signals:
+def _looks(names: list[str]) -> dict[str, dict[str, Any]]:
+    """Return how each response is drawn, by its name: of many the later are the narrower."""
+    others = [color for color in COLORS if color not in TAKEN]
+    lines = OF_TWO + tuple((color, STYLES[k % len(STYLES)]) for k, color in enumerate(others))
+    widths = [WIDTHS[-1]] * len(OF_TWO) if len(names) <= len(OF_TWO) else WIDTHS
+    looks = {}
+    for k, name in enumerate(names):
+        color, style = lines[k % len(lines)]
+        width = widths[min(k, len(widths) - 1)]
+        looks[name] = {"color": color, "linestyle": style, "linewidth": width}
+    return looks
+
+
+def _title(curve: Curve) -> str:
+    shifted = f", shifted by {curve.shift:.4g} s" if curve.shift else ""
+    return f"{curve.name}: {Path(curve.path.parent.name, curve.path.name)}{shifted}"
+
+
+def _curves(axes: Axes, compared: Agreement, signal: str, looks: dict[str, dict[str, Any]]) -> None:
+    """Draw a signal of all that have it, the record below the lines."""
+    time = compared.time
+    own = {each.second: each for each in compared.from_reference if each.signal == signal}
+    for curve in sorted(compared.curves, key=lambda curve: curve.name in looks):
+        if signal not in curve.signals:
             continue
-        inside = (curve.time >= begin) & (curve.time <= end)
-        points = envelope(curve.time[inside], curve.signals[between.signal][inside])
-        if curve.name in LINES:
-            color, style = LINES[curve.name]
-            axes.plot(*points, style, color=color, linewidth=1.4, label=curve.name)
+        inside = (curve.time >= time[0]) & (curve.time <= time[-1])
+        points = envelope(curve.time[inside], curve.signals[signal][inside])
+        if curve.name in looks:
+            f = f", f = {own[curve.name].f:.2e} pu²" if curve.name in own else ""
+            axes.plot(*points, label=f"{curve.name}{f}", **looks[curve.name])
         else:
             axes.plot(*points, ".", color=MEASURED, markersize=3, label=curve.name)
-    axes.set_ylabel(label_of(between.signal))
+    axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
-    value, at = between.largest
-    text = f"B - A: rms {between.rms:.3g} pu, largest {value:.3g} pu at {at:.4g} s"
-    axes.set_title(text, fontsize=9, loc="right")
+    between = [each for each in compared.between if each.signal == signal]
+    if len(between) == 1:
+        value, at = between[0].largest
+        text = f"{_name(between[0])}: rms {between[0].rms:.3g} pu, largest {value:.3g} pu"
+        axes.set_title(f"{text} at {at:.4g} s", fontsize=9, loc="right")
     tidy(axes)
 
 
-def _differences(axes: Axes, differences: list[Difference]) -> None:
+def _differences(
+    axes: Axes, differences: list[Difference], looks: dict[str, dict[str, Any]]
+) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
+    of_records = any(difference.first == RECORD for difference in differences)
     for difference in differences:
-        of_record = difference.first == "record"
+        between = (of_records and difference.first != RECORD) or len(differences) == 1
         axes.plot(
             *envelope(difference.time, MILLI * difference.error),
-            color=LINES[difference.second][0] if of_record else "black",
-            linewidth=0.6 if of_record else 1.1,
-            label=f"{difference.second} - {difference.first}",
+            color="black" if between else looks[difference.second]["color"],
+            linewidth=1.1 if between else 0.6,
+            label=_name(difference),
         )
     several = len(differences) > 1
-    axes.set_ylabel("difference\n(1e-3 pu)" if several else "B - A\n(1e-3 pu)")
+    label = "difference" if several else _name(differences[0])
+    axes.set_ylabel(f"{label}\n(1e-3 pu)")
     if several:
         axes.legend(loc="best", frameon=False, ncols=len(differences), fontsize=8)
     tidy(axes)
+
+
+def _name(difference: Difference) -> str:
+    return f"{difference.second} - {difference.first}"

@@ -1,37 +1,53 @@
-"""Two responses beside each other."""
+"""Responses beside each other."""
 
 from rich.console import Console
 from rich.table import Table
 
 from exfit.analysis.comparison import Agreement
+from exfit.analysis.curves import RECORD
 from exfit.dsp.features import LABELS
+from exfit.output.terminal.side_by_side import Row, side_by_side, tables
 from exfit.output.terminal.terminal import notes, number, plain_table
 
 
 def agreement(console: Console, result: Agreement) -> None:
-    """Show how two responses, and a record, differ, and the features of their step."""
+    """Show how responses, and a record, differ, the features of their step, and what was fitted."""
     for curve in result.curves:
-        shifted = f", shifted by {result.shift:g} s" if curve.name == "B" and result.shift else ""
+        shifted = f", shifted by {curve.shift:.6g} s" if curve.shift else ""
         console.print(f"{curve.name:6}  {curve.path}{shifted}", soft_wrap=True, markup=False)
     console.print()
     console.print(_differences(result))
+    console.print()
+    whose = "the record" if result.from_reference[0].first == RECORD else "A"
+    console.print(f"against {whose}: f, half the sum of squares over the samples")
+    console.print(_matches(result))
     if result.features and result.step_at is not None:
         console.print()
         console.print(f"{result.judged} after the step at {result.step_at:.4g} s")
-        console.print(_features(result))
+        _features(console, result)
+    if len(result.results) > 1:
+        console.print()
+        side_by_side(console, result.results, models=True)
     console.print()
     notes(console, result.notes)
-    between = result.between[0]
-    console.print(
-        f"compared over {between.time[0]:g} ... {between.time[-1]:g} s at {len(between.time)} "
-        "instants"
-    )
+    time = result.differences[0].time
+    console.print(f"compared over {time[0]:g} ... {time[-1]:g} s at {len(time)} instants")
     worst = max(result.differences, key=lambda difference: difference.interpolation)
     if worst.interpolation:
         console.print(
             f"between samples: a cubic, up to {worst.interpolation:.1e} pu from a straight line "
             f"({worst.signal})"
         )
+
+
+def _matches(result: Agreement) -> Table:
+    """Return how well each response matches the reference."""
+    numbers = ("f, pu²", "rmse, pu", "fit, %", "samples")
+    table = plain_table("", "signal", *numbers, numbers=numbers)
+    for entry in result.from_reference:
+        cells = (f"{entry.f:.4e}", f"{entry.rmse:.3e}", f"{entry.fit_percent:.2f}")
+        table.add_row(entry.second, entry.signal, *cells, str(entry.count))
+    return table
 
 
 def _differences(result: Agreement) -> Table:
@@ -46,10 +62,13 @@ def _differences(result: Agreement) -> Table:
     return table
 
 
-def _features(result: Agreement) -> Table:
-    names = tuple(result.features)
-    table = plain_table("", "unit", *names, numbers=names)
-    for label, key, unit in LABELS:
-        cells = [number(getattr(features, key)) for features in result.features.values()]
-        table.add_row(label, unit, *cells)
-    return table
+def _features(console: Console, result: Agreement) -> None:
+    rows = [
+        Row(
+            label,
+            unit,
+            tuple(number(getattr(features, key)) for features in result.features.values()),
+        )
+        for label, key, unit in LABELS
+    ]
+    tables(console, [*result.features], rows)

@@ -63,7 +63,7 @@ def side_by_side(
         first = _start(fits[0])
         rows = [row._replace(cells=(first.get(row.label, ""), *row.cells)) for row in rows]
         headings = ["start", *headings]
-    _tables(console, headings, rows)
+    tables(console, headings, rows)
     shown = {mark for row in parameters for cell in row.cells for mark in MARKS if mark in cell}
     if shown:
         legend = ", ".join(f"{mark} {words}" for mark, words in MARKS.items() if mark in shown)
@@ -76,7 +76,7 @@ def _start(fit: FitResult) -> dict[str, str]:
     return {**values, COST: f"{fit.start_cost:.3e} "}
 
 
-def _tables(console: Console, headings: Sequence[str], rows: Sequence[Row]) -> None:
+def tables(console: Console, headings: Sequence[str], rows: Sequence[Row]) -> None:
     """Show rows as tables below each other, each with as many columns as fit."""
     for columns in _packed(headings, rows, console.width):
         names = [headings[k] for k in columns]
