@@ -70,10 +70,12 @@ def compare(
 
     Each CURVE is the folder or the result.json of a fit or a simulation, or a CSV file of any
     program; they are named A, B, C and so on. The signals of A are compared over the time that all
-    cover, on the finest of their clocks. The differences are those from A and from the record; f is half
-    the sum of their squares. Clocks that differ are reported, and moved with --align or --shift.
-    Parameters of fits are shown side by side. Writes compare.json, compare.csv and compare.png to
-    runs/compare, or to DIR; with a record compare-record.csv too.
+    cover, on the finest of their clocks: with A, and with the record at its instants. f is half the
+    sum of the squared differences. Clocks that differ are reported, and moved with --align or
+    --shift. Parameters of fits are shown side by side.
+
+    Writes compare.json, compare.csv and compare.png to runs/compare, or to DIR; with a record
+    compare-record.csv too.
     """
     if len(curves) < FEWEST_CURVES and record is None:
         raise click.UsageError("One CURVE alone can be compared only with a --record.")
