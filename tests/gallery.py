@@ -33,6 +33,7 @@ from exfit.output import plots, terminal
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "gallery.md"
 FOLDER = PAGE.parent / "img"
+OTHERS = "thesis_"  # pictures of another page: tests/studies/thesis.py
 BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 
 DPI = 84  # of the figures: 756 points wide, that of a page
@@ -299,11 +300,16 @@ def with_section(page: str) -> str:
     return f"{before}{BEGIN}\n{section()}\n\n{END}{after}"
 
 
+def own_files() -> list[Path]:
+    """Return the pictures in the folder that are no other page's."""
+    return [path for path in FOLDER.iterdir() if not path.name.startswith(OTHERS)]
+
+
 def write() -> None:
     """Write the gallery and its page; what is no part of it any more goes."""
     FOLDER.mkdir(exist_ok=True)
     pictures = drawn()
-    for path in FOLDER.iterdir():
+    for path in own_files():
         if path.name not in pictures:
             path.unlink()
     for name, content in pictures.items():

@@ -15,6 +15,7 @@ from gallery import (
     ROOT,
     RUNS,
     drawn,
+    own_files,
     same,
     same_word,
     smaller,
@@ -42,7 +43,7 @@ def test_every_picture_is_what_its_command_makes():
 
 
 def test_no_picture_is_left_of_a_command_that_is_gone():
-    assert sorted(path.name for path in FOLDER.iterdir()) == sorted(PICTURES)
+    assert sorted(path.name for path in own_files()) == sorted(PICTURES)
 
 
 def test_the_page_shows_every_picture_once_with_its_command():
