@@ -84,7 +84,10 @@ ROWS = (
     ),
     SignalRow("delta", "rotor angle", "rad"),
     SignalRow("speed", "speed"),
-    SignalRow("vs", "stabiliser signal"),
+    SignalRow(
+        "vs", "stabiliser signal", turn=8,
+        words=("vpss", "upss", "pss output", "pss", "stabiliser", "stabilizer", "vs"),
+    ),
     SignalRow("vc1", "measured voltage"),
     SignalRow("E", "source voltage"),
     SignalRow("R", "resistance to the source"),

@@ -5,18 +5,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from exfit.case.case import Case
 from exfit.case.parts import Part
 from exfit.case.schema import (
-    SIGNALS_OF_A_TEST,
     BumpTest,
     ChannelSection,
+    FindableStep,
     PhasesSection,
     Reference,
+    ReferenceFile,
     ReferenceTable,
     Unknown,
     start_value,
 )
 from exfit.fitting.setup import ExperimentSetup
-from exfit.plants import NETWORK
+from exfit.plants import NETWORK, REFERENCES
 from exfit.records.reading import file_hash
+from exfit.records.record import Record
 from exfit.results.description import (
     NetworkParameter,
     PartDescription,
@@ -41,19 +43,24 @@ def input_hashes(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str
         hashes["parameters"] = file_hash(case.parameter_file)
     if case.model is not None and case.model.endswith(".py"):
         hashes["model"] = file_hash(case.folder / case.model)
-    records = (setup.record.sha256 for setup in setups)
-    return hashes | dict(zip(labelled_records(case), records, strict=True))
+    return hashes | {label: record.sha256 for label, record in _records(case, setups)}
 
 
 def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]:
     """Return the name of every file that goes into a result, by its label."""
-    records = (setup.record.source.name for setup in setups)
     return {
         "case": case.path.name,
         "model": (case.folder / (case.model or "")).name,
         "parameters": "" if case.parameter_file is None else case.parameter_file.name,
-        **dict(zip(labelled_records(case), records, strict=True)),
+        **{label: record.source.name for label, record in _records(case, setups)},
     }
+
+
+def _records(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[tuple[str, Record]]:
+    """Yield the records of a case by their labels, each with the files of its reference."""
+    for label, setup in zip(labelled_records(case), setups, strict=True):
+        yield label, setup.record
+        yield from ((f"{label}.{signal}", file) for signal, file in setup.references.items())
 
 
 def values_by_part(case: Case, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
@@ -128,7 +135,7 @@ def _events(test: BumpTest) -> Iterator[str]:
     """Yield what was done to the unit, in words."""
     if test.vt0 is not None:
         yield f"vt0 {_given(test.vt0, 'g', 'pu')}"
-    for signal in SIGNALS_OF_A_TEST:
+    for signal in REFERENCES:
         yield from _reference(signal, getattr(test, signal))
     for event in test.E:
         yield f"E {event.step:+g} pu at {event.at:g} s"
@@ -144,10 +151,18 @@ def _reference(signal: str, given: Reference) -> Iterator[str]:
         (start, first), (end, last) = given.table[0], given.table[-1]
         rows = f"{len(given.table)} rows, {start:g} ... {end:g} s"
         yield f"{signal} by a table of {rows}, from {first:g} to {last:g} pu"
-        return
-    for event in given:
-        change = f"{signal} {_given(event.step, '+g', 'pu')} at {_given(event.at, 'g', 's')}"
-        yield change if event.ramp is None else f"{change}, in a ramp of {event.ramp:g} s"
+    elif isinstance(given, ReferenceFile):
+        yield f"{signal} from the column {given.column} of {given.file}"
+    elif isinstance(given, str):
+        yield f"{signal} as recorded"
+    else:
+        yield from (_event(signal, event) for event in given)
+
+
+def _event(signal: str, event: FindableStep) -> str:
+    """Return a step or ramp of a signal."""
+    change = f"{signal} {_given(event.step, '+g', 'pu')} at {_given(event.at, 'g', 's')}"
+    return change if event.ramp is None else f"{change}, in a ramp of {event.ramp:g} s"
 
 
 def _channel(signal: str, entry: ChannelSection | PhasesSection) -> str:

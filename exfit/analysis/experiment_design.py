@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from exfit.analysis.diagnostics import search_range_notes
 from exfit.case.case import Case
-from exfit.case.schema import SIGNALS_OF_A_TEST
 from exfit.dsp.noise import noise as noise_of
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments, planned
@@ -28,6 +27,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.uncertainty import UncertaintyAnalysis, linearisation, uncertainty_of
 from exfit.inference import Confidence
+from exfit.plants import REFERENCES
 from exfit.signals import NOISE
 from exfit.simulation.simulator import Simulator
 from exfit.util.text import near
@@ -242,7 +242,7 @@ def _scaled(experiment: Experiment, size: float) -> Experiment:
         return experiment
     share = size / moves[0].largest
     scaled = tuple(
-        step._replace(step=share * step.step) if step.signal in SIGNALS_OF_A_TEST else step
+        step._replace(step=share * step.step) if step.signal in REFERENCES else step
         for step in simulator.inputs.steps
     )
     return replace(experiment, simulator=simulator.with_inputs(scaled, simulator.delay))

@@ -8,7 +8,7 @@ from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.util.files import siblings
 
-RECORDS = ("record", "records", "validate")
+NAMING_FILES = ("test", "record", "records", "validate")
 # the places of parameters, and how their names begin
 SECTIONS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "": (("parameters", "free"), ("parameters", "fixed")),
@@ -19,14 +19,14 @@ SECTIONS: Mapping[str, tuple[tuple[str, ...], ...]] = {
 
 
 def files_of(case: Path) -> tuple[Path, ...]:
-    """Return the case file, its model's file and its records, whether they exist or not.
+    """Return the case file and the files that it names, whether they exist or not: model, records.
 
     Of a file that cannot be read as YAML it is the case alone.
     """
     content = _content(case)
     model = content.get("model")
     named = [model] if isinstance(model, str) and model.endswith(".py") else []
-    named += [file for key in RECORDS for file in _files(content.get(key))]
+    named += [file for key in NAMING_FILES for file in _files(content.get(key))]
     files = [part for name in named for part in _parts(case.parent / name)]
     return tuple(dict.fromkeys([case, *files]))
 

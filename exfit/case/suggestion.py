@@ -33,7 +33,7 @@ def record_section(
     channels = [channel for signal in RECORDED if (channel := inspection.channel_of(signal))]
     lines = ["record:", f"  file: {_text(file)}", f"  time: {_clock(inspection)}", "  channels:"]
     lines += _voltage_lines(inspection)
-    lines += _channel_lines(channels, only)
+    lines += _channel_lines(channels, only, inspection.reference)
     if any(channel.missing for channel in channels):
         lines.append("  gaps: skip            # samples without a number are left out")
     return lines
@@ -54,25 +54,36 @@ def _voltage_lines(inspection: Inspection) -> Iterator[str]:
         yield f"    vt: {{column: {FILL_IN}}}"
 
 
-def _channel_lines(channels: Sequence[InspectedChannel], only: tuple[str, ...]) -> Iterator[str]:
-    """Yield the entry of each channel, with what to check above it."""
-    noisy = all(in_per_unit(channel) and channel.noise > 0.0 for channel in channels)
+def _channel_lines(
+    channels: Sequence[InspectedChannel], only: tuple[str, ...], reference: InspectedChannel | None
+) -> Iterator[str]:
+    """Yield the entry of each channel, with what to check above it.
+
+    A recorded ``reference`` drives the simulation: it is not compared, and has no noise.
+    """
+    compared = [channel for channel in channels if channel is not reference]
+    noisy = all(in_per_unit(channel) and channel.noise > 0.0 for channel in compared)
     for channel in channels:
-        mark = "" if channel.signal in only else "# "
+        drives = channel is reference
+        mark = "" if drives or channel.signal in only else "# "
         yield f"    # {_about(channel)}"
-        yield f"    {mark}{channel.signal}: {_channel(channel, noisy)}"
+        yield f"    {mark}{channel.signal}: {_channel(channel, noisy, drives)}"
 
 
 def bump_section(inspection: Inspection, vt0: bool = False) -> list[str]:
-    """Return the lines of a ``test:`` section: steps whose instants the fit finds.
+    """Return the lines of a ``test:`` section: the recorded reference, or steps.
 
-    Their sizes are to be filled in, unless the reference was recorded: vt changes by less, and the
-    gain of a regulator is what makes the difference. ``vt0`` says whether to give the level before.
+    The instants of steps are found by the fit; their sizes are to be filled in: vt changes by less,
+    and the gain of a regulator is what makes the difference. ``vt0`` says whether to give the level
+    before.
     """
     lines = ["test:"]
     if vt0:
         level = inspection.channel_of("vt")
         lines.append(commented(f"  vt0: {_number(level.level if level else 1.0)}", "at rest"))
+    if inspection.reference is not None:
+        text = f"{inspection.reference.name}, from its level at rest on"
+        return [*lines, commented("  vref: recorded", text)]
     if not inspection.steps:
         at = "the record shows no step: when, s, and by how much, pu?"
         return [*lines, f"  # {at}", f"  vref: [{{at: {FILL_IN}, step: {FILL_IN}}}]"]
@@ -159,7 +170,7 @@ def _about(channel: InspectedChannel) -> str:
     return f"{why}; {channel.level:.5g} {channel.unit or '?'} at rest; base: {base}"
 
 
-def _channel(channel: InspectedChannel, noisy: bool) -> str:
+def _channel(channel: InspectedChannel, noisy: bool, drives: bool) -> str:
     entries = {"column": _text(channel.name)}
     if channel.unit == "%":
         entries["scale"] = "0.01"
@@ -167,9 +178,9 @@ def _channel(channel: InspectedChannel, noisy: bool) -> str:
         entries |= {"unit": str(channel.unit), "base": FILL_IN}
     elif not in_per_unit(channel):
         entries |= {"unit": FILL_IN, "base": FILL_IN}
-    if noisy:
+    if noisy and not drives:
         entries["noise"] = yaml_number(float(f"{channel.noise:.2g}"))
-    if channel.spikes:
+    if channel.spikes and not drives:
         entries["outliers"] = f"{SPIKE_LIMIT:g}"
     if len(entries) == 1:
         return entries["column"]

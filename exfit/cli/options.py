@@ -133,6 +133,7 @@ def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
     files = [
         case.path,
         *(case.folder / recording.record.file for recording in recordings),
+        *(case.folder / file for test in case.tests for file in test.files),
         *filter(None, [case.parameter_file]),
     ]
     names = [recording.name for recording in recordings] if command in NAMED_AFTER_RECORDS else ()

@@ -17,11 +17,12 @@ from exfit.fitting.levels import deviation, levels_of
 from exfit.fitting.nuisance import nuisance_parameters, prefix_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recordings import record_of
+from exfit.fitting.references import references_of, span_of
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.fitting.system import system_of
 from exfit.plants import NETWORK, VT0
 from exfit.records.record import Record
-from exfit.simulation.inputs import MOST_STEPS, Inputs, InputStep, RecordedInputs
+from exfit.simulation.inputs import MOST_STEPS, Inputs, RecordedInput
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -37,15 +38,21 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     system = system_of(view)
     driving = [signal for signal in file.channels if signal in system.inputs]
     record = without_masked(record_of(case, recording), file, driving)
-    test = with_detected_steps(case, recording, record)
+    references = references_of(case, recording.test, span_of(recording.test, record), record, file)
+    resolved = recording.model_copy(update={"test": references.test})
+    test = with_detected_steps(case, resolved, record)
     network = {} if view is case else _network_values(view)
     steps = tuple(input_steps(view, test, {**values, **network}))
-    nuisances, free = nuisance_parameters(prefix_of(recording), test, file, steps)
+    nuisances, free = nuisance_parameters(
+        prefix_of(recording), test, file, steps, alone=not references.recorded
+    )
     if any(nuisance.kind == "shift" for nuisance in nuisances):
         steps = tuple(step._replace(smooth=False) for step in steps)
     delay = start_value(file.delay) or 0.0
     beyond = max(0.0, _earliest_reading(nuisances, free) - delay)
-    inputs = _inputs(test, record, steps, driving, beyond)
+    recorded = {**_played_back(view, test, record, driving), **references.recorded}
+    begin, end = span_of(test, record)
+    inputs = Inputs(begin, end + beyond, steps, recorded)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
     experiment = Experiment(
         simulator.with_inputs(steps, delay) if delay else simulator,
@@ -55,7 +62,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         recording.name,
     )
     starts = tuple(_with_given_start(case, parameter) for parameter in free)
-    return ExperimentSetup(case.path, test, record, experiment, starts)
+    return ExperimentSetup(case.path, test, record, experiment, starts, references.files)
 
 
 def _with_given_start(case: Case, parameter: FreeParameter) -> FreeParameter:
@@ -87,20 +94,13 @@ def _earliest_reading(nuisances: Sequence[Nuisance], free: Sequence[FreeParamete
     )
 
 
-def _inputs(
-    test: BumpTest,
-    record: Record,
-    steps: tuple[InputStep, ...],
-    driving: Sequence[str],
-    beyond: float,
-) -> Inputs:
-    """Return the inputs along a record, until ``beyond`` seconds after its end."""
-    begin = float(record.time[0]) if test.begin is None else test.begin
-    inputs = Inputs(begin, float(record.time[-1]) + beyond, steps)
-    if not driving:
-        return inputs
-    deviations: dict[str, Array] = {s: deviation(test, record, s) for s in driving}
-    return replace(inputs, recorded=RecordedInputs(record.time, deviations))
+def _played_back(
+    case: Case, test: BumpTest, record: Record, driving: Sequence[str]
+) -> dict[str, RecordedInput]:
+    """Return the signals of a record that are played back in place of a plant."""
+    if not case.kind.plays_back:
+        return {}
+    return {s: RecordedInput(record.time, deviation(test, record, s)) for s in driving}
 
 
 def _channels(
@@ -145,7 +145,9 @@ def plain_simulator(case: Case, values: Values) -> tuple[Simulator, dict[str, fl
             ]
         )
     times = np.linspace(0.0, test.duration, round(count) + 1)
-    inputs = Inputs(0.0, test.duration, tuple(input_steps(case, test, values)))
+    references = references_of(case, test, (0.0, test.duration))
+    steps = tuple(input_steps(case, references.test, values))
+    inputs = Inputs(0.0, test.duration, steps, references.recorded)
     return Simulator(system_of(case), inputs, times, case.simulation.step), {VT0: vt0}
 
 

@@ -95,6 +95,16 @@ def _filtering(record: Record, signal: str, section: Section, kept: Mask) -> Fil
         raise RecordError(f"{record.source}: {signal}: {what}: {fault}") from fault
 
 
+def filtering_of(place: str, time: NDArray[np.float64], filter: Filter | None) -> Filtering | None:
+    """Return the filter of a recorded signal (M,) that drives a simulation, None without one."""
+    if filter is None:
+        return None
+    try:
+        return Filtering(time, np.ones(len(time), dtype=bool), _filter(filter))
+    except ValueError as fault:
+        raise RecordError(f"{place}: filter: {fault}") from fault
+
+
 def _filter(section: Filter | None) -> LowPass | Median | None:
     if section is None:
         return None

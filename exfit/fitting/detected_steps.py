@@ -8,7 +8,6 @@ import numpy as np
 
 from exfit.case.case import Case
 from exfit.case.schema import (
-    SIGNALS_OF_A_TEST,
     BumpTest,
     FindableStep,
     RecordFile,
@@ -20,6 +19,7 @@ from exfit.dsp.filtering import outliers
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.nuisance import prefix_of
+from exfit.plants import REFERENCES
 from exfit.records.record import Record
 from exfit.records.steps import INSTANT_WITHIN
 
@@ -57,7 +57,7 @@ def _refuse_wrong_order(place: str, steps: Sequence[FindableStep]) -> None:
 def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | None:
     """Return until when a record is at rest, s: until the earliest instant that it may show."""
     delay = _lowest(file.delay)
-    events = (event for signal in SIGNALS_OF_A_TEST for event in test.events(signal))
+    events = (event for signal in REFERENCES for event in test.events(signal))
     unknown = [event.at for event in events if isinstance(event.at, Unknown)]
     if test.steady_until is not None or not (unknown or delay < 0.0):
         return test.steady_until

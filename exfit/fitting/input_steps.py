@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 
 from exfit.case.case import Case
 from exfit.case.schema import (
-    SIGNALS_OF_A_TEST,
     BumpTest,
     StepSection,
     Switch,
@@ -12,7 +11,7 @@ from exfit.case.schema import (
     start_value,
 )
 from exfit.errors import CaseError
-from exfit.plants import NETWORK
+from exfit.plants import NETWORK, REFERENCES
 from exfit.simulation.inputs import InputStep
 
 Values = Mapping[str, float]
@@ -41,7 +40,7 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
 
 def _of_signals(test: BumpTest) -> Iterator[InputStep]:
     """Yield the steps and ramps of the reference and of the stabiliser's signal."""
-    for signal in SIGNALS_OF_A_TEST:
+    for signal in REFERENCES:
         for event in test.events(signal):
             at, step = start_value(event.at) or 0.0, start_value(event.step) or 0.0
             yield InputStep(at, step, signal, isinstance(event.at, Unknown), event.ramp or 0.0)

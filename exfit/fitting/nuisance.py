@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
-from exfit.case.schema import SIGNALS_OF_A_TEST, SINGLE, BumpTest, RecordFile, Recording, Unknown
+from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
 from exfit.fitting.experiment import Nuisance
 from exfit.fitting.parameters import FreeParameter
+from exfit.plants import REFERENCES
 from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
 
@@ -29,35 +30,30 @@ def prefix_of(recording: Recording) -> str:
 def names_of(recording: Recording) -> tuple[str, ...]:
     """Return the names of all that a fit finds about a record."""
     test, file = recording.test, recording.record
-    steps = [
-        InputStep(0.0, 0.0, signal) for signal in SIGNALS_OF_A_TEST for _ in test.events(signal)
-    ]
-    return tuple(
-        nuisance.name for nuisance, _ in _with_sections(prefix_of(recording), test, file, steps)
-    )
+    steps = [InputStep(0.0, 0.0, signal) for signal in REFERENCES for _ in test.events(signal)]
+    prefix = prefix_of(recording)
+    nuisances = [*_of_steps(prefix, test, steps, shift=False), *_of_record(prefix, test, file)]
+    return tuple(nuisance.name for nuisance, _ in nuisances)
 
 
 def nuisance_parameters(
-    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep]
+    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep], alone: bool = True
 ) -> tuple[tuple[Nuisance, ...], tuple[FreeParameter, ...]]:
-    """Return what a fit finds about a record; the names begin with ``prefix``."""
-    nuisances = [*_with_sections(prefix, test, file, steps)]
+    """Return what a fit finds about a record; the names begin with ``prefix``.
+
+    ``alone`` says that nothing but the steps moves the unit.
+    """
+    shift = alone and shifted(test, file, steps)
+    nuisances = [*_of_steps(prefix, test, steps, shift), *_of_record(prefix, test, file)]
     return tuple(nuisance for nuisance, _ in nuisances), tuple(
         _free(nuisance.name, value) for nuisance, value in nuisances
     )
 
 
-def _with_sections(
-    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep]
-) -> Iterator[tuple[Nuisance, Unknown]]:
-    yield from _of_steps(prefix, test, steps, shifted(test, file, steps))
-    yield from _of_record(prefix, test, file)
-
-
 def _of_steps(
     prefix: str, test: BumpTest, steps: Sequence[InputStep], shift: bool
 ) -> Iterator[tuple[Nuisance, Unknown]]:
-    for signal in SIGNALS_OF_A_TEST:
+    for signal in REFERENCES:
         places = [place for place, change in enumerate(steps) if change.signal == signal]
         for number, (place, step) in enumerate(zip(places, test.events(signal), strict=True)):
             which = f"{prefix}{signal}{number + 1 if number else ''}"

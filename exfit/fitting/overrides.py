@@ -11,6 +11,7 @@ from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.fitting.nuisance import names_of
+from exfit.fitting.references import with_recorded_steps
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
 from exfit.util.text import near
@@ -157,4 +158,5 @@ def _no_numbers(key: str, given: Any) -> Iterator[str]:
 
 def _of_records(case: Case) -> list[str]:
     """Return the names of all that a fit of a case finds about its records."""
-    return [name for recording in case.recordings for name in names_of(recording)]
+    recordings = [with_recorded_steps(case, recording) for recording in case.recordings]
+    return [name for recording in recordings for name in names_of(recording)]

@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import (
-    SIGNALS_OF_A_TEST,
     BumpTest,
     ChannelSection,
     PhasesSection,
     RecordFile,
     Recording,
+    ReferenceFile,
     ReferenceTable,
+    Time,
     TimeColumn,
     Unknown,
     start_value,
 )
 from exfit.errors import CaseError, RecordError
+from exfit.plants import REFERENCES
 from exfit.records.clock import Clock
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
@@ -84,7 +86,7 @@ def read_section(file: RecordFile, folder: Path, per_unit: bool) -> Record:
     """
     return read_record(
         folder / file.file,
-        clock_of(file),
+        clock_of(file.time),
         {signal: source_of(channel) for signal, channel in file.channels.items()},
         file.window,
         file.gaps == "skip",
@@ -93,7 +95,7 @@ def read_section(file: RecordFile, folder: Path, per_unit: bool) -> Record:
         frozenset(
             signal
             for signal, channel in file.channels.items()
-            if per_unit and _as_it_stands(channel)
+            if per_unit and standing_alone(channel)
         ),
     )
 
@@ -133,23 +135,23 @@ def _refuse_short_tables(
     case: Case, test: BumpTest, covered: tuple[float, float], path: Path
 ) -> None:
     """Raise CaseError where a table does not cover a test from its start to its end (s)."""
-    for signal in SIGNALS_OF_A_TEST:
+    for signal in REFERENCES:
         reference = getattr(test, signal)
         if isinstance(reference, ReferenceTable):
             first, last = reference.table[0][0], reference.table[-1][0]
             if not first <= covered[0] <= covered[1] <= last:
                 rows, whole = (f"{show(a)} ... {show(b)} s" for a, b in ((first, last), covered))
                 text = f"{rows} does not cover the test, {whole} of {path}: add a row"
-                raise CaseError([f"{case.path}: {signal}.table: {text}"])
+                raise CaseError([f"{case.path}: test.{signal}.table: {text}"])
 
 
-def clock_of(record: RecordFile) -> Clock:
-    """Return the place of the time of a record."""
-    if isinstance(record.time, str):
-        return Clock((record.time,))
-    if isinstance(record.time, TimeColumn):
-        return Clock((record.time.column,), record.time.unit)
-    return Clock(record.time)
+def clock_of(time: Time) -> Clock:
+    """Return the place of the time in a file."""
+    if isinstance(time, str):
+        return Clock((time,))
+    if isinstance(time, TimeColumn):
+        return Clock((time.column,), time.unit)
+    return Clock(time)
 
 
 def column_of(channel: ChannelSection) -> Column:
@@ -160,9 +162,9 @@ def column_of(channel: ChannelSection) -> Column:
     )
 
 
-def _as_it_stands(channel: ChannelSection | PhasesSection) -> bool:
+def standing_alone(channel: ChannelSection | PhasesSection | ReferenceFile) -> bool:
     """Return whether a case takes the numbers of a column for per unit."""
-    if not isinstance(channel, ChannelSection):
+    if isinstance(channel, PhasesSection):
         return False
     return channel.unit is None and channel.base is None and channel.scale == 1.0
 

@@ -1,7 +1,7 @@
 """A test of a case beside its record, set up to be simulated."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -35,7 +35,8 @@ def with_enough_substeps(simulated: Simulated, values: Values, case: Path) -> Si
 class ExperimentSetup:
     """A test of a case beside its record, ready to be simulated.
 
-    ``test`` has a number for everything; ``free`` are those of its values that a fit finds.
+    ``test`` has a number for everything; ``free`` are those of its values that a fit finds,
+    ``references`` the files of the test's signals beside the record, by signal.
     """
 
     case: Path
@@ -43,6 +44,7 @@ class ExperimentSetup:
     record: Record
     experiment: Experiment
     free: tuple[FreeParameter, ...]
+    references: Mapping[str, Record] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

@@ -17,7 +17,7 @@ from exfit.plants.parts import (
     exciter_inputs,
     exciter_parameters,
 )
-from exfit.plants.plant import Equipment, PlantKind, Stabilised
+from exfit.plants.plant import REFERENCES, Equipment, PlantKind, Stabilised
 from exfit.plants.playback import DRIVING, initial, playback
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "MEASURED",
     "NETWORK",
     "OPEN_CIRCUIT",
+    "REFERENCES",
     "SATURATION",
     "STABILISER",
     "VT0",

@@ -12,6 +12,7 @@ from exfit.plants.parts import SaturationForm
 from exfit.signals import COMPARED
 
 Component = TypeVar("Component", Model, Machine)
+REFERENCES = ("vref", "vs")  # inputs that are given as steps, ramps, tables or records
 Requirement = Literal["exciter", "machine", "network"]
 
 
@@ -85,6 +86,11 @@ class PlantKind:
     def plays_back(self) -> bool:
         """Whether a record drives the simulation, which cannot be without one."""
         return bool(self.driving)
+
+    @property
+    def recorded_inputs(self) -> tuple[str, ...]:
+        """The inputs of which a test may take what the record shows, beside a plant."""
+        return () if self.plays_back else tuple(name for name in self.events if name in REFERENCES)
 
     @property
     def compared(self) -> tuple[str, ...]:

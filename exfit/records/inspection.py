@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.quality import mains_frequency, noise_of
+from exfit.dsp.reference_moves import rest_end
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
 from exfit.records.channel_inspection import PLACES_LISTED, InspectedChannel, inspect_channel
@@ -72,6 +73,18 @@ class Inspection:
     def channel_of(self, signal: str) -> InspectedChannel | None:
         """Return the channel that seems to be a signal, None without one."""
         return next((channel for channel in self.channels if channel.signal == signal), None)
+
+    @property
+    def reference(self) -> InspectedChannel | None:
+        """The channel of a recorded reference that rests and then moves, None without one."""
+        channel = self.channel_of(REFERENCE)
+        if channel is None or channel.missing:
+            return None
+        try:
+            rest_end(self.samples[channel.name])
+        except ValueError:
+            return None
+        return channel
 
     @property
     def findings(self) -> tuple[str, ...]:

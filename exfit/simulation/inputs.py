@@ -82,21 +82,48 @@ def _mean_of_line(x: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedInputs:
-    """Recorded inputs: ``time`` (M,) in s, and what each signal (M,) deviates from the start."""
+class RecordedInput:
+    """A recorded input: by how much its ``samples`` (M,) at ``time`` (s) deviate from the start.
+
+    Between samples it runs in lines; beyond the first and last it stays.
+    """
 
     time: Array
-    signals: Mapping[str, Array]
+    samples: Array
+
+    def on(self, part: GridSegment) -> Array:
+        """Return it at the grid points (n + 1,) of a segment.
+
+        Where samples lie closer than these, it is averaged over the grid with a linear B-spline: so
+        the area under it stays the same, and what lies between grid points is not lost.
+        """
+        if float(np.median(np.diff(self.time))) >= part.step * (1.0 - ON_GRID):
+            return np.interp(part.times, self.time, self.samples)
+        cells = np.arange(-1, part.steps + 2)  # one more on each side
+        grid = part.start + part.step * cells
+        inside = self.time[(self.time > grid[0]) & (self.time < grid[-1])]
+        ends = np.union1d(grid, inside)
+        middles, lengths = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
+        cell = np.clip(np.searchsorted(grid, middles) - 1, 0, len(grid) - 2)
+        # of a product of two lines, Simpson's rule is exact
+        areas = np.zeros((2, len(middles)))
+        for places, weight in ((ends[:-1], 1.0), (middles, 4.0), (ends[1:], 1.0)):
+            share = (places - grid[cell]) / part.step
+            values = np.interp(places, self.time, self.samples) * weight * lengths / 6.0
+            areas += np.stack([1.0 - share, share]) * values
+        falling, rising = (np.bincount(cell, area, len(grid) - 1) for area in areas)
+        averages: Array = (rising[:-1] + falling[1:]) / part.step
+        return averages
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """A test from ``start`` to ``end`` (s): steps of the inputs, and recorded ones played back."""
+    """A test from ``start`` to ``end`` (s): steps of the inputs, and recorded ones by signal."""
 
     start: float
     end: float
     steps: tuple[InputStep, ...]
-    recorded: RecordedInputs | None = None
+    recorded: Mapping[str, RecordedInput] = field(default_factory=dict)
 
     def level(self, signal: str, at: float) -> float:
         """Return the sum of an input's exact steps at an instant; each counts when complete."""
@@ -105,9 +132,12 @@ class Inputs:
 
     def input(self, signal: str, part: GridSegment) -> Array:
         """Return an input at the grid points (n + 1,) of a segment."""
+        u = self.stepped(signal, part)
+        return u + self.recorded[signal].on(part) if signal in self.recorded else u
+
+    def stepped(self, signal: str, part: GridSegment) -> Array:
+        """Return what of an input is steps and ramps."""
         u = np.full(part.steps + 1, self.level(signal, part.start))
-        if self.recorded is not None and signal in self.recorded.signals:
-            u += np.interp(part.times, self.recorded.time, self.recorded.signals[signal])
         for change in self.steps:
             rising = change.at <= part.start < change.end
             if change.signal == signal and (change.smooth or rising):

@@ -71,7 +71,12 @@ class Simulator:
         self.system, self.inputs, self.times = system, inputs, times
         self.step, self.least, self.delay = step, least, delay
         self._grid = grid_segments(inputs, step)
-        self._input_samples = [self._inputs_of(segment) for segment in self._grid]
+        # a long record is read on the grid once, whatever else a fit moves
+        self._recorded_samples = [
+            {name: recorded.on(segment) for name, recorded in inputs.recorded.items()}
+            for segment in self._grid
+        ]
+        self._input_samples = self._inputs_on_grid()
         self._sampling: Interpolation | WholeRun = Interpolation(self._grid, times, delay)
         self._substeps_of: dict[bytes, int] = {}  # of the parameters of late
 
@@ -88,10 +93,7 @@ class Simulator:
         result = copy(self)
         result.inputs, result.delay = replace(self.inputs, steps=steps), delay
         if changed:
-            before = zip(self._input_samples, self._grid, strict=True)
-            result._input_samples = [
-                result._inputs_with(changed, u, segment) for u, segment in before
-            ]
+            result._input_samples = result._inputs_on_grid(changed)
         if delay != self.delay:
             result._sampling = Interpolation(self._grid, self.times, delay)
         return result
@@ -291,18 +293,23 @@ class Simulator:
     def _with(self, step: float, least: int) -> "Simulator":
         return Simulator(self.system, self.inputs, self.times, step, least, self.delay)
 
-    def _inputs_of(self, segment: GridSegment) -> Array:
-        """Return the inputs at the grid points of a segment, (n + 1, nu)."""
-        inputs = [self.inputs.input(name, segment) for name in self.system.inputs]
-        return np.ascontiguousarray(np.stack(inputs, axis=1))
+    def _inputs_on_grid(self, changed: Container[str] | None = None) -> list[Array]:
+        """Return the inputs at the grid points of each segment, (n + 1, nu).
 
-    def _inputs_with(self, changed: Container[str], before: Array, segment: GridSegment) -> Array:
-        """Return the inputs of before with the changed ones of them computed anew."""
-        u = before.copy()
-        for column, name in enumerate(self.system.inputs):
-            if name in changed:
-                u[:, column] = self.inputs.input(name, segment)
-        return u
+        Only those ``changed`` are computed anew, where these are given.
+        """
+        samples = []
+        for k, (segment, recorded) in enumerate(
+            zip(self._grid, self._recorded_samples, strict=True)
+        ):
+            u = np.empty((segment.steps + 1, len(self.system.inputs)))
+            for column, name in enumerate(self.system.inputs):
+                if changed is None or name in changed:
+                    u[:, column] = self.inputs.stepped(name, segment) + recorded.get(name, 0.0)
+                else:
+                    u[:, column] = self._input_samples[k][:, column]
+            samples.append(u)
+        return samples
 
     def _vector(self, values: Values) -> Array:
         return np.array([values[name] for name in self.system.parameters], dtype=np.float64)

@@ -159,7 +159,7 @@ def test_an_exciter_that_needs_the_field_current_says_so(tmp_path):
 def test_what_drives_is_not_compared(tmp_path):
     setup = build_experiments(case_of(exciter(), tmp_path))[0]
     assert [channel.signal for channel in setup.channels] == ["efd"]
-    assert set(setup.experiment.simulator.inputs.recorded.signals) == {"vt", "ifd"}
+    assert set(setup.experiment.simulator.inputs.recorded) == {"vt", "ifd"}
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_a_known_reference_far_away_is_reached_too(tmp_path):
         text = exciter().replace("{type: playback}", f"{{type: playback, vref: {vref}}}")
         case = case_of(text.replace(steps, "steady_until: 1.0"), tmp_path)
         setup = build_experiments(case)[0]
-        still = replace(setup.experiment.simulator.inputs, recorded=None)
+        still = replace(setup.experiment.simulator.inputs, recorded={})
         simulator = Simulator(
             setup.experiment.simulator.system, still, np.linspace(0.0, 1.0, 11), 1e-3
         )

@@ -26,7 +26,7 @@ from exfit.simulation.inputs import (
     Direction,
     Inputs,
     InputStep,
-    RecordedInputs,
+    RecordedInput,
     each,
     grid_segments,
 )
@@ -400,7 +400,7 @@ def test_a_recorder_with_a_delay_shows_what_was(model):
 
 
 def test_a_moved_simulator_is_the_one_built_so():
-    values, played = lively_values("AC1A"), RecordedInputs(CLOCK, {"vref": 1e-3 * np.sin(CLOCK)})
+    values, played = lively_values("AC1A"), {"vref": RecordedInput(CLOCK, 1e-3 * np.sin(CLOCK))}
     steps = (SMOOTH, InputStep(0.7, 1e-4), InputStep(1.3, 2e-4, smooth=True))
     inputs = Inputs(0.0, 2.0, steps, played)
     simulator = Simulator(system_of("AC1A"), inputs, BETWEEN, 1e-3)

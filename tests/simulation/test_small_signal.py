@@ -15,7 +15,7 @@ from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.plants import MACHINE, MEASURED, SATURATION, playback
-from exfit.simulation.inputs import Inputs, InputStep, RecordedInputs
+from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.small_signal import StateSpace, linearised, margins, small_signal
 
@@ -281,7 +281,7 @@ def test_a_small_sine_comes_back_as_the_closed_response_says(name, frequency):
     system, values = system_of(name), lively_values(name)
     times = np.linspace(0.0, 60.0, 60001)
     size = 1e-5
-    sine = RecordedInputs(times, {"vref": size * np.sin(2.0 * np.pi * frequency * times)})
+    sine = {"vref": RecordedInput(times, size * np.sin(2.0 * np.pi * frequency * times))}
     simulator = Simulator(system, Inputs(0.0, 60.0, (), sine), times, 1e-3)
     vt = simulator.samples(values, ("vt",))[0][30000:, 0]
     angle = 2.0 * np.pi * frequency * times[30000:]

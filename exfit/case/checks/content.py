@@ -9,6 +9,7 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
 from exfit.case.checks.plant import model_faults, plants_of_records_faults, stabiliser_faults
 from exfit.case.checks.record import channels_faults, noise_faults, record_faults, repeated_names
+from exfit.case.checks.recorded_reference import recorded_reference_faults
 from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
@@ -68,6 +69,7 @@ def _recording_faults(
     has_record = "record" in recording
     yield from bump_test_faults(test, network, kind)
     yield from nuisance_faults(test, record, kind, has_record)
+    yield from recorded_reference_faults(test, record, kind, has_record)
     if has_record:
         yield from record_faults(test, record)
         yield from channels_faults(record.at("channels"), kind)

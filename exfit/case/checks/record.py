@@ -77,8 +77,8 @@ def _window_faults(test: ContentNode, window: tuple[float, float] | None) -> Ite
 def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of the channels of a record, one by one and together."""
     for signal, channel in channels.sections:
-        if signal not in kind.signals:
-            signals = ", ".join(kind.signals)
+        if signal not in (*kind.signals, *kind.recorded_inputs):
+            signals = ", ".join((*kind.signals, *kind.recorded_inputs))
             yield channel.fault(f"not allowed with plant {kind.name}, which has {signals}")
         if signal in kind.driving:
             yield from _driving_faults(channel)
@@ -145,7 +145,7 @@ def noise_faults(recordings: Sequence[ContentNode], kind: PlantKind) -> Iterator
         channel
         for recording in recordings
         for signal, channel in recording.at("record", "channels").sections
-        if signal not in kind.driving
+        if signal not in (*kind.driving, *kind.recorded_inputs)
     ]
     for channel in channels:
         if "noise" in channel and "weight" in channel:

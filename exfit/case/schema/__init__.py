@@ -3,24 +3,23 @@
 The descriptions reach editors through the JSON Schema, and the documentation of the keys.
 """
 
+from exfit.case.schema.columns import Filter, MedianSection, Time, TimeColumn
 from exfit.case.schema.document import CaseDocument
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
 from exfit.case.schema.plants import InfiniteBus, OpenCircuit, Plant, SaturationName, Stabiliser
 from exfit.case.schema.records import (
     SINGLE,
     ChannelSection,
-    Filter,
-    MedianSection,
     PhasesSection,
     RecordFile,
     Recording,
-    TimeColumn,
 )
 from exfit.case.schema.tests import (
-    SIGNALS_OF_A_TEST,
+    MOST_ROWS,
     BumpTest,
     FindableStep,
     Reference,
+    ReferenceFile,
     ReferenceTable,
     StepSection,
     Switch,
@@ -28,7 +27,7 @@ from exfit.case.schema.tests import (
 from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
 
 __all__ = [
-    "SIGNALS_OF_A_TEST",
+    "MOST_ROWS",
     "SINGLE",
     "BumpTest",
     "CaseDocument",
@@ -47,12 +46,14 @@ __all__ = [
     "RecordFile",
     "Recording",
     "Reference",
+    "ReferenceFile",
     "ReferenceTable",
     "SaturationName",
     "SimulationSection",
     "Stabiliser",
     "StepSection",
     "Switch",
+    "Time",
     "TimeColumn",
     "Unknown",
     "Value",

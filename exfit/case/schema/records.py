@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
     Discriminator,
     Field,
@@ -15,6 +14,7 @@ from pydantic import (
 )
 
 from exfit.case.messages import FILE_NAME
+from exfit.case.schema.columns import Filter, Time
 from exfit.case.schema.plants import OffLine, OnLine
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Count, Findable, Number, Positive, Section, Text, thawed
@@ -29,29 +29,6 @@ SINGLE = "fit"  # name of a record that stands alone
 
 def _channel(value: Any) -> Any:
     return {"column": value} if isinstance(value, str) else value
-
-
-class LowPassSection(Section):
-    """A low-pass filter, applied forwards and backwards, so without delay."""
-
-    lowpass: Positive = Field(description="Cut-off frequency, Hz.")
-
-
-class MedianSection(Section):
-    """A running median."""
-
-    median: Count = Field(description="Number of samples, odd.")
-
-
-def _is_median(value: Any) -> str:
-    median = isinstance(value, MedianSection) or (isinstance(value, dict) and "median" in value)
-    return "[median]" if median else "[lowpass]"
-
-
-Filter = Annotated[
-    Annotated[LowPassSection, Tag("[lowpass]")] | Annotated[MedianSection, Tag("[median]")],
-    Discriminator(_is_median),
-]
 
 
 class Compared(Section):
@@ -129,27 +106,6 @@ def _kind_of_channel(value: Any) -> str:
 Entry = Annotated[
     Annotated[ChannelSection, Tag("[column]")] | Annotated[PhasesSection, Tag("[phases]")],
     Discriminator(_kind_of_channel),
-]
-
-
-class TimeColumn(Section):
-    """The column with the time, and its unit."""
-
-    column: Text = Field(description="Name of the column.")
-    unit: Literal["s", "ms", "us", "min"] = Field(description="Unit of its numbers.")
-
-
-def _kind_of_clock(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return "[pair]"
-    return "[column]" if isinstance(value, dict | BaseModel) else "[name]"
-
-
-Time = Annotated[
-    Annotated[Text, Tag("[name]")]
-    | Annotated[tuple[Text, Text], Tag("[pair]")]
-    | Annotated[TimeColumn, Tag("[column]")],
-    Discriminator(_kind_of_clock),
 ]
 
 

@@ -1,18 +1,21 @@
 """The sections of the case file about a test: what was done to the unit."""
 
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from exfit.case.schema.columns import Filter, Time
 from exfit.case.schema.values import (
     Findable,
     NotNegative,
     Number,
     Positive,
     Section,
+    Text,
     start_value,
 )
+from exfit.plants import REFERENCES
 
 MOST_ROWS = 1000  # of a table; a longer one is a file
 
@@ -61,16 +64,43 @@ class ReferenceTable(Section):
         )
 
 
+class ReferenceFile(Section):
+    """A signal from a file in any format of a record, on the clock of the record.
+
+    It is taken like a recorded one; where its rows are more than 0.1 s apart, as a table.
+    """
+
+    file: Text = Field(description="Path, relative to the case file.")
+    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    time: Time = Field(description="Column with the time, given like record.time.")
+    column: Text = Field(
+        description="Name of the column; column / base * scale is in pu, of which only changes act."
+    )
+    unit: Text | None = Field(default=None, description="Unit of the column, such as kV, pu or %.")
+    base: Positive | None = Field(default=None, description="Value of 1 pu in that unit.")
+    scale: Number = Field(default=1.0, description="Factor; not zero.")
+    filter: Filter | None = Field(
+        default=None,
+        description="{lowpass: Hz} or {median: samples}, against its noise; its jumps stay.",
+    )
+
+
 def _kind_of_reference(value: Any) -> str:
+    if isinstance(value, str):
+        return "[recorded]"
+    file = isinstance(value, dict) and bool({"file", "column"} & value.keys())
+    if file or isinstance(value, ReferenceFile):
+        return "[file]"
     return "[table]" if isinstance(value, dict | ReferenceTable) else "[steps]"
 
 
 Reference = Annotated[
     Annotated[tuple[FindableStep, ...], Field(min_length=1), Tag("[steps]")]
-    | Annotated[ReferenceTable, Tag("[table]")],
+    | Annotated[ReferenceTable, Tag("[table]")]
+    | Annotated[ReferenceFile, Tag("[file]")]
+    | Annotated[Literal["recorded"], Tag("[recorded]")],
     Discriminator(_kind_of_reference),
 ]
-SIGNALS_OF_A_TEST = ("vref", "vs")  # which a test changes by steps, ramps and tables
 
 
 class Switch(Section):
@@ -104,7 +134,8 @@ class BumpTest(Section):
     )
     vref: Reference = Field(
         default=(),
-        description="The reference: steps and ramps in order of time, or a table.",
+        description="The reference: steps and ramps in order of time; a table; a file; or "
+        "recorded: the channel vref of the record.",
     )
     vs: Reference = Field(
         default=(),
@@ -123,14 +154,27 @@ class BumpTest(Section):
     )
 
     def events(self, signal: str) -> tuple[FindableStep, ...]:
-        """Return the steps and ramps of vref or vs; those of a table in order of time."""
-        given: tuple[FindableStep, ...] | ReferenceTable = getattr(self, signal)
-        return given.events if isinstance(given, ReferenceTable) else given
+        """Return the steps and ramps of vref or vs in order of time; none of a recorded one."""
+        given = self.reference(signal)
+        if isinstance(given, ReferenceTable):
+            return given.events
+        return given if isinstance(given, tuple) else ()
+
+    def reference(self, signal: str) -> Reference:
+        """Return how vref or vs is given."""
+        given: Reference = getattr(self, signal)
+        return given
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files of its signals, as the case names them."""
+        given = map(self.reference, REFERENCES)
+        return tuple(reference.file for reference in given if isinstance(reference, ReferenceFile))
 
     @property
     def instants(self) -> tuple[float, ...]:
         """The times of all events that are given as numbers, s, in order."""
-        events = (event for signal in SIGNALS_OF_A_TEST for event in self.events(signal))
+        events = (event for signal in REFERENCES for event in self.events(signal))
         instants = {start_value(event.at) for event in events}
         instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
         return tuple(sorted(at for at in instants if at is not None))
