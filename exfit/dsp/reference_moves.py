@@ -17,6 +17,7 @@ JUMP = (0.1, 10.0)  # of the whole range and times the noise: a smaller change i
 NEIGHBOUR = (0.2, 4.0)  # of the jump and times the noise: by less it changes before and after
 WINDOW = 10  # samples, before and after a place, whose means show whether the reference moves there
 MOVING = 4.0  # times the standard error of their difference
+FEWEST_RESTING = 30  # samples at rest: of fewer a slope may pass for noise
 DRIFT = 4.0  # times its standard error: a slope beyond is no rest
 LONGEST_JUMP = 0.1  # s between two samples: what takes longer may be a ramp
 UNEVEN = 1.5  # times the usual spacing: a longer one is a gap
@@ -67,9 +68,7 @@ def rest_end(samples: Array) -> int:
     near = np.flatnonzero(away[: far[0]] <= max(NEAR_LEVEL[0] * span, NEAR_LEVEL[1] * noise))
     end = int(near[-1]) + 1 if len(near) else 0
     if end < FEWEST_SAMPLES:
-        raise ValueError(
-            f"at rest for {end} samples only, not for {FEWEST_SAMPLES}: its level is unknown"
-        )
+        raise ValueError(f"moves within its first {FEWEST_SAMPLES} samples: its level is unknown")
     return end
 
 
@@ -101,7 +100,7 @@ def _rests(samples: Array, noise: float) -> Iterator[tuple[int, int]]:
     places = np.pad(moved, (WINDOW - 1, WINDOW), mode="edge")
     bounds = np.flatnonzero(np.diff(places, prepend=True, append=True))
     for start, stop in zip(bounds[::2], bounds[1::2], strict=True):
-        if stop - start >= 2 * WINDOW and _level(samples[start:stop], noise):
+        if stop - start >= FEWEST_RESTING and _level(samples[start:stop], noise):
             yield int(start), int(stop)
 
 
