@@ -59,7 +59,10 @@ def robust_of(case: Case) -> Robust | None:
 
 
 def free_parameters(case: Case, setups: Sequence[ExperimentSetup] = ()) -> list[FreeParameter]:
-    """Return the free parameters of a case, then what is found about its records."""
+    """Return the free parameters of a case, then what is found about its records.
+
+    Raises CaseError for a start given beside the case that gives no size by which to search.
+    """
     rows = case.rows()
     shared = [
         FreeParameter(
@@ -71,4 +74,10 @@ def free_parameters(case: Case, setups: Sequence[ExperimentSetup] = ()) -> list[
         )
         for name, section in case.free().items()
     ]
+    sizeless = [parameter.name for parameter in shared if parameter.width == 0.0]
+    if sizeless:
+        raise CaseError(
+            f"{case.path}: {name}: a start of 0 gives no size by which to search: give min and max"
+            for name in sizeless
+        )
     return [*shared, *(parameter for setup in setups for parameter in setup.free)]

@@ -9,14 +9,17 @@ import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import CONFIGS
 from records import TEST, UNIT, case_of, one, write
 from records import TIME as SAMPLES
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
+from exfit.exchange.psse.export import export
 from exfit.fitting.build import build_experiments
-from exfit.fitting.overrides import changed_values, read_parameters
+from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
 from exfit.fitting.parameters import FreeParameter
+from exfit.models import MODELS
 from exfit.records.record import Record
 from exfit.results.io import load_result, result_text
 from exfit.results.tables import parameter_file
@@ -134,6 +137,20 @@ def test_what_the_equations_exclude_is_refused_as_a_value_too(found):
             changed_values(case, {name: value}, "--set")
 
 
+def test_a_start_of_zero_given_beside_the_case_is_refused_where_it_gives_no_size(found):
+    folder, content, _ = found
+    case = with_given_values(case_of(content, folder), {"KD": 0.0}, "--set")
+    with pytest.raises(CaseError, match="KD: a start of 0 gives no size"):
+        fit(case)
+
+
+def test_the_file_for_psse_warns_of_what_is_not_physical(found):
+    _, _, result = found
+    (warning,) = [text for text in export(result, 1, "1").warnings if "not physical" in text]
+    assert "KD -0.3" in warning
+    assert "TE" not in warning
+
+
 def test_a_profile_goes_where_the_bounds_would_have_stopped_it(found):
     folder, content, result = found
     (of_gain,) = profile(case_of(content, folder), "KD").profiles
@@ -156,3 +173,34 @@ def test_bounds_that_are_never_met_do_not_matter(strategy):
         case = Case.from_dict(content, Record.from_arrays(TIME, {"vt": TRUTH}))
         ends.append([parameter.value for parameter in fit(case, strategy).parameters.values()])
     assert np.allclose(*ends, rtol=1e-5)  # the record is noiseless: both end at k = 4, a = 2
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("factor", [0.5, 1.6])
+def test_a_fit_without_bounds_runs_to_an_end_with_every_model(model, factor):
+    """Whatever it meets on its way is a rejected trial; what it ends with, the equations allow."""
+    content = yaml.safe_load((CONFIGS / "models" / f"{model.lower()}.yaml").read_text())
+    content["test"]["duration"] = 4.0
+    truth = Case.from_dict(content)
+    response = simulate(truth).response
+    rng = np.random.default_rng(1)
+    noisy = response.signals["vt"] + 1e-4 * rng.standard_normal(len(response.time))
+    record = Record.from_arrays(response.time, {"vt": noisy})
+    del content["test"]["duration"]
+    fixed = content["parameters"].setdefault("fixed", {})
+    free = content["parameters"]["free"] = {}
+    for row in MODELS[model].sheet:
+        if row.free:
+            fixed.pop(row.symbol, None)
+            start = factor * truth.values()[row.symbol]
+            free[row.symbol] = {"start": start, "scale": "linear"}
+    content["estimate"] = {"iterations": 12}
+    rows = Case.from_dict(content, record).rows()
+    for strategy in ("dgn", "lm"):
+        result = fit(Case.from_dict(content, record), strategy)
+        assert result.cost < 0.1 * result.start_cost
+        assert json.loads(result_text(result))["parameters"].keys() == free.keys()
+        for name, parameter in result.parameters.items():
+            assert rows[name].range_fault(parameter.value) is None
+            marked = any(note.startswith(f"{name} = ") for note in result.notes)
+            assert marked == (not parameter.physical), name

@@ -61,6 +61,9 @@ def _of_fit(result: FitResult) -> Iterator[str]:
     """Yield what of the fit itself the reader must know."""
     if not result.success:
         yield f"the fit did not converge: {result.message}"
+    outside = [f"{name} {p.value:.4g}" for name, p in result.parameters.items() if not p.physical]
+    if outside:
+        yield f"not physical, outside the range of the data sheet: {', '.join(outside)}"
     if result.saturation != "quadratic":
         yield f"fitted with saturation: {result.saturation}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
 
