@@ -60,7 +60,7 @@ class LineSearch:
         move = shorten(problem, linear, step, armijo=self.armijo, cut=self.cut)
         if move.point is None:
             return move, self
-        moved = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))
+        farthest = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))
         useful = move.damping == 1.0 and move.quality > GOOD
         least = self.reach if useful else LEAST_REACH
-        return move, replace(self, reach=max(least, 2.0 * moved))
+        return move, replace(self, reach=max(least, 2.0 * farthest))

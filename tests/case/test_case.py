@@ -50,7 +50,12 @@ estimate:
   strategy: auto
   jacobian: central
   iterations: 50
-  tolerance: {gradient: 1.0e-7, step: 1.0e-9}
+  tolerance: {gradient: 1.0e-7, gradient_absolute: 1.0e-9, step: 1.0e-9}
+  difference_step: 1.0e-5
+  stop: {rmse: 2.0e-4}
+  armijo: 1.0e-3
+  dgn: {step: full, cut: half}
+  lm: {update: ratio, nu: 0.5, nu_min: 1.0e-6, increase: 4, decrease: 0.25}
   good_enough: {rmse: 3.0e-4}
 simulation: {step: 0.002, output_step: 0.01}
 validate:
@@ -119,6 +124,11 @@ def test_the_case_holds_what_the_file_says(case_file):
     estimate = case.estimate
     assert (estimate.strategy, estimate.jacobian, estimate.iterations) == ("auto", "central", 50)
     assert (estimate.tolerance.gradient, estimate.tolerance.step) == (1e-7, 1e-9)
+    assert (estimate.tolerance.gradient_absolute, estimate.difference_step) == (1e-9, 1e-5)
+    assert (estimate.stop.rmse, estimate.armijo) == (2e-4, 1e-3)
+    assert (estimate.dgn.step, estimate.dgn.cut) == ("full", "half")
+    lm = estimate.lm
+    assert (lm.update, lm.nu, lm.nu_min, lm.increase, lm.decrease) == ("ratio", 0.5, 1e-6, 4, 0.25)
     assert (estimate.good_enough.rmse, case.accept.rmse) == (3e-4, 1.5e-4)
     assert (case.simulation.step, case.simulation.output_step) == (0.002, 0.01)
     (validation,) = case.validations
@@ -164,6 +174,11 @@ def test_what_may_be_missing_has_a_default(case_file):
     )
     assert (estimate.tolerance.gradient, estimate.tolerance.step) == (1e-8, 1e-10)
     assert estimate.good_enough.rmse == 2e-4
+    assert estimate.tolerance.gradient_absolute is estimate.difference_step is estimate.stop is None
+    assert (estimate.armijo, estimate.dgn.step, estimate.dgn.cut) == (1e-4, "capped", "parabola")
+    lm = estimate.lm
+    assert (lm.update, lm.radius, lm.nu) == ("radius", 0.5, None)
+    assert (lm.nu_min, lm.increase, lm.decrease) == (1e-3, 2.0, 0.5)
     assert (case.simulation.step, case.simulation.output_step) == (0.001, 0.005)
     assert case.validations == ()
 
@@ -312,6 +327,42 @@ def test_all_faults_of_a_case_made_in_python_are_reported_with_their_places():
 FORM = {
     "unknown key": ("saturation:", "saturtion:", "saturtion", ["unknown key", "saturation?"]),
     "unknown inner key": ("iterations:", "tries:", "estimate.tries", ["unknown key", "strategy"]),
+    "limit of an unknown phase": (
+        "iterations: 50",
+        "iterations: {lm: 20, dng: 20}",
+        "estimate.iterations.dng",
+        ["unknown key", "dgn?"],
+    ),
+    "no iterations of a phase": (
+        "iterations: 50",
+        "iterations: {lm: 0}",
+        "estimate.iterations.lm",
+        ["0 is below 1"],
+    ),
+    "words for iterations": (
+        "iterations: 50",
+        "iterations: many",
+        "estimate.iterations",
+        ["'many' is not a whole number"],
+    ),
+    "Armijo's constant too large": (
+        "armijo: 1.0e-3",
+        "armijo: 0.5",
+        "estimate.armijo",
+        ["0.5 is not below 0.5"],
+    ),
+    "coarse differences": (
+        "difference_step: 1.0e-5",
+        "difference_step: 0.2",
+        "estimate.difference_step",
+        ["0.2 is above 0.1"],
+    ),
+    "unknown cut": ("cut: half", "cut: third", "estimate.dgn.cut", ["parabola, half"]),
+    "unknown step": ("step: full", "step: long", "estimate.dgn.step", ["capped, full"]),
+    "unknown update": ("update: ratio", "update: rate", "estimate.lm.update", ["ratio?"]),
+    "no increase": ("increase: 4", "increase: 1", "estimate.lm.increase", ["1 is not above 1"]),
+    "no decrease": ("decrease: 0.25", "decrease: 1", "estimate.lm.decrease", ["1 is not below 1"]),
+    "no match": ("stop: {rmse: 2.0e-4}", "stop: {rmse: 0}", "estimate.stop.rmse", ["not above 0"]),
     "unknown key of a machine": (
         "machine: GENROU",
         "machine: GENROU\n  machin: x",
@@ -496,6 +547,24 @@ MEANING = {
         "{at: 2, step: 1}, {at: 2, step: -1}",
         "test.vref[1].at",
         ["2 s is not after 2 s"],
+    ),
+    "step of no difference": (
+        "jacobian: central",
+        "jacobian: exact",
+        "estimate.difference_step",
+        ["only with estimate.jacobian: central, forward or backward"],
+    ),
+    "damping of a radius": (
+        "update: ratio, nu: 0.5, nu_min: 1.0e-6, increase: 4, decrease: 0.25",
+        "increase: 3",
+        "estimate.lm.increase",
+        ["only with estimate.lm.update: ratio"],
+    ),
+    "radius of a ratio": (
+        "nu: 0.5",
+        "radius: 0.5",
+        "estimate.lm.radius",
+        ["only with estimate.lm.update: radius"],
     ),
     "ramp in no time": ("step: 0.05", "step: 0.05, ramp: 0", "test.vref[0].ramp", ["0 is not abo"]),
     "step within a ramp": (

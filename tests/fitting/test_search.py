@@ -7,6 +7,7 @@ from records import recording as recorded
 
 from exfit.analysis.profiles import profile
 from exfit.estimate import STATUS, Stop
+from exfit.fitting.residuals import JACOBIANS
 from exfit.fitting.search import fitted, search
 from exfit.results.model import AT_TOLERANCE
 from exfit.util.text import to_json
@@ -132,6 +133,19 @@ def test_the_cut_of_a_step_is_its_half_or_lies_at_the_parabola(tmp_path):
     assert all(damping == 0.5**inner for damping, inner in lengths["half"])
     assert all(0.2**inner <= damping <= 0.5**inner for damping, inner in lengths["parabola"])
     assert any(damping != 0.5**inner for damping, inner in lengths["parabola"])
+
+
+@pytest.mark.parametrize(("kind", "order"), [("central", 2), ("forward", 1), ("backward", 1)])
+def test_the_step_of_differences_sets_their_error(tmp_path, kind, order):
+    """Half the step: half the error, or a quarter; what is beyond is of a higher order."""
+    errors = []
+    for step in (2e-3, 1e-3):
+        settings = {"jacobian": kind, "difference_step": step}
+        case = case_of({**config("first_order"), "estimate": settings}, tmp_path)
+        residuals = fitted(case)[1].residuals
+        apart = JACOBIANS[kind](residuals)(residuals.start) - residuals.exact(residuals.start)
+        errors.append(np.linalg.norm(apart))
+    assert errors[0] / errors[1] == pytest.approx(2.0**order, rel=0.01)
 
 
 STARTS = [

@@ -286,6 +286,12 @@ def test_a_pole_of_the_first_order_system_is_what_was_fitted(fits, pages):
     assert f"{a / (2 * np.pi):.4g} Hz" in pages("first order").text
 
 
+def test_a_search_that_ended_at_a_tolerance_is_not_called_converged(tmp_path):
+    run = first_order(tmp_path / "case", estimate={"stop": {"rmse": 0.1}}, validate=None)
+    assert verdict(load_result(run)).word == "Ended at a tolerance"
+    assert "standard errors away" in Page(page_of(run)).text
+
+
 @pytest.mark.parametrize(
     ("accept", "down", "word"),
     [

@@ -58,17 +58,17 @@ def _judged(result: FitResult) -> tuple[str, str, bool | None]:
     if missed:
         names = listed(missed)
         return "No match", f"the response matches {names} no better than a constant would", False
-    return _validated(result.validation)
+    return _validated(result.validation, result.outcome)
 
 
-def _validated(validation: Sequence[Comparison]) -> tuple[str, str, bool | None]:
+def _validated(validation: Sequence[Comparison], outcome: str) -> tuple[str, str, bool | None]:
     reasons = [match.reason or match.name for match in validation if not match.accepted]
     limits = [match.limit for match in validation if match.limit is not None]
     if reasons:
         return "Not accepted", "; ".join(reasons), False
     if not validation:
-        return "Converged", "no record was kept for a validation", None
+        return outcome.capitalize(), "no record was kept for a validation", None
     if len(limits) < len(validation):
-        return "Converged", "nothing limits the error of its validations", None
+        return outcome.capitalize(), "nothing limits the error of its validations", None
     limit = f"{max(limits):.2e} pu"
-    return "Accepted", f"converged, and every validation is within its limit, rmse {limit}", True
+    return "Accepted", f"{outcome}, and every validation is within its limit, rmse {limit}", True
