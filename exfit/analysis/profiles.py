@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
+from exfit.analysis.diagnostics import search_range_notes
 from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.problem import FitProblem
@@ -117,7 +118,7 @@ def profile(
             _profile(case, problem.residuals, uncertainty, cost_profile)
             for cost_profile in cost_profiles
         ),
-        notes=tuple(_notes(best, cost_profiles[0].x)),
+        notes=(*search_range_notes(case), *_notes(best, cost_profiles[0].x)),
         interrupted=interrupted,
     )
 

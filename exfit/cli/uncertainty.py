@@ -79,7 +79,8 @@ def identify(
     """Predict which free parameters of CASE a test determines, and how well; it needs no record.
 
     Compared at the start values are the test of CASE, steps of 2, 5 and 10 %, a test twice as long,
-    and further channels. Writes identify.json and figures to runs/CASE-identify, or to DIR.
+    and further channels; the parameters are ranked by what 1 % of each does to the response. Writes
+    identify.json, sensitivities.csv and figures to runs/CASE-identify, or to DIR.
     """
     from exfit import workflows
     from exfit.output import run_folder

@@ -149,4 +149,5 @@ def _origin(result: FitResult, name: str) -> str:
     parameter = result.parameters.get(name)
     if parameter is None:
         return "typical" if name in result.typical else result.ties.get(name, "fixed")
-    return f"fitted, on its {parameter.at_bound}" if parameter.at_bound else "fitted"
+    marks = [f"on its {parameter.at_bound}"] if parameter.at_bound else []
+    return ", ".join(["fitted", *marks, *([] if parameter.physical else ["not physical"])])

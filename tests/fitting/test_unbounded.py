@@ -1,6 +1,8 @@
 """Fits without bounds: what they find, and that they say what is not physical."""
 
+import io
 import json
+import re
 from math import inf
 
 import numpy as np
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from places import CONFIGS
 from records import TEST, UNIT, case_of, one, write
 from records import TIME as SAMPLES
+from rich.console import Console
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
@@ -20,6 +23,8 @@ from exfit.fitting.build import build_experiments
 from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
 from exfit.fitting.parameters import FreeParameter
 from exfit.models import MODELS
+from exfit.output import terminal
+from exfit.output.report import html
 from exfit.records.record import Record
 from exfit.results.io import load_result, result_text
 from exfit.results.tables import parameter_file
@@ -115,6 +120,31 @@ def test_a_missing_bound_is_null_in_the_file_and_infinite_in_python(found, tmp_p
     assert (read["KD"].min, read["KD"].max) == (-inf, inf)
     assert (read["TE"].min, read["TE"].max) == (0.01, inf)
     assert read == dict(result.parameters)
+
+
+def test_terminal_report_and_file_mark_the_value_and_no_other(found):
+    folder, _, result = found
+    stream = io.StringIO()
+    terminal.fit(Console(file=stream, width=80), result)
+    lines = stream.getvalue().splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    for name in ("KD", "TE"):
+        (line,) = [line for line in lines if line.startswith(f"{name} ")]
+        assert line.rstrip().endswith("not physical") == (name == "KD")
+        (stored,) = [row for row in parameter_file(result).splitlines() if f" {name}:" in row]
+        assert stored.endswith("# fitted, not physical" if name == "KD" else "# fitted")
+    ranked = [effect.parameter for effect in result.knowledge.effects]
+    shown = " ".join(line.strip() for line in lines).partition("in units of the noise: ")[2]
+    assert re.findall(r"(K[AD]|T[AE]) [\d.]+", shown.partition("note:")[0])[:3] == ranked
+    page = html(result, folder)
+    rows = {name: page.partition(f'<th scope="row">{name} <small>')[2] for name in ("KD", "TE")}
+    cells = {name: row.partition("</tr>")[0] for name, row in rows.items()}
+    assert "not physical" in cells["KD"]
+    assert ">none<" in cells["KD"]
+    assert "not physical" not in cells["TE"]
+    assert "0.01 … –" in cells["TE"]
+    ranking = page.partition("Change for 1 % of each parameter")[2].partition("</table>")[0]
+    assert re.findall(r'<th scope="row">(\w+)</th>', ranking) == ranked
 
 
 def test_its_parameters_are_taken_up_by_a_simulation_which_says_so(found, tmp_path):

@@ -50,7 +50,7 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
         minima(console, result.minima, result.parameters)
     if result.knowledge is not None:
         console.print()
-        remarks(console, "sensitivity:", ranking(result.knowledge.effects))
+        remarks(console, "sensitivity:", ranking(result.knowledge.effects), "bold")
         unresolved(console, result.knowledge.sentences)
     reasons = [match.reason for match in result.validation]
     notes(console, (text for text in result.notes if text not in reasons))
