@@ -120,14 +120,15 @@ def simulators() -> Figure:
     """Return ANDES and exfit with the same values beside the record."""
     panels = []
     for number, name in tables.SHOWN.items():
-        curves = simulated_twice(name)
+        simulated = simulated_twice(name)
+        time, (measured, ours) = simulated.exfit.time, simulated.exfit.values
         panels.append(
             Panel(
                 f"{number} values of {tables.values_of(name)}",
-                Curve("measured", curves.time, curves.measured),
+                Curve("measured", time, measured),
                 [
-                    Curve("exfit", curves.time, curves.exfit, SIMULATED),
-                    Curve("ANDES", curves.time, curves.andes, START, "--"),
+                    Curve("exfit", time, ours, SIMULATED),
+                    Curve("ANDES", time, simulated.andes.values[1], START, "--"),
                 ],
             )
         )

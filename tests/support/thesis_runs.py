@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,8 +27,11 @@ from thesis_numbers import (
 )
 
 import exfit
+from exfit.analysis.comparison import compare
+from exfit.analysis.differences import Difference
 from exfit.case.case import Case
 from exfit.fitting.search import fitted
+from exfit.output import run_folder
 from exfit.results.comparisons import Comparison
 
 Array = NDArray[np.float64]
@@ -249,36 +254,31 @@ def first_order_fit() -> exfit.FitResult:
 # ---- other simulators, other steps
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Simulated:
-    """The same values in two programs: ANDES' curve and exfit's (M,) beside the record."""
+    """The same values in two programs, exfit and ANDES, and how far each is from the record."""
 
-    name: str
-    time: Array
-    measured: Array
-    andes: Array
-    exfit: Array
-
-    def cost(self, curve: Array) -> float:
-        """Return f of one of the curves."""
-        return half_square(curve - self.measured)
-
-    @property
-    def apart(self) -> float:
-        """The largest difference of the two, per unit."""
-        return float(np.max(np.abs(self.exfit - self.andes)))
+    exfit: Difference
+    andes: Difference
+    between: Difference
 
 
 @cache
 def simulated_twice(name: str) -> Simulated:
-    """Return a curve of sample_data/andes, and the response of exfit to the same values."""
+    """Compare exfit's response to the values of a curve of sample_data/andes with that curve.
+
+    It is what ``exfit compare RUN CURVE --record RECORD`` does.
+    """
     case, method = CURVES[name]
-    match = exfit.simulate(thesis_case(case, RESULTS[case, method], "dgn")).comparison
-    assert match is not None
-    curve = exfit.read_record(SAMPLES / "andes" / f"{name}.csv", "t", {"vt": "vt"})
-    assert np.allclose(curve.time, match.time, atol=1e-9)
-    overlay = match.overlays["vt"]
-    return Simulated(name, match.time, overlay.measured, curve.signals["vt"], overlay.simulated)
+    simulation = exfit.simulate(thesis_case(case, RESULTS[case, method], "dgn"))
+    with TemporaryDirectory() as folder:
+        run = Path(folder)
+        run_folder.write_simulation(simulation, name, run, figures=False)
+        sources = (run, SAMPLES / "andes" / f"{name}.csv")
+        agreement = compare(sources, SAMPLES / "ac1a_up.csv")
+    ours, andes = (entry for entry in agreement.from_reference if entry.signal == "vt")
+    (between,) = agreement.between
+    return Simulated(ours, andes, between)
 
 
 LATE = 0.05  # s

@@ -1,6 +1,6 @@
 """The tables of docs/thesis.md: what the thesis prints beside what exfit finds."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 
 from thesis_numbers import (
@@ -19,12 +19,11 @@ from thesis_numbers import (
     TOOLBOX,
     TRUE,
     A,
-    History,
     K,
 )
 from thesis_runs import (
     TRUTH,
-    Fits,
+    Trialled,
     fits_of,
     jacobians_at,
     replays,
@@ -75,49 +74,41 @@ def scientific(value: float) -> str:
     return f"{value:.2e}".replace("e-0", "e-")
 
 
+def millionths(cost: float) -> str:
+    """Return f in units of 1e-6."""
+    return f"{1e6 * cost:.4g}"
+
+
 def history_table(number: int) -> str:
     """Return a table of the thesis with exfit's columns beside it."""
     (history,) = (entry for entry in TABLES if entry.number == number)
-    return trust_region_table(history) if history.phase == LM else armijo_table(history)
-
-
-def armijo_table(history: History) -> str:
-    """Return a history of damped Gauss-Newton."""
+    counted = "trials" if history.phase == LM else "Armijo"
     ours = fits_of(history.case).by_method[history.method].history
-    head = (
-        "iteration",
-        *(f"{name}, thesis" for name in ("norm of g", "f", "Armijo")),
-        *(f"{name}, exfit" for name in ("norm of g", "f", "Armijo")),
-    )
-    exfit_rows = [(norm_of(line), scientific(line.cost), str(line.inner)) for line in ours]
-    return table(head, numbered(history.rows, exfit_rows))
-
-
-def trust_region_table(history: History) -> str:
-    """Return a history of Levenberg-Marquardt: also with what the thesis' program renewed late."""
-    ours = fits_of(history.case).by_method[history.method].history
-    head = (
-        "iteration",
-        *(f"{name}, thesis" for name in ("norm of g", "f", "trials")),
-        *(f"{name}, stale" for name in ("norm of g", "f", "trials", "f there")),
-        *(f"{name}, exfit" for name in ("norm of g", "f", "trials")),
-    )
-    stale = [
-        (
-            f"{line.gradient_norm:.1e}",
-            scientific(line.cost),
-            str(line.trials),
-            scientific(line.cost_there),
-        )
-        for line in stale_levenberg_marquardt(history.case)
+    exfit_rows = [
+        (norm_of(line), cost_of(line), str(line.trials if history.phase == LM else line.inner))
+        for line in ours
     ]
-    exfit_rows = [(norm_of(line), scientific(line.cost), str(line.trials)) for line in ours]
-    return table(head, numbered(history.rows, stale, exfit_rows))
+    head = ("", "thesis: norm of g", "f", counted)
+    if history.phase == LM:
+        stale = [
+            (f"{line.gradient_norm:.6f}", cost_of(line), str(line.trials), f"{line.cost_there:.7f}")
+            for line in stale_levenberg_marquardt(history.case)
+        ]
+        head = (*head, "stale: norm of g", "f", counted, "f there")
+        groups = (history.rows, stale, exfit_rows)
+    else:
+        groups = (history.rows, exfit_rows)
+    return table((*head, "exfit: norm of g", "f", counted), numbered(*groups))
 
 
 def norm_of(line: Iteration) -> str:
     """Return the norm of g over the parameters relative to their start."""
-    return f"{HALF * line.gradient_norm:.1e}"
+    return f"{HALF * line.gradient_norm:.6f}"
+
+
+def cost_of(line: Iteration | Trialled) -> str:
+    """Return f with the digits that distinguish costs above the noise."""
+    return f"{line.cost:.7f}"
 
 
 def numbered(*groups: Sequence[Sequence[str]]) -> list[list[str]]:
@@ -135,104 +126,78 @@ def numbered(*groups: Sequence[Sequence[str]]) -> list[list[str]]:
 
 def parameter_table(name: str) -> str:
     """Return what each method found in a case, of the thesis and of exfit."""
-    fits = fits_of(name)
-    methods = list(fits.by_method)
-    head = ["", "start"]
-    for method in methods:
-        head += [f"{METHODS[method]}, thesis", "exfit"]
-    head += ["default of exfit", "95 %", "record made with"]
-    rows = [parameter_row(symbol, name, fits) for symbol in STARTS[name]]
-    costs = [
-        "f",
-        scientific(next(iter(fits.by_method.values())).start_cost),
-        *(cell for method in methods for cell in ("", scientific(fits.by_method[method].cost))),
-        scientific(fits.default.cost),
-        "",
-        scientific(fits.cost_of_truth),
-    ]
-    return table(head, [*rows, costs])
-
-
-def parameter_row(symbol: str, name: str, fits: Fits) -> list[str]:
-    """Return the row of one parameter."""
-    cells = [symbol, f"{STARTS[name][symbol]:g}"]
+    fits, start = fits_of(name), STARTS[name]
+    first = next(iter(fits.by_method.values()))
+    rows = [["start", *map(printed, start.values()), millionths(first.start_cost)]]
     for method, result in fits.by_method.items():
-        cells += [f"{RESULTS[name, method][symbol]:g}", f"{result.values[symbol]:.4g}"]
-    truth = f"{TRUTH[unit_of(name)][symbol]:g}"
-    return [*cells, *own_cells(symbol, fits.default), truth]
+        theirs = RESULTS[name, method]
+        rows.append([f"{METHODS[method]}, thesis", *(printed(theirs[key]) for key in start), ""])
+        found = [short(result.values[symbol]) for symbol in start]
+        rows.append([f"{METHODS[method]}, exfit", *found, millionths(result.cost)])
+    rows += own_rows(fits.default, start)
+    truth = [printed(TRUTH[unit_of(name)][symbol]) for symbol in start]
+    rows.append(["record made with", *truth, millionths(fits.cost_of_truth)])
+    return table(("", *start, "f·10⁶"), rows)
 
 
-def own_cells(symbol: str, result: exfit.FitResult) -> list[str]:
-    """Return the value and the interval that exfit finds without settings."""
-    if symbol not in result.parameters:
-        return [f"{result.values[symbol]:.4g} (fixed)", ""]
-    parameter = result.parameters[symbol]
-    if parameter.interval is None:
-        return [f"{parameter.value:.4g}", "not determined"]
-    low, high = parameter.interval
-    return [f"{parameter.value:.4g}", f"{low:.3g} ... {high:.3g}"]
+def own_rows(result: exfit.FitResult, names: Iterable[str]) -> list[list[str]]:
+    """Return the values that exfit finds without settings, and the ends of their intervals."""
+    values, low, high = ["default of exfit"], ["95 % from"], ["to"]
+    for symbol in names:
+        values.append(short(result.values[symbol]))
+        parameter = result.parameters.get(symbol)
+        interval = None if parameter is None else parameter.interval
+        ends = map(short, interval) if interval else ["fixed" if parameter is None else "-"] * 2
+        for row, end in zip((low, high), ends, strict=True):
+            row.append(end)
+    return [[*values, millionths(result.cost)], [*low, ""], [*high, ""]]
+
+
+def printed(value: float) -> str:
+    """Return a value with all digits that it is given with."""
+    return f"{value:.8g}"
+
+
+def short(value: float) -> str:
+    """Return a value of a parameter with four significant digits."""
+    return f"{value:.4g}"
 
 
 def summary_table() -> str:
     """Return every search: where it began and ended, in the thesis and with exfit."""
-    head = (
-        "case",
-        "method",
-        "f, thesis",
-        "iterations",
-        "f, exfit",
-        "iterations",
-        "simulations",
-        "rmse",
-        "down-step",
-    )
+    head = ("case", "method", "f, thesis", "f·10⁶, exfit", "iterations", "simulations", "step down")
     return table(head, (row for name in CASES for row in summary_rows(name)))
 
 
-def summary_rows(name: str) -> Iterable[list[str]]:
+def summary_rows(name: str) -> Iterator[list[str]]:
     """Yield the rows of a case."""
+    printed = {entry.method: entry.rows for entry in TABLES if entry.case == name}
     for method, result in fits_of(name).every.items():
-        histories = [entry for entry in TABLES if (entry.case, entry.method) == (name, method)]
-        costs, count = "", ""
-        for history in histories:
-            costs = f"{history.rows[0][1]} → {history.rows[-1][1]}"
-            count = str(len(history.rows) - 1)
+        rows = printed.get(method)
         yield [
             CASES[name],
             METHODS[method],
-            costs,
-            count,
-            f"{scientific(result.start_cost)} → {scientific(result.cost)}",
-            str(result.nit),
+            f"{rows[0][1]} → {rows[-1][1]}" if rows else "",
+            f"{millionths(result.start_cost)} → {millionths(result.cost)}",
+            f"{len(rows) - 1}; {result.nit}" if rows else str(result.nit),
             str(result.simulations),
-            scientific(result.rmse),
             scientific(result.validation[0].rmse),
         ]
 
 
-def jacobian_table() -> str:
-    """Return the Jacobian of 3.3 at its sixteen instants."""
+def jacobian_table(column: int) -> str:
+    """Return dv/dk (column 0) or dv/da (1) of 3.3 at its sixteen instants."""
     ours = jacobians_at(K, A)
-    head = (
-        "t (s)",
-        *(
-            f"d{numerator}: {column}"
-            for numerator in ("v/dk", "v/da")
-            for column in ("approximate", "true", "absolute", "relative", "exfit", "absolute")
-        ),
-    )
-    printed = [
-        [texts[column].split() for texts in (APPROXIMATE, TRUE, ABSOLUTE, RELATIVE)]
-        for column in range(2)
+    values, errors = ours.differences[:, column], (ours.closed - ours.differences)[:, column]
+    printed = [text[column].split() for text in (APPROXIMATE, TRUE, ABSOLUTE, RELATIVE)]
+    name = ("dv/dk", "dv/da")[column]
+    head = (f"{name} at t (s)", "approximate", "true", "absolute", "relative", "exfit", "absolute")
+    rows = [
+        [f"{instant:g}", *map(decimal, row), f"{value:.7f}", f"{error:.0e}"]
+        for instant, row, value, error in zip(
+            INSTANTS, zip(*printed, strict=True), values, errors, strict=True
+        )
     ]
-    rows = []
-    for k, instant in enumerate(INSTANTS):
-        cells = [f"{instant:g}"]
-        for column in range(2):
-            cells += [decimal(values[k]) for values in printed[column]]
-            value = ours.differences[k, column]
-            cells += [f"{value:.7f}", f"{ours.closed[k, column] - value:.0e}"]
-        rows.append(cells)
     return table(head, rows)
 
 
@@ -254,9 +219,9 @@ def simulators_table() -> str:
                 values_of(curve),
                 scientific(psse),
                 scientific(matlab),
-                scientific(simulated.cost(simulated.andes)),
-                scientific(simulated.cost(simulated.exfit)),
-                scientific(simulated.apart),
+                scientific(simulated.andes.f),
+                scientific(simulated.exfit.f),
+                scientific(abs(simulated.between.largest[0])),
             ]
         )
     return table(head, rows)
