@@ -76,7 +76,8 @@ def scientific(value: float) -> str:
 
 def millionths(cost: float) -> str:
     """Return f in units of 1e-6."""
-    return f"{1e6 * cost:.4g}"
+    value = 1e6 * cost
+    return f"{value:.4g}" if value < 1e4 else f"{value:.0f}"
 
 
 def history_table(number: int) -> str:
@@ -128,14 +129,14 @@ def parameter_table(name: str) -> str:
     """Return what each method found in a case, of the thesis and of exfit."""
     fits, start = fits_of(name), STARTS[name]
     first = next(iter(fits.by_method.values()))
-    rows = [["start", *map(printed, start.values()), millionths(first.start_cost)]]
+    rows = [["start", *map(as_given, start.values()), millionths(first.start_cost)]]
     for method, result in fits.by_method.items():
         theirs = RESULTS[name, method]
-        rows.append([f"{METHODS[method]}, thesis", *(printed(theirs[key]) for key in start), ""])
+        rows.append([f"{METHODS[method]}, thesis", *(as_given(theirs[key]) for key in start), ""])
         found = [short(result.values[symbol]) for symbol in start]
         rows.append([f"{METHODS[method]}, exfit", *found, millionths(result.cost)])
     rows += own_rows(fits.default, start)
-    truth = [printed(TRUTH[unit_of(name)][symbol]) for symbol in start]
+    truth = [as_given(TRUTH[unit_of(name)][symbol]) for symbol in start]
     rows.append(["record made with", *truth, millionths(fits.cost_of_truth)])
     return table(("", *start, "f·10⁶"), rows)
 
@@ -153,7 +154,7 @@ def own_rows(result: exfit.FitResult, names: Iterable[str]) -> list[list[str]]:
     return [[*values, millionths(result.cost)], [*low, ""], [*high, ""]]
 
 
-def printed(value: float) -> str:
+def as_given(value: float) -> str:
     """Return a value with all digits that it is given with."""
     return f"{value:.8g}"
 
@@ -161,6 +162,15 @@ def printed(value: float) -> str:
 def short(value: float) -> str:
     """Return a value of a parameter with four significant digits."""
     return f"{value:.4g}"
+
+
+def sensitivity_table(name: str) -> str:
+    """Return by how much 1 % of each parameter moves the response, the largest first."""
+    uncertainty = fits_of(name).default.knowledge
+    assert uncertainty is not None
+    effects = uncertainty.effects
+    head = [effect.parameter for effect in effects]
+    return table(head, [[f"{effect.of_noise:.2g}" for effect in effects]])
 
 
 def summary_table() -> str:
