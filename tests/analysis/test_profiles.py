@@ -158,8 +158,8 @@ def search_ends(monkeypatch):
     search = module.search
 
     def replaced(change):
-        def other(case, problem, *rest):
-            found, minima = search(case, problem, *rest)
+        def other(case, problem, *rest, **options):
+            found, minima = search(case, problem, *rest, **options)
             return change(problem.residuals, found), minima
 
         monkeypatch.setattr(module, "search", other)
