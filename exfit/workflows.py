@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import __version__, estimate
-from exfit.analysis import experiment_design, model_check, profiles
+from exfit.analysis import experiment_design, model_check, profiles, validation
 from exfit.analysis.case_description import (
     fixed_values,
     input_hashes,
@@ -31,7 +31,6 @@ from exfit.analysis.iteration_responses import (
 from exfit.analysis.model_check import Check
 from exfit.analysis.profiles import Profiles
 from exfit.analysis.solution import (
-    aligned,
     analysed,
     comparisons_of,
     fit_notes,
@@ -39,12 +38,10 @@ from exfit.analysis.solution import (
     iteration_of,
     minima_of,
     record_notes,
-    validation_of,
 )
 from exfit.case import load
 from exfit.case.case import Case
 from exfit.case.record_section import record_section
-from exfit.case.schema import SINGLE, Recording
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
@@ -52,6 +49,7 @@ from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.system import values_of
+from exfit.fitting.unplanned_test import GivenSteps
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
@@ -299,46 +297,39 @@ def simulation_notes(case: Case, values: Mapping[str, float], response: Response
 
 
 def validate(
-    case: CaseOrPath, values: ValuesOrResult, record: Path | str | None = None
+    case: CaseOrPath,
+    values: ValuesOrResult,
+    record: Record | Path | str | None = None,
+    step: float | Sequence[float] = (),
+    at: float | Sequence[float] = (),
 ) -> list[Comparison]:
     """Compare a case with its records: the fitted ones first, then those that no fit saw.
+
+    Those that no fit saw are judged: ``accepted``, or the ``reason`` why not.
 
     Args:
         case: a case, or the path of its file.
         values: of parameters, by name, or those of a fit.
-        record: a file in place of the first record that no fit saw (or of the fitted one if there
-            is no other), under the same test and columns.
+        record: in place of all records that no fit saw: a record, or a file with the columns of
+            the first of them, or of the fitted one where there is no other. Its steps are found in
+            it: ``steps`` of the comparison says which.
+        step: size of its step, pu, in place of the one found; of several steps one for each.
+        at: instant of its step, s, in place of the one found; of several steps one for each.
 
-    Raises ExfitError for input that cannot be used.
+    Raises ExfitError for input that cannot be used, or where there is nothing to validate on.
 
     Example:
         >>> result = exfit.fit("case.yaml")
         >>> [match.rmse for match in exfit.validate("case.yaml", result)]
+        >>> exfit.validate("case.yaml", result, "down.csv")[-1].accepted
     """
     case = loaded(case, values)
-    fitted, unseen = list(case.recordings), list(case.validations)
-    if record is not None:
-        unseen = [_in_place_of([*unseen, *fitted], case, Path(record))]
-    if not fitted + unseen:
-        raise CaseError([f"{case.path}: validate: missing; there is no record to compare with"])
-    values = values_of(case, changes_of(case, values))
-    setups = [
-        build_experiment(case, recording, values).with_enough_substeps(values)
-        for recording in fitted
-    ]
-    others = [build_experiment(case, recording, values) for recording in unseen]
-    comparisons = [compare_with_record(setup, setup.name, values) for setup in setups]
-    validated = (aligned(case, setup, values) for setup in others)
-    return [*comparisons, *(validation_of(case, comparisons, *pair) for pair in validated)]
+    given = GivenSteps(_numbers(step), _numbers(at))
+    return validation.validate(case, values_of(case, changes_of(case, values)), record, given)
 
 
-def _in_place_of(recordings: Sequence[Recording], case: Case, file: Path) -> Recording:
-    """Return the first of the recordings with another file."""
-    if not recordings:
-        raise CaseError([f"{case.path}: record: missing; its columns are needed to read {file}"])
-    section = recordings[0].record.model_copy(update={"file": str(file.absolute())})
-    name = file.name if file.stem == SINGLE else file.stem
-    return recordings[0].model_copy(update={"name": name, "record": section})
+def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Sequence) else (given,)
 
 
 def profile(

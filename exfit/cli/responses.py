@@ -65,19 +65,40 @@ def simulate(
     "--record",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Record in place of the first under validate.",
+    help="Record in place of those under validate; its steps are found in it.",
+)
+@click.option(
+    "--step",
+    "steps",
+    type=float,
+    multiple=True,
+    metavar="SIZE",
+    help="Size of the step of --record, pu, in place of the one found.",
+)
+@click.option(
+    "--at",
+    "instants",
+    type=float,
+    multiple=True,
+    metavar="INSTANT",
+    help="Instant of the step of --record, s, in place of the one found.",
 )
 @output_options
 def validate(
     case: Path,
     parameters: Path | None,
     record: Path | None,
+    steps: tuple[float, ...],
+    instants: tuple[float, ...],
     output: Output,
 ) -> None:
     """Compare fitted values with the records of CASE that were not fitted.
 
-    The values are those of the last fit of the case, or of --parameters. Writes validation.json,
-    samples and overlays to runs/CASE-validate, or to DIR.
+    The values are those of the last fit of the case, or of --parameters. The steps of --record are
+    found in it and shown; --step -0.05 and --at 1.0 replace what is found, each of several steps
+    has its own. Writes validation.json, samples and overlays to runs/CASE-validate, or to DIR.
+    Exit code 1: bad input, no step found, or no record to validate on; 3: a validation is not
+    accepted.
     """
     from exfit import workflows
     from exfit.fitting.overrides import fitted_model_hash, read_parameters
@@ -91,7 +112,10 @@ def validate(
             [f"{case}: no earlier fit of this case; run exfit fit, or give --parameters FILE"]
         )
     folder = output.folder_of(loaded, "validate")
-    comparisons = workflows.validate(loaded, read_parameters(loaded, source), record)
+    if record is not None:
+        run_folder.refuse_inputs("validate", [record], folder, [record.stem])
+    values = read_parameters(loaded, source)
+    comparisons = workflows.validate(loaded, values, record, steps, instants)
     warn(run_folder.write_validation(comparisons, folder, output.figures))
     if output.as_json:
         print_json({"validation": [plain(comparison) for comparison in comparisons]})

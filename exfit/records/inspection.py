@@ -20,11 +20,8 @@ from exfit.records.formats.table import Table, listed, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.steps import (
     SAME_STEP,
-    ChannelSteps,
     RecordedStep,
-    changes_from_start,
-    combined_steps,
-    steps_of_channel,
+    steps_of_signals,
     with_sizes,
 )
 from exfit.records.units import unit_in, usual
@@ -135,7 +132,8 @@ def inspect(
     groups = tuple(_phase_groups(time, samples, stated))
     signals = samples | {group.name: _effective(samples, group.columns) for group in groups}
     guesses = _guesses(samples, groups, stated)
-    own_steps, steps = _find_steps(time, signals, guesses)
+    references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
+    own_steps, steps = steps_of_signals(time, signals, references)
     channels = tuple(
         inspect_channel(name, units[name], time, column, own_steps[name], steps)
         for name, column in samples.items()
@@ -241,21 +239,6 @@ def _phase_groups(
 def _effective(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
     """Return the effective value (M,) of three phases, waveforms or effective values each."""
     return np.asarray(np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0)))
-
-
-def _find_steps(
-    time: Array, signals: Mapping[str, Array], guesses: Mapping[str, Guess]
-) -> tuple[dict[str, ChannelSteps], tuple[RecordedStep, ...]]:
-    """Return the steps of each signal, and those of the test; these without their lasting sizes.
-
-    Where no signal rests before a step, it is one that the record begins with.
-    """
-    references = {name for name, guess in guesses.items() if guess.signal == REFERENCE}
-    own = {name: steps_of_channel(time, y, name in references) for name, y in signals.items()}
-    if not any(channel.changes for channel in own.values()):
-        starting = changes_from_start(time, signals)
-        own |= {name: ChannelSteps((change,)) for name, change in starting.items()}
-    return own, combined_steps({name: channel.changes for name, channel in own.items()})
 
 
 def _with_sizes(

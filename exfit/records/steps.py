@@ -1,6 +1,6 @@
 """The steps of a test, as all channels of a record together show them."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,6 +85,20 @@ def steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSte
     except ValueError as fault:
         return ChannelSteps(remark=str(fault))
     return ChannelSteps(tuple(_refined(t, y, step, block) for step in steps))
+
+
+def steps_of_signals(
+    time: Array, signals: Mapping[str, Array], references: Collection[str] = ()
+) -> tuple[dict[str, ChannelSteps], tuple[RecordedStep, ...]]:
+    """Return the steps of each signal (M,), and those of the test; these without lasting sizes.
+
+    Where no signal rests before a step, it is one that the record begins with.
+    """
+    own = {name: steps_of_channel(time, y, name in references) for name, y in signals.items()}
+    if not any(channel.changes for channel in own.values()):
+        starting = changes_from_start(time, signals)
+        own |= {name: ChannelSteps((change,)) for name, change in starting.items()}
+    return own, combined_steps({name: channel.changes for name, channel in own.items()})
 
 
 def _block_medians(time: Array, samples: Array, block: int) -> tuple[Array, Array]:

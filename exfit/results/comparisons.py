@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import nan
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +97,24 @@ class StepFeatures:
     simulated: Features | None
 
 
+class ValidatedStep(NamedTuple):
+    """A step of a record that was given by hand: when (s) and by how much (pu).
+
+    ``found`` says what the record shows of it and no one gave: instant, size.
+    """
+
+    signal: str
+    at: float
+    size: float
+    found: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The step in words."""
+        source = f"{' and '.join(self.found)} found in the record" if self.found else "given"
+        return f"{self.signal} {self.size:+.4g} pu at {self.at:.4g} s, {source}"
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """A simulated response beside a record.
@@ -106,7 +124,8 @@ class Comparison:
     in s: of a result that is read back they are thinned, and missing in files of an earlier
     version. ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse
     (pu) that is accepted, ``reason`` why it is not accepted, and ``of_record`` what was found about
-    the record itself. ``rmse``, ``max_error`` and ``fit_percent`` are those of
+    the record itself; ``steps`` are those of a record that was given by hand, ``notes`` what must
+    be known of it. ``rmse``, ``max_error`` and ``fit_percent`` are those of
     vt, or of the first signal where there is no vt.
     """
 
@@ -125,6 +144,8 @@ class Comparison:
     limit: float | None = None
     reason: str = ""
     validation: bool = False
+    steps: tuple[ValidatedStep, ...] = ()
+    notes: tuple[str, ...] = ()
     of_record: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
     sha256: str = field(default="", metadata=IN_FILE)
     substeps: int = field(default=0, metadata=IN_FILE)

@@ -254,7 +254,7 @@ def test_a_fit_needs_a_record_but_a_simulation_does_not(run, workplace):
     )
     before = listing(workplace)
     is_refused(run("fit", case), ["case.yaml", "record", "missing"], before, workplace)
-    words = ["case.yaml", "no record to compare with"]
+    words = ["case.yaml", "no record to validate on"]
     is_refused(run("validate", case, "--parameters", "values.yaml"), words, before, workplace)
     assert run("simulate", case, "--no-plots").code == 0
     assert run("check", case).code == 0
@@ -493,20 +493,79 @@ def test_a_validation_without_a_fit_says_what_to_give(run, workplace):
     is_refused(run("validate", case), words, before, workplace)
 
 
-def test_another_record_takes_the_place_of_the_first_validation(run):
-    samples = columns("down.csv")
+BY_HAND = ("--no-plots", "--parameters", "values.yaml", "--record")
+
+
+def other_record(samples):
+    """Return a record in a folder of its own."""
     other = Path("elsewhere/other.csv")
     other.parent.mkdir()
-    shifted = np.array(samples["v"], float) + 0.5
-    other.write_text(csv_text(TIME, shifted))
-    ran = run(
-        *("validate", case_file(), "--no-plots", "--json"),
-        *("--parameters", "values.yaml", "--record", other),
-    )
+    other.write_text(csv_text(TIME, samples))
+    return other
+
+
+@pytest.mark.parametrize(("level", "size"), [(0.0, 1.0), (2.5, -1.0), (1.0, 0.25)])
+def test_the_step_of_a_record_by_hand_is_found_in_it_whatever_the_case_stepped(run, level, size):
+    """It takes the place of the validation; level, sign and size are those of the record."""
+    other = other_record(level + size * TRUTH)
+    ran = run("validate", case_file(), "--json", *BY_HAND, other)
+    assert ran.code == 0
     fit, validation = json.loads(ran.out)["validation"]
     assert (fit["name"], validation["name"]) == ("fit", "other")
-    assert fit["rmse"] < 1e-6
-    assert validation["rmse"] == pytest.approx(0.5, rel=1e-6)
+    (step,) = validation["steps"]
+    assert step["found"] == ["instant", "size"]
+    assert step["at"] == pytest.approx(0.5, abs=5e-3)
+    assert step["size"] == pytest.approx(size, rel=5e-3)
+    assert validation["rmse"] < 5e-3 * abs(size)
+    stored = json.loads(Path("runs/case-validate/validation.json").read_text())
+    assert stored == json.loads(ran.out)
+    shown = run("validate", case_file(), *BY_HAND, other).out
+    assert f"step: vref {step['size']:+.4g} pu at {step['at']:.4g} s, instant and size" in shown
+
+
+def test_a_step_that_is_given_takes_the_place_of_the_one_found(run):
+    """Each alone, or both; a wrong one is not accepted."""
+    other = other_record(2.0 - TRUTH)
+    given = {(): 0, ("--step", -1.0): 0, ("--at", 0.5): 0, ("--step", 1.0, "--at", 0.5): 3}
+    for options, code in given.items():
+        ran = run("validate", case_file(), "--json", *BY_HAND, other, *options)
+        assert ran.code == code, options
+        (step,) = json.loads(ran.out)["validation"][-1]["steps"]
+        assert ("size" in step["found"]) is ("--step" not in options)
+        assert ("instant" in step["found"]) is ("--at" not in options)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--record", "flat.csv"], ["flat.csv", "no step found", "--step SIZE and --at INSTANT"]),
+        (["--record", "down.csv", "--at", 7], ["at: 7 s lies outside", "down.csv", "0 ... 3 s"]),
+        (
+            ["--record", "down.csv", "--step", 1, "--step", 2],
+            ["step: 2 given for 1 step, at 0.4835 s"],
+        ),
+        (["--record", "down.csv", "--at", 1, "--at", 0.5], ["0.5 s is not after 1 s"]),
+        (["--step", 1], ["case.yaml", "of a record that is given with them"]),
+        (["--record", "dwon.csv"], ["dwon.csv", "No such file"]),
+    ],
+)
+def test_a_record_by_hand_without_a_step_to_use_is_refused(run, workplace, options, words):
+    case, before = case_file(), listing(workplace)
+    ran = run("validate", case, "--parameters", "values.yaml", *options)
+    is_refused(ran, words, before, workplace)
+
+
+def test_nothing_to_validate_on_is_refused(run, workplace):
+    case, before = case_file(changed(CASE, ("validate", []))), listing(workplace)
+    ran = run("validate", case, "--parameters", "values.yaml")
+    is_refused(
+        ran, ["case.yaml: validate: missing", "but the fitted ones", "--record"], before, workplace
+    )
+
+
+def test_the_fitted_record_does_not_validate_its_fit_and_the_command_says_so(run):
+    ran = run("validate", case_file(), *BY_HAND, "up.csv")
+    assert "up.csv is a file that was fitted (fit)" in " ".join(ran.out.split())
 
 
 def test_a_record_that_is_called_fit_is_not_taken_for_the_fitted_one(run):

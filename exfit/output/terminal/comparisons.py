@@ -37,6 +37,9 @@ def validation(console: Console, all_of_them: Sequence[Comparison]) -> None:
         records = [f"{m.name} ({m.record})" for m in all_of_them if m.validation is chosen]
         if records:
             console.print(f"{role} {', '.join(records)}", soft_wrap=True, markup=False)
+    for match in all_of_them:
+        remarks(console, "step:", (step.text for step in match.steps))
+        remarks(console, "note:", match.notes)
     comparisons(console, all_of_them)
 
 

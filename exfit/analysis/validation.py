@@ -1,0 +1,125 @@
+"""How fitted values do on other records: those of the case, or one that is given by hand."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from exfit.analysis.diagnostics import unsteady_notes
+from exfit.analysis.solution import aligned, validation_of
+from exfit.case.case import Case
+from exfit.case.schema import Recording
+from exfit.errors import CaseError
+from exfit.fitting.build import build_experiment
+from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
+from exfit.records.record import Record
+from exfit.results.compare_with_record import compare_with_record
+from exfit.results.comparisons import Comparison, ValidatedStep
+
+Values = Mapping[str, float]
+
+EARLY_OR_LATE = {"min": "late", "max": "early"}  # a response, by the bound that its step is on
+NOTHING_TO_VALIDATE_ON = (
+    "missing: there is no record to validate on but the fitted ones; name one there, or give it by "
+    "`exfit validate CASE --record FILE` (record in Python)"
+)
+
+
+def validate(
+    case: Case, values: Values, record: Record | Path | str | None, given: GivenSteps
+) -> list[Comparison]:
+    """Return the comparisons with the fitted records, then with those that no fit saw.
+
+    A ``record`` by hand takes the place of all of these. Raises ExfitError where input cannot be
+    used, or where there is nothing to validate on.
+    """
+    if record is None and any(given):
+        raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
+    fitted = [
+        compare_with_record(setup.with_enough_substeps(values), setup.name, values)
+        for setup in (build_experiment(case, recording, values) for recording in case.recordings)
+    ]
+    if record is not None:
+        return [*fitted, validation_by_hand(case, fitted, values, record, given)]
+    if not case.validations:
+        raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
+    unseen = [build_experiment(case, recording, values) for recording in case.validations]
+    validated = (aligned(case, setup, values) for setup in unseen)
+    return [*fitted, *(validation_of(case, fitted, *pair) for pair in validated)]
+
+
+def validation_by_hand(
+    case: Case,
+    fitted: Sequence[Comparison],
+    values: Values,
+    record: Record | Path | str,
+    given: GivenSteps,
+) -> Comparison:
+    """Return how values do on a record that the case does not name, judged by ``fitted`` ones.
+
+    Its columns are those of the first record under validate, or else of the first fitted one.
+    Raises ExfitError where the record or the steps given cannot be used.
+    """
+    recordings = (*case.validations, *case.recordings)
+    if not recordings:
+        text = "record: missing; its columns are needed to read a record"
+        raise CaseError([f"{case.path}: {text}"])
+    recording = _in_place_of(recordings[0], record, {match.name for match in fitted})
+    if isinstance(record, Record):
+        case = replace(case, given_records={**case.given_records, recording.name: record})
+    test = with_steps_of_record(case, recording, values, given)
+    setup, own_values = aligned(case, test.setup, values)
+    comparison = validation_of(case, fitted, setup, own_values)
+    return replace(
+        comparison,
+        steps=tuple(_steps(setup, own_values, given)),
+        notes=tuple(_notes(test, comparison, fitted, own_values)),
+    )
+
+
+def _in_place_of(recording: Recording, record: Record | Path | str, taken: set[str]) -> Recording:
+    """Return a recording with another record, whole: windows and masks are those of its own."""
+    file = record.source if isinstance(record, Record) else Path(record)
+    update = {"file": str(file.absolute()), "window": None, "mask": ()}
+    name = file.name if file.stem in taken else file.stem
+    section = recording.record.model_copy(update=update)
+    return recording.model_copy(update={"name": name, "record": section})
+
+
+def _steps(setup: ExperimentSetup, values: Values, given: GivenSteps) -> Iterator[ValidatedStep]:
+    """Yield the steps that the record holds, as they were found at last or given."""
+    simulator = setup.experiment.with_inputs(values)
+    found = tuple(
+        name
+        for name, numbers in (("instant", given.instants), ("size", given.sizes))
+        if not numbers
+    )
+    for step in simulator.inputs.steps:
+        at = step.at + simulator.delay
+        if at >= setup.record.time[0]:
+            yield ValidatedStep(step.signal, at, step.step, found)
+
+
+def _notes(
+    test: UnplannedTest, comparison: Comparison, fitted: Sequence[Comparison], values: Values
+) -> Iterator[str]:
+    """Yield what must be known of a record that was given by hand."""
+    record, steady = test.setup.record, test.setup.test.steady
+    for match in fitted:
+        if match.sha256 == comparison.sha256:
+            yield (
+                f"{comparison.record} is a file that was fitted ({match.name}): what the fit saw "
+                "does not validate it"
+            )
+    if test.earlier:
+        yield "the steps before the record are those of the case under validate"
+    elif steady is not None:
+        yield from unsteady_notes(record, steady, test.setup.channels)
+    for parameter in test.setup.free:
+        side = parameter.bound(values[parameter.name])
+        if side is not None and parameter.name.endswith(".at"):
+            way = {"min": "earlier", "max": "later"}[side]
+            yield (
+                f"a step {way} than the record shows it would match better than the one at "
+                f"{values[parameter.name]:.4g} s: the response is too {EARLY_OR_LATE[side]}"
+            )

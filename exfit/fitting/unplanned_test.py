@@ -1,0 +1,268 @@
+"""The test of a record that its case does not describe: its steps, as the record shows them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from math import isfinite
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.case import Case
+from exfit.case.schema import BumpTest, FindableStep, RecordFile, Recording, Unknown, start_value
+from exfit.dsp.quality import noise_of
+from exfit.errors import CaseError, RecordError
+from exfit.fitting.build import build_experiment
+from exfit.fitting.detected_steps import SIZE_WITHIN
+from exfit.fitting.recordings import clock_of, read_section
+from exfit.fitting.setup import ExperimentSetup
+from exfit.records.formats import open_table
+from exfit.records.inspection import inspect
+from exfit.records.record import Record
+from exfit.records.steps import INSTANT_WITHIN, RecordedStep, steps_of_signals, with_sizes
+from exfit.simulation.simulator import Response
+from exfit.util.text import show
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+Test = Mapping[str, Any]  # keys of a test with what they become
+
+GIVE_STEP = "give it by --step SIZE and --at INSTANT (step and at in Python)"
+REST_SHARE = 0.5  # of the rest before a step: its instant is not sought farther back
+# standard errors: an instant that is sought farther off would hide a response that is late
+INSTANT_ERRORS = 4.0
+FIRST_SAMPLE_WITHIN = 8.0  # times the noise: how far a level may be from one sample
+SAME_LEVEL = 0.1  # of the largest step: how far a record may begin from where earlier steps led
+
+
+class GivenSteps(NamedTuple):
+    """The sizes (pu) and instants (s) of steps that a user gives; empty: the record shows them."""
+
+    sizes: tuple[float, ...] = ()
+    instants: tuple[float, ...] = ()
+
+
+class UnplannedTest(NamedTuple):
+    """A record with its test; ``earlier``: with the steps of the case from before the record."""
+
+    setup: ExperimentSetup
+    earlier: bool
+
+
+def with_steps_of_record(
+    case: Case, recording: Recording, values: Values, given: GivenSteps
+) -> UnplannedTest:
+    """Return the setup of a record whose steps are those that it shows, or that are ``given``.
+
+    The test of the ``recording`` is that of another record of its kind: it says which signal is
+    stepped. The size of a step starts from the change of vt and the gain of the simulation; it and
+    the instant are left to be found within bounds. Raises RecordError where the record shows no
+    step, CaseError where the steps given cannot be used.
+    """
+    given_record, file = case.given_records.get(recording.name), recording.record
+    record = given_record or read_section(file, case.folder, case.kind.per_unit)
+    signal = _stepped(case, recording.test)
+    if signal is not None and recording.test.reference(signal) == "recorded" and not any(given):
+        own = dict.fromkeys(("vt0", "begin", "steady_until"))
+        return UnplannedTest(_built(case, recording, values, own), earlier=False)
+    if given.instants:
+        _refuse_outside(record, given.instants)
+        steps = tuple(RecordedStep(at, 0.0, (), {}, False) for at in given.instants)
+    elif given_record is None:
+        steps = _steps_of_file(file, case.folder)
+    else:
+        _, steps = steps_of_signals(record.time, record.signals)
+    steps = _lasting(record, steps, given)
+    if signal is None:
+        test: Test = {"steady_until": _earliest(record, steps, 0), "vt0": None}
+        return UnplannedTest(_built(case, recording, values, test), earlier=False)
+
+    def setup_with(sizes: Sequence[float], earlier: Test) -> ExperimentSetup:
+        events = tuple(_events(record, steps, sizes, given))
+        test = {**_start(record, steps), **earlier, signal: (*earlier.get(signal, ()), *events)}
+        return _built(case, recording, values, test)
+
+    sizes = _sizes(record, steps, given, lambda sizes: setup_with(sizes, {}).response(values))
+    earlier = _earlier(recording.test, signal, record)
+    if earlier:
+        setup = setup_with(sizes, earlier)
+        if _begins_there(setup, values, steps[0], sizes):
+            return UnplannedTest(setup, earlier=True)
+    return UnplannedTest(setup_with(sizes, {}), earlier=False)
+
+
+def _stepped(case: Case, test: BumpTest) -> str | None:
+    """Return the signal that is stepped, None with a plant whose tests have no steps.
+
+    Raises CaseError where the test of the case changes the network.
+    """
+    if test.E or test.network:
+        text = "changes the network: the steps of a record by hand are those of vref or vs"
+        raise CaseError([f"{case.path}: test: {text}; give the record under validate"])
+    if not case.kind.events:
+        return None
+    return "vs" if test.vs and not test.vref else "vref"
+
+
+def _built(case: Case, recording: Recording, values: Values, test: Test) -> ExperimentSetup:
+    """Return the setup of a recording with another test."""
+    changed = recording.test.model_copy(update=test)
+    return build_experiment(case, recording.model_copy(update={"test": changed}), values)
+
+
+# ---- the steps
+
+
+def _steps_of_file(file: RecordFile, folder: Path) -> tuple[RecordedStep, ...]:
+    """Return the steps of a file by all its channels: more than the case names may show them."""
+    clock = clock_of(file.time)
+    table = open_table(folder / file.file, file.sheet)
+    return inspect(table, clock.columns, clock.unit).steps
+
+
+def _lasting(
+    record: Record, steps: tuple[RecordedStep, ...], given: GivenSteps
+) -> tuple[RecordedStep, ...]:
+    """Return those steps that change vt for good, with their sizes; all where these are given.
+
+    Raises RecordError where there is none.
+    """
+    if not steps:
+        raise RecordError(f"{record.source}: no step found in its channels; {GIVE_STEP}")
+    noises = {name: noise_of(y[np.isfinite(y)]) for name, y in record.signals.items()}
+    sized = with_sizes(steps, record.signals, noises, record.time)
+    if given.instants or given.sizes:
+        return sized
+    lasting = tuple(step for step in sized if "vt" in step.sizes)
+    if not lasting:
+        at = ", ".join(f"{step.at:.4g}" for step in sized)
+        text = f"the step at {at} s leaves no lasting change of vt to find its size from"
+        raise RecordError(f"{record.source}: {text}; {GIVE_STEP}")
+    return lasting
+
+
+def _refuse_outside(record: Record, instants: Sequence[float]) -> None:
+    """Raise CaseError where steps are not in order of time, or lie outside a record."""
+    first, last = float(record.time[0]), float(record.time[-1])
+    for at in instants:
+        if not first <= at < last:
+            text = f"{show(at)} s lies outside {record.source}, {show(first)} ... {show(last)} s"
+            raise CaseError([f"at: {text}"])
+    for before, at in pairwise(instants):
+        if at <= before:
+            raise CaseError([f"at: {show(at)} s is not after {show(before)} s, the step before"])
+
+
+def _sizes(
+    record: Record,
+    steps: Sequence[RecordedStep],
+    given: GivenSteps,
+    response: Callable[[Sequence[float]], Response],
+) -> tuple[float, ...]:
+    """Return the sizes of the steps: those given, else vt's through the gain of the simulation.
+
+    Raises CaseError where as many are not given as there are steps, RecordError where vt does not
+    show one.
+    """
+    if given.sizes:
+        _refuse_other_count(steps, given.sizes)
+        return given.sizes
+    for step in steps:
+        if "vt" not in step.sizes:
+            text = f"no lasting change of vt at {step.at:.4g} s"
+            raise RecordError(f"{record.source}: {text}; {GIVE_STEP}")
+    sizes = tuple(step.sizes["vt"] for step in steps)
+    simulated = response(sizes).signals.get("vt")
+    if simulated is None:  # it drives
+        return sizes
+    changes = with_sizes(steps, {"vt": simulated}, {}, record.time)
+    return tuple(
+        _through_gain(size, change.sizes.get("vt", 0.0))
+        for size, change in zip(sizes, changes, strict=True)
+    )
+
+
+def _refuse_other_count(steps: Sequence[RecordedStep], sizes: Sequence[float]) -> None:
+    """Raise CaseError where a size is not given for each step."""
+    if len(sizes) != len(steps):
+        instants = ", ".join(f"{step.at:.4g}" for step in steps)
+        number = f"{len(steps)} step{'s' if len(steps) > 1 else ''}"
+        text = f"{len(sizes)} given for {number}, at {instants} s: give one for each"
+        raise CaseError([f"step: {text}"])
+
+
+def _through_gain(size: float, change: float) -> float:
+    """Return the size of a step that changes vt by as much as one of ``size`` does by ``change``.
+
+    It stays where the simulation moves the other way, which no size mends.
+    """
+    gain = change / size
+    return size / gain if gain > 0.0 and isfinite(size / gain) else size
+
+
+def _events(
+    record: Record, steps: Sequence[RecordedStep], sizes: Sequence[float], given: GivenSteps
+) -> list[FindableStep]:
+    """Return the steps of a test: numbers where they are given, else with bounds."""
+    last = float(record.time[-1])
+    ends = [*(_earliest(record, steps, k) for k in range(1, len(steps))), last]
+    events = []
+    for k, (step, size, end) in enumerate(zip(steps, sizes, ends, strict=True)):
+        at: float | Unknown = step.at
+        if not given.instants and not step.from_start:
+            within = INSTANT_ERRORS * step.error
+            low = max(step.at - within, _earliest(record, steps, k))
+            at = Unknown(start=step.at, min=low, max=min(step.at + within, end))
+        low, high = sorted(((1.0 - SIZE_WITHIN) * size, (1.0 + SIZE_WITHIN) * size))
+        found = Unknown(start=size, min=low, max=high)
+        events.append(FindableStep(at=at, step=size if given.sizes else found))
+    return events
+
+
+def _earliest(record: Record, steps: Sequence[RecordedStep], k: int) -> float:
+    """Return the earliest instant of a step, s: until then the record is at rest."""
+    before = steps[k - 1].at if k else float(record.time[0])
+    return steps[k].at - min(INSTANT_WITHIN, REST_SHARE * (steps[k].at - before))
+
+
+# ---- where the record begins
+
+
+def _start(record: Record, steps: Sequence[RecordedStep]) -> Test:
+    """Return what of a test says where it starts: at rest, at the level of the record."""
+    test: dict[str, Any] = dict.fromkeys(("vt0", "begin", "duration", "steady_until"))
+    test |= dict.fromkeys(("vref", "vs"), ())
+    vt = record.signals.get("vt")
+    first = steps[0]
+    if vt is None or not first.from_start:
+        return {**test, "steady_until": _earliest(record, steps, 0)}
+    level = float(vt[np.isfinite(vt)][0])
+    within = FIRST_SAMPLE_WITHIN * noise_of(vt[np.isfinite(vt)])
+    sought = Unknown(start=level, min=level - within, max=level + within)
+    return {**test, "vt0": sought if within > 0.0 else level}
+
+
+def _earlier(test: BumpTest, signal: str, record: Record) -> Test:
+    """Return what was done before a record, as the test of the case gives it; {} for nothing."""
+    steps = tuple(
+        event
+        for event in test.events(signal)
+        if (at := start_value(event.at)) is not None and at < record.time[0]
+    )
+    if test.begin is None or not steps:
+        return {}
+    return {"begin": test.begin, "vt0": test.vt0, "steady_until": None, signal: steps}
+
+
+def _begins_there(
+    setup: ExperimentSetup, values: Values, first: RecordedStep, sizes: Sequence[float]
+) -> bool:
+    """Return whether a record begins where the steps before it have led the simulation."""
+    vt = setup.record.signals.get("vt")
+    if vt is None:
+        return True
+    rest = (setup.record.time < first.at) & np.isfinite(vt)
+    simulated = setup.response(values).signals["vt"]
+    off = abs(float(np.mean(vt[rest]) - np.mean(simulated[rest])))
+    return off < SAME_LEVEL * max(map(abs, sizes))

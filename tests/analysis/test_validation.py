@@ -1,0 +1,155 @@
+"""A record that is given by hand: its steps are found in it, and it is judged by the fit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import ROOT
+
+from exfit.case.load import load_case
+from exfit.case.schema import ChannelSection, StepSection
+from exfit.errors import CaseError, RecordError
+from exfit.records.record import Record
+from exfit.workflows import read_record, validate
+
+AC1A = {"KA": 364.1523, "TA": 0.0542, "KF": 0.0413, "TF": 1.458, "TE": 1.6724, "KC": 0.486}
+UNIT1 = {"KPR": 78.84, "KIR": 2.4636, "KDR": 37.05, "TDR": 0.1638, "TE": 1.4044, "KC": 0.0301}
+UNIT2 = {"KPR": 85.6266, "KIR": 2.5912, "KDR": 25.381, "TDR": 0.2044, "TE": 1.8426, "KC": 0.3233}
+TRUTH = {
+    "ac1a_typical": {**AC1A, "KD": 0.4039},
+    "field_record": {**AC1A, "KD": 0.4039},
+    "exciter_playback": {"KA": 364.1523, "TA": 0.0542, "KF": 0.0413, "TF": 1.458, "TE": 1.6724},
+    "ac8b_unit1": {**UNIT1, "KD": 0.0511},
+    "ac8b_unit2": {**UNIT2, "KD": 0.0265},
+    "ac8b_on_line": {"KPR": 80, "KIR": 5, "KDR": 10, "TDR": 0.1, "TE": 1.2, "KC": 0.55},
+    "first_order": {"k": 4.0, "a": 2.0},
+}  # sample_data/README.md
+UP, DOWN = (1.0, 0.05), (1.0, -0.05)
+STEPS = [
+    ("ac1a_up", "ac1a_typical", [UP]),
+    ("ac1a_down", "ac1a_typical", [DOWN]),
+    ("ac1a_channels", "ac1a_typical", [UP, (11.0, -0.05)]),
+    ("ac1a_channels", "exciter_playback", [UP, (11.0, -0.05)]),
+    ("ac8b_unit1_up", "ac8b_unit1", [UP]),
+    ("ac8b_unit1_down", "ac8b_unit1", [DOWN]),
+    ("ac8b_unit2_up", "ac8b_unit2", [UP]),
+    ("ac8b_unit2_down", "ac8b_unit2", [DOWN]),
+    ("field_record", "field_record", [(2.137, 0.05)]),
+    ("ac8b_on_line", "ac8b_on_line", [(1.0, 0.02)]),
+    ("first_order", "first_order", [(0.0, 1.0)]),
+    ("first_order_down", "first_order", [(0.0, -1.0)]),
+]
+
+
+def case_of(name, alone=True):
+    """Return a case, by default without a record of its own to validate on."""
+    case = load_case(ROOT / "configs" / f"{name}.yaml")
+    return replace(case, validations=()) if alone else case
+
+
+def by_hand(record, name, alone=True, **given):
+    """Return how the true parameters of a case do on a sample record that is given by hand."""
+    path = ROOT / "sample_data" / f"{record}.csv"
+    return validate(case_of(name, alone), TRUTH[name], path, **given)[-1]
+
+
+@pytest.mark.parametrize(("record", "name", "steps"), STEPS)
+def test_the_steps_of_every_sample_record_are_found_in_it_and_the_truth_is_accepted(
+    record, name, steps
+):
+    """To 2 ms and 1 %: AC8B is not quite at rest where its step down is recorded."""
+    match = by_hand(record, name)
+    assert match.accepted, match.reason
+    assert len(match.steps) == len(steps)
+    for found, (at, size) in zip(match.steps, steps, strict=True):
+        assert found.signal == "vref"
+        assert found.at == pytest.approx(at, abs=2e-3)
+        assert found.size == pytest.approx(size, rel=0.01)
+
+
+@pytest.mark.parametrize("sign", ["up", "down"])
+@pytest.mark.parametrize(
+    ("unit", "name"),
+    [
+        (unit, name)
+        for unit in ("ac1a", "ac8b_unit1", "ac8b_unit2")
+        for name in ("ac1a_typical", "ac8b_unit1", "ac8b_unit2")
+        if not name.startswith(unit)
+    ],
+)
+def test_the_record_of_another_unit_is_not_accepted(unit, name, sign):
+    match = by_hand(f"{unit}_{sign}", name)
+    assert not match.accepted
+    assert f"on {unit}_{sign} the error is" in match.reason
+
+
+def test_a_late_response_is_not_hidden_by_a_later_step():
+    """The instant is bound to where the record shows the step, a few of its standard errors."""
+    slow = {**TRUTH["ac1a_typical"], "TA": 0.15}
+    record = ROOT / "sample_data" / "ac1a_down.csv"
+    match = validate(case_of("ac1a_typical"), slow, record)[-1]
+    assert abs(match.steps[0].at - 1.0) < 0.02
+    assert any("the response is too late" in note for note in match.notes)
+
+
+def test_what_came_before_the_record_is_taken_from_the_case_where_it_leads_there():
+    """AC8B settles for a minute: the step up, 9 s before, is still seen; but not in another."""
+    known = by_hand("ac8b_unit1_down", "ac8b_unit1", alone=False)
+    assert known.rmse < 0.75 * by_hand("ac8b_unit1_down", "ac8b_unit1").rmse
+    assert any("before the record" in note for note in known.notes)
+    up = by_hand("ac8b_unit1_up", "ac8b_unit1", alone=False)
+    assert up.rmse == pytest.approx(1e-4, rel=0.1)
+    assert not any("before the record" in note for note in up.notes)
+
+
+def test_given_steps_are_taken_as_they_are():
+    match = by_hand("ac1a_channels", "ac1a_typical", step=(0.05, -0.05), at=(1.0, 11.0))
+    assert [(step.at, step.size) for step in match.steps] == [UP, (11.0, -0.05)]
+    assert match.of_record == {}
+    assert match.rmse == pytest.approx(1e-4, rel=0.1)
+
+
+def test_an_array_is_validated_on_as_its_file_is():
+    path = ROOT / "sample_data" / "ac1a_down.csv"
+    record = read_record(path, "t", {"vt": "vt"})
+    case, values = case_of("ac1a_typical"), TRUTH["ac1a_typical"]
+    array, file = (validate(case, values, given)[-1] for given in (record, path))
+    assert array.name == file.name
+    assert array.rmse == pytest.approx(file.rmse, rel=1e-3)
+
+
+def test_a_record_without_a_step_is_refused_and_the_message_says_what_to_give():
+    samples = np.random.default_rng(3).normal(1.0, 1e-4, 400)
+    record = Record.from_arrays(0.01 * np.arange(400), {"vt": samples})
+    with pytest.raises(RecordError, match=r"no step found .* --step SIZE and --at INSTANT"):
+        validate(case_of("ac1a_typical"), TRUTH["ac1a_typical"], record)
+
+
+def test_a_case_that_steps_its_source_takes_records_under_validate_only():
+    case = case_of("ac8b_on_line")
+    test = case.test.model_copy(update={"vref": (), "E": (StepSection(at=1.0, step=0.01),)})
+    path = ROOT / "sample_data" / "ac8b_on_line.csv"
+    with pytest.raises(CaseError, match="give the record under validate"):
+        validate(replace(case, test=test), TRUTH["ac8b_on_line"], path)
+
+
+def test_a_recorded_reference_says_by_itself_what_was_stepped():
+    """The record by hand has its own reference, whatever that of the case did."""
+    down = read_record(ROOT / "sample_data" / "ac1a_down.csv", "t", {"vt": "vt"})
+    way = np.where(down.time < 0.995, 1.05, 1.0)
+    case = load_case(ROOT / "configs" / "ac1a_typical.yaml")
+    (kept,) = case.validations
+    channels = {**kept.record.channels, "vref": ChannelSection(column="vref")}
+    recorded = kept.model_copy(
+        update={
+            "test": kept.test.model_copy(update={"vref": "recorded"}),
+            "record": kept.record.model_copy(update={"channels": channels}),
+        }
+    )
+    alone = replace(case, test=None, record=None, validations=(recorded,))
+    record = Record.from_arrays(down.time, {"vt": down.signals["vt"], "vref": way})
+    (match,) = validate(alone, TRUTH["ac1a_typical"], record)
+    (step,) = match.steps
+    assert step.size == pytest.approx(-0.05, rel=1e-9)
+    assert step.at == pytest.approx(1.0, abs=0.01)
+    assert match.rmse == pytest.approx(1e-4, rel=0.2)
