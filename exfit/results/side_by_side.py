@@ -37,6 +37,16 @@ def outcome_of(result: FitResult) -> str:
     return CONVERGED if result.accepted else NOT_ACCEPTED
 
 
+def explanation_of(result: FitResult) -> str:
+    """Return in a sentence why a fit ended so."""
+    outcome = outcome_of(result)
+    if outcome == NO_MATCH:
+        return "the response matches the record no better than a constant would"
+    if outcome == NOT_ACCEPTED:
+        return "; ".join(match.reason for match in result.validation if match.reason)
+    return result.message
+
+
 def parameters_beside(
     results: Sequence[FitResult],
 ) -> dict[str, tuple[ParameterValue | None, ...]]:
@@ -94,7 +104,7 @@ def _figures(fit: FitResult) -> dict[str, str]:
         "model": fit.model,
         "strategy": fit.strategy,
         "outcome": outcome_of(fit),
-        "message": fit.message,
+        "explanation": explanation_of(fit),
         "f_start": _number(fit.start_cost),
         "f": _number(fit.cost),
         "rmse": _number(fit.rmse),

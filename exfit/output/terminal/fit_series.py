@@ -9,8 +9,9 @@ from rich.text import Text
 
 from exfit.fleet.fits import FitRun, FitSeries, PlannedFit, Progress
 from exfit.output.terminal.side_by_side import side_by_side
+from exfit.output.terminal.terminal import remarks
 from exfit.results.model import FitResult, Iteration
-from exfit.results.side_by_side import CONVERGED, outcome_of
+from exfit.results.side_by_side import CONVERGED, explanation_of, outcome_of
 
 HEADS = ("fit", "it", "f", "rmse", "s", "")
 FORMS = ("{:>4}", "{:>10}", "{:>10}", "{:>7}", "{:<13}")  # behind the name
@@ -110,5 +111,4 @@ def _outcomes(console: Console, results: Mapping[str, FitResult]) -> None:
     for name, result in results.items():
         outcome = outcome_of(result)
         style = "green" if outcome == CONVERGED else "bold red"
-        text = Text.assemble(f"{name}: ", (outcome, style), f": {result.message}")
-        console.print(text, soft_wrap=True)
+        remarks(console, f"{name}: {outcome}:", [explanation_of(result)], style)
