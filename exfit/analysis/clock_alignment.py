@@ -111,13 +111,13 @@ def _matched(reference: Curve, curve: Curve, signal: str, offset: float, within:
     """Return the offset (s) near a first one at which a curve differs least from the reference."""
     from scipy.optimize import minimize_scalar
 
-    found = minimize_scalar(
+    best = minimize_scalar(
         lambda by: _from_reference(reference, curve.shifted(by), signal).rmse,
         bounds=(offset - within, offset + within),
         method="bounded",
         options={"xatol": MATCHED},
     )
-    return float(found.x)
+    return float(best.x)
 
 
 def _from_reference(reference: Curve, curve: Curve, signal: str) -> Difference:

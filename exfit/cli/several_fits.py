@@ -1,6 +1,7 @@
 """Fits of several cases with several strategies, one after the other."""
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,9 @@ def fit_several(
     folder = output.folder(SERIES)
     plan = planned(cases, strategies, given.load)
     _refuse_own_files(plan, folder)
+    if output.figures:
+        # now: after Ctrl-C in the midst of it the figure of all fits could not be drawn
+        import_module("exfit.output.plots")
     series = _shown(plan, folder, output) if output.shown else _quiet(plan, folder, output)
     if not series.runs and series.interrupted:
         raise Interruption("no fit is done")

@@ -58,40 +58,40 @@ def run(capsys):
     return command
 
 
-def of(found, signal="vt", first="A", second="B"):
-    (one,) = [
-        one
-        for one in found.differences
-        if (one.signal, one.first, one.second) == (signal, first, second)
+def of(agreement, signal="vt", first="A", second="B"):
+    (difference,) = [
+        each
+        for each in agreement.differences
+        if (each.signal, each.first, each.second) == (signal, first, second)
     ]
-    return one
+    return difference
 
 
 def test_a_response_does_not_differ_from_itself():
     a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
-    one = of(compare([a, a], None, BY_NAME))
-    assert (one.rms, one.largest[0], one.interpolation) == (0.0, 0.0, 0.0)
+    difference = of(compare([a, a], None, BY_NAME))
+    assert (difference.rms, difference.largest[0], difference.interpolation) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("step", [0.01, 0.007, 0.0213])
 def test_an_offset_is_the_difference_on_any_two_clocks(step):
     a = write("a.csv", t=clock(0.01), vt=rise(clock(0.01)))
     b = write("b.csv", t=clock(step), vt=rise(clock(step)) + 0.003)
-    one = of(compare([a, b], None, BY_NAME))
-    assert len(one.time) == pytest.approx(10.0 / min(step, 0.01), abs=2)
-    assert one.rms == pytest.approx(0.003, abs=one.interpolation + 1e-9)
-    assert one.largest[0] == pytest.approx(0.003, abs=one.interpolation + 1e-9)
+    difference = of(compare([a, b], None, BY_NAME))
+    assert len(difference.time) == pytest.approx(10.0 / min(step, 0.01), abs=2)
+    assert difference.rms == pytest.approx(0.003, abs=difference.interpolation + 1e-9)
+    assert difference.largest[0] == pytest.approx(0.003, abs=difference.interpolation + 1e-9)
     # a straight line is off by an eighth of the curvature times the step squared
     bound = max(step, 0.01) ** 2 / 8.0 * SIZE / LAG**2
-    assert one.interpolation <= (0.0 if step == 0.01 else 1.5 * bound)
+    assert difference.interpolation <= (0.0 if step == 0.01 else 1.5 * bound)
 
 
 def test_the_stated_error_of_interpolation_is_more_than_the_true_one():
     time, fine = clock(0.05), clock(0.001)
     a = write("a.csv", t=time, vt=np.sin(time))
     b = write("b.csv", t=fine, vt=np.sin(fine))
-    one = of(compare([a, b], None, BY_NAME))
-    assert 0.0 < np.max(np.abs(one.error)) < one.interpolation
+    difference = of(compare([a, b], None, BY_NAME))
+    assert 0.0 < np.max(np.abs(difference.error)) < difference.interpolation
 
 
 def test_the_rms_is_over_time_whatever_the_samples():
@@ -99,9 +99,9 @@ def test_the_rms_is_over_time_whatever_the_samples():
     uneven = np.concatenate([np.linspace(0.0, 0.1, 500), np.linspace(0.11, 1.0, 90)])
     a = write("a.csv", t=uneven, vt=np.ones(len(uneven)))
     b = write("b.csv", t=uneven, vt=1.0 + uneven)
-    one = of(compare([a, b], None, BY_NAME))
-    assert one.rms == pytest.approx(3.0**-0.5, rel=1e-4)  # of the trapezoids
-    assert one.largest == pytest.approx((1.0, 1.0))
+    difference = of(compare([a, b], None, BY_NAME))
+    assert difference.rms == pytest.approx(3.0**-0.5, rel=1e-4)  # of the trapezoids
+    assert difference.largest == pytest.approx((1.0, 1.0))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -116,9 +116,9 @@ def test_the_largest_difference_has_its_sign_and_its_instant(side):
 def test_nothing_is_compared_beyond_what_both_cover():
     a = write("a.csv", t=clock(0.01, 4.0, -1.0), vt=rise(clock(0.01, 4.0, -1.0)))
     b = write("b.csv", t=clock(0.02, 9.0, 0.5), vt=rise(clock(0.02, 9.0, 0.5)))
-    one = of(compare([a, b], None, BY_NAME))
-    assert (one.time[0], one.time[-1]) == pytest.approx((0.5, 4.0))
-    assert np.isfinite(one.error).all()
+    difference = of(compare([a, b], None, BY_NAME))
+    assert (difference.time[0], difference.time[-1]) == pytest.approx((0.5, 4.0))
+    assert np.isfinite(difference.error).all()
 
 
 def proposed(note):
@@ -133,9 +133,9 @@ def test_a_shift_puts_two_clocks_together_and_is_proposed():
     assert proposed(note) == pytest.approx(AT - 3.0, abs=1e-4)
     (note,) = compare([a, b], None, BY_NAME, {"B": -1.2}).notes
     assert proposed(note) == pytest.approx(AT - 3.0, abs=1e-4)
-    found = compare([a, b], None, BY_NAME, {"B": -2.0})
-    assert found.notes == ()
-    assert of(found).rms == pytest.approx(0.0, abs=1e-9)
+    agreement = compare([a, b], None, BY_NAME, {"B": -2.0})
+    assert agreement.notes == ()
+    assert of(agreement).rms == pytest.approx(0.0, abs=1e-9)
 
 
 def test_final_values_are_the_means_of_the_last_twentieth():
@@ -153,8 +153,8 @@ def test_final_values_are_of_the_time_that_both_show():
     for name, vt in (("a", falls), ("b", np.where(time < 8.0, 1.01, np.nan))):
         rows = (f"{t:.9g},{'' if np.isnan(y) else y}" for t, y in zip(time, vt, strict=True))
         Path(f"{name}.csv").write_text("\n".join(["t,vt", *rows]) + "\n")
-    found = of(compare([Path("a.csv"), Path("b.csv")], None, BY_NAME))
-    assert found.finals == pytest.approx((1.0, 1.01))
+    difference = of(compare([Path("a.csv"), Path("b.csv")], None, BY_NAME))
+    assert difference.finals == pytest.approx((1.0, 1.01))
 
 
 def test_features_stand_beside_each_other_with_the_step_found():
@@ -162,10 +162,10 @@ def test_features_stand_beside_each_other_with_the_step_found():
     time = clock(0.002)
     a = write("a.csv", t=time, vt=rise(time))
     b = write("b.csv", t=time, vt=rise(time, lag=2.0 * LAG))
-    found = compare([a, b], None, BY_NAME)
-    assert found.step_at == pytest.approx(AT, abs=0.05)  # by the shape of the rise
-    assert found.features["A"].rise_time == pytest.approx(3.3579 * LAG, rel=1e-3)
-    assert found.features["B"].rise_time == pytest.approx(2.0 * 3.3579 * LAG, rel=1e-3)
+    agreement = compare([a, b], None, BY_NAME)
+    assert agreement.step_at == pytest.approx(AT, abs=0.05)  # by the shape of the rise
+    assert agreement.features["A"].rise_time == pytest.approx(3.3579 * LAG, rel=1e-3)
+    assert agreement.features["B"].rise_time == pytest.approx(2.0 * 3.3579 * LAG, rel=1e-3)
     given = compare([a, b], None, BY_NAME, step_at=AT)
     assert given.step_at == AT
 
@@ -175,16 +175,16 @@ def test_features_are_of_the_time_before_the_first_ends():
     short, long = clock(0.01, 5.0), clock(0.01, 9.0)
     a = write("a.csv", t=short, vt=rise(short))
     b = write("b.csv", t=long, vt=rise(long) + np.where(long > 5.5, 0.02, 0.0))
-    found = compare([a, b], None, BY_NAME).features
-    assert found["B"].final_value == pytest.approx(found["A"].final_value, abs=1e-9)
+    features = compare([a, b], None, BY_NAME).features
+    assert features["B"].final_value == pytest.approx(features["A"].final_value, abs=1e-9)
 
 
 def test_without_a_step_there_are_no_features():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=np.ones(len(time)))
-    found = compare([a, a], None, BY_NAME)
-    assert found.features == {}
-    assert found.step_at is None
+    agreement = compare([a, a], None, BY_NAME)
+    assert agreement.features == {}
+    assert agreement.step_at is None
 
 
 def test_a_record_is_never_interpolated():
@@ -194,23 +194,23 @@ def test_a_record_is_never_interpolated():
     b = write("b.csv", t=time, vt=rise(time) + 0.001)
     measured = rise(coarse) + 1e-3 * rng.standard_normal(len(coarse))
     record = write("record.csv", t=coarse, vt=measured)
-    found = compare([a, b], record, BY_NAME)
-    one = of(found, first="record", second="A")
-    np.testing.assert_allclose(one.time, coarse)
-    np.testing.assert_allclose(one.values[0], measured, rtol=0, atol=1e-11)
-    assert one.rms == pytest.approx(1e-3, rel=0.1)  # of 770 samples, 2.5 % is one sigma
-    assert {*found.features} == {"A", "B", "record"}
+    agreement = compare([a, b], record, BY_NAME)
+    difference = of(agreement, first="record", second="A")
+    np.testing.assert_allclose(difference.time, coarse)
+    np.testing.assert_allclose(difference.values[0], measured, rtol=0, atol=1e-11)
+    assert difference.rms == pytest.approx(1e-3, rel=0.1)  # of 770 samples, 2.5 % is one sigma
+    assert {*agreement.features} == {"A", "B", "record"}
 
 
 def test_all_signals_in_common_are_compared_and_no_others():
     time = clock(0.01)
     a = write("a.csv", t=time, vt=rise(time), efd=2 * rise(time), ifd=time, VA=time)
     b = write("b.csv", t=time, vt=rise(time), efd=2 * rise(time) + 0.1, q=time, VA=time)
-    found = compare([a, b], None, BY_NAME)
-    assert [one.signal for one in found.between] == ["vt", "efd"]
-    assert of(found, "efd").rms == pytest.approx(0.1)
-    asked = compare([a, b], None, ColumnChoice({"VA": ["VA"]}))
-    assert "VA" in [one.signal for one in asked.between]
+    agreement = compare([a, b], None, BY_NAME)
+    assert [each.signal for each in agreement.between] == ["vt", "efd"]
+    assert of(agreement, "efd").rms == pytest.approx(0.1)
+    by_name = compare([a, b], None, ColumnChoice({"VA": ["VA"]}))
+    assert "VA" in [each.signal for each in by_name.between]
 
 
 def test_a_fit_is_compared_with_an_export_of_another_program():
@@ -219,11 +219,11 @@ def test_a_fit_is_compared_with_an_export_of_another_program():
     Path("fit/result.json").write_text("{}")
     export = {"Time(s)": time, "VOLT 1 [GEN]": rise(time), "EFD": time}
     b = write("psse.csv", **export)
-    asked = ColumnChoice({"vt": ["VOLT 1 [GEN]"]})
+    choice = ColumnChoice({"vt": ["VOLT 1 [GEN]"]})
     for fit in (Path("fit"), Path("fit/result.json"), Path("fit/response.csv")):
-        found = compare([fit, b], Path("fit/response.csv"), asked)
-        assert of(found).rms == 0.0
-        assert of(found, first="record").finals[0] == pytest.approx(2.05, abs=1e-6)
+        agreement = compare([fit, b], Path("fit/response.csv"), choice)
+        assert of(agreement).rms == 0.0
+        assert of(agreement, first="record").finals[0] == pytest.approx(2.05, abs=1e-6)
 
 
 def test_a_column_of_time_is_named_where_it_has_a_name_of_its_own():
@@ -239,9 +239,9 @@ def test_of_instants_that_repeat_the_last_row_is_taken():
     """A simulator writes the instant of a step twice: before and after it."""
     a = write("a.csv", t=[0, 1, 1, 2], vt=[1, 1, 2, 2])
     b = write("b.csv", t=[0, 1, 2], vt=[1, 2, 2])
-    found = compare([a, b], None, BY_NAME)
-    assert of(found).rms == 0.0
-    assert any("1 instants repeat" in note for note in found.notes)
+    agreement = compare([a, b], None, BY_NAME)
+    assert of(agreement).rms == 0.0
+    assert any("1 instants repeat" in note for note in agreement.notes)
 
 
 def test_nothing_is_read_across_a_gap():
@@ -249,11 +249,11 @@ def test_nothing_is_read_across_a_gap():
     gappy = np.where((time > 4.0) & (time < 5.0), np.nan, time)
     a = write("a.csv", t=time, vt=gappy)
     b = write("b.csv", t=fine, vt=fine)
-    one = of(compare([a, b], None, BY_NAME))
-    inside = (one.time > 4.0 + 1e-6) & (one.time < 5.0 - 1e-6)
-    assert np.isnan(one.error[inside]).all()
-    assert np.isfinite(one.error[~inside]).all()
-    assert one.rms == pytest.approx(0.0, abs=1e-9)
+    difference = of(compare([a, b], None, BY_NAME))
+    inside = (difference.time > 4.0 + 1e-6) & (difference.time < 5.0 - 1e-6)
+    assert np.isnan(difference.error[inside]).all()
+    assert np.isfinite(difference.error[~inside]).all()
+    assert difference.rms == pytest.approx(0.0, abs=1e-9)
 
 
 def good():
@@ -402,13 +402,13 @@ def test_f_is_half_the_sum_of_squares_over_the_samples_of_the_record():
 def test_without_a_record_the_first_is_the_reference():
     time = clock(0.01)
     sources = [write(f"{k}.csv", t=time, vt=rise(time) + 1e-3 * k) for k in range(3)]
-    found = compare(sources)
-    assert [(entry.first, entry.second) for entry in found.from_reference] == [
+    agreement = compare(sources)
+    assert [(entry.first, entry.second) for entry in agreement.from_reference] == [
         ("A", "B"),
         ("A", "C"),
     ]
-    assert of(found, second="C").f == pytest.approx(0.5 * 1001 * 4e-6)
-    assert of(found, second="C").fit_percent == pytest.approx(
+    assert of(agreement, second="C").f == pytest.approx(0.5 * 1001 * 4e-6)
+    assert of(agreement, second="C").fit_percent == pytest.approx(
         100.0 * (1.0 - 2e-3 / np.std(rise(time))), abs=1e-3
     )
 
@@ -421,9 +421,9 @@ def test_all_are_compared_over_the_time_that_all_cover():
         write("b.csv", t=long, vt=rise(long) + 0.001),
         write("c.csv", t=short, vt=rise(short)),
     ]
-    found = compare(sources, write("record.csv", t=long, vt=noisy(long)))
-    assert {entry.count for entry in found.from_reference} == {351}
-    assert {len(entry.time) for entry in found.between} == {351}
+    agreement = compare(sources, write("record.csv", t=long, vt=noisy(long)))
+    assert {entry.count for entry in agreement.from_reference} == {351}
+    assert {len(entry.time) for entry in agreement.between} == {351}
 
 
 def test_one_response_is_compared_with_a_record(run):
@@ -453,14 +453,14 @@ def test_aligned_clocks_have_their_steps_together(at):
     record = write("record.csv", t=time, vt=noisy(time))
     a = write("a.csv", t=time, vt=rise(time, at=at))
     b = write("b.csv", t=time, vt=rise(time))
-    found = compare([a, b], record, align=True)
-    shifts = {curve.name: curve.shift for curve in found.curves}
+    agreement = compare([a, b], record, align=True)
+    shifts = {curve.name: curve.shift for curve in agreement.curves}
     assert shifts == {"A": pytest.approx(AT - at, abs=1e-3), "B": 0.0, "record": 0.0}
-    assert of(found, first="record", second="A").rmse == pytest.approx(1e-4, rel=0.1)
-    (note,) = found.notes
+    assert of(agreement, first="record", second="A").rmse == pytest.approx(1e-4, rel=0.1)
+    (note,) = agreement.notes
     assert "A is shifted by" in note
     (proposed,) = compare([a, b], record).notes
-    assert f"f = {of(found, first='record', second='A').f:.2e}" in proposed
+    assert f"f = {of(agreement, first='record', second='A').f:.2e}" in proposed
     assert "--align" in proposed
 
 
@@ -469,9 +469,9 @@ def test_clocks_that_are_one_are_not_moved_whatever_the_shape(lag):
     """What is detected differs by some of the rise: that is no difference of clocks."""
     time = clock(0.01)
     a, b = (write(f"{k}.csv", t=time, vt=rise(time, lag=k)) for k in (LAG, lag))
-    found = compare([a, b], align=True)
-    assert [curve.shift for curve in found.curves] == [0.0, 0.0]
-    assert found.notes == ()
+    agreement = compare([a, b], align=True)
+    assert [curve.shift for curve in agreement.curves] == [0.0, 0.0]
+    assert agreement.notes == ()
 
 
 def test_what_cannot_be_aligned_or_shifted_is_refused(run):
@@ -546,6 +546,8 @@ def test_a_result_that_cannot_be_read_costs_its_parameters_only(fits):
     time = clock(0.01)
     write("fit/response.csv", t=time, vt_simulated=rise(time))
     Path("fit/result.json").write_text("{}")
-    found = compare([Path("fit"), fits / "both"], None, BY_NAME)
-    assert [*found.results] == ["B"]
-    assert any("A: its parameters are not shown: fit/result.json" in note for note in found.notes)
+    agreement = compare([Path("fit"), fits / "both"], None, BY_NAME)
+    assert [*agreement.results] == ["B"]
+    assert any(
+        "A: its parameters are not shown: fit/result.json" in note for note in agreement.notes
+    )

@@ -77,6 +77,26 @@ def test_json_is_one_document_and_quiet_is_silent(run):
     assert run("fit", *cases, "--quiet", "--no-plots", "-o", "out")[:2] == (0, "")
 
 
+def test_values_given_beside_the_cases_are_the_starts_of_all_fits(run):
+    cases = [case_file("a.yaml"), case_file("b.yaml")]
+    ran = run("fit", *cases, *BOTH, "--set", "k=3", "--json", "--no-plots")
+    assert ran.code == 0
+    starts = [entry["result"]["parameters"]["k"]["start"] for entry in json.loads(ran.out)["runs"]]
+    assert starts == [3.0] * 4
+    refused = run("fit", *cases, *BOTH, "--set", "q=3")
+    assert (refused.code, refused.out) == (1, "")
+    assert "q" in refused.err
+
+
+def test_a_validation_that_is_not_accepted_is_explained_below_the_table(run):
+    wrong = {"name": "down", "test": {"vt0": 0.0, "vref": [{"at": 0.5, "step": 2.0}]}, **again()}
+    ran = run("fit", case_file("a.yaml", validate=[wrong]), *BOTH, "--no-plots")
+    assert ran.code == 3
+    assert "dgn: not accepted: " in ran.out
+    assert "lm: not accepted: " in ran.out
+    assert max(map(len, ran.out.splitlines())) <= WIDTH
+
+
 def test_one_case_with_one_strategy_is_a_fit_as_ever(run):
     ran = run("fit", case_file("a.yaml"), "--strategy", "lm", "--no-plots")
     assert ran.code == 0
