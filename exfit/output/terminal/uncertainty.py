@@ -48,16 +48,16 @@ def design(console: Console, result: Design) -> None:
         table.add_row(name, *(error_of(confidence.parameters[name]) for confidence in tests))
     console.print(table)
     console.print()
-    effects(console, result.own.effects)
-    console.print()
+    if result.own.effects:
+        effects(console, result.own.effects)
+        console.print()
     unresolved(console, result.sentences)
     notes(console, result.notes)
 
 
 def effects(console: Console, ranked: Sequence[ParameterEffect]) -> None:
     """Show what 1 % of each parameter does to the records, the strongest first."""
-    labels = [*ranked[0].rms] if ranked else []
-    heads = [*(f"{label} (pu)" for label in labels), "of noise"]
+    heads = [*(f"{label} (pu)" for label in ranked[0].rms), "of noise"]
     table = plain_table("parameter", *heads, numbers=heads)
     for effect in ranked:
         changes = (f"{change:.2e}" for change in effect.rms.values())
