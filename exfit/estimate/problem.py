@@ -37,9 +37,17 @@ def half_square(residuals: Array) -> float:
 class Problem:
     """Calls fun and jac, counts the calls and remembers the best trial."""
 
-    def __init__(self, fun: Function, jac: Differences | Function, box: Box, scaled: bool) -> None:
+    def __init__(
+        self,
+        fun: Function,
+        jac: Differences | Function,
+        box: Box,
+        scaled: bool,
+        jacobian_error: float | None = None,
+    ) -> None:
         self.fun, self.jac, self.box, self.scaled = fun, jac, box, scaled
-        self.unseen = JACOBIAN_ERROR["exact" if callable(jac) else jac]
+        usual = JACOBIAN_ERROR["exact" if callable(jac) else jac]
+        self.unseen = usual if jacobian_error is None else jacobian_error
         self.nfev = self.njev = 0
         self.best: Point | None = None
 

@@ -28,6 +28,7 @@ def least_squares(
     ftol: float = 1e-10,
     xtol: float = 1e-10,
     x_scale: ArrayLike | None = None,
+    jacobian_error: float | None = None,
     good_enough: float | None = None,
     matches: Callable[[Array], bool] | None = None,
     searches: Searches = USUAL,
@@ -43,6 +44,8 @@ def least_squares(
 
     x_scale      what counts as one unit of each variable; None takes it from the columns of J.
                  Use 1 for logarithms
+    jacobian_error  of jac, as a share of its largest singular value: directions that J sees by
+                 less are left alone. None: that of rounding, or of the differences taken here
     good_enough  root mean square of residuals that counts as a match (auto); None: convergence
     matches      whether residuals (M,) are so small that the search may end
     searches     the settings of gn, dgn and lm
@@ -66,7 +69,7 @@ def least_squares(
         raise ValueError(f"method: {method!r} is none of {', '.join(STRATEGIES)}")
     if not callable(jac) and jac not in RELATIVE_STEP:
         raise ValueError(f"jac: {jac!r} is neither callable nor one of {', '.join(RELATIVE_STEP)}")
-    problem = Problem(fun, jac, box, x_scale is not None)
+    problem = Problem(fun, jac, box, x_scale is not None, jacobian_error)
     rules = Rules(max_iterations, gtol, ftol, xtol, gtol_absolute, matches)
     run = SearchRun(problem, rules, searches, callback)
     try:

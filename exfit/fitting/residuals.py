@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
+ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
 
@@ -298,3 +299,16 @@ JACOBIANS: Mapping[str, Callable[[Residuals], Callable[[Array], Array]]] = {
     "forward": lambda residuals: residuals.forward,
     "backward": lambda residuals: residuals.backward,
 }
+
+
+def jacobian_error(jacobian: str, difference_step: float | None = None) -> float | None:
+    """Return the error of a Jacobian by differences, as a share of its largest singular value.
+
+    It is what rounding or curvature makes of a direction that no signal sees; None for the exact
+    one.
+    """
+    if jacobian == "exact":
+        return None
+    central = jacobian == "central"
+    step = difference_step or (CENTRAL_STEP if central else ONE_SIDED_STEP)
+    return max(ROUNDING_OF_RUNS / step, step**2 if central else step)

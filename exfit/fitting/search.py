@@ -12,7 +12,12 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
-from exfit.fitting.residuals import JACOBIANS, Residuals, SimulationCounter
+from exfit.fitting.residuals import (
+    JACOBIANS,
+    Residuals,
+    SimulationCounter,
+    jacobian_error,
+)
 from exfit.fitting.setup import ExperimentSetup
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
@@ -95,6 +100,7 @@ def _settings(options: Estimate, residuals: Residuals) -> dict[str, Any]:
         "gtol_absolute": options.tolerance.gradient_absolute,
         "xtol": options.tolerance.step,
         "x_scale": UNIT,
+        "jacobian_error": jacobian_error(options.jacobian, options.difference_step),
         "good_enough": options.good_enough.rmse * np.sqrt(share),
         "matches": None if stop is None else partial(residuals.match, rmse=stop.rmse),
         "searches": searches_of(options),

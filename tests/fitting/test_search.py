@@ -7,7 +7,7 @@ from records import recording as recorded
 
 from exfit.analysis.profiles import profile
 from exfit.estimate import STATUS, Stop
-from exfit.fitting.residuals import JACOBIANS
+from exfit.fitting.residuals import JACOBIANS, jacobian_error
 from exfit.fitting.search import fitted, search
 from exfit.results.model import AT_TOLERANCE
 from exfit.util.text import to_json
@@ -179,3 +179,34 @@ def test_the_profiles_are_about_a_minimum_whatever_ends_a_fit(tmp_path):
     usual = profile(case_of(content, tmp_path), ["k"], ignore)
     stop = {**content, "estimate": {"stop": {"rmse": 0.1}}}
     assert profile(case_of(stop, tmp_path), ["k"], ignore).cost == usual.cost
+
+
+@pytest.mark.parametrize(
+    ("jacobian", "step"),
+    [("central", None), ("central", 1e-3), ("forward", None), ("backward", None)],
+)
+def test_what_differences_make_of_a_redundant_gain_lies_below_their_error(jacobian, step, tmp_path):
+    """With TA = 0 only the products of KA act: one direction is seen by none of the signals."""
+    content = {**config("ac8b_unit1_ka_free"), "estimate": {"jacobian": jacobian}}
+    if step is not None:
+        content["estimate"]["difference_step"] = step
+    residuals = fitted(case_of(content, tmp_path))[1].compressed
+    low, high = residuals.bounds
+    rng, error = np.random.default_rng(2026), jacobian_error(jacobian, step)
+    for _ in range(3):
+        theta = residuals.start + 0.05 * rng.uniform(-1.0, 1.0, len(low)) * (high - low)
+        quotients = JACOBIANS[jacobian](residuals)(np.clip(theta, low, high))
+        singular = np.linalg.svd(quotients, compute_uv=False)
+        # what rounding makes is a third of the error, what the record determines ten times it
+        assert singular[-1] < error * singular[0]
+        assert singular[-2] > 3.0 * error * singular[0]
+
+
+def test_a_search_by_differences_leaves_a_redundant_gain_alone(tmp_path):
+    """Else its direction, which rounding makes, is tried and shortened twenty times."""
+    content = config("ac8b_unit1_ka_free")
+    _, exact = searched(tmp_path, content, strategy="dgn")
+    _, result = searched(tmp_path, content, strategy="dgn", jacobian="central")
+    assert result.success
+    assert result.cost == pytest.approx(exact.cost, rel=1e-3)
+    assert max(line.inner for line in result.history) <= 5
