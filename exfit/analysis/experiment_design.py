@@ -29,6 +29,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis, linearisation, uncert
 from exfit.inference import Confidence
 from exfit.plants import REFERENCES
 from exfit.signals import NOISE
+from exfit.simulation.inputs import grid_segments
 from exfit.simulation.simulator import Simulator
 from exfit.util.text import near
 from exfit.util.typed import plain
@@ -235,17 +236,38 @@ def _signals(case: Case, own: Sequence[Experiment]) -> tuple[str, ...]:
 
 
 def _scaled(experiment: Experiment, size: float) -> Experiment:
-    """Return a test whose first move of the reference has a given size, others in proportion."""
-    simulator = experiment.simulator
-    moves = simulator.inputs.moves("vref")
-    if not moves:
+    """Return a test whose first move of the reference has a given size, others in proportion.
+
+    Of a recorded reference it is the largest move.
+    """
+    old = experiment.simulator
+    largest = _largest_move(old)
+    if largest is None:
         return experiment
-    share = size / moves[0].largest
-    scaled = tuple(
+    share = size / largest
+    steps = tuple(
         step._replace(step=share * step.step) if step.signal in REFERENCES else step
-        for step in simulator.inputs.steps
+        for step in old.inputs.steps
     )
-    return replace(experiment, simulator=simulator.with_inputs(scaled, simulator.delay))
+    recorded = {
+        signal: replace(given, samples=share * given.samples) if signal in REFERENCES else given
+        for signal, given in old.inputs.recorded.items()
+    }
+    if not recorded:
+        return replace(experiment, simulator=old.with_inputs(steps, old.delay))
+    inputs = replace(old.inputs, steps=steps, recorded=recorded)
+    simulator = Simulator(old.system, inputs, old.times, old.step, old.least, old.delay)
+    return replace(experiment, simulator=simulator)
+
+
+def _largest_move(simulator: Simulator) -> float | None:
+    """Return by how much a test moves the reference, pu; None where it does not."""
+    inputs = simulator.inputs
+    if "vref" in inputs.recorded:
+        grid = grid_segments(inputs, simulator.step)
+        return max(float(np.max(np.abs(inputs.input("vref", part)))) for part in grid)
+    moves = inputs.moves("vref")
+    return moves[0].largest if moves else None
 
 
 def _longer(experiment: Experiment) -> Experiment:

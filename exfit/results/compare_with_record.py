@@ -13,7 +13,7 @@ from exfit.results.comparisons import (
     StepFeatures,
     match_of,
 )
-from exfit.simulation.inputs import Inputs
+from exfit.simulation.inputs import Inputs, InputStep
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -67,12 +67,24 @@ def _features(setup: ExperimentSetup, signal: Array, values: Values) -> Features
     """Return the features of the first move of the reference that the record holds."""
     kept = np.isfinite(signal)
     time = setup.record.time[kept]
-    simulator = setup.experiment.with_inputs(values)
-    steps = [step._replace(at=step.at + simulator.delay) for step in simulator.inputs.steps]
-    inside = [change for change in steps if change.at >= time[0]]
+    inside = [change for change in _changes(setup, values) if change.at >= time[0]]
     if not inside or inside[0].signal != "vref":
         return None
     first = Inputs(float(time[0]), float(time[-1]), tuple(inside)).moves("vref")[0]
     later = [change.at for change in inside if change.at > first.end]
     until = later[0] if later else float(time[-1])
     return features(time, signal[kept], inside[0].at, until)
+
+
+def _changes(setup: ExperimentSetup, values: Values) -> list[InputStep]:
+    """Return what a test changes, as the recorder shows it, in the order of time.
+
+    A recorded reference may move before it jumps, from the end of the steady part on.
+    """
+    simulator = setup.experiment.with_inputs(values)
+    steps = [step._replace(at=step.at + simulator.delay) for step in simulator.inputs.steps]
+    steady = setup.test.steady
+    if "vref" in simulator.inputs.recorded and steady is not None:
+        first = steps[0].at if steps else float(setup.record.time[-1])
+        return [InputStep(steady, 0.0), *steps] if steady < first else steps
+    return steps

@@ -103,6 +103,39 @@ def test_several_jumps_and_a_ramp_are_found_in_one_recorded_reference():
     assert found == pytest.approx([K, A, *instants], rel=3e-3)
 
 
+def test_the_features_are_those_of_the_first_move():
+    """Of a ramp by itself, as recorded, and up to the jump that follows."""
+    back = 0.5 * to_step(TIME, 3.0037)
+    cases = (
+        case_with(RAMP, to_ramp(TIME)),
+        case_with("recorded", to_ramp(TIME), WAY),
+        case_with("recorded", to_ramp(TIME) - back, WAY - 0.5 * (TIME > 3.0037)),
+    )
+    given, recorded, before_jump = (
+        simulate(case, {"k": K, "a": A}).comparison.features.simulated for case in cases
+    )
+    assert given.initial_value == pytest.approx(0.0, abs=1e-9)
+    assert given.final_value == pytest.approx(K / A, rel=1e-2)
+    assert recorded.rise_time == pytest.approx(given.rise_time, rel=0.02)
+    last = (TIME > 2.9) & (TIME < 3.0)
+    assert before_jump.final_value == pytest.approx(np.mean(to_ramp(TIME[last])), rel=1e-3)
+
+
+def test_a_recorded_reference_is_scaled_as_a_ramp_is(tmp_path):
+    """In a plan with a step of 5 %, of a record whose reference moved by 2 %."""
+    clock = np.arange(0.0, 6.0, 0.01)
+    ramp = {"at": 1.0, "step": 0.02, "ramp": 0.5}
+    shown = synthetic(tmp_path, {"vt0": 1.0, "vref": [ramp]}, clock, noise=0.0)
+    way = 1.0 + 0.02 * np.clip((clock - 1.0) / 0.5, 0.0, 1.0)
+    write(tmp_path / "record.csv", t=clock, vt=shown["vt"], vref=way)
+    errors = []
+    for vref, channels in (([ramp], {"vt": "vt"}), ("recorded", {"vt": "vt", "vref": "vref"})):
+        content = one({"vt0": 1.0, "vref": vref}, channels, ["KA", "TE"])
+        plans = identify(case_of(content, tmp_path), {"vt": 1e-4}).plans
+        errors.append(errors_of(next(plan for plan in plans if plan.label == "5 %")))
+    assert errors[1] == pytest.approx(errors[0], rel=1e-6)
+
+
 def test_the_instant_and_the_size_of_a_ramp_can_be_found():
     ramp = {"at": found_in(1.1, 0.8, 1.3), "step": found_in(0.8, 0.5, 1.5), "ramp": LONG}
     content = deepcopy(FIRST_ORDER)
