@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
 from exfit.fitting.setup import ExperimentSetup, compared
+from exfit.plants import VT0
 from exfit.results.comparisons import (
     Comparison,
     Overlay,
@@ -39,6 +40,7 @@ def compare_with_record(
             compared(channel, setup.experiment.measured(channel, at)),
             compared(channel, channel.as_recorded(samples[:, k])),
             None if first is None else compared(channel, channel.as_recorded(first[:, k])),
+            _reference(setup, at) if channel.signal == "vt" else None,
         )
         for k, channel in enumerate(setup.channels)
     }
@@ -61,6 +63,16 @@ def compare_with_record(
         time=setup.record.time,
         overlays=overlays,
     )
+
+
+def _reference(setup: ExperimentSetup, values: Values) -> Array | None:
+    """Return how the reference moved (M,) from where vt rests; None where it moved by steps."""
+    simulator = setup.experiment.with_inputs(values)
+    inputs = simulator.inputs
+    ramps = any(step.ramp for step in inputs.steps if step.signal == "vref")
+    if not ramps and "vref" not in inputs.recorded:
+        return None
+    return setup.experiment.parameters(values)[VT0] + simulator.input("vref")
 
 
 def _features(setup: ExperimentSetup, signal: Array, values: Values) -> Features | None:

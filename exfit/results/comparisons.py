@@ -13,17 +13,21 @@ from exfit.util.typed import IN_FILE
 
 Array = NDArray[np.float64]
 
+REFERENCE = "vref, from where vt rests"  # how figures call the reference beside vt
+
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
     """Measured and simulated samples (M,) of one signal, per unit; ``start`` after a fit.
 
-    What is left out of the comparison is nan.
+    What is left out of the comparison is nan. Beside vt, ``reference`` is how vref moved from where
+    vt rests, if not by steps alone.
     """
 
     measured: Array
     simulated: Array
     start: Array | None = None
+    reference: Array | None = None
 
     @property
     def error(self) -> Array:

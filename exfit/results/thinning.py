@@ -53,7 +53,13 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
     signals = [
         samples
         for overlay in comparison.overlays.values()
-        for samples in (overlay.measured, overlay.simulated, overlay.start, overlay.error)
+        for samples in (
+            overlay.measured,
+            overlay.simulated,
+            overlay.start,
+            overlay.reference,
+            overlay.error,
+        )
         if samples is not None
     ]
     rows = _rows(signals, MOST_ROWS) if signals else np.arange(0)
@@ -62,14 +68,18 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
         comparison,
         time=_instants(comparison.time, rows),
         overlays={
-            signal: Overlay(
-                _rounded(overlay.measured[rows]),
-                _rounded(overlay.simulated[rows]),
-                None if overlay.start is None else _rounded(overlay.start[rows]),
-            )
-            for signal, overlay in comparison.overlays.items()
+            signal: _overlay(overlay, rows) for signal, overlay in comparison.overlays.items()
         },
         iteration_responses=None if responses is None else _responses(responses, iterations),
+    )
+
+
+def _overlay(overlay: Overlay, rows: NDArray[np.intp]) -> Overlay:
+    return Overlay(
+        _rounded(overlay.measured[rows]),
+        _rounded(overlay.simulated[rows]),
+        None if overlay.start is None else _rounded(overlay.start[rows]),
+        None if overlay.reference is None else _rounded(overlay.reference[rows]),
     )
 
 

@@ -200,6 +200,11 @@ class Simulator:
         run = code.run(p, code.start(p), self._spans(parts))
         return self._sampling(run)[:, :, 0], parts
 
+    def input(self, signal: str) -> Array:
+        """Return an input (M,) at the sample times, which the recorder delays."""
+        inputs = self._sampling(self._input_samples)
+        return inputs[:, self.system.inputs.index(signal)]
+
     def run(self, values: Values) -> Run:
         """Return all outputs and inputs of the system on the grid, without the recorder's delay."""
         code = kernel(self.system, self.system.outputs, 1)

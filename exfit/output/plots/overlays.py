@@ -4,8 +4,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.decimation import envelope
-from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
-from exfit.results.comparisons import Comparison, Overlay
+from exfit.output.plots.style import LIMIT, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.results.comparisons import REFERENCE, Comparison, Overlay
 from exfit.signals import label_of
 
 
@@ -27,6 +27,10 @@ def overlay(comparison: Comparison, title: str) -> Figure:
 
 def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay) -> None:
     time = comparison.time
+    if overlaid.reference is not None:
+        axes.plot(
+            *envelope(time, overlaid.reference), "-", color=LIMIT, linewidth=0.9, label=REFERENCE
+        )
     axes.plot(
         *envelope(time, overlaid.measured), ".", color=MEASURED, markersize=3, label="measured"
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from exfit.dsp.decimation import envelope, kept_rows
 from exfit.output.report.charts import Chart, Panel, Series
 from exfit.output.report.layout import BINS, LEVEL, LOW, MILLI, TALL, TIME
-from exfit.results.comparisons import Comparison
+from exfit.results.comparisons import REFERENCE, Comparison
 from exfit.results.model import FitResult
 from exfit.results.tables import clock_digits
 from exfit.signals import label_of
@@ -78,6 +78,8 @@ def overlay(key: str, comparison: Comparison, signal: str, bins: int = BINS) -> 
     lines = [Series("measured", *envelope(time, samples.measured, bins), "measured", dots=True)]
     if samples.start is not None:
         lines.append(Series("start values", *envelope(time, samples.start, bins), "start"))
+    if samples.reference is not None:
+        lines.append(Series(REFERENCE, *envelope(time, samples.reference, bins), "reference thin"))
     lines.append(Series(fit, *envelope(time, samples.simulated, bins), "simulated"))
     error = Series("", *envelope(time, MILLI * samples.error, bins), "simulated thin")
     return Chart(
