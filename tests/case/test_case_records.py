@@ -563,6 +563,72 @@ def test_what_is_not_allowed_with_a_record_that_drives_is_refused(place, value, 
     assert text in told[0][2]
 
 
+RECORDED = (("records", 0, "test", "vref"), "recorded")
+LEVEL = ("records", 0, "record", "channels", "vref")
+FILE = {"file": "ref.csv", "time": "t", "column": "v"}
+UP = "records[0]"
+
+
+@pytest.mark.parametrize(
+    ("changes", "faults"),
+    [
+        ([RECORDED], {f"{UP}.record.channels.vref": "is missing: test.vref is recorded"}),
+        (
+            [RECORDED, (LEVEL, "vref"), (("records", 0, "test", "begin"), -1.0)],
+            {f"{UP}.test.begin": "the record shows it from its start only",
+             f"{UP}.test.vt0": "must be given with begin"},
+        ),
+        ([(LEVEL, "vref")], {f"{UP}.record.channels.vref": "give recorded there, or leave"}),
+        (
+            [RECORDED, (LEVEL, {"column": "vref", "unit": "kV", "noise": 1e-4, "averaged": 0.1,
+                                "scale": {"start": 1, "min": 0.5, "max": 2}})],
+            {f"{UP}.record.channels.vref.noise": "has no effect: the signal drives",
+             f"{UP}.record.channels.vref.averaged": "has no effect: the signal drives",
+             f"{UP}.record.channels.vref.scale": "must be a number"},
+        ),
+        (
+            [RECORDED, (LEVEL, {"column": "vref", "unit": "kV"})],
+            {f"{UP}.record.channels.vref.base": "what is 1 pu in kV?"},
+        ),
+        (
+            [(RECORDED[0], {**FILE, "unit": "kV", "filter": {"median": 4}, "noise": 1})],
+            {f"{UP}.test.vref.base": "what is 1 pu in kV?",
+             f"{UP}.test.vref.filter.median": "4 is not an odd number",
+             f"{UP}.test.vref.noise": "unknown key"},
+        ),
+        ([(RECORDED[0], {"file": "ref.csv"})], {f"{UP}.test.vref.time": "is missing",
+                                                f"{UP}.test.vref.column": "is missing"}),
+        ([(RECORDED[0], "recordet")], {f"{UP}.test.vref": "did you mean recorded?"}),
+    ],
+)  # fmt: skip
+def test_every_fault_of_a_recorded_reference_is_reported(changes, faults):
+    content = EXAMPLE
+    for place, value in changes:
+        content = changed(place, value, content)
+    reported = dict(fault.split(": ", 2)[1:] for fault in faults_of(content))
+    assert reported.keys() == faults.keys()
+    assert all(text in reported[place] for place, text in faults.items())
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ("recorded", "record.channels.vref drives it without"),
+        (FILE, "give the record a channel vref"),
+    ],
+)
+def test_a_playback_takes_its_reference_from_a_channel_alone(given, text):
+    content = changed(("test",), {"steady_until": 1.0, "vref": given}, PLAYBACK)
+    (fault,) = faults_of(content)
+    assert ": test.vref: not allowed with plant playback: " in fault
+    assert text in fault
+
+
+def test_a_recorded_reference_needs_a_record():
+    (fault,) = faults_of(changed(("test", "vref"), "recorded", ALONE))
+    assert fault.endswith(": test.vref: recorded needs a record")
+
+
 @pytest.mark.parametrize(
     ("value", "told_at", "text"),
     [

@@ -121,6 +121,16 @@ def test_the_features_are_those_of_the_first_move():
     assert before_jump.final_value == pytest.approx(np.mean(to_ramp(TIME[last])), rel=1e-3)
 
 
+def test_a_reference_that_is_more_than_steps_is_shown_beside_vt():
+    steps = case_with([{"at": AT, "step": 1.0}], to_step(TIME, AT))
+    recorded = case_with("recorded", to_ramp(TIME), WAY)
+    for case, shown in ((steps, None), (recorded, WAY - 1.0), (case_with(RAMP, WAY), WAY - 1.0)):
+        reference = simulate(case, {"k": K, "a": A}).comparison.overlays["vt"].reference
+        assert (reference is None) == (shown is None)
+        if shown is not None:
+            assert reference == pytest.approx(shown, abs=1e-9)
+
+
 def test_a_recorded_reference_is_scaled_as_a_ramp_is(tmp_path):
     """In a plan with a step of 5 %, of a record whose reference moved by 2 %."""
     clock = np.arange(0.0, 6.0, 0.01)

@@ -1,5 +1,6 @@
 """Figures: every axis says what it shows, whatever the result; a warning is an error."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,13 @@ def comparison(signals=("vt",), start=None):
         time=TIME,
         overlays=overlays,
     )
+
+
+def test_a_reference_that_was_recorded_is_drawn_beside_vt():
+    overlay = Overlay(RISE, RISE, None, RISE)
+    figure = plots.overlay(replace(comparison(), overlays={"vt": overlay}), "title")
+    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert labels == ["vref, from where vt rests", "measured", "simulated"]
 
 
 def line(number, phase, values):
