@@ -231,6 +231,19 @@ def test_the_records_of_the_page_are_a_valid_part_of_a_case(cases):
     assert case.on_load
 
 
+def test_the_forms_of_the_reference_are_read(cases):
+    """Each of them in its turn in place of the first, with the record that belongs to it."""
+    text = block("records.md", "yaml", 2)
+    (first, *others) = re.findall(r"^  (?:# )?(vref: .*)$", text, re.MULTILINE)
+    assert len(others) == 4
+    for form in (first, *others):
+        shown = text.replace(f"  {first}", f"  {form}", 1)
+        shown = shown if form == first else shown.replace(", vref: vref}", "}")
+        (cases / "case.yaml").write_text(MACHINE + shown, encoding="utf-8")
+        case = load_case(cases / "case.yaml")
+        assert case.test.vref
+
+
 def test_the_unit_on_load_of_the_page_can_be_simulated(cases):
     (cases / "case.yaml").write_text("model: AC1A\n" + block("plants.md", "yaml"), "utf-8")
     response = workflows.simulate(load_case(cases / "case.yaml"), {}).response

@@ -5,6 +5,10 @@ from copy import deepcopy
 import numpy as np
 import pytest
 from cases import FIRST_ORDER
+from places import CONFIGS
+from ramp_record import FILE, STEP, ramp_record
+from ramp_record import NOISE as NOISE_OF_SAMPLE
+from ramp_record import UNIT as TRUE_UNIT
 from records import case_of, config, found_in, one, synthetic, write
 
 from exfit.case.case import Case
@@ -264,6 +268,24 @@ def test_a_unit_is_found_alike_from_ramp_table_and_channel(tmp_path):
         low, high = parameter.interval
         for other in results[1:]:
             assert abs(other.parameters[name].value - parameter.value) < 0.1 * (high - low), name
+
+
+def test_the_sample_record_of_a_ramp_and_a_jump_leads_to_the_unit_that_made_it():
+    """Another integrator computed it; seven parameters and the instant of the jump."""
+    result = fit(CONFIGS / "ac1a_ramp.yaml")
+    for name in ("KA", "TA", "TE", "KF", "TF", "KC", "KD"):
+        low, high = result.parameters[name].interval
+        assert low < TRUE_UNIT[name] < high
+    low, high = result.parameters["vref.at"].interval
+    assert low < STEP.at < high
+    assert high - low < 0.002
+    assert result.comparison.rmse == pytest.approx(NOISE_OF_SAMPLE["vt"], rel=0.05)
+
+
+def test_that_record_is_what_its_script_makes():
+    made = np.loadtxt(ramp_record().splitlines(), delimiter=",", skiprows=1)
+    kept = np.loadtxt(FILE, delimiter=",", skiprows=1)
+    assert np.abs(made - kept).max() < 1.1e-5  # a digit may round the other way
 
 
 @pytest.mark.parametrize("signal", ["vref", "vs"])

@@ -59,6 +59,8 @@ def truth(record):
     down = (1.0, moved(f"reference_{unit}.csv", 10.5, 20.0))
     if record == "ac1a_channels":
         return [up, (11.0, down[1])]
+    if record == "ac1a_ramp":
+        return [up, (9.0037, down[1])]
     return [up if record.endswith("up") else down]
 
 
