@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
 from exfit.fitting.setup import ExperimentSetup, compared
-from exfit.plants import VT0
 from exfit.results.comparisons import (
     Comparison,
     Overlay,
@@ -40,7 +39,7 @@ def compare_with_record(
             compared(channel, setup.experiment.measured(channel, at)),
             compared(channel, channel.as_recorded(samples[:, k])),
             None if first is None else compared(channel, channel.as_recorded(first[:, k])),
-            _reference(setup, at) if channel.signal == "vt" else None,
+            _reference(setup, at, samples[0, k]) if channel.signal == "vt" else None,
         )
         for k, channel in enumerate(setup.channels)
     }
@@ -65,14 +64,14 @@ def compare_with_record(
     )
 
 
-def _reference(setup: ExperimentSetup, values: Values) -> Array | None:
+def _reference(setup: ExperimentSetup, values: Values, vt0: float) -> Array | None:
     """Return how the reference moved (M,) from where vt rests; None where it moved by steps."""
     simulator = setup.experiment.with_inputs(values)
     inputs = simulator.inputs
     ramps = any(step.ramp for step in inputs.steps if step.signal == "vref")
     if not ramps and "vref" not in inputs.recorded:
         return None
-    return setup.experiment.parameters(values)[VT0] + simulator.input("vref")
+    return vt0 + simulator.input("vref")
 
 
 def _features(setup: ExperimentSetup, signal: Array, values: Values) -> Features | None:
