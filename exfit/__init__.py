@@ -21,6 +21,7 @@ from exfit.errors import (
 )
 
 if TYPE_CHECKING:
+    from exfit.analysis.translation import translate
     from exfit.case.case import Case
     from exfit.fleet.fits import fit_all
     from exfit.records.record import Record
@@ -60,6 +61,7 @@ __all__ = [
     "profile",
     "read_record",
     "simulate",
+    "translate",
     "validate",
 ]
 
@@ -76,6 +78,7 @@ _MODULES = {
     "profile": "exfit.workflows",
     "read_record": "exfit.workflows",
     "simulate": "exfit.workflows",
+    "translate": "exfit.analysis.translation",
     "validate": "exfit.workflows",
 }
 

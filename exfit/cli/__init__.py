@@ -18,6 +18,7 @@ from exfit.cli.records import inspect_, new
 from exfit.cli.reporting import report
 from exfit.cli.responses import simulate, validate
 from exfit.cli.streams import unfailing_output
+from exfit.cli.translating import translate
 from exfit.cli.uncertainty import identify, profile
 from exfit.errors import ExfitError
 
@@ -58,7 +59,7 @@ def main() -> None:
 
 OF_RECORDS = (inspect_, new)
 OF_CASES = (fit, simulate, validate, check, profile, identify)
-OF_RESULTS = (report, compare, import_, export)
+OF_RESULTS = (report, compare, translate, import_, export)
 COMMANDS = (*OF_RECORDS, *OF_CASES, *OF_RESULTS, models, schema)
 for command in COMMANDS:
     main.add_command(command)

@@ -16,6 +16,7 @@ from exfit.fleet.fits import FitSeries
 from exfit.records.inspection import Inspection
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
+from exfit.results.translation import Translation
 from exfit.workflows import SimulationResult
 
 if TYPE_CHECKING:
@@ -109,3 +110,11 @@ def of_agreement(agreement: Agreement) -> Drawings:
     from exfit.output import plots
 
     return {"compare.png": partial(plots.agreement, agreement)}
+
+
+def of_translation(translation: Translation) -> Drawings:
+    """Return the figure of a fitted exciter as another model."""
+    from exfit.output import plots
+
+    title = f"{translation.name}: {translation.source} and {translation.target}"
+    return {"translation.png": partial(plots.translation, translation, title)}

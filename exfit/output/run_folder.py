@@ -18,7 +18,9 @@ from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
 from exfit.fleet.fits import FitSeries
+from exfit.models.sheet import Model
 from exfit.output import run_figures
+from exfit.output.translated_files import files_of_translation
 from exfit.records.inspection import Inspection
 from exfit.results.comparisons import Comparison
 from exfit.results.io import WHOLE_FIT, result_text
@@ -33,6 +35,7 @@ from exfit.results.tables import (
     parameter_file,
     table,
 )
+from exfit.results.translation import Translation
 from exfit.util.cache import cache_folder
 from exfit.util.files import write, write_together
 from exfit.util.interrupts import deferred_interrupts
@@ -47,7 +50,18 @@ ITERATIONS, SENSITIVITIES = "iterations.csv", "sensitivities.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
 INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
 SERIES, AT_RECORD = "fits.json", "compare-record.csv"
-MAIN_FILES = (WHOLE_FIT, VALIDATION, PROFILES, DESIGN, INSPECTION, RESPONSE, AGREEMENT, SERIES)
+TRANSLATION = "translation.json"
+MAIN_FILES = (
+    WHOLE_FIT,
+    VALIDATION,
+    PROFILES,
+    DESIGN,
+    INSPECTION,
+    RESPONSE,
+    AGREEMENT,
+    SERIES,
+    TRANSLATION,
+)
 # what a command may write that could be an input too, beside files that are named after records
 NUMBERS = {
     "fit": (PARAMETERS, "history.csv", RESPONSE, ITERATIONS, SENSITIVITIES, WHOLE_FIT),
@@ -57,6 +71,7 @@ NUMBERS = {
     "identify": (DESIGN, SENSITIVITIES),
     "compare": ("compare.csv", AT_RECORD, AGREEMENT),
     "fits": ("fits.csv", SERIES),
+    "translate": ("translation.csv", TRANSLATION),
 }
 # what a fit may write, beside the files that are named after records
 FILES_OF_FIT = (
@@ -291,6 +306,24 @@ def write_agreement(agreement: Agreement, folder: Path, figures: bool) -> tuple[
     write_together(folder, numbers, ["compare.png", AT_RECORD])
     drawings = partial(run_figures.of_agreement, agreement)
     return _draw(folder / AGREEMENT, drawings) if figures else ()
+
+
+def write_translation(
+    translation: Translation,
+    result: FitResult,
+    target: tuple[str, Model],
+    folder: Path,
+    figures: bool,
+) -> tuple[str, ...]:
+    """Write a translation as JSON, its responses, a case and a PSS/E file of the target, a figure.
+
+    ``target`` is the model, behind its name as it was given.
+    """
+    numbers = files_of_translation(translation, result, target, folder)
+    numbers[TRANSLATION] = to_json(translation.to_dict())
+    write_together(folder, numbers, ["translation.png"])
+    drawings = partial(run_figures.of_translation, translation)
+    return _draw(folder / TRANSLATION, drawings) if figures else ()
 
 
 def agreement_table(agreement: Agreement) -> str:

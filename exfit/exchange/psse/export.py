@@ -2,18 +2,25 @@
 
 import textwrap
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 from exfit import __version__
 from exfit.errors import ExfitError
-from exfit.exchange.psse.records import WIDTH, Definition, alternatives, definitions, record_text
+from exfit.exchange.psse.records import (
+    WIDTH,
+    Definition,
+    alternatives,
+    definition_of,
+    definitions,
+    record_text,
+)
 from exfit.models import MODELS
+from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES
 from exfit.results.model import FitResult
+from exfit.results.translation import Translation
 from exfit.util.text import near, show
-
-NO_LIMIT = 99.0  # pu: data sheets write limits that never act as 99 or 999
 
 
 @dataclass(frozen=True)
@@ -34,12 +41,23 @@ class Written:
     typical: tuple[str, ...]
 
 
-def export(result: FitResult, bus: int, machine_id: str, name: str | None = None) -> Exported:
-    """Return the PSS/E records of a fit.
+def export(
+    result: FitResult,
+    bus: int,
+    machine_id: str,
+    name: str | None = None,
+    translation: Translation | None = None,
+) -> Exported:
+    """Return the PSS/E records of a fit, of its exciter as its ``translation`` has it.
 
     ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
     model has no record.
     """
+    origin = [*_origin(result)]
+    if translation is not None:
+        verdict = f"{translation.source} as {translation.target}: {translation.verdict}"
+        origin += [f"{text}." for text in (verdict, *translation.notes)]
+        result = _translated(result, translation)
     warnings = [*_of_fit(result)]
     written = [
         *_machine(result, warnings),
@@ -50,11 +68,28 @@ def export(result: FitResult, bus: int, machine_id: str, name: str | None = None
         raise ExfitError(f"{result.model} has no PSS/E record")
     for record in written:
         warnings += _warnings(record)
-    comments = [*_origin(result), *(f"{text}." for text in _of_fit(result))]
+    comments = [*origin, *(f"{text}." for text in _of_fit(result))]
     comments += [text for record in written for text in _comments(record)]
     lines = [line for text in comments for line in _wrapped(text)]
     lines += [record_text(entry.definition, entry.values, bus, machine_id) for entry in written]
     return Exported("\n".join(lines) + "\n", tuple(warnings))
+
+
+def _translated(result: FitResult, translation: Translation) -> FitResult:
+    """Return a result whose exciter is that of a translation."""
+    others = {name: entry for name, entry in result.parameters.items() if "." in name}
+    of_others = tuple(name for name in result.typical if "." in name)
+    of_target = tuple(
+        name for name, entry in translation.parameters.items() if entry.origin == "typical"
+    )
+    return replace(
+        result,
+        model=translation.target,
+        parameters=others,
+        fixed=translation.values,
+        typical=(*of_target, *of_others),
+        inputs={label: sha for label, sha in result.inputs.items() if label != "model"},
+    )
 
 
 def _of_fit(result: FitResult) -> Iterator[str]:
@@ -82,9 +117,18 @@ def _exciter(result: FitResult, name: str | None) -> Iterator[Written]:
     wanted = next(iter(candidates)) if name is None else name.upper()
     if wanted not in candidates:
         raise ExfitError(
-            f"--model {name}: not a record of {result.model}; {near(wanted, candidates)}"
+            f"--model {name}: not a record of {result.model}; "
+            f"{_other_model(wanted) or near(wanted, candidates)}"
         )
     yield _written(result, candidates[wanted], "")
+
+
+def _other_model(name: str) -> str:
+    """Return a hint where a record is that of another exciter."""
+    definition = definition_of(name)
+    if definition is None or definition.kind != "exciter":
+        return ""
+    return f"`exfit translate RESULT --model {name}` finds the data of {definition.model.name}"
 
 
 def _machine(result: FitResult, warnings: list[str]) -> Iterator[Written]:
@@ -142,9 +186,9 @@ def _warnings(entry: Written) -> Iterator[str]:
 def _matters(symbol: str, value: float) -> bool:
     """Return whether a value does anything: a gain of 0 and a limit out of reach do not."""
     if symbol.endswith("MAX"):
-        return value < NO_LIMIT
+        return value < OUT_OF_REACH
     if symbol.endswith("MIN"):
-        return value > -NO_LIMIT
+        return value > -OUT_OF_REACH
     return value != 0.0
 
 

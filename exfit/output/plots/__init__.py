@@ -8,6 +8,7 @@ from exfit.output.plots.records import inspection
 from exfit.output.plots.responses import overview, response
 from exfit.output.plots.search import convergence, trajectories, waterfall
 from exfit.output.plots.style import png
+from exfit.output.plots.translations import translation
 from exfit.output.plots.uncertainty import correlation, profiles, sensitivity
 
 __all__ = [
@@ -24,5 +25,6 @@ __all__ = [
     "response",
     "sensitivity",
     "trajectories",
+    "translation",
     "waterfall",
 ]

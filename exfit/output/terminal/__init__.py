@@ -9,6 +9,7 @@ from exfit.output.terminal.fits import fit
 from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
 from exfit.output.terminal.records import inspection
 from exfit.output.terminal.terminal import again, console, notes, waiting, written
+from exfit.output.terminal.translations import translation
 from exfit.output.terminal.uncertainty import design, profiles
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "notes",
     "profiles",
     "task",
+    "translation",
     "validation",
     "waiting",
     "written",

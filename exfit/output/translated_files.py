@@ -1,0 +1,70 @@
+"""The files of a translation: its responses as a table, a case and PSS/E records of the target."""
+
+from pathlib import Path
+
+from exfit.analysis.translation_steps import network_of
+from exfit.case.suggestion import relative
+from exfit.case.translated_case import translated_case
+from exfit.exchange.psse.export import export
+from exfit.exchange.psse.records import alternatives
+from exfit.models.sheet import Model
+from exfit.results.model import FitResult
+from exfit.results.tables import table
+from exfit.results.translation import Translation
+
+
+def files_of_translation(
+    translation: Translation, result: FitResult, target: tuple[str, Model], folder: Path
+) -> dict[str, str]:
+    """Return the texts of the files, to be written into ``folder``, by their names.
+
+    ``target`` is the model, behind its name as it was given: of a user's own model its file.
+    """
+    given, model = target
+    own = f"{result.name}-{model.name}"
+    name = relative(Path(given), folder) if given.endswith(".py") else model.name
+    files = {
+        f"{own}.yaml": case_of_translation(translation, result, (name, model), folder),
+        "translation.csv": responses_table(translation),
+    }
+    if alternatives(model):
+        files[f"{own}.dyr"] = export(result, 1, "1", translation=translation).text
+    return files
+
+
+def responses_table(translation: Translation) -> str:
+    """Return the responses of both models in every step, as CSV."""
+    header, columns = ["t"], [translation.time]
+    for step in translation.steps:
+        for model, signals in (
+            (translation.source, step.source),
+            (translation.target, step.target),
+        ):
+            for signal, samples in signals.items():
+                header.append(f"{signal} {model} {step.label}")
+                columns.append(samples)
+    return table(header, columns)
+
+
+def case_of_translation(
+    translation: Translation, result: FitResult, target: tuple[str, Model], folder: Path
+) -> str:
+    """Return the case of the fit with the target in place of its exciter."""
+    machine = {"machine": result.machine_model, "parameters": dict(result.machine)}
+    network = network_of(result)
+    plant = (
+        {"type": "infinite-bus", **machine, "network": network}
+        if network
+        else {"type": "open-circuit", **machine}
+    )
+    return translated_case(
+        result.case_text,
+        result.case,
+        folder,
+        target,
+        translation.values,
+        {symbol: entry.provenance for symbol, entry in translation.parameters.items()},
+        plant,
+        f"{translation.source} of {result.case.name} as {translation.target}.\n"
+        f"{translation.verdict}",
+    )
