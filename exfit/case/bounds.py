@@ -10,11 +10,13 @@ def search_bounds(low: float | None, high: float | None, row: Parameter | None) 
     """Return the bounds of a free parameter, given those that the case has.
 
     A missing one is the limit of the equations, which may be infinite; a time constant stays where
-    its block is not bypassed. Without a data sheet there is no limit.
+    its block is not bypassed, also where its bound of 0 belongs to a start of 0 that another one
+    has replaced. Without a data sheet there is no limit.
     """
     lowest, highest = (-inf, inf) if row is None else row.domain
     if row is not None and row.is_time:
         lowest = max(lowest, SHORTEST)
+        low = None if low == 0.0 else low
     return lowest if low is None else low, highest if high is None else high
 
 

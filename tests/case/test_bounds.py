@@ -2,11 +2,14 @@
 
 from math import inf
 
+import numpy as np
 import pytest
 from records import case_of, config
 
 from exfit.case.bounds import is_held, search_bounds
 from exfit.errors import CaseError
+from exfit.fitting.overrides import with_given_values
+from exfit.fitting.problem import free_parameters
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.workflows import check, fit
@@ -72,6 +75,17 @@ def test_a_fit_that_holds_it_is_that_of_a_case_which_fixes_it(tmp_path):
     assert result.fixed["TA"] == 0.0
     fixed = fit(ac8b(tmp_path, 0.0))
     assert dict(result.parameters) == dict(fixed.parameters)
+
+
+@pytest.mark.parametrize("time", [{"start": 0}, {"start": 0, "min": 0, "max": 1}])
+def test_a_start_given_beside_the_case_frees_it_where_its_block_acts(tmp_path, time):
+    case = with_given_values(ac8b(tmp_path, time), {"TA": 0.01}, "--set")
+    assert case.held() == ()
+    parameter = {free.name: free for free in free_parameters(case)}["TA"]
+    assert (parameter.start, parameter.low) == (0.01, SHORTEST)
+    assert np.isfinite(parameter.scaled(parameter.low))
+    with pytest.raises(CaseError, match="TA: 5e-05 lies outside its bounds"):
+        with_given_values(case, {"TA": 5e-5}, "--set")
 
 
 def test_what_follows_a_held_time_follows_zero(tmp_path):
