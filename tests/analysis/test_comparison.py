@@ -464,6 +464,16 @@ def test_aligned_clocks_have_their_steps_together(at):
     assert "--align" in proposed
 
 
+def test_clocks_without_a_time_in_common_are_aligned():
+    """A recorder counts from midnight, a simulator from zero."""
+    time, midnight = clock(0.01), clock(0.01, 40010.0, 40000.0)
+    a = write("a.csv", t=time, vt=rise(time))
+    b = write("b.csv", t=midnight, vt=rise(midnight, at=40002.0))
+    with pytest.raises(RecordError, match=r"no time in common.*--align"):
+        compare([a, b])
+    assert compare([a, b], align=True).curves[1].shift == pytest.approx(AT - 40002.0, abs=1e-3)
+
+
 @pytest.mark.parametrize("lag", [LAG, 2.0 * LAG])
 def test_clocks_that_are_one_are_not_moved_whatever_the_shape(lag):
     """What is detected differs by some of the rise: that is no difference of clocks."""
