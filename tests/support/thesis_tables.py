@@ -102,6 +102,11 @@ def history_table(number: int) -> str:
     return table((*head, "exfit: norm of g", "f", counted), numbered(*groups))
 
 
+def settled(result: exfit.FitResult) -> int:
+    """Return the iteration from which f is within 5 % of where it ends."""
+    return next(line.number for line in result.history if line.cost < 1.05 * result.cost)
+
+
 def norm_of(line: Iteration) -> str:
     """Return the norm of g over the parameters relative to their start."""
     return f"{HALF * line.gradient_norm:.6f}"
