@@ -142,7 +142,8 @@ def _value(pair: Counterpart, source: Placed, resolved: Values) -> StartValue:
     if same is not None:
         raw = computed_if_zero(row) and computed_if_zero(same)
         value = source.values[same.symbol] if raw else resolved[same.symbol]
-        if row.low <= value <= row.high:
+        # a fit without bounds may have left the range of the data sheet
+        if row.low <= value <= row.high or not same.low <= value <= same.high:
             return StartValue(value, "copied", (same.symbol,))
     return _without_counterpart(row, source)
 

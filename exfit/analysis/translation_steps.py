@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.translation_start import Placed
+from exfit.case.peek import section_of
 from exfit.engine.system import System
 from exfit.errors import ExfitError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
@@ -119,7 +120,8 @@ def source_model(result: FitResult) -> Model:
         raise ExfitError(f"the fit is of {result.model}, without an exciter")
     sha256 = result.inputs.get("model", "")
     if sha256:
-        return find(result.files.get("model", ""), result.case.parent, sha256)
+        name = section_of(result.case_text, result.case, "model") or result.files.get("model", "")
+        return find(str(name), result.case.parent, sha256)
     if result.model not in MODELS:
         raise ExfitError(f"{result.model} is not in the catalogue")
     return MODELS[result.model]
@@ -167,7 +169,9 @@ def _stabiliser(result: FitResult) -> Stabilised | None:
     if name is None or name not in STABILISERS:
         return None
     model = STABILISERS[name]
-    return Stabilised(model, model.inputs)
+    section = section_of(result.case_text, result.case, "stabiliser")
+    given = section.get("inputs") if isinstance(section, Mapping) else None
+    return Stabilised(model, tuple(map(str, given)) if given else model.inputs)
 
 
 def reference_steps(

@@ -45,16 +45,8 @@ def translation_notes(
     steps: Sequence[StepComparison],
 ) -> Iterator[str]:
     """Yield what must be known beside the numbers."""
-    result, source, target = task.result, task.source.name, task.target.name
-    if not result.success:
-        yield f"the fit of {source} did not converge: {result.message}"
-    open_ = [
-        name
-        for name, parameter in result.parameters.items()
-        if name in task.own and parameter.interval is None
-    ]
-    if open_:
-        yield f"the record of the fit did not determine {', '.join(open_)} of {source}"
+    source, target = task.source.name, task.target.name
+    yield from _fit_notes(task)
     hidden = [name for name, share in unnoticed.items() if share > UNDETERMINED]
     if hidden:
         yield (
@@ -65,6 +57,20 @@ def translation_notes(
         yield f"typical, {source} has no such parameter: {', '.join(typical)} of {target}"
     yield from _limit_notes(steps, source, target)
     yield from _plant_notes(task)
+
+
+def _fit_notes(task: TranslationTask) -> Iterator[str]:
+    """Yield what of the fit itself must be known."""
+    result, source = task.result, task.source.name
+    if not result.success:
+        yield f"the fit of {source} did not converge: {result.message}"
+    own = {name: entry for name, entry in result.parameters.items() if name in task.own}
+    unknown = [name for name, entry in own.items() if entry.interval is None]
+    if unknown:
+        yield f"the record of the fit did not determine {', '.join(unknown)} of {source}"
+    outside = [f"{name} {entry.value:.4g}" for name, entry in own.items() if not entry.physical]
+    if outside:
+        yield f"not physical, outside the range of the data sheet: {', '.join(outside)}"
 
 
 def _limit_notes(steps: Sequence[StepComparison], source: str, target: str) -> Iterator[str]:

@@ -41,6 +41,15 @@ def parameters_of(case: Path) -> tuple[str, ...]:
     return _names(_content(case), free=False)
 
 
+def section_of(text: str, case: Path, key: str) -> Any:
+    """Return what the text of a case has under a key of its top; None where there is nothing."""
+    try:
+        root, _ = read_yaml(text, case)
+    except CaseError:
+        return None
+    return root.value.get(key)
+
+
 def _content(case: Path) -> Mapping[str, Any]:
     try:
         root, _ = read_yaml(read_text(case), case)

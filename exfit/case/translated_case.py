@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from exfit.case.starting_case import bounds_of, free_of
+from exfit.case.starting_case import BOUNDS, bounds_of, free_of
 from exfit.case.suggestion import relative
 from exfit.case.templates import commented
 from exfit.case.yaml import read_yaml
@@ -81,7 +81,7 @@ def _with_values(plant: Mapping[str, Any], values: Mapping[str, float]) -> dict[
 def _parameters(
     model: Model, values: Mapping[str, float], provenance: Mapping[str, str]
 ) -> Iterator[str]:
-    free = [row for row in free_of(model) if values[row.symbol] > 0.0]
+    free = [row for row in free_of(model) if values[row.symbol] != 0.0]
     yield "  fixed:"
     for row in model.sheet:
         if row not in free:
@@ -91,11 +91,15 @@ def _parameters(
         yield "  free:"
     for row in free:
         yield f"    # {row.unit}, {row.meaning}; {provenance[row.symbol]}"
-        start, low, high = (yaml_number(number) for number in _start(row, values[row.symbol]))
-        yield f"    {row.symbol}: {{start: {start}, min: {low}, max: {high}}}"
+        yield f"    {row.symbol}: {{{_section(row, values[row.symbol])}}}"
 
 
-def _start(row: Parameter, value: float) -> tuple[float, float, float]:
-    """Return a start within the bounds of a fit: those around the typical value, and wider."""
+def _section(row: Parameter, value: float) -> str:
+    """Return a start within the bounds of a fit, also where it is not physical."""
     low, high = bounds_of(row._replace(typical=value))
-    return value, float(f"{min(low, value):.6g}"), float(f"{max(high, value):.6g}")
+    if not row.low <= value <= row.high:
+        low, high = sorted(share * value for share in BOUNDS)
+    bounds = float(f"{min(low, value):.6g}"), float(f"{max(high, value):.6g}")
+    start, low_text, high_text = (yaml_number(number) for number in (value, *bounds))
+    scale = "" if value > 0.0 else ", scale: linear"
+    return f"start: {start}, min: {low_text}, max: {high_text}{scale}"

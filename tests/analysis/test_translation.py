@@ -11,9 +11,11 @@ from translations import NETWORK, NO_LIMITS, any_fit, fit_of
 
 import exfit
 from exfit.analysis.translation_search import NOTICEABLE, _unnoticed
+from exfit.analysis.translation_steps import step_plants
 from exfit.errors import ExfitError, ModelError
-from exfit.models import MODELS
+from exfit.models import MODELS, STABILISERS
 from exfit.models.exciters import sexs
+from exfit.models.sheet import typical
 from exfit.results.model import FittedParameter
 from exfit.results.translation import EXACT, POOR
 
@@ -148,6 +150,32 @@ def test_a_value_that_the_record_did_not_determine_stays_marked():
     assert "the record of the fit did not determine TF of IEEET1" in translation.notes
 
 
+def test_a_value_that_is_not_physical_is_copied_and_said():
+    fit = fit_of(FIT, "AC1A", **FAR)
+    found = FittedParameter(-0.1, 0.3, -1.0, 1.0, interval=(-0.2, -0.05), physical=False)
+    own = {name: value for name, value in fit.fixed.items() if name != "KD"}
+    translation = exfit.translate(
+        replace(fit, parameters={"KD": found}, fixed=own), "EXAC1", (0.01,)
+    )
+    assert translation.exact
+    assert translation.values["KD"] == -0.1
+    assert "not physical, outside the range of the data sheet: KD -0.1" in translation.notes
+
+
+def test_a_stabiliser_listens_to_what_the_case_says():
+    fit = replace(
+        fit_of(FIT, "AC1A", network=NETWORK),
+        stabiliser_model="STAB1",
+        stabiliser=typical(STABILISERS["STAB1"].sheet),
+    )
+    text = "stabiliser: {model: STAB1, inputs: [p]}"
+    inputs = [
+        step_plants(replace(fit, case_text=case_text))[1].equipment.stabiliser.inputs
+        for case_text in (text, "")
+    ]
+    assert inputs == [("p",), STABILISERS["STAB1"].inputs]
+
+
 @pytest.mark.long
 def test_a_fit_with_a_network_is_compared_on_load_too():
     translation = translated("AC1A", "EXAC1", network=NETWORK, **FAR)
@@ -202,6 +230,10 @@ def test_a_users_own_model_is_run_only_from_the_file_that_was_fitted(tmp_path):
         files={"model": "own.py"},
     )
     assert exfit.translate(fit, "SEXS", (0.01,)).exact
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "same.py").write_text(code)
+    moved = replace(fit, case_text="model: sub/same.py\n", files={"model": "same.py"})
+    assert exfit.translate(moved, "SEXS", (0.01,)).exact
     (tmp_path / "own.py").write_text("raise SystemExit('run')\n")
     with pytest.raises(ModelError, match="not run: the file has changed since the fit"):
         exfit.translate(fit, "SEXS")

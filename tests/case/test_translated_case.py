@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 import yaml
 from places import ROOT
 
@@ -59,6 +60,12 @@ def test_a_gain_of_zero_stays_fixed():
     case = parse_case(translated(CASE.read_text(encoding="utf-8"), KF=0.0), CASE)
     assert "KF" not in case.free()
     assert case.values()["KF"] == 0.0
+
+
+def test_a_value_that_is_not_physical_can_be_fitted_again():
+    case = parse_case(translated(CASE.read_text(encoding="utf-8"), KD=-0.1), CASE)
+    free = case.free()["KD"]
+    assert (free.start, free.min, free.max) == (-0.1, -1.0, pytest.approx(-0.01))
 
 
 def test_without_a_case_file_it_is_a_case_to_simulate():
