@@ -441,7 +441,7 @@ def test_one_response_is_compared_with_a_record(run):
 
 
 def test_more_responses_than_letters_have_names():
-    a = write("a.csv", t=clock(0.1), vt=rise(clock(0.1)))
+    a = write("a.csv", t=clock(1.0), vt=rise(clock(1.0)))
     names = [curve.name for curve in compare([a] * 28).curves]
     assert (names[0], names[25:]) == ("A", ["Z", "AA", "AB"])
 

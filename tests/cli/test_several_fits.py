@@ -29,7 +29,7 @@ def workplace(empty_folder, monkeypatch):
     (empty_folder / "up.csv").write_text("\n".join(["t,v", *rows]) + "\n")
     monkeypatch.setattr(plots.style, "DPI", 40)
     for name in OF_ONE_FIT:
-        monkeypatch.setattr(plots, name, lambda *_: Figure())
+        monkeypatch.setattr(plots, name, lambda *_: Figure(figsize=(1, 1)))
     return empty_folder
 
 
@@ -194,6 +194,7 @@ main()
 """
 
 
+@pytest.mark.long  # a process of its own
 def test_ctrl_c_keeps_what_is_done_and_ends_with_3():
     cases = [str(case_file(f"{name}.yaml")) for name in "abc"]
     ran = subprocess.run(
