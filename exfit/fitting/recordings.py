@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
+from exfit.case.checks.record import BEFORE_RECORD
 from exfit.case.schema import (
     BumpTest,
     ChannelSection,
@@ -112,10 +113,10 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
         start = test.begin
     for at in test.instants:
         if not start <= at < end:
-            raise RecordError(
-                f"{path}: holds {show(start)} ... {show(end)} s, "
-                f"but {case.path} has a step at {show(at)} s"
+            text = (
+                f"holds {show(start)} ... {show(end)} s, but {case.path} has a step at {show(at)} s"
             )
+            raise RecordError(f"{path}: {text}{f'; {BEFORE_RECORD}' if at < start else ''}")
     _refuse_short_tables(case, test, (float(start), float(end)), path)
     steady = test.steady
     if steady is not None and steady > end:

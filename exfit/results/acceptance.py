@@ -76,8 +76,8 @@ def _why_not(
         return "" if within else text
     if not validation.judged.describes:
         return (
-            f"the response matches {name} no better than a constant would: check the sign, size "
-            "and instant of its step, and whether it is a record of this unit"
+            f"the response matches {name} no better than a constant would: check vt0 and the "
+            "sign, size and instant of its step, and whether it is a record of this unit"
         )
     if within:
         return ""

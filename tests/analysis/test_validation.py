@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from places import ROOT
 
+from exfit.case.case import Case
 from exfit.case.load import load_case
 from exfit.case.schema import ChannelSection, StepSection
 from exfit.errors import CaseError, RecordError
@@ -17,6 +19,7 @@ UNIT1 = {"KPR": 78.84, "KIR": 2.4636, "KDR": 37.05, "TDR": 0.1638, "TE": 1.4044,
 UNIT2 = {"KPR": 85.6266, "KIR": 2.5912, "KDR": 25.381, "TDR": 0.2044, "TE": 1.8426, "KC": 0.3233}
 TRUTH = {
     "ac1a_typical": {**AC1A, "KD": 0.4039},
+    "ac1a_windows": {**AC1A, "KD": 0.4039},
     "field_record": {**AC1A, "KD": 0.4039},
     "exciter_playback": {"KA": 364.1523, "TA": 0.0542, "KF": 0.0413, "TF": 1.458, "TE": 1.6724},
     "ac8b_unit1": {**UNIT1, "KD": 0.0511},
@@ -153,3 +156,40 @@ def test_a_recorded_reference_says_by_itself_what_was_stepped():
     assert step.size == pytest.approx(-0.05, rel=1e-9)
     assert step.at == pytest.approx(1.0, abs=0.01)
     assert match.rmse == pytest.approx(1e-4, rel=0.2)
+
+
+def test_windows_of_one_record_are_fitted_and_validated_on():
+    """The second begins at rest at the level that the record has there, not where the first did."""
+    fitted, down = validate(case_of("ac1a_windows", alone=False), TRUTH["ac1a_windows"])
+    assert fitted.sha256 == down.sha256
+    assert (fitted.time[-1], down.time[0]) == (10.0, 10.0)
+    assert down.accepted
+    for match, level in ((fitted, 1.0), (down, 1.0495)):
+        assert match.rmse == pytest.approx(1e-4, rel=0.2)
+        assert match.overlays["vt"].simulated[0] == pytest.approx(level, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("window", "words"),
+    [
+        ([10.0, 20.0], ["validate[0].test.vref[0].at: 1 s", "give begin before"]),
+        ([0.0, 10.0], ["validate[0].test.vref[1].at: 11 s", "end the window"]),
+    ],
+)
+def test_a_step_outside_its_window_is_refused_with_what_to_write(window, words):
+    content = yaml.safe_load((ROOT / "configs" / "ac1a_windows.yaml").read_text())
+    (entry,) = content["validate"]
+    entry["test"]["vref"] = [{"at": 1.0, "step": 0.05}, {"at": 11.0, "step": -0.05}]
+    entry["record"]["window"] = window
+    with pytest.raises(CaseError) as refused:
+        Case.from_dict(content, folder=ROOT / "configs")
+    for word in ["leave this step out", *words]:
+        assert word in str(refused.value)
+
+
+def test_a_step_before_the_whole_record_is_refused_with_what_to_write():
+    content = yaml.safe_load((ROOT / "configs" / "ac1a_windows.yaml").read_text())
+    content["validate"][0]["test"]["vref"].insert(0, {"at": -1.0, "step": 0.05})
+    del content["validate"][0]["record"]["window"]
+    with pytest.raises(RecordError, match=r"has a step at -1 s; leave this step out"):
+        validate(Case.from_dict(content, folder=ROOT / "configs"), TRUTH["ac1a_windows"])

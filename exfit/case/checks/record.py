@@ -22,6 +22,11 @@ FILES_OF_A_RUN = (
     "profile",
     "starts",
 )
+BEFORE_RECORD = (
+    "leave this step out, then the simulation begins at rest from the level that the record has "
+    "there; or, if the unit had not settled, give begin before this step, and vt0 at that time"
+)
+AFTER_WINDOW = "leave this step out, or end the window after it"
 PREFIXES_OF_PARTS = ("machine", "network", "stabiliser")
 
 
@@ -71,7 +76,8 @@ def _window_faults(test: ContentNode, window: tuple[float, float] | None) -> Ite
     for place, at in instants_of(test):
         if not start <= at < end:
             limits = f"{show(start)} ... {show(end)} s"
-            yield place.fault(f"{show(at)} s lies outside the window {limits} of the record")
+            text = f"{show(at)} s lies outside the window {limits} of the record"
+            yield place.fault(f"{text}: {BEFORE_RECORD if at < start else AFTER_WINDOW}")
 
 
 def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
