@@ -8,12 +8,17 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
+from exfit.case.schema import BumpTest, ReferenceTable
+from exfit.dsp.reference_moves import scatter
 from exfit.fitting.experiment import Channel
+from exfit.fitting.references import is_table
 from exfit.fitting.residuals import Residuals, noise_of
+from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import system_of
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
+from exfit.plants import REFERENCES
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
 from exfit.simulation.kernels import parameters_used
@@ -106,6 +111,25 @@ def misfit_notes(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> Iter
                 f"the error of {noise.label} is {times:.2g} times the scatter of its record from "
                 "sample to sample: the step, the model or the record differs from the case, and "
                 "the intervals do not include that error"
+            )
+
+
+def reference_notes(test: BumpTest, setup: ExperimentSetup) -> Iterator[str]:
+    """Yield how well a recorded reference is known: the size of the test is as uncertain."""
+    for signal in REFERENCES:
+        record = setup.references.get(signal, setup.record)
+        given = test.reference(signal)
+        if isinstance(given, tuple | ReferenceTable) or is_table(record):
+            continue
+        samples = record.signals[signal]
+        at_rest = np.count_nonzero(record.time < (setup.test.steady or np.inf))
+        error = scatter(samples) / np.sqrt(at_rest)
+        if error > 0.0:
+            share = 100.0 * error / np.ptp(samples)
+            yield (
+                f"{signal} was recorded with noise of {scatter(samples):.1e} pu: its mean at rest "
+                f"leaves the size of its change uncertain by {share:.1g} %, and the intervals do "
+                "not include that error"
             )
 
 

@@ -15,6 +15,7 @@ from exfit.analysis.diagnostics import (
     misfit_notes,
     notes,
     outlier_notes,
+    reference_notes,
     tolerance_notes,
     unsteady_notes,
     voltage_notes,
@@ -218,7 +219,7 @@ def fit_notes(
     yield from given_value_notes(case)
     yield from tolerance_notes(residuals, best)
     yield from notes(case, residuals, best, comparisons)
-    for setup, comparison in zip(setups, comparisons, strict=True):
+    for recording, setup, comparison in zip(case.recordings, setups, comparisons, strict=True):
         vt0 = setup.test.vt0 if setup.test.begin is None else None
         # a fitted vt0 lies where the record begins, or on a bound, which is reported
         yield from match_notes(comparison, None if isinstance(vt0, Unknown) else vt0)
@@ -226,6 +227,7 @@ def fit_notes(
             yield from voltage_notes(comparison)
         yield from record_notes(setup, comparison)
         yield from outlier_notes(setup.record.source.name, setup.channels)
+        yield from reference_notes(recording.test, setup)
     if analysis.uncertainty is not None:
         yield from misfit_notes(residuals, analysis.uncertainty)
     yield from skipped_response_notes(comparisons)

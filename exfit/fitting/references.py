@@ -116,7 +116,7 @@ def references_of(
     tables = {
         signal: ReferenceTable(table=_rows(record, signal))
         for signal, record in files.items()
-        if _is_table(record)
+        if is_table(record)
     }
     test = test.model_copy(update=tables)
     sampled = dict(_sampled(test, files, record, file))
@@ -132,7 +132,7 @@ def references_of(
     )
 
 
-def _is_table(record: Record) -> bool:
+def is_table(record: Record) -> bool:
     """Return whether a file is a table of few rows and not the samples of a recorder."""
     spacing = float(np.median(np.diff(record.time)))
     return spacing > LONGEST_JUMP and len(record.time) <= MOST_ROWS

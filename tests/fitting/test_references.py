@@ -96,6 +96,15 @@ def test_a_jump_between_two_samples_is_a_step_whose_instant_is_found(noise):
     assert result.comparison.rmse < 1.1 * NOISE
 
 
+def test_the_noise_of_a_recorded_reference_is_reported():
+    """Its standard error, 1e-4 over the root of a hundred samples at rest, of a way of 1."""
+    text = "vref was recorded with noise of"
+    quiet, loud = (fit(case_with("recorded", to_ramp(TIME), noisy(WAY, 1, n))) for n in (0, 1e-4))
+    assert not any(note.startswith(text) for note in quiet.notes)
+    (note,) = (note for note in loud.notes if note.startswith(text))
+    assert "uncertain by 0.001 %" in note
+
+
 def test_several_jumps_and_a_ramp_are_found_in_one_recorded_reference():
     instants, sizes = (0.6004, 2.3069), (0.5, -0.8)
     way = 1.0 + 0.4 * np.clip((TIME - 1.2) / 0.7, 0.0, 1.0)
@@ -251,7 +260,8 @@ UP = [{"at": 1.0, "step": 0.05, "ramp": 0.5}]
 def test_a_unit_is_found_alike_from_ramp_table_and_channel(tmp_path):
     """AC1A, five parameters; 100 Hz, vt with noise of 1e-4 pu, vref of five decimals.
 
-    Noise of 1e-4 pu on vref, while it moves, may move TA by 0.3 of its interval.
+    Noise of 1e-4 pu on vref would leave the size of the ramp uncertain by 0.02 %, and move KA,
+    which follows from the last 0.3 % of vt, by up to its whole interval.
     """
     clock = np.arange(0.0, 10.0, 0.01)
     shown = synthetic(tmp_path, {"vt0": 1.0, "vref": UP}, clock)
