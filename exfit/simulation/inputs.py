@@ -99,18 +99,17 @@ class RecordedInput:
         """
         if float(np.median(np.diff(self.time))) >= part.step * (1.0 - ON_GRID):
             return np.interp(part.times, self.time, self.samples)
-        cells = np.arange(-1, part.steps + 2)  # one more on each side
-        grid = part.start + part.step * cells
+        grid = part.start + part.step * np.arange(-1, part.steps + 2)  # one more on each side
         inside = self.time[(self.time > grid[0]) & (self.time < grid[-1])]
-        ends = np.union1d(grid, inside)
-        middles, lengths = 0.5 * (ends[1:] + ends[:-1]), np.diff(ends)
-        cell = np.clip(np.searchsorted(grid, middles) - 1, 0, len(grid) - 2)
-        # of a product of two lines, Simpson's rule is exact
-        areas = np.zeros((2, len(middles)))
-        for places, weight in ((ends[:-1], 1.0), (middles, 4.0), (ends[1:], 1.0)):
-            share = (places - grid[cell]) / part.step
-            values = np.interp(places, self.time, self.samples) * weight * lengths / 6.0
-            areas += np.stack([1.0 - share, share]) * values
+        ends = np.insert(inside, np.searchsorted(inside, grid), grid)
+        values = np.interp(ends, self.time, self.samples)
+        lengths = np.diff(ends)
+        cell = np.clip(np.searchsorted(grid, ends[:-1], "right") - 1, 0, len(grid) - 2)
+        share = (0.5 * (ends[1:] + ends[:-1]) - grid[cell]) / part.step  # of the middle
+        # the product of two lines: of their middles, and a twelfth of that of their changes
+        areas = 0.5 * lengths * (values[1:] + values[:-1])
+        bent = np.diff(values) * lengths**2 / (12.0 * part.step)
+        areas = np.stack([(1.0 - share) * areas - bent, share * areas + bent])
         falling, rising = (np.bincount(cell, area, len(grid) - 1) for area in areas)
         averages: Array = (rising[:-1] + falling[1:]) / part.step
         return averages

@@ -399,6 +399,22 @@ def test_a_recorder_with_a_delay_shows_what_was(model):
     assert (slopes[60:-26] != 0.0).all()
 
 
+@pytest.mark.parametrize("spacing", [2.7e-4, 1e-3, 1.3e-3])
+def test_the_area_under_a_recorded_input_stays(spacing):
+    """Samples closer than the grid are averaged over it; a line between others stays a line."""
+    (part,) = grid_segments(Inputs(0.2, 1.7, ()), 1e-3)
+    times = np.arange(0.0, 2.0, spacing)
+    line = RecordedInput(times, 2.0 + 3.0 * times).on(part)
+    assert line == pytest.approx(2.0 + 3.0 * part.times, abs=1e-11)
+    noise = np.random.default_rng(1).standard_normal(len(times))
+    noise[(times < 0.25) | (times > 1.65)] = 0.0
+    got = RecordedInput(times, noise).on(part)
+    if spacing < part.step:
+        assert part.step * got.sum() == pytest.approx(spacing * noise.sum(), abs=1e-13)
+    else:
+        assert (got == np.interp(part.times, times, noise)).all()
+
+
 def test_a_moved_simulator_is_the_one_built_so():
     values, played = lively_values("AC1A"), {"vref": RecordedInput(CLOCK, 1e-3 * np.sin(CLOCK))}
     steps = (SMOOTH, InputStep(0.7, 1e-4), InputStep(1.3, 2e-4, smooth=True))
