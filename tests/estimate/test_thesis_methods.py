@@ -1,15 +1,18 @@
 """The methods of the thesis, typed here a second time as its chapter 3 states them."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from known_minima import CERTIFIED, random_problem
 from places import CONFIGS
+from scipy.optimize import least_squares as scipy_least_squares
 from scipy.optimize import lsq_linear
 
 from exfit.case.load import load_case
 from exfit.case.schema import Estimate
-from exfit.estimate import least_squares
+from exfit.estimate import RatioDamping, Searches, least_squares
 from exfit.fitting.search import UNIT, fitted, searches_of
 
 LITERAL = {"dgn": {"step": "full", "cut": "half"}, "lm": {"update": "ratio"}}
@@ -38,7 +41,7 @@ def damped_gauss_newton(fun, jac, x, count, direction=unbounded_direction, alpha
     return rows
 
 
-def levenberg_marquardt(fun, jac, x, count, nu=None, least=1e-3, up=2.0, down=0.5):
+def levenberg_marquardt(fun, jac, x, count, nu=None, least=1e-3, up=2.0, down=0.5, bounds=None):
     """Section 3.5 with the trust-region test of Kelley 1999: x, and how many trials there were."""
     rows = [(x, 0)]
     for _ in range(count):
@@ -49,7 +52,12 @@ def levenberg_marquardt(fun, jac, x, count, nu=None, least=1e-3, up=2.0, down=0.
         ratio, trials = -1.0, 0
         while ratio < 0.0:
             rows_of_nu = np.sqrt(nu) * np.eye(len(x))
-            s = np.linalg.lstsq(np.vstack([jacobian, rows_of_nu]), -both, rcond=None)[0]
+            A = np.vstack([jacobian, rows_of_nu])
+            s = (
+                np.linalg.lstsq(A, -both, rcond=None)[0]
+                if bounds is None
+                else within(A, both, x, bounds)
+            )
             ratio = (f - fun(x + s) @ fun(x + s) / 2) / (-(gradient @ s) / 2)
             nu = max(up * nu, least) if ratio < 0.25 else nu
             trials += 1
@@ -58,6 +66,12 @@ def levenberg_marquardt(fun, jac, x, count, nu=None, least=1e-3, up=2.0, down=0.
         x = x + s
         rows.append((x, trials))
     return rows
+
+
+def within(A, b, x, bounds):
+    """The s that minimises |A s + b| within the bounds of x + s, by SciPy."""
+    low, high = bounds
+    return lsq_linear(A, -b, (low - x, high - x), method="bvls", tol=1e-15).x
 
 
 def residuals_of(name, logarithmic):
@@ -137,12 +151,72 @@ def test_the_damping_starts_and_changes_as_it_is_told():
 
 def test_within_bounds_the_direction_is_the_best_that_they_allow():
     residuals = residuals_of("ac1a_typical", logarithmic=True)
-    low, high = residuals.bounds
-
-    def within(jacobian, r, x):
-        return lsq_linear(jacobian, -r, (low - x, high - x), method="bvls", tol=1e-15).x
-
-    result = searched(residuals, "dgn", 6, bounds=(low, high))
-    rows = damped_gauss_newton(residuals, residuals.exact, residuals.start, result.nit, within)
+    direction = partial(within, bounds=residuals.bounds)
+    result = searched(residuals, "dgn", 6, bounds=residuals.bounds)
+    rows = damped_gauss_newton(residuals, residuals.exact, residuals.start, result.nit, direction)
     assert_same(result, rows, "dgn")
     assert result.history[1].inner > 0
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_within_bounds_the_damped_step_is_the_best_that_they_allow(seed):
+    fun, jac, start, bounds = random_problem(seed)
+    settings = searches_of(Estimate.model_validate(LITERAL))
+    result = least_squares(
+        fun, start, jac, bounds, "lm", max_iterations=6, x_scale=UNIT, searches=settings
+    )
+    rows = levenberg_marquardt(fun, jac, start, result.nit, bounds=bounds)
+    assert_same(result, rows, "lm")
+    assert any(((line.x == bounds[0]) | (line.x == bounds[1])).any() for line in result.history)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "after"),
+    [(0.0, 2.0), (0.249, 2.0), (0.25, 1.0), (0.75, 1.0), (0.751, 0.5)],
+)
+def test_the_damping_follows_the_ratio(ratio, after):
+    assert RatioDamping().after(1.0, ratio) == after
+    assert RatioDamping(least=0.8).after(1.0, ratio) == (0.0 if after < 0.8 else after)
+    assert RatioDamping(least=3.0).after(1.0, ratio) == {2.0: 3.0, 1.0: 1.0, 0.5: 0.0}[after]
+
+
+@pytest.mark.parametrize(("slope", "accepted"), [(1e-3, True), (-1e-3, False)])
+def test_a_trial_that_lowers_the_cost_at_all_is_accepted(slope, accepted):
+    """The Jacobian promises a thousand times as much, or the decrease of what rises."""
+    result = least_squares(
+        lambda x: [1.0 + slope * x[0]],
+        [0.0],
+        lambda x: [[1.0]],
+        method="lm",
+        max_iterations=1,
+        searches=Searches(lm=RatioDamping()),
+    )
+    assert (result.history[1].inner == 0) == accepted
+
+
+@pytest.mark.parametrize("method", ["dgn", "lm"])
+@pytest.mark.parametrize("seed", range(12))
+def test_active_bounds_cost_no_more_than_scipy_finds(seed, method):
+    fun, jac, start, bounds = random_problem(seed)
+    points = []
+
+    def watched(x):
+        points.append(x)
+        return fun(x)
+
+    searches = searches_of(Estimate.model_validate(LITERAL))
+    result = least_squares(watched, start, jac, bounds, method, searches=searches)
+    other = scipy_least_squares(fun, start, jac, bounds, ftol=1e-14, xtol=1e-14, gtol=1e-14)
+    assert result.success, result.message
+    assert result.cost <= other.cost * (1.0 + 1e-8)
+    assert all((bounds[0] <= x).all() and (x <= bounds[1]).all() for x in points)
+
+
+@pytest.mark.parametrize("method", ["dgn", "lm"])
+@pytest.mark.parametrize("name", ["Misra1a", "MGH09", "Eckerle4", "BoxBOD", "Thurber"])
+def test_finds_the_certified_minimum(name, method):
+    case = CERTIFIED[name]
+    searches = searches_of(Estimate.model_validate(LITERAL))
+    result = least_squares(case.fun, case.starts[-1], case.jac, method=method, searches=searches)
+    assert result.success, result.message
+    assert 2.0 * result.cost == pytest.approx(case.squares, rel=1e-7)

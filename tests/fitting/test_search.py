@@ -170,8 +170,31 @@ def test_gauss_newton_moves_from_every_start_of_the_thesis(tmp_path, name):
     _, result = searched(tmp_path, config(name), strategy="gn")
     assert result.cost < 0.95 * result.history[0].cost
     assert result.history[1].inner <= 1
+    assert all(line.inner == 0 for line in result.history[2:] if line.step_norm)
     if not result.success:
         assert "strategy dgn" in result.message
+
+
+def test_robust_leaves_a_full_step_that_fails_to_levenberg_marquardt(tmp_path):
+    _, result = searched(tmp_path, config("ac1a_typical"), strategy="robust")
+    lines = result.history[1:]
+    assert [line.phase for line in lines] == ["gn"] + ["lm"] * (len(lines) - 1)
+    assert lines[0].step_norm == 0.0
+
+
+def test_a_step_of_levenberg_marquardt_is_capped_where_it_is_damped(tmp_path):
+    _, result = searched(tmp_path, config("ac1a_typical"), strategy="lm")
+    first = [line for line in result.history[1:] if not line.inner]
+    assert [line.capped for line in first] == [line.damping > 0.0 for line in first]
+    assert {line.capped for line in first} == {True, False}
+
+
+def test_armijos_constant_is_that_of_levenberg_marquardt_too(tmp_path):
+    least = {}
+    for armijo in (1e-4, 0.45):
+        _, result = searched(tmp_path, config("ac1a_high"), strategy="lm", armijo=armijo)
+        least[armijo] = min(line.quality for line in result.history[1:] if line.step_norm)
+    assert least[1e-4] < 0.45 < least[0.45]
 
 
 def test_the_profiles_are_about_a_minimum_whatever_ends_a_fit(tmp_path):
