@@ -41,6 +41,9 @@ def test_the_search_stops_where_the_curves_of_all_records_match(tmp_path, prior)
     assert max(rms(residuals, result.history[-1].x)) <= limit
     assert all(max(rms(residuals, line.x)) > limit for line in result.history[:-1])
     assert result.promise > 0.0
+    of_priors = np.ones(len(residuals.priors))
+    assert len(of_priors) == prior
+    assert residuals.match(np.append(np.zeros(residuals.count), of_priors), 1e-9)
 
 
 def test_a_start_that_matches_is_the_result(tmp_path):
@@ -59,6 +62,17 @@ def test_a_fit_that_ends_at_a_tolerance_says_so_and_how_far_from_a_minimum(tmp_p
     whole = fit(case_of(content, tmp_path))
     assert whole.outcome == "converged"
     assert not any("tolerance of the case" in note for note in whole.notes)
+
+
+def test_the_distance_from_a_minimum_is_that_of_the_costs(tmp_path):
+    """In a nearly linear problem: z^2 is twice the cost above the minimum, in variances."""
+    content = config("first_order")
+    stopped = fit(case_of({**content, "estimate": {"stop": {"rmse": 1e-4}}}, tmp_path))
+    whole = fit(case_of(content, tmp_path))
+    freedom = len(stopped.comparison.time) - len(stopped.parameters)
+    variance = 2.0 * stopped.cost / freedom
+    distance = np.sqrt(2.0 * (stopped.cost - whole.cost) / variance)
+    assert any(f"may be {distance:.2g} standard errors away" in note for note in stopped.notes)
 
 
 def test_the_results_know_the_status_of_a_tolerance():
