@@ -130,7 +130,10 @@ def test_what_is_shown_of_a_record_has_the_cost_that_the_fit_found(tmp_path, del
     """The instant, 40 ms off its start, moves the response once, also when it is read back."""
     synthetic(tmp_path, TEST, TIME)
     test = {"vt0": 1.0, "vref": [{"at": found_in(1.04, 0.9, 1.1), "step": 0.05}]}
-    case = case_of(one(test, delay=delay), tmp_path)
+    content = one(test, delay=delay)
+    record = {**content["record"], "delay": 0.0}
+    content["validate"] = [{"name": "again", "test": TEST, "record": record}]
+    case = case_of(content, tmp_path)
     found = fit(case)
     assert found.comparisons[0].cost == pytest.approx(found.cost, rel=1e-9)
     for again in (validate(case, found.values)[0], simulate(case, found.values).comparison):

@@ -281,6 +281,7 @@ def test_a_parameters_file_gives_the_fit_back(tmp_path):
         several(
             recording("up", delay=found_in(0.0, -0.1, 0.1)),
             recording("down", step=found_in(-0.045, -0.08, -0.02)),
+            validate=[{**recording("up"), "name": "again"}],
         )
     )
     content["records"][0]["test"]["vt0"] = 1.0
@@ -295,7 +296,7 @@ def test_a_parameters_file_gives_the_fit_back(tmp_path):
     assert not {"TE", "VAMIN"} & back.keys()
     assert values_of(case, back) == pytest.approx(found.values, rel=1e-12)
     again = validate(case, back)
-    for one_, other in zip(again, found.comparisons, strict=True):
+    for one_, other in zip(again[:2], found.comparisons, strict=True):
         assert one_.cost == pytest.approx(other.cost, rel=1e-9)
     compared = simulate(case, back).comparison
     assert compared.cost == pytest.approx(found.comparison.cost, rel=1e-9)

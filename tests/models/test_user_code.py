@@ -30,8 +30,10 @@ def case(tmp_path, monkeypatch):
     rows = "\n".join(f"{t:.9g},{v:.9g}" for t, v in zip(TIME, TRUTH, strict=True))
     (tmp_path / "up.csv").write_text(f"t,v\n{rows}\n")
     record = {"file": "up.csv", "time": "t", "channels": {"vt": "v"}}
+    again = {"name": "again", "test": FIRST_ORDER["test"], "record": record}
+    content = {**FIRST_ORDER, "model": "mine.py", "record": record, "validate": [again]}
     path = tmp_path / "case.yaml"
-    path.write_text(yaml.safe_dump({**FIRST_ORDER, "model": "mine.py", "record": record}))
+    path.write_text(yaml.safe_dump(content))
     return path
 
 
