@@ -111,9 +111,8 @@ def _notes(
                 f"{comparison.record} is a file that was fitted ({match.name}): what the fit saw "
                 "does not validate it"
             )
-    if test.earlier:
-        yield "the steps before the record are those of the case under validate"
-    elif steady is not None:
+    yield from test.notes
+    if not test.notes and steady is not None:
         yield from unsteady_notes(record, steady, test.setup.channels)
     for parameter in test.setup.free:
         side = parameter.bound(values[parameter.name])

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, FindableStep, RecordFile, Recording, Unknown, start_value
+from exfit.case.schema import (
+    BumpTest,
+    ChannelSection,
+    FindableStep,
+    RecordFile,
+    Recording,
+    Unknown,
+    start_value,
+)
+from exfit.case.suggestion import in_per_unit
 from exfit.dsp.quality import noise_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
@@ -18,7 +27,7 @@ from exfit.fitting.detected_steps import SIZE_WITHIN
 from exfit.fitting.recordings import clock_of, read_section
 from exfit.fitting.setup import ExperimentSetup
 from exfit.records.formats import open_table
-from exfit.records.inspection import inspect
+from exfit.records.inspection import Inspection, inspect
 from exfit.records.record import Record
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep, steps_of_signals, with_sizes
 from exfit.simulation.simulator import Response
@@ -28,6 +37,8 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Test = Mapping[str, Any]  # keys of a test with what they become
 
+OWN_REFERENCE = "the reference is the one recorded beside the response"
+EARLIER_STEPS = "the steps before the record are those of the case under validate"
 GIVE_STEP = "give it by --step SIZE and --at INSTANT (step and at in Python)"
 REST_SHARE = 0.5  # of the rest before a step: its instant is not sought farther back
 # standard errors: an instant that is sought farther off would hide a response that is late
@@ -44,10 +55,10 @@ class GivenSteps(NamedTuple):
 
 
 class UnplannedTest(NamedTuple):
-    """A record with its test; ``earlier``: with the steps of the case from before the record."""
+    """A record with its test, and what must be known of where that is from."""
 
     setup: ExperimentSetup
-    earlier: bool
+    notes: tuple[str, ...] = ()
 
 
 def with_steps_of_record(
@@ -56,27 +67,24 @@ def with_steps_of_record(
     """Return the setup of a record whose steps are those that it shows, or that are ``given``.
 
     The test of the ``recording`` is that of another record of its kind: it says which signal is
-    stepped. The size of a step starts from the change of vt and the gain of the simulation; it and
-    the instant are left to be found within bounds. Raises RecordError where the record shows no
-    step, CaseError where the steps given cannot be used.
+    stepped. A reference that the file holds is taken as it is, in place of steps. The size of a
+    step starts from the change of vt and the gain of the simulation; it and the instant are left to
+    be found within bounds. Raises RecordError where the record shows no step, CaseError where the
+    steps given cannot be used.
     """
     given_record, file = case.given_records.get(recording.name), recording.record
     record = given_record or read_section(file, case.folder, case.kind.per_unit)
     signal = _stepped(case, recording.test)
-    if signal is not None and recording.test.reference(signal) == "recorded" and not any(given):
-        own = dict.fromkeys(("vt0", "begin", "steady_until"))
-        return UnplannedTest(_built(case, recording, values, own), earlier=False)
-    if given.instants:
-        _refuse_outside(record, given.instants)
-        steps = tuple(RecordedStep(at, 0.0, (), {}, False) for at in given.instants)
-    elif given_record is None:
-        steps = _steps_of_file(file, case.folder)
-    else:
-        _, steps = steps_of_signals(record.time, record.signals)
-    steps = _lasting(record, steps, given)
+    inspection = None if given_record else _inspected(file, case.folder)
+    if signal == "vref" and not any(given) and not case.kind.plays_back:
+        recording = _with_own_reference(recording, inspection)
+        if recording.test.vref == "recorded":
+            test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))
+            return UnplannedTest(_built(case, recording, values, test), (OWN_REFERENCE,))
+    steps = _lasting(record, _shown(record, inspection, given), given)
     if signal is None:
-        test: Test = {"steady_until": _earliest(record, steps, 0), "vt0": None}
-        return UnplannedTest(_built(case, recording, values, test), earlier=False)
+        test = {"steady_until": _earliest(record, steps, 0), "vt0": None}
+        return UnplannedTest(_built(case, recording, values, test))
 
     def setup_with(sizes: Sequence[float], earlier: Test) -> ExperimentSetup:
         events = tuple(_events(record, steps, sizes, given))
@@ -88,8 +96,8 @@ def with_steps_of_record(
     if earlier:
         setup = setup_with(sizes, earlier)
         if _begins_there(setup, values, steps[0], sizes):
-            return UnplannedTest(setup, earlier=True)
-    return UnplannedTest(setup_with(sizes, {}), earlier=False)
+            return UnplannedTest(setup, (EARLIER_STEPS,))
+    return UnplannedTest(setup_with(sizes, {}))
 
 
 def _stepped(case: Case, test: BumpTest) -> str | None:
@@ -114,11 +122,33 @@ def _built(case: Case, recording: Recording, values: Values, test: Test) -> Expe
 # ---- the steps
 
 
-def _steps_of_file(file: RecordFile, folder: Path) -> tuple[RecordedStep, ...]:
-    """Return the steps of a file by all its channels: more than the case names may show them."""
+def _inspected(file: RecordFile, folder: Path) -> Inspection:
+    """Return what all channels of a file show: more than those that the case names."""
     clock = clock_of(file.time)
-    table = open_table(folder / file.file, file.sheet)
-    return inspect(table, clock.columns, clock.unit).steps
+    return inspect(open_table(folder / file.file, file.sheet), clock.columns, clock.unit)
+
+
+def _with_own_reference(recording: Recording, inspection: Inspection | None) -> Recording:
+    """Return a recording with the reference that its file holds per unit, if it holds one."""
+    reference = None if inspection is None else inspection.reference
+    if reference is None or not in_per_unit(reference) or recording.test.vref == "recorded":
+        return recording
+    channels = {**recording.record.channels, "vref": ChannelSection(column=reference.name)}
+    test = recording.test.model_copy(update={"vref": "recorded"})
+    file = recording.record.model_copy(update={"channels": channels})
+    return recording.model_copy(update={"test": test, "record": file})
+
+
+def _shown(
+    record: Record, inspection: Inspection | None, given: GivenSteps
+) -> tuple[RecordedStep, ...]:
+    """Return the steps at the instants given, or those that a file or else a record shows."""
+    if given.instants:
+        _refuse_outside(record, given.instants)
+        return tuple(RecordedStep(at, 0.0, (), {}, False) for at in given.instants)
+    if inspection is not None:
+        return inspection.steps
+    return steps_of_signals(record.time, record.signals)[1]
 
 
 def _lasting(

@@ -158,6 +158,18 @@ def test_a_recorded_reference_says_by_itself_what_was_stepped():
     assert match.rmse == pytest.approx(1e-4, rel=0.2)
 
 
+def test_a_reference_in_the_file_is_taken_though_the_case_does_not_name_it():
+    """A ramp up, which is no step, and a step down at 9.0037 s, between two samples."""
+    path = ROOT / "sample_data" / "ac1a_ramp.csv"
+    values = {**TRUTH["ac1a_typical"], "TR": 0.02}
+    match = validate(case_of("ac1a_typical"), values, path)[-1]
+    assert match.accepted, match.reason
+    assert match.rmse == pytest.approx(1e-4, rel=0.1)
+    (step,) = match.steps
+    assert (step.at, step.size) == pytest.approx((9.0037, -0.05), abs=1e-3)
+    assert "the reference is the one recorded beside the response" in match.notes
+
+
 def test_windows_of_one_record_are_fitted_and_validated_on():
     """The second begins at rest at the level that the record has there, not where the first did."""
     fitted, down = validate(case_of("ac1a_windows", alone=False), TRUTH["ac1a_windows"])
