@@ -9,14 +9,17 @@ from itertools import pairwise
 from pathlib import Path
 
 import click
+import jsonschema
 import numpy as np
 import pytest
+import yaml
 from matplotlib.figure import Figure
 from places import ROOT
 from test_layers import MAY_IMPORT
 
 import exfit
 from exfit import workflows
+from exfit.case.json_schema import json_schema
 from exfit.case.load import load_case
 from exfit.cli import main
 from exfit.cli.options import NOT_CONVERGED
@@ -240,8 +243,8 @@ def test_the_forms_of_the_reference_are_read(cases):
         shown = text.replace(f"  {first}", f"  {form}", 1)
         shown = shown if form == first else shown.replace(", vref: vref}", "}")
         (cases / "case.yaml").write_text(MACHINE + shown, encoding="utf-8")
-        case = load_case(cases / "case.yaml")
-        assert case.test.vref
+        assert load_case(cases / "case.yaml").test.vref
+        jsonschema.validate(yaml.safe_load(MACHINE + shown), json_schema())
 
 
 def test_the_unit_on_load_of_the_page_can_be_simulated(cases):

@@ -51,8 +51,8 @@ def jumps(time: Array, samples: Array) -> NDArray[np.intp]:
     beside = np.maximum(at_ends[:-2], at_ends[2:])
     alone = beside <= NEIGHBOUR[0] * changes + NEIGHBOUR[1] * noise
     close = spacing <= min(UNEVEN * float(np.median(spacing)), LONGEST_JUMP)
-    found = np.flatnonzero((changes > large) & alone & close)
-    return found[(found >= FEWEST_SAMPLES - 1) & (found < len(changes) - 1)]
+    after = np.flatnonzero((changes > large) & alone & close)
+    return after[(after >= FEWEST_SAMPLES - 1) & (after < len(changes) - 1)]
 
 
 def rest_end(samples: Array) -> int:

@@ -11,6 +11,7 @@ from places import SAMPLES
 from exfit.case.load import load_case
 from exfit.case.starting_case import bounds_of, free_of, starting_case
 from exfit.errors import CaseError
+from exfit.fitting.build import build_experiments
 from exfit.models import MODELS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
@@ -102,6 +103,19 @@ def test_the_case_is_fitted_as_it_stands(name, record, tmp_path):
     found = fit(load_case(started(name, record(name), tmp_path)))
     assert found.comparison.rmse == pytest.approx(NOISE, rel=0.1)
     assert found.parameters["vref.at"].value == pytest.approx(AT, abs=0.02)
+
+
+def test_a_recorded_reference_is_used_in_place_of_steps(tmp_path):
+    file = SAMPLES / "ac1a_ramp.csv"
+    text = starting_case(
+        MODELS["AC1A"], "AC1A", MACHINES["GENROU"], inspect(open_table(file)), tmp_path
+    )
+    (tmp_path / "case.yaml").write_text(text)
+    case = load_case(tmp_path / "case.yaml")
+    assert case.test.vref == "recorded"
+    assert case.record.channels.keys() == {"vt", "vref"}
+    (setup,) = build_experiments(case)
+    assert [parameter.name for parameter in setup.free] == ["vref.at"]
 
 
 @pytest.mark.parametrize("machine", MACHINES)

@@ -37,12 +37,6 @@ class FindableStep(Section):
         description="Time that the change takes, in a line, s; default: it is a step.",
     )
 
-    @property
-    def end(self) -> float | None:
-        """The instant from which on it is complete, s; None where the record shows it."""
-        at = start_value(self.at)
-        return None if at is None else at + (self.ramp or 0.0)
-
 
 class ReferenceTable(Section):
     """A signal as a table: lines between its rows."""
@@ -130,7 +124,8 @@ class BumpTest(Section):
     )
     steady_until: Number | None = Field(
         default=None,
-        description="End of the steady state in the record, s; default: the first step.",
+        description="End of the steady state in the record, s; default: the first step, or the "
+        "first move of a recorded reference.",
     )
     vref: Reference = Field(
         default=(),
