@@ -26,6 +26,8 @@ SAME: Mapping[str, str] = {
     "ceiling of the bridge voltage": "ceiling of the field voltage",
     "floor of the bridge voltage": "floor of the field voltage",
 }
+# of the rectifier of a static exciter, which moves its ceiling alone and is not fitted
+LOADING, CEILING_LOADING = "rectifier loading factor", "rectifier loading of the ceiling"
 # the value of a quantity at which its block does nothing
 WITHOUT_EFFECT: Mapping[str, float] = {
     "voltage transducer lag": 0.0,
@@ -42,7 +44,8 @@ WITHOUT_EFFECT: Mapping[str, float] = {
     "stabilising feedback gain": 0.0,
     "stabilising feedback lag": 0.0,
     "stabilising feedback lead": 0.0,
-    "rectifier loading factor": 0.0,
+    LOADING: 0.0,
+    CEILING_LOADING: 0.0,
     "demagnetising factor": 0.0,
     "exciter constant": 1.0,
     "saturation at E1": 0.0,
@@ -79,6 +82,8 @@ class Counterpart(NamedTuple):
 def quantity(row: Parameter) -> str:
     """Return what a parameter is, in words that are the same in all data sheets."""
     meaning = row.meaning
+    if meaning == LOADING and not row.free:
+        return CEILING_LOADING
     for qualifier in QUALIFIERS:
         meaning = meaning.removesuffix(qualifier)
     return SAME.get(meaning, meaning)
@@ -94,9 +99,11 @@ def by_quantity(sheet: Sheet) -> dict[str, Parameter]:
 
 def counterparts(sheet: Sheet, source: Sheet) -> tuple[Counterpart, ...]:
     """Return every parameter of a data sheet with its counterpart in another."""
-    literal, rows = {row.meaning: row for row in source}, by_quantity(source)
+    literal = {(row.meaning, quantity(row)): row for row in source}
+    rows = by_quantity(source)
     return tuple(
-        Counterpart(row, literal.get(row.meaning) or rows.get(quantity(row))) for row in sheet
+        Counterpart(row, literal.get((row.meaning, quantity(row))) or rows.get(quantity(row)))
+        for row in sheet
     )
 
 
