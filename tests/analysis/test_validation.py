@@ -44,6 +44,12 @@ STEPS = [
 ]
 
 
+def test_every_sample_record_is_among_them():
+    """But the ramp, which is no step: its record holds the reference, and has a test of its own."""
+    records = {path.stem for path in (ROOT / "sample_data").glob("*.csv")}
+    assert {record for record, _, _ in STEPS} == records - {"ac1a_ramp"}
+
+
 def case_of(name, alone=True):
     """Return a case, by default without a record of its own to validate on."""
     case = load_case(ROOT / "configs" / f"{name}.yaml")
