@@ -598,6 +598,10 @@ UP = "records[0]"
         ),
         ([(RECORDED[0], {"file": "ref.csv"})], {f"{UP}.test.vref.time": "is missing",
                                                 f"{UP}.test.vref.column": "is missing"}),
+        (
+            [RECORDED, (LEVEL, "vref"), (("records", 0, "record", "resample"), 50.0)],
+            {f"{UP}.record.resample": "its filter smears the jumps"},
+        ),
         ([(RECORDED[0], "recordet")], {f"{UP}.test.vref": "did you mean recorded?"}),
     ],
 )  # fmt: skip

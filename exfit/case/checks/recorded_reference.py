@@ -18,6 +18,9 @@ def recorded_reference_faults(
         given, channel = test.at(signal), record.at("channels", signal)
         if given.text == RECORDED:
             yield from _recorded_faults(test, signal, channel, kind, has_record)
+            if "resample" in record:
+                text = f"not allowed with test.{signal}: {RECORDED}: its filter smears the jumps"
+                yield record.at("resample").fault(text)
         elif channel.value is not None and signal in kind.recorded_inputs:
             yield channel.fault(_not_used(signal, given))
         if signal in kind.recorded_inputs:
