@@ -4,14 +4,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from exfit.analysis.diagnostics import unsteady_notes
 from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.case.schema import Recording
+from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
+from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
@@ -111,6 +115,7 @@ def _notes(
                 f"{comparison.record} is a file that was fitted ({match.name}): what the fit saw "
                 "does not validate it"
             )
+    yield from _spike_notes(test.setup)
     yield from test.notes
     if not test.notes and steady is not None:
         yield from unsteady_notes(record, steady, test.setup.channels)
@@ -121,4 +126,17 @@ def _notes(
             yield (
                 f"a step {way} than the record shows it would match better than the one at "
                 f"{values[parameter.name]:.4g} s: the response is too {EARLY_OR_LATE[side]}"
+            )
+
+
+def _spike_notes(setup: ExperimentSetup) -> Iterator[str]:
+    """Yield the compared channels with spikes, which count as errors of the model."""
+    for channel in setup.channels:
+        kept = channel.kept & np.isfinite(channel.measured)
+        samples = channel.measured[kept]
+        count = len(spikes(setup.record.time[kept], samples, noise_of(samples), SPIKE_LIMIT))
+        if count:
+            yield (
+                f"{channel.signal} of {setup.record.source.name} has {count} samples that look "
+                f"like spikes: `outliers: {SPIKE_LIMIT:g}` on the channel leaves them out"
             )
