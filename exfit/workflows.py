@@ -28,6 +28,7 @@ from exfit.analysis.iteration_responses import (
     LiveResponse,
     live_response,
 )
+from exfit.analysis.judgement import doubt_of
 from exfit.analysis.model_check import Check
 from exfit.analysis.profiles import Profiles
 from exfit.analysis.solution import (
@@ -104,16 +105,17 @@ def fit(
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
     hashes, case_text = input_hashes(case, used), _text_of(case)
-    history: list[Iteration] = []
 
     def announce(line: estimate.SolverIteration) -> None:
-        history.append(iteration_of(line, residuals))
         response = None if live is None else live_response(setups[0], residuals, line.x)
         if live is not None and response is not None:
             live(response)
-        progress(history[-1])
+        progress(iteration_of(line, residuals))
 
-    best, search_result = search(case, problem, method, announce, search_progress, counter)
+    doubt = doubt_of(case, problem, setups, unseen)
+    found = search(case, problem, method, announce, search_progress, counter, doubt=doubt)
+    best = found.best
+    history = [iteration_of(line, residuals) for line in found.history]
     values = residuals.values(best.x)
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
@@ -139,18 +141,21 @@ def fit(
         cost=best.cost,
         comparisons=comparisons,
         knowledge=analysis.uncertainty,
-        minima=minima_of(residuals, search_result),
+        minima=minima_of(residuals, found.minima),
         status=best.status,
         message=best.message,
         success=best.success,
-        interrupted=analysis.interrupted or _was_interrupted(search_result),
+        interrupted=analysis.interrupted or _was_interrupted(found.minima),
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,
         simulations=counter.simulations,
         substeps=counter.substeps,
         seconds=clock.perf_counter() - began,
-        notes=tuple(fit_notes(case, residuals, best, setups, comparisons, analysis)),
+        notes=(
+            *found.notes,
+            *fit_notes(case, residuals, best, setups, comparisons, analysis),
+        ),
         validation=analysis.validation,
         versions=versions(),
         inputs=hashes,

@@ -1,6 +1,6 @@
 """The profile likelihood of a case's parameters: how far each can move if the others follow."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.diagnostics import search_range_notes
+from exfit.analysis.judgement import doubt_of
 from exfit.case.case import Case
 from exfit.errors import CaseError
+from exfit.fitting.build import build_experiment
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
+from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import LEVEL
 from exfit.util.text import near
@@ -101,7 +104,7 @@ def profile(
     """
     setups, problem = fitted(case)
     wanted = _indices(case, problem.residuals, names)
-    best = _minimum(case, problem, progress)
+    best = _minimum(case, setups, problem, progress)
     x, records = best.x, names_of_records(setups)
     for _ in range(MOST_MINIMA):
         uncertainty = uncertainty_at(problem, x, records)
@@ -137,12 +140,18 @@ def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str
 
 
 def _minimum(
-    case: Case, problem: FitProblem, progress: Callable[[estimate.Progress], None]
+    case: Case,
+    setups: Sequence[ExperimentSetup],
+    problem: FitProblem,
+    progress: Callable[[estimate.Progress], None],
 ) -> estimate.Result:
     """Return the fit of a case; raises KeyboardInterrupt where it was interrupted."""
     options = case.estimate.to_the_minimum()
-    best, minima = search(
-        case, problem, options.strategy, lambda _: None, progress, options=options
+    start, judged = case.values(), case.validations if options.strategy == "auto" else ()
+    unseen = [build_experiment(case, recording, start) for recording in judged]
+    doubt = doubt_of(case, problem, setups, unseen)
+    best, minima, *_ = search(
+        case, problem, options.strategy, lambda _: None, progress, options=options, doubt=doubt
     )
     if best.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
         raise KeyboardInterrupt

@@ -31,7 +31,7 @@ def fit_live(
     else:
         title, most = terminal.task(case, strategy), case.estimate.most_iterations
         with terminal.LiveIterations(console, title, most).running() as shown:
-            result = workflows.fit(case, strategy, shown, live=shown.live)
+            result = workflows.fit(case, strategy, shown, shown.starts, shown.live)
     try:
         missing = run_folder.write_fit(result, folder, plots)
     finally:  # whatever becomes of the files

@@ -17,6 +17,7 @@ class Stop(Enum):
         "no trial lowers the cost, which has a kink here: the linear model sees nothing beyond it"
     )
     CREEPING = "ten iterations, all with rejected trials, gained less than a millionth of the cost"
+    UNCONFIRMED = "the lowest minimum is in doubt, and no other start led to it"
     ITERATIONS = "the iteration limit was reached"
     INTERRUPTED = "interrupted: this is the best point seen until then"
     JACOBIAN = "the Jacobian is not finite here"
@@ -49,6 +50,7 @@ STATUS = {
     Stop.FULL_STEP: -4,
     Stop.ILL_CONDITIONED: -5,
     Stop.TRUSTED: -6,
+    Stop.UNCONFIRMED: -7,
 }
 
 
@@ -90,7 +92,7 @@ class Result:
 
     status: 1 gradient, 2 floor, 3 step, 4 kink, 5 creeping (converged); 6 match, 7 flat (ended at
     a tolerance given, perhaps before a minimum); 0 iteration limit; -1 interrupted, -2 Jacobian not
-    finite, -3 stalled, -4 full step failed, -5 ill-conditioned (not converged).
+    finite, -3 stalled, -4 full step failed, -5 ill-conditioned, -7 unconfirmed (not converged).
     message is the sentence, stop the member of Stop. optimality is the largest component of the
     projected gradient; promise is the decrease of the cost that the linear model at x still
     promises. After an interruption jac, grad and promise may be nan.

@@ -83,6 +83,7 @@ def multistart(
     good_enough: float | None = None,
     matches: Callable[[Array], bool] | None = None,
     searches: Searches = USUAL,
+    earlier: Sequence[Result] = (),
 ) -> MultistartResult:
     """Minimise f(x) = 1/2 sum(fun(x)^2) from ``count`` starts spread over finite bounds (N,).
 
@@ -95,6 +96,8 @@ def multistart(
     screen  gives the costs (K,) of many points (K, N) at once; without it fun is called for each
     watch   gets every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
             with what is done
+    earlier results of `least_squares` with the same fun: their starts and ends count, too, as the
+            first ones
 
     Two ends are one minimum where half a standard error, in cost f / 4 (M - N), exceeds both the
     difference of their costs and what the linear model at the better one makes of their distance:
@@ -145,7 +148,8 @@ def multistart(
     end_costs = np.full(count, nan)
     end_costs[list(ends)] = [end.result.cost for end in ends.values()]
     failed = int(np.count_nonzero(np.isinf(costs)))
-    minima = tuple(minimum(group, fun, jac) for group in distinct(ends[k] for k in sorted(ends)))
+    before = [end_of(result, nothing) for result in earlier]
+    minima = minima_of([*before, *(ends[k] for k in sorted(ends))], fun, jac)
     candidates = [local.result for local in minima[:1]]
     if stop.is_set() and np.isfinite(costs).any():
         start = points[np.nanargmin(costs)]
@@ -153,8 +157,8 @@ def multistart(
     return MultistartResult(
         minima=minima,
         best=min(candidates, key=lambda result: result.cost, default=None),
-        start_costs=costs,
-        end_costs=end_costs,
+        start_costs=np.append(starts_of(earlier), costs),
+        end_costs=np.append(ends_of(earlier), end_costs),
         failed=failed,
         unrefined=count - failed - len(ends),
         interrupted=stop.is_set(),
@@ -267,6 +271,23 @@ def same(best: StartOutcome, other: StartOutcome) -> bool:
     way = best.triangle @ (other.result.x - best.result.x)
     rise = other.result.cost - best.result.cost
     return max(rise, 0.5 * float(way @ way)) <= best.step
+
+
+def starts_of(earlier: Sequence[Result]) -> list[float]:
+    """Return the costs at which searches began."""
+    return [result.history[0].cost for result in earlier]
+
+
+def ends_of(earlier: Sequence[Result]) -> list[float]:
+    """Return the costs at which searches ended."""
+    return [result.cost for result in earlier]
+
+
+def minima_of(
+    ends: Iterable[StartOutcome], fun: Function, jac: Function
+) -> tuple[LocalMinimum, ...]:
+    """Return the distinct minima that ends are, the lowest first."""
+    return tuple(minimum(group, fun, jac) for group in distinct(ends))
 
 
 def minimum(group: Sequence[StartOutcome], fun: Function, jac: Function) -> LocalMinimum:

@@ -1,7 +1,8 @@
 """The search for the parameters of a case."""
 
-from collections.abc import Callable, Iterable
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
+from exfit.fitting.recommended import Doubt, SearchResult, recommended
 from exfit.fitting.residuals import (
     JACOBIANS,
+    LEAST_NOISE,
     Residuals,
     SimulationCounter,
     jacobian_error,
@@ -21,6 +24,7 @@ from exfit.fitting.residuals import (
 from exfit.fitting.setup import ExperimentSetup
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
+LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
@@ -49,50 +53,99 @@ def search(
     progress: Callable[[estimate.Progress], None],
     counter: SimulationCounter | None = None,
     options: Estimate | None = None,
-) -> tuple[estimate.Result, estimate.MultistartResult | None]:
+    doubt: Doubt | None = None,
+) -> SearchResult:
     """Return the best point found from the start of a case, or from all its starts.
 
     ``counter`` counts the simulations of the search alone; ``options`` are by default the case's.
+    ``doubt`` says why an end may not be the one looked for: strategy auto goes on then.
     """
     options = options or case.estimate
-    residuals = problem.compressed.counted_by(counter)
-    jacobian = JACOBIANS[options.jacobian](residuals)
-    settings = _settings(options, residuals)
-    if options.starts == 1:
-        result = estimate.least_squares(
-            residuals,
-            residuals.start,
-            jac=jacobian,
-            bounds=residuals.bounds,
+    searches = CaseSearches(problem, options, progress, counter)
+    if options.starts > 1:
+        minima = searches.from_starts(method, options.starts)
+        if minima.best is None:
+            raise KeyboardInterrupt
+        for line in minima.best.history:
+            announce(line)
+        return SearchResult(minima.best, minima, minima.best.history)
+    if method == "auto" and doubt is not None:
+        return recommended(searches, doubt, announce)
+    best = searches.one(method, announce)
+    return SearchResult(best, None, best.history)
+
+
+@dataclass(frozen=True)
+class CaseSearches:
+    """The searches for the parameters of a case, with its settings."""
+
+    problem: FitProblem
+    options: Estimate
+    progress: Callable[[estimate.Progress], None]
+    counter: SimulationCounter | None
+
+    @cached_property
+    def residuals(self) -> Residuals:
+        """What is made small."""
+        return self.problem.compressed.counted_by(self.counter)
+
+    def one(
+        self, method: str, announce: Callable[[estimate.SolverIteration], None]
+    ) -> estimate.Result:
+        """Return the end of a search from the start of the case."""
+        return estimate.least_squares(
+            self.residuals,
+            self.residuals.start,
+            jac=JACOBIANS[self.options.jacobian](self.residuals),
+            bounds=self.residuals.bounds,
             method=method,
             callback=announce,
-            **settings,
+            **_settings(self.options, self.residuals),
         )
-        return result, None
-    minima = estimate.multistart(
-        residuals,
-        jacobian,
-        residuals.bounds,
-        options.starts,
-        x0=residuals.start,
-        screen=residuals.costs,
-        refine=options.refine,
-        watch=progress,
-        method=method,
-        **settings,
-    )
-    best = minima.best
-    if best is None:
-        raise KeyboardInterrupt
-    for line in best.history:
-        announce(line)
-    return best, minima
+
+    def from_starts(self, method: str, count: int) -> estimate.MultistartResult:
+        """Return the minima from the start of the case and others over the bounds."""
+        return self._many(
+            method,
+            count,
+            x0=self.residuals.start,
+            screen=self.residuals.costs,
+            refine=self.options.refine,
+        )
+
+    def many(
+        self, method: str, count: int, earlier: Sequence[estimate.Result]
+    ) -> estimate.MultistartResult | None:
+        """Return the minima from starts over the bounds; None where these are not finite."""
+        if not np.isfinite(self.residuals.bounds).all():
+            return None
+        return self._many(method, count, earlier=earlier)
+
+    def _many(self, method: str, count: int, **more: Any) -> estimate.MultistartResult:
+        return estimate.multistart(
+            self.residuals,
+            JACOBIANS[self.options.jacobian](self.residuals),
+            self.residuals.bounds,
+            count,
+            watch=self.progress,
+            method=method,
+            **_settings(self.options, self.residuals),
+            **more,
+        )
+
+    def margin(self, cost: float) -> float:
+        """Return by how much a cost may exceed this one and the records do not tell them apart.
+
+        That is the limit of the likelihood ratio, or what no recorder shows where that is more.
+        """
+        residuals = self.problem.residuals
+        freedom = max(1, residuals.count - len(residuals.free))
+        weights = [channel.weight**2 * channel.samples for channel in residuals.channels]
+        return LIKELIHOOD_RATIO * cost / freedom + 0.5 * LEAST_NOISE**2 * sum(weights)
 
 
 def _settings(options: Estimate, residuals: Residuals) -> dict[str, Any]:
     """Return the settings of a search, by the names that `exfit.estimate` has for them."""
-    priors = len(residuals.priors)
-    share = (residuals.samples + priors) / (residuals.count + priors)
     stop = options.stop
     return {
         "max_iterations": options.most_iterations,
@@ -101,10 +154,19 @@ def _settings(options: Estimate, residuals: Residuals) -> dict[str, Any]:
         "xtol": options.tolerance.step,
         "x_scale": UNIT,
         "jacobian_error": jacobian_error(options.jacobian, options.difference_step),
-        "good_enough": options.good_enough.rmse * np.sqrt(share),
+        "good_enough": _good_enough(options, residuals),
         "matches": None if stop is None else partial(residuals.match, rmse=stop.rmse),
         "searches": searches_of(options),
     }
+
+
+def _good_enough(options: Estimate, residuals: Residuals) -> float | None:
+    """Return the root mean square of the residuals that a case calls a match, if it does."""
+    if options.good_enough is None:
+        return None
+    priors = len(residuals.priors)
+    share = (residuals.samples + priors) / (residuals.count + priors)
+    return float(options.good_enough.rmse * np.sqrt(share))
 
 
 def searches_of(options: Estimate) -> estimate.Searches:

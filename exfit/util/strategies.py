@@ -12,7 +12,8 @@ STRATEGIES: Mapping[str, str] = {
     "dgn": "damped Gauss-Newton: each step capped, then shortened until Armijo's rule holds",
     "lm": "Levenberg-Marquardt",
     "lm-then-dgn": "lm to reach a better start, then dgn, and lm again where that stalls",
-    "auto": "dgn, and where its match is poor lm-then-dgn from the start, the better of both",
+    "auto": "dgn; where noise or validation casts doubt on its match lm-then-dgn, then 16 more "
+    "starts; the lowest minimum of all",
     "robust": "gn while it makes progress, then lm",
 }
 DEFAULT_STRATEGY = "lm-then-dgn"

@@ -122,7 +122,8 @@ def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
         asked[len(residuals(start))] = good_enough
         raise KeyboardInterrupt
 
-    case = dense_case(tmp_path)
+    match = {"estimate": {"good_enough": {"rmse": 2e-4}}}
+    case = dense_case(tmp_path, sections=match)
     every = residuals(case)
     few = compressed(every)
     monkeypatch.setattr("exfit.fitting.search.estimate.least_squares", stopped)

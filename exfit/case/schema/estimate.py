@@ -160,9 +160,10 @@ class Estimate(Section):
         default_factory=DgnSection, description="Settings of damped Gauss-Newton."
     )
     lm: LmSection = Field(default_factory=LmSection, description="Settings of Levenberg-Marquardt.")
-    good_enough: Limit = Field(
-        default_factory=lambda: Limit(rmse=2e-4),
-        description="Error below which strategy auto accepts a match; default: rmse 2e-4.",
+    good_enough: Limit | None = Field(
+        default=None,
+        description="Error below which strategy auto accepts a match. Default: as long as the "
+        "residuals are white and no larger than the noise of the record.",
     )
     loss: Literal["least-squares", "huber", "soft-l1"] = Field(
         default="least-squares",

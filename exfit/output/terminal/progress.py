@@ -43,6 +43,7 @@ class LiveIterations:
         self.lines: list[Iteration] = []
         self._sketch: LiveResponse | None = None
         self._live: Live | None = None
+        self._starts: Progress | None = None
         self._next = 0.0  # when it may be drawn again
 
     @contextmanager
@@ -78,6 +79,14 @@ class LiveIterations:
             self.console.print(_row(_cells(iteration)), soft_wrap=True)
         else:
             self._draw(self._live)
+
+    def starts(self, progress: Progress) -> None:
+        """Show how far a search from more starts is."""
+        self._starts = progress
+        if self._live is not None:
+            self._draw(self._live)
+        elif progress.done == progress.total:
+            self.console.print(_of_starts(progress), soft_wrap=True)
 
     def _draw(self, live: Live) -> None:
         """Draw, unless that was done so lately that it would slow down the fit."""
@@ -129,7 +138,7 @@ class LiveIterations:
         share = last.cost / first.cost if first.cost > 0.0 else 1.0
         cost = f"cost {last.cost:.4e}, {100.0 * share:.3g} % of the start's"
         text = f"iteration {last.number}{limit}: {cost}"
-        return Text(text, style="dim")
+        return Text(text if self._starts is None else _of_starts(self._starts), style="dim")
 
 
 def _most(iterations: int | Mapping[str, int]) -> str:
@@ -137,6 +146,11 @@ def _most(iterations: int | Mapping[str, int]) -> str:
     if isinstance(iterations, int):
         return f"{iterations} a phase"
     return ", ".join(f"{count} {phase}" for phase, count in iterations.items())
+
+
+def _of_starts(progress: Progress) -> str:
+    stage = f"{progress.stage} {progress.done} of {progress.total} more starts"
+    return f"{stage}: lowest cost {progress.best:.4e}"
 
 
 def _joined(lines: Iterable[Text]) -> Text:
