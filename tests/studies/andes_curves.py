@@ -35,39 +35,39 @@ SETTINGS = {
 
 def system(values: Mapping[str, float]) -> andes.System:
     """Return a machine on open circuit at rest, whose EXAC1 has some values of its own."""
-    one = andes.System(default_config=True, no_output=True)
+    unit = andes.System(default_config=True, no_output=True)
     for number in (1, 2):
-        one.add("Bus", {"idx": number, "Vn": KV, "v0": 1.0, "a0": 0.0})
-    one.add("Line", {"bus1": 1, "bus2": 2, "r": 0.0, "x": 0.1, "b": 0.0, "Vn1": KV, "Vn2": KV})
-    one.add("Slack", {"idx": 1, "bus": 1, "Vn": KV, "v0": 1.0, "a0": 0.0})
+        unit.add("Bus", {"idx": number, "Vn": KV, "v0": 1.0, "a0": 0.0})
+    unit.add("Line", {"bus1": 1, "bus2": 2, "r": 0.0, "x": 0.1, "b": 0.0, "Vn1": KV, "Vn2": KV})
+    unit.add("Slack", {"idx": 1, "bus": 1, "Vn": KV, "v0": 1.0, "a0": 0.0})
     machine = {key: REFERENCE["generator"][key] for key in MACHINE_KEYS}
-    one.add("GENROU", {"idx": "G", "bus": 1, "gen": 1, "Vn": KV, "M": 8.0, "D": 0.0, **machine})
+    unit.add("GENROU", {"idx": "G", "bus": 1, "gen": 1, "Vn": KV, "M": 8.0, "D": 0.0, **machine})
     given = {key: value for key, value in REFERENCE["params_in_effect"].items() if key != "bus"}
-    one.add("EXAC1", {"syn": "G", **given, **values})
-    one.setup()
-    one.PFlow.run()
+    unit.add("EXAC1", {"syn": "G", **given, **values})
+    unit.setup()
+    unit.PFlow.run()
     for key, value in SETTINGS.items():
-        setattr(one.TDS.config, key, value)
-    return one
+        setattr(unit.TDS.config, key, value)
+    return unit
 
 
 def simulated(values: Mapping[str, float]) -> np.ndarray:
     """Return vt (1001,) on the clock of the records, for a step of the reference at 1 s."""
-    one = system(values)
-    run(one, AT, INTEGRATION)
-    one.EXAC1.vref0.v[0] += STEP
-    one.TDS.custom_event = True
-    run(one, AT + FIRST, FIRST)
-    run(one, END, INTEGRATION)
-    voltage = one.dae.ts.y[:, one.Bus.v.a[0]]
-    return np.interp(CLOCK, one.dae.ts.t, voltage)
+    unit = system(values)
+    run(unit, AT, INTEGRATION)
+    unit.EXAC1.vref0.v[0] += STEP
+    unit.TDS.custom_event = True
+    run(unit, AT + FIRST, FIRST)
+    run(unit, END, INTEGRATION)
+    voltage = unit.dae.ts.y[:, unit.Bus.v.a[0]]
+    return np.interp(CLOCK, unit.dae.ts.t, voltage)
 
 
-def run(one: andes.System, until: float, step: float) -> None:
+def run(unit: andes.System, until: float, step: float) -> None:
     """Go on until an instant with steps of one size, s."""
-    one.TDS.config.tf, one.TDS.config.tstep = until, step
-    one.TDS.h = one.TDS.deltat = step
-    one.TDS.run()
+    unit.TDS.config.tf, unit.TDS.config.tstep = until, step
+    unit.TDS.h = unit.TDS.deltat = step
+    unit.TDS.run()
 
 
 if __name__ == "__main__":
