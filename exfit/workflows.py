@@ -119,7 +119,7 @@ def fit(
     values = residuals.values(best.x)
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
-    analysis = analysed(case, problem, best, fine, comparisons, unseen)
+    analysis = analysed(case, problem, best, fine, comparisons, unseen, history)
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
     return FitResult(
@@ -146,6 +146,7 @@ def fit(
         message=best.message,
         success=best.success,
         interrupted=analysis.interrupted or _was_interrupted(found.minima),
+        phase_ends=analysis.phase_ends,
         history=tuple(history),
         nfev=best.nfev,
         njev=best.njev,

@@ -22,6 +22,7 @@ from exfit.analysis.diagnostics import (
 )
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
+from exfit.analysis.phase_ends import phase_ends
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
 from exfit.case.schema import Unknown
@@ -38,7 +39,7 @@ from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour
-from exfit.results.model import FittedParameter, Iteration, Minima, Minimum
+from exfit.results.model import FittedParameter, Iteration, Minima, Minimum, PhaseEnd
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -62,6 +63,7 @@ class Analysis(NamedTuple):
     uncertainty: UncertaintyAnalysis | None
     validation: tuple[Comparison, ...]
     behaviour: Behaviour | None
+    phase_ends: tuple[PhaseEnd, ...]
     interrupted: bool
     unfinished: bool
 
@@ -78,6 +80,7 @@ def analysed(
     setups: Sequence[ExperimentSetup],
     fitted: Sequence[Comparison],
     unseen: Sequence[ExperimentSetup],
+    history: Sequence[Iteration] = (),
 ) -> Analysis:
     """Return how well the best point is determined, how it does on ``unseen`` records, and more.
 
@@ -87,7 +90,9 @@ def analysed(
     values = problem.residuals.values(best.x)
     interrupted, unfinished = best.stop is estimate.Stop.INTERRUPTED, False
     uncertainty, behaviour, validation = None, None, list[Comparison]()
+    ends = list[PhaseEnd]()
     try:
+        ends += phase_ends(case, setups, problem.residuals, history)
         if not interrupted:
             uncertainty = uncertainty_of_solution(problem, best.x, setups)
         validated = [aligned(case, setup, values) for setup in unseen]
@@ -95,7 +100,7 @@ def analysed(
         behaviour = behaviour_of(setups, values, validated)
     except KeyboardInterrupt:  # what the search came to stays
         interrupted = unfinished = True
-    return Analysis(uncertainty, tuple(validation), behaviour, interrupted, unfinished)
+    return Analysis(uncertainty, tuple(validation), behaviour, tuple(ends), interrupted, unfinished)
 
 
 def fitted_parameters(

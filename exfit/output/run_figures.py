@@ -34,6 +34,7 @@ def of_fit(result: FitResult) -> Drawings:
     if single:
         title = f"{result.name}: {result.model} fitted to {result.comparison.record}"
         drawings["overlay.png"] = partial(plots.overlay, result.comparison, title)
+    drawings |= of_phase_ends(result)
     if any(match.iteration_responses is not None for match in result.comparisons):
         drawings["iterations.png"] = partial(plots.iterations, result)
     drawings["convergence.png"] = partial(plots.convergence, result)
@@ -44,6 +45,24 @@ def of_fit(result: FitResult) -> Drawings:
         drawings["starts.png"] = partial(plots.waterfall, result.minima, result.name)
     drawings |= of_comparisons([*(() if single else result.comparisons), *result.validation])
     return drawings
+
+
+def of_phase_ends(result: FitResult) -> Drawings:
+    """Return the overlays of the points where a phase of the search handed over to the next."""
+    from exfit.output import plots
+
+    return {
+        f"overlay_{end.phase}.png"
+        if match.name == SINGLE
+        else f"{match.name}-{end.phase}.png": partial(
+            plots.overlay,
+            match,
+            f"{result.name}: end of {end.phase} (iteration {end.iteration}), {match.record}",
+            f"end of {end.phase}",
+        )
+        for end in result.phase_ends
+        for match in end.comparisons
+    }
 
 
 def of_series(series: FitSeries) -> Drawings:

@@ -33,12 +33,14 @@ from exfit.results.tables import (
     history_table,
     iteration_responses_table,
     parameter_file,
+    phase_end_file,
     table,
 )
 from exfit.results.translation import Translation
 from exfit.util.cache import cache_folder
 from exfit.util.files import write, write_together
 from exfit.util.interrupts import deferred_interrupts
+from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
 from exfit.util.typed import plain
 from exfit.workflows import SimulationResult
@@ -63,8 +65,17 @@ MAIN_FILES = (
     TRANSLATION,
 )
 # what a command may write that could be an input too, beside files that are named after records
+PHASE_PARAMETERS = tuple(f"parameters_{phase}.yaml" for phase in PHASES)
 NUMBERS = {
-    "fit": (PARAMETERS, "history.csv", RESPONSE, ITERATIONS, SENSITIVITIES, WHOLE_FIT),
+    "fit": (
+        PARAMETERS,
+        *PHASE_PARAMETERS,
+        "history.csv",
+        RESPONSE,
+        ITERATIONS,
+        SENSITIVITIES,
+        WHOLE_FIT,
+    ),
     "simulate": (RESPONSE,),
     "validate": (VALIDATION,),
     "profile": ("profile.csv", PROFILES),
@@ -75,6 +86,8 @@ NUMBERS = {
 }
 # what a fit may write, beside the files that are named after records
 FILES_OF_FIT = (
+    *PHASE_PARAMETERS,
+    *(f"overlay_{phase}.png" for phase in PHASES),
     ITERATIONS,
     RESPONSE,
     SENSITIVITIES,
@@ -153,6 +166,8 @@ def write_series(series: FitSeries, folder: Path, figures: bool) -> tuple[str, .
 def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
     """Yield the names and contents of a fit's tables, and last of its result."""
     yield PARAMETERS, parameter_file(result)
+    for end in result.phase_ends:
+        yield f"parameters_{end.phase}.yaml", phase_end_file(result, end)
     yield "history.csv", history_table(result)
     if result.comparison.name == SINGLE:
         yield RESPONSE, comparison_table(result.comparison)
@@ -187,7 +202,8 @@ def _of_records(main: Path) -> set[str]:
 
 def _named_after(records: Iterable[str]) -> set[str]:
     """Return the names of the files that are named after records."""
-    endings = (".csv", ".png", f"-{ITERATIONS}")
+    phases = (f"-{phase}.png" for phase in PHASES)
+    endings = (".csv", ".png", f"-{ITERATIONS}", *phases)
     return {name + ending for name in records if name for ending in endings}
 
 

@@ -125,6 +125,22 @@ class Minima:
         return int(np.count_nonzero(np.isinf(self.start_costs)))
 
 
+@dataclass(frozen=True, eq=False)
+class PhaseEnd:
+    """Where a phase of the search handed over to the next, on its way to the fit.
+
+    ``iteration`` is its number in the history, ``values`` are those of the free parameters and of
+    all others of the exciter there, ``comparisons`` the response to them beside each record.
+    """
+
+    phase: str
+    next_phase: str
+    iteration: int
+    cost: Annotated[float, nan]
+    values: Mapping[str, float]
+    comparisons: tuple[Comparison, ...] = field(default=(), metadata={KEY: "records"})
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class FitResult:
     """A fit: what was found, how, and how well it matches.
@@ -181,6 +197,7 @@ class FitResult:
     versions: Mapping[str, str]
     inputs: Mapping[str, str]
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
+    phase_ends: tuple[PhaseEnd, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)
     strategy_given: bool = field(default=True, metadata=IN_FILE)
     parts: tuple[PartDescription, ...] = field(default=(), metadata=IN_FILE)

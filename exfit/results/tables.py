@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from exfit.dsp.decimation import kept_rows
 from exfit.inference import ParameterEffect
 from exfit.results.comparisons import Comparison, IterationResponses
-from exfit.results.model import FitResult
+from exfit.results.model import FitResult, PhaseEnd
 from exfit.util.text import yaml_number
 
 Array = NDArray[np.float64]
@@ -141,6 +141,24 @@ def parameter_file(result: FitResult) -> str:
     if result.of_records:
         lines += ["records:  # identified with the parameters"]
         lines += [f"  {name}: {yaml_number(value)}" for name, value in result.of_records.items()]
+    return "\n".join(lines) + "\n"
+
+
+def phase_end_file(result: FitResult, end: PhaseEnd) -> str:
+    """Return the values at the end of a phase as YAML, to be read as those of `parameter_file`."""
+    matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in end.comparisons)
+    own = [name for name in result.own_values if name in end.values]
+    lines = [
+        f"# {result.model}, {', '.join(matches)}; end of {end.phase}, iteration {end.iteration}, "
+        f"where {end.next_phase} went on",
+        f"model: {result.model}",
+        *([f"model_sha256: {result.inputs['model']}"] if "model" in result.inputs else []),
+        "parameters:",
+        *(f"  {name}: {yaml_number(end.values[name])}" for name in own),
+    ]
+    if result.of_records:
+        lines += ["records:"]
+        lines += [f"  {name}: {yaml_number(end.values[name])}" for name in result.of_records]
     return "\n".join(lines) + "\n"
 
 

@@ -28,6 +28,10 @@ def thinned(result: FitResult) -> FitResult:
         result,
         comparisons=tuple(_comparison(match, count) for match in result.comparisons),
         validation=tuple(_comparison(match, count) for match in result.validation),
+        phase_ends=tuple(
+            replace(end, comparisons=tuple(_comparison(match, count) for match in end.comparisons))
+            for end in result.phase_ends
+        ),
         knowledge=None if result.knowledge is None else _knowledge(result.knowledge),
         behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
     )

@@ -20,6 +20,8 @@ FIRST_ORDER = {
 FILES_OF_A_FIT = {
     "result.json",
     "parameters.yaml",
+    "parameters_lm.yaml",
+    "overlay_lm.png",
     "history.csv",
     "response.csv",
     "overlay.png",

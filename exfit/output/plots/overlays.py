@@ -9,15 +9,18 @@ from exfit.results.comparisons import REFERENCE, Comparison, Overlay
 from exfit.signals import label_of
 
 
-def overlay(comparison: Comparison, title: str) -> Figure:
-    """Return measured and simulated signals on one axis each, with their difference below."""
+def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
+    """Return measured and simulated signals on one axis each, with their difference below.
+
+    ``label`` names the simulated ones, by default fitted or simulated.
+    """
     count = len(comparison.overlays)
     figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * count), layout="constrained")
     axes = figure.subplots(
         2 * count, 1, sharex=True, height_ratios=[3.0, 1.0] * count, squeeze=False
     )
     for k, (signal, overlaid) in enumerate(comparison.overlays.items()):
-        _signal(axes[2 * k, 0], comparison, signal, overlaid)
+        _signal(axes[2 * k, 0], comparison, signal, overlaid, label)
         _error(axes[2 * k + 1, 0], comparison, overlaid)
     axes[-1, 0].set_xlabel("time (s)")
     figure.align_ylabels()
@@ -25,7 +28,7 @@ def overlay(comparison: Comparison, title: str) -> Figure:
     return figure
 
 
-def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay) -> None:
+def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay, label: str) -> None:
     time = comparison.time
     if overlaid.reference is not None:
         axes.plot(
@@ -38,7 +41,7 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay) 
         axes.plot(
             *envelope(time, overlaid.start), "--", color=START, linewidth=1.2, label="start values"
         )
-    label = "fitted" if overlaid.start is not None else "simulated"
+    label = label or ("fitted" if overlaid.start is not None else "simulated")
     axes.plot(*envelope(time, overlaid.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
     axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)

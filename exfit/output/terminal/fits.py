@@ -44,6 +44,7 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
         f"{result.nit} iterations, {result.nfev} residuals, {result.njev} Jacobians, "
         f"{result.simulations} simulations, {result.seconds:.2f} s"
     )
+    _phase_ends(console, result)
     console.print(f"sub-steps: {result.substeps}")
     if result.minima is not None:
         console.print()
@@ -56,6 +57,16 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     notes(console, (text for text in result.notes if text not in reasons))
     if result.validation or several:
         comparisons(console, [*result.comparisons, *result.validation])
+
+
+def _phase_ends(console: Console, result: FitResult) -> None:
+    """Show where each phase of the search handed over to the next."""
+    for end in result.phase_ends:
+        errors = ", ".join(f"{match.rmse:.3e}" for match in end.comparisons)
+        console.print(
+            f"end of {end.phase}: iteration {end.iteration}, cost {end.cost:.4e}   "
+            f"rmse {errors} pu   parameters_{end.phase}.yaml"
+        )
 
 
 def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:

@@ -65,6 +65,12 @@ def _facts(result: FitResult) -> Iterator[tuple[str, str]]:
     yield "cost at the start", _square(result.start_cost)
     yield "cost at the end", _square(result.cost)
     yield "iterations", show(result.nit)
+    for end in result.phase_ends:
+        errors = ", ".join(f"{match.rmse:.2e}" for match in end.comparisons)
+        yield (
+            f"end of {end.phase}",
+            (f"iteration {end.iteration}, cost {_square(end.cost)}, rmse {errors} pu"),
+        )
     yield "residuals and Jacobians", f"{result.nfev:g} and {result.njev:g}"
     yield "simulations", show(result.simulations)
     yield "sub-steps of a step", show(result.substeps)
