@@ -51,10 +51,10 @@ def fit(
     """Fit the free parameters of each CASE to its records.
 
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
-    runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged; 1: bad
-    input; 3: not converged, no match at all, or a validation that is not accepted: beyond the
-    limit of accept in the case, without it no better than a constant or beyond 3 times the error
-    of the fit.
+    runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged, or ended
+    at a tolerance that the case gives; 1: bad input; 3: not converged, no match at all, or a
+    validation that is not accepted: beyond the limit of accept in the case, without it no better
+    than a constant or beyond 3 times the error of the fit.
 
     --set overrides --parameters, and both override the case: they give the start of a free
     parameter, and the value of another. The result says which values they changed.
