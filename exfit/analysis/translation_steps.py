@@ -18,7 +18,16 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.models import MODELS, STABILISERS, find
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Model, typical
-from exfit.plants import KINDS, MACHINE, NETWORK, SATURATION, STABILISER, VT0, Stabilised
+from exfit.plants import (
+    INFINITE_BUS,
+    MACHINE,
+    NETWORK,
+    OPEN_CIRCUIT,
+    SATURATION,
+    STABILISER,
+    VT0,
+    Stabilised,
+)
 from exfit.plants.plant import Equipment, PlantKind
 from exfit.results.model import FitResult
 from exfit.simulation.inputs import Inputs, InputStep
@@ -37,7 +46,6 @@ INTEGRATION_STEP = 0.002  # s
 EFD_WEIGHT = 0.1  # of the error of efd, as a share of its range, beside that of vt
 RATED_VOLTAGE = 1.0  # pu, at the start
 DEFAULT_MACHINE = "GENROU"
-OPEN_CIRCUIT, ON_LOAD = "open-circuit", "infinite-bus"
 SIGNALS = ("vt", "efd")
 
 
@@ -142,7 +150,7 @@ def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
     given = {**typical(machine.sheet), **result.machine}
     values = {MACHINE + symbol: value for symbol, value in given.items()} | {VT0: RATED_VOLTAGE}
     form = SATURATION[result.saturation]
-    plants = [StepPlant(KINDS[OPEN_CIRCUIT], Equipment(None, machine, form), values)]
+    plants = [StepPlant(OPEN_CIRCUIT, Equipment(None, machine, form), values)]
     network = network_of(result)
     if network:
         equipment = Equipment(
@@ -150,7 +158,7 @@ def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
         )
         own = {NETWORK + symbol: value for symbol, value in network.items()}
         own |= {STABILISER + symbol: value for symbol, value in result.stabiliser.items()}
-        plants.append(StepPlant(KINDS[ON_LOAD], equipment, {**values, **own}))
+        plants.append(StepPlant(INFINITE_BUS, equipment, {**values, **own}))
     return tuple(plants)
 
 

@@ -8,6 +8,7 @@ from exfit.case.translated_case import translated_case
 from exfit.exchange.psse.export import export
 from exfit.exchange.psse.records import alternatives
 from exfit.models.sheet import Model
+from exfit.plants import INFINITE_BUS, OPEN_CIRCUIT
 from exfit.results.model import FitResult
 from exfit.results.tables import table
 from exfit.results.translation import Translation
@@ -53,9 +54,9 @@ def case_of_translation(
     machine = {"machine": result.machine_model, "parameters": dict(result.machine)}
     network = network_of(result)
     plant = (
-        {"type": "infinite-bus", **machine, "network": network}
+        {"type": INFINITE_BUS.name, **machine, "network": network}
         if network
-        else {"type": "open-circuit", **machine}
+        else {"type": OPEN_CIRCUIT.name, **machine}
     )
     return translated_case(
         result.case_text,

@@ -1,7 +1,7 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
 from exfit.plants.alone import alone
-from exfit.plants.infinite_bus import HEARD, flow_sheet, infinite_bus
+from exfit.plants.infinite_bus import HEARD, INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
@@ -24,6 +24,7 @@ __all__ = [
     "DRIVING",
     "EVENTS",
     "HEARD",
+    "INFINITE_BUS",
     "KINDS",
     "MACHINE",
     "MEASURED",
