@@ -63,12 +63,14 @@ def _judged(result: FitResult) -> tuple[str, str, bool | None]:
 
 def _validated(validation: Sequence[Comparison], outcome: str) -> tuple[str, str, bool | None]:
     reasons = [match.reason or match.name for match in validation if not match.accepted]
-    limits = [match.limit for match in validation if match.limit is not None]
+    limits = [
+        f"{match.limit:.2e} pu ({match.name})" for match in validation if match.limit is not None
+    ]
     if reasons:
         return "Not accepted", "; ".join(reasons), False
     if not validation:
         return outcome.capitalize(), "no record was kept for a validation", None
     if len(limits) < len(validation):
         return outcome.capitalize(), "nothing limits the error of its validations", None
-    limit = f"{max(limits):.2e} pu"
-    return "Accepted", f"{outcome}, and every validation is within its limit, rmse {limit}", True
+    within = f"every validation is within its limit of {', '.join(limits)}"
+    return "Accepted", f"{outcome}, and {within}", True
