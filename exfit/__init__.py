@@ -21,7 +21,7 @@ from exfit.errors import (
 )
 
 if TYPE_CHECKING:
-    from exfit.analysis.translation import translate
+    from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
     from exfit.fleet.fits import fit_all
     from exfit.records.record import Record
@@ -78,7 +78,7 @@ _MODULES = {
     "profile": "exfit.workflows",
     "read_record": "exfit.workflows",
     "simulate": "exfit.workflows",
-    "translate": "exfit.analysis.translation",
+    "translate": "exfit.analysis.translation.translate",
     "validate": "exfit.workflows",
 }
 

@@ -37,8 +37,8 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
     a figure to runs/CASE-MODEL, or to DIR. Exit code 3: the response is another, by more than 5 %
     of a step.
     """
-    from exfit.analysis.translation import target_model
-    from exfit.analysis.translation import translate as translated
+    from exfit.analysis.translation.translate import target_model
+    from exfit.analysis.translation.translate import translate as translated
     from exfit.output import run_folder
     from exfit.results.io import load_result, result_file
 

@@ -10,8 +10,8 @@ import pytest
 from translations import NETWORK, NO_LIMITS, any_fit, fit_of
 
 import exfit
-from exfit.analysis.translation_search import NOTICEABLE, _unnoticed
-from exfit.analysis.translation_steps import step_plants
+from exfit.analysis.translation.search import NOTICEABLE, _unnoticed
+from exfit.analysis.translation.steps import step_plants
 from exfit.errors import ExfitError, ModelError
 from exfit.models import MODELS, STABILISERS
 from exfit.models.exciters import sexs

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from exfit.analysis.translation_start import StartValue
-from exfit.analysis.translation_steps import DEFAULT_MACHINE, TranslationTask
+from exfit.analysis.translation.start import StartValue
+from exfit.analysis.translation.steps import DEFAULT_MACHINE, TranslationTask
 from exfit.results.model import FitResult
 from exfit.results.translation import UNDETERMINED, StepComparison, TranslatedParameter
 

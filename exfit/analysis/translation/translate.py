@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.analysis.translation_search import (
+from exfit.analysis.translation.search import (
     MANY_STARTS,
     ONE_START,
     Effort,
@@ -24,13 +24,13 @@ from exfit.analysis.translation_search import (
     free_parameters,
     search,
 )
-from exfit.analysis.translation_start import (
+from exfit.analysis.translation.start import (
     StartValue,
     lost_parameters,
     starting_values,
     with_limits,
 )
-from exfit.analysis.translation_steps import (
+from exfit.analysis.translation.steps import (
     ReferenceStep,
     StepPlant,
     StepResponse,
@@ -42,7 +42,7 @@ from exfit.analysis.translation_steps import (
     step_plants,
     times_of_steps,
 )
-from exfit.analysis.translation_words import translated_parameters, translation_notes
+from exfit.analysis.translation.words import translated_parameters, translation_notes
 from exfit.case.starting_case import ALONE
 from exfit.errors import ExfitError, SimulationError
 from exfit.fitting.parameters import FreeParameter

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.analysis.translation_start import Placed
+from exfit.analysis.translation.start import Placed
 from exfit.case.peek import section_of
 from exfit.engine.system import System
 from exfit.errors import ExfitError, SimulationError

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit import estimate
-from exfit.analysis.translation_start import StartValue
-from exfit.analysis.translation_steps import TranslationTask
+from exfit.analysis.translation.start import StartValue
+from exfit.analysis.translation.steps import TranslationTask
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT

@@ -1,0 +1,1 @@
+"""A fitted exciter as another model: where it starts, the steps it is compared in, the search."""
