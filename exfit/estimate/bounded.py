@@ -7,18 +7,21 @@ import numpy as np
 from exfit.estimate.arrays import EPS, UNSEEN, Array, Mask
 
 
-def bounded_minimum(A: Array, b: Array, low: Array, high: Array) -> Array:
+def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float = UNSEEN) -> Array:
     """Return y (N,), of small norm, that minimises |A y + b| over low <= y <= high; 0 lies within.
 
-    A (M, N), b (M,). An active set: every variable starts free unless the slope holds it on a
-    bound; one that meets a bound is fixed there, and let go where the slope pulls it back.
+    A (M, N), b (M,); ``unseen``: the error of A, as a share of its largest singular value, below
+    which a direction does not exist.
+
+    An active set: every variable starts free unless the slope holds it on a bound; one that meets a
+    bound is fixed there, and let go where the slope pulls it back.
 
     Source: Stark & Parker 1995, bounded-variable least squares; Lawson & Hanson 1974, ch. 23.
     """
     y, slope = np.zeros_like(low), A.T @ b
     fixed = (low == high) | ((low == 0.0) & (slope > 0.0)) | ((high == 0.0) & (slope < 0.0))
     for _ in range(10 * len(y)):
-        goal = free_minimum(A, b, y, fixed)
+        goal = free_minimum(A, b, y, fixed, unseen)
         blocked = (goal < low) | (goal > high)
         if blocked.any():
             y, hit = first_bound(y, goal, low, high, blocked)
@@ -33,11 +36,11 @@ def bounded_minimum(A: Array, b: Array, low: Array, high: Array) -> Array:
     return y
 
 
-def free_minimum(A: Array, b: Array, y: Array, fixed: Mask) -> Array:
+def free_minimum(A: Array, b: Array, y: Array, fixed: Mask, unseen: float) -> Array:
     """Return y with its free variables where |A y + b| is least, bounds or not."""
     goal = y.copy()
     rest = -(b + A[:, fixed] @ y[fixed])
-    goal[~fixed] = np.linalg.lstsq(A[:, ~fixed], rest, rcond=UNSEEN)[0]
+    goal[~fixed] = np.linalg.lstsq(A[:, ~fixed], rest, rcond=unseen)[0]
     return goal
 
 

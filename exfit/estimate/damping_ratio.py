@@ -85,6 +85,5 @@ def damped_step(linear: LinearModel, nu: float) -> DampedStep:
         np.vstack([rows, sqrt(nu) * np.eye(count)]),
         np.append(linear.amounts, np.zeros(count)),
     )
-    return step_to(
-        linear, scale * bounded_minimum(rows, b, linear.low / scale, linear.high / scale)
-    )
+    low, high = linear.low / scale, linear.high / scale
+    return step_to(linear, scale * bounded_minimum(rows, b, low, high, linear.unseen))

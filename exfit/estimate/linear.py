@@ -144,7 +144,7 @@ def solve(linear: LinearModel, nu: float = 0.0, reach: float = inf) -> DampedSte
         rows = s[:, None] * V
         if nu > 0.0:
             rows, b = np.vstack([rows, sqrt(nu) * np.eye(len(y))]), np.append(b, np.zeros(len(y)))
-        y = bounded_minimum(rows, b, low, high)
+        y = bounded_minimum(rows, b, low, high, linear.unseen)
     return step_to(linear, y)
 
 
