@@ -329,6 +329,7 @@ def test_the_command_writes_its_files_and_says_what_they_hold(run):
     assert run(a, b, "--quiet", "--no-plots")[:2] == (0, "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("record", [False, True])
 def test_the_figure_has_a_panel_and_a_panel_of_differences_for_each_signal(record):
     time = clock(0.01)

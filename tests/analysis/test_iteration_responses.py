@@ -93,6 +93,7 @@ def test_of_many_iterations_some_are_kept_evenly_with_the_first_and_the_last(cou
     assert not len(steps) or 1 <= np.max(steps) <= np.min(steps) + 1
 
 
+@pytest.mark.long
 def test_an_iteration_without_a_response_is_left_out(fitted, monkeypatch, tmp_path):
     whole = Experiment.samples
     lost = fitted.history[1].values["k"]

@@ -72,6 +72,7 @@ def test_an_end_before_a_minimum_casts_doubt():
     assert "had not converged: the iteration limit" in doubt(TRUTH + NOISE[0], iterations=1)
 
 
+@pytest.mark.long
 def test_auto_goes_on_from_a_minimum_that_noise_and_validation_exclude():
     """Here dgn ends at 1.068 of the lowest cost (TE 10), 22 times worse on the step down."""
     result = exfit.fit(ROOT / "configs" / "ac8b_unit2_ka_free.yaml", "auto")

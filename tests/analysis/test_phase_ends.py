@@ -31,6 +31,7 @@ def test_the_end_of_lm_is_its_last_iteration_with_the_response_there(fit):
     assert 0.5 * np.sum(match.overlays["vt"].error ** 2) == pytest.approx(end.cost, rel=1e-6)
 
 
+@pytest.mark.long
 def test_its_files_start_a_fit_where_lm_ended(fit, tmp_path):
     run_folder.write_fit(fit, tmp_path, figures=True)
     (end,) = fit.phase_ends

@@ -54,6 +54,7 @@ def test_where_the_response_is_linear_the_interval_is_that_of_linear_theory(near
         assert one.ends == ("", "")
 
 
+@pytest.mark.long
 def test_channels_of_unlike_noise_each_count_by_their_own():
     """The machine's data show in vt, whose errors are slow, and in ifd, whose errors are white."""
     found = profile(case_of("machine_playback"))
@@ -91,6 +92,7 @@ def test_kd_of_ac1a_is_open_down_to_its_bound(kd):
     assert one.value < 0.4039 < one.high
 
 
+@pytest.mark.long
 def test_at_the_end_of_the_interval_no_refit_costs_less_than_the_rise(kd):
     (one,) = kd.profiles
     case = case_of("ac1a_typical")

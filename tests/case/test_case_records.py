@@ -760,6 +760,7 @@ JUNK = st.recursive(
 )
 
 
+@pytest.mark.long
 @given(st.lists(st.tuples(st.sampled_from(PLACES), JUNK), min_size=1, max_size=3))
 def test_junk_in_the_new_keys_gives_a_case_or_its_refusal(beside_a_record, changes):
     """What is accepted can be set beside its record, or is refused in words there."""

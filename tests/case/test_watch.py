@@ -180,6 +180,7 @@ def test_a_file_that_comes_or_goes_is_a_change(place):
     assert watch.changed(stamps) == (Path("up.csv"),)
 
 
+@pytest.mark.long
 def test_a_change_in_a_folder_that_is_not_there_yet_is_waited_for(place):
     write_case({**CASE, "record": {**CASE["record"], "file": "later/up.csv"}})
     stamps = watch.stamps_of(Path("case.yaml"))

@@ -625,6 +625,7 @@ def test_paths_are_relative_to_the_case_not_to_the_shell(run, tmp_path, monkeypa
     assert (tmp_path / "runs" / "case-fit" / "result.json").is_file()
 
 
+@pytest.mark.long
 def test_a_path_may_hold_spaces_brackets_and_letters_of_any_language(run):
     case = case_file(path="Prüfung [1] 試験/fall ä.yaml")
     for name in ("up.csv", "down.csv"):
@@ -788,6 +789,7 @@ def test_a_folder_in_the_place_of_the_results_is_refused(run, workplace, command
     is_refused(ran, [name[command], "it is a folder"], before, workplace)
 
 
+@pytest.mark.long
 def test_an_interruption_at_the_start_leaves_the_start_and_all_figures(run, monkeypatch):
     def stop(self, line):
         raise KeyboardInterrupt

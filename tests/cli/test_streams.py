@@ -170,6 +170,7 @@ def test_a_run_that_goes_on_can_ask_whether_anybody_listens(monkeypatch):
         assert output_is_lost()
 
 
+@pytest.mark.long
 def test_a_real_pipe_that_is_closed_costs_no_file_and_shows_no_traceback():
     reader, writer = os.pipe()
     os.close(reader)

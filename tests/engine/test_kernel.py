@@ -444,6 +444,7 @@ def test_code_that_moves_no_input_takes_no_array_of_them():
 # --- threads --------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_threads_give_the_same_to_the_last_bit(model):
     system, outputs = system_of(model), ("vt",)
     code = compiled(system, outputs)

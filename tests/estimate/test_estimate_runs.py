@@ -332,6 +332,7 @@ def test_auto_goes_on_until_the_match_is_good_enough():
     assert greedy.nit == len(greedy.history) - 2  # two of the lines are starts
 
 
+@pytest.mark.long
 def test_the_cost_falls_within_every_phase():
     for case in KNOWN.values():
         for method in EVERY_METHOD:

@@ -144,6 +144,7 @@ def test_where_nothing_is_finite_there_are_no_minima():
     assert (found.minima, found.failed, found.unrefined) == ((), 8, 0)
 
 
+@pytest.mark.long
 def test_a_screen_that_takes_many_points_changes_nothing():
     sizes = []
 

@@ -90,6 +90,7 @@ def test_a_match_of_the_curves_is_that_of_all_samples(tmp_path):
         assert few.match(short, factor * limit) is matches
 
 
+@pytest.mark.long
 def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
     case = dense_case(tmp_path, sections={"estimate": {"strategy": "auto"}})
     ours = fit(case)
@@ -158,6 +159,7 @@ def filtered(filter_):
 ONE_STEP = {"vt0": 1.0, "vref": [{"at": found_in(1.0, 0.8, 1.2), "step": 0.05}]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("record", "sections", "test"),
     [

@@ -73,6 +73,7 @@ def both(tmp_path, names=("up", "down"), **record):
     return case_of(three_free(several(*entries)), tmp_path)
 
 
+@pytest.mark.long
 def test_the_order_of_the_records_does_not_matter(tmp_path):
     ends = [fit(both(tmp_path, order)) for order in (("up", "down"), ("down", "up"))]
     assert unit(ends[0]) == pytest.approx(unit(ends[1]), rel=SAME)
@@ -181,6 +182,7 @@ def test_tests_on_line_and_off_line_find_the_same_exciter(tmp_path):
         assert known[name].std_error < 0.01 * value, name
 
 
+@pytest.mark.long
 def test_a_case_on_line_may_hold_a_record_off_line(tmp_path):
     """Which of the two plants is the case's own does not matter."""
     content, free, _ = on_and_off_line(tmp_path)

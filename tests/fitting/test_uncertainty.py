@@ -228,6 +228,7 @@ def test_the_weight_of_a_channel_changes_nothing_that_is_known():
         )
 
 
+@pytest.mark.long
 def test_intervals_of_a_fit_are_widened_for_noise_that_is_not_white():
     exact, rng = first_order(), np.random.default_rng(2)
     held, wider = [], []

@@ -259,6 +259,7 @@ def moves(model, symbol, row):
     return False
 
 
+@pytest.mark.long
 def test_no_parameter_is_inert_but_what_is_said_to_act_on_load_only(model):
     rows = {row.symbol: row for row in MODELS[model].sheet}
     if model not in WITHOUT_PLANT:

@@ -73,6 +73,7 @@ def test_a_small_step_of_the_voltage_is_that_of_the_block_diagram(name, seed):
     assert np.abs(efd - expected).max() < 1e-6 * np.abs(expected - 1.3).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ST1A", "EXST1"])
 def test_a_rate_feedback_around_a_regulator_without_a_lag_is_the_block_diagram_s(name):
     """TA = 0: output and feedback wait for each other, whatever lead is between them."""
@@ -121,6 +122,7 @@ def wide(name, **changes):
     return values | {k: v for k, v in WIDE.items() if k in values} | changes
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("vt", [0.6, 1.1])
 @pytest.mark.parametrize("name", STATIC)
 def test_a_large_step_reaches_the_ceiling_or_the_floor_of_the_standard(name, vt):

@@ -19,6 +19,7 @@ def series():
     return exfit.fit_all(cases, STRATEGIES)
 
 
+@pytest.mark.long
 def test_each_case_has_an_overlay_errors_and_costs_with_a_line_for_each_fit(series):
     figure = plots.fit_series(series)
     assert plots.png(figure)

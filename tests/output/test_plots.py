@@ -122,6 +122,7 @@ def draws(figure):
     return plots.png(figure).startswith(PNG)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("signals", "start"), [(("vt",), None), (("vt",), RISE), (("vt", "efd", "ifd"), RISE)]
 )

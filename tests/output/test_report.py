@@ -461,6 +461,7 @@ def test_the_command_writes_the_page_and_says_where(own, capsys):
     assert "cannot be read" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_long_record_makes_no_long_page(tmp_path):
     folder = tmp_path / "case"
     folder.mkdir()

@@ -202,6 +202,7 @@ def test_a_last_fit_outlives_its_folder_and_another_case_that_takes_it(fitted, f
     assert read_parameters(load_case(CASE), run_folder.last_fit(CASE)) == fitted.values
 
 
+@pytest.mark.long
 def test_a_fit_leaves_no_figure_or_table_of_a_former_one(fitted, tmp_path, monkeypatch):
     """A former fit of three records, drawn, whose records have other names but for one."""
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
@@ -257,6 +258,7 @@ def value_in(folder):
     return json.loads((folder / "result.json").read_text())["parameters"]["k"]["value"]
 
 
+@pytest.mark.long
 def test_a_figure_that_fails_is_reported_and_all_else_stands(twice, monkeypatch):
     result, folder = twice
 
@@ -270,6 +272,7 @@ def test_a_figure_that_fails_is_reported_and_all_else_stands(twice, monkeypatch)
     assert value_in(folder) == 7.0
 
 
+@pytest.mark.long
 def test_a_disk_that_fills_up_while_drawing_costs_figures_alone(twice, monkeypatch):
     result, folder = twice
 
@@ -317,6 +320,7 @@ def test_an_interruption_while_the_numbers_are_made_waits_for_all_of_them(twice,
     assert value_in(folder) == 7.0
 
 
+@pytest.mark.long
 def test_figures_do_not_come_beside_the_numbers_of_another_run(fitted, twice, monkeypatch):
     """Two runs write to one folder: the second puts its numbers there while the first draws."""
     result, folder = twice

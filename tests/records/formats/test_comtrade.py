@@ -419,6 +419,7 @@ def test_a_damaged_single_file_is_refused_by_its_place(tmp_path, fault):
     refused(lambda: read_comtrade(tmp_path / "bump.cff"), *named)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", FORMS)
 @given(damage(), st.sampled_from(["cfg", "dat", "cff"]))
 @settings(

@@ -230,6 +230,7 @@ def test_the_missing_package_is_named_with_its_extra(book, monkeypatch):
     refused(lambda: read_excel(path), "bump.xlsx", 'pip install "exfit[excel]"')
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("inside", [False, True], ids=["file", "sheet"])
 @given(damage())
 @settings(
