@@ -156,8 +156,11 @@ def _run(parts: Sequence[TracePart]) -> Writer:
     w.put("br label %inner")
 
     w.label("inner")
-    w.put("%j = phi i64 [0, %outer], [%j.next, %inner]")
+    w.put("%j = phi i64 [0, %outer], [%j.next, %again]")
     _write_substep(w, parts, fixed, inputs, slots, fractions)
+    w.put("br label %again")
+
+    w.label("again")
     w.put("%j.next = add i64 %j, 1")
     w.put(f"br i1 {w.let('icmp slt i64 %j.next, %m')}, label %inner, label %next")
 

@@ -97,11 +97,16 @@ def _machine(made_for: Target) -> tuple[Any, str]:
 
 
 def _build(ir: str, machine: Any) -> bytes:
+    """Return the machine code of an IR.
+
+    All that other passes look for, equal values and values that a loop does not change, the trace
+    has found; turning short branches into choices is what they must not do.
+    """
     parsed = llvm.parse_assembly(ir)
-    options = llvm.PipelineTuningOptions(speed_level=2)
-    llvm.create_pass_builder(machine, options).getModulePassManager().run(
-        parsed, llvm.create_pass_builder(machine, options)
-    )
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_always_inliner_pass()
+    passes.add_sroa_pass()
+    passes.run(parsed, llvm.create_pass_builder(machine, llvm.PipelineTuningOptions()))
     code: bytes = machine.emit_object(parsed)
     return code
 

@@ -5,9 +5,11 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from exfit.engine.trace import Node, in_order
+from exfit.engine.choices import Region, regions
+from exfit.engine.trace import Node
 
 Values = dict[Node | tuple[Node, str], str]
+Regions = dict[Region, list[Node]]
 
 BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
 LOGIC = {"&": "and", "|": "or"}
@@ -52,6 +54,7 @@ class Writer:
     def __init__(self, narrow: Shape, wide: Shape) -> None:
         self.narrow, self.wide = narrow, wide
         self.lines: list[str] = []
+        self.block = "entry"
 
     def put(self, text: str) -> None:
         """Write an instruction without a result."""
@@ -59,6 +62,7 @@ class Writer:
 
     def label(self, name: str) -> None:
         """Begin a basic block."""
+        self.block = name
         self.lines.append(f"{name}:")
 
     def let(self, text: str) -> str:
@@ -108,9 +112,33 @@ class Writer:
 
     def prepare(self, targets: Sequence[Node], values: Values) -> None:
         """Write what the targets need beyond ``values``, which grows."""
-        for node in in_order(targets):
-            if node not in values and node.constant is None:
+        self._write_region((), regions(targets, values, self._branches), values)
+
+    def _branches(self, node: Node) -> bool:
+        """Return whether a choice is a branch: a processor foresees it, and waits for nothing."""
+        return node.op == "select" and node.varies and self.narrow.lanes == 1
+
+    def _write_region(self, region: Region, nodes: Regions, values: Values) -> None:
+        for node in nodes.get(region, ()):
+            if self._branches(node):
+                values[node] = self._branch(node, region, nodes, values)
+            else:
                 values[node] = self._instruction(node, values)
+
+    def _branch(self, node: Node, region: Region, nodes: Regions, values: Values) -> str:
+        """Write both branches of a choice, each with what it alone needs."""
+        shape, mark, ends = self.shape(node), len(self.lines), []
+        condition = values[node.operands[0]]
+        self.put(f"br i1 {condition}, label %branch1.{mark}, label %branch2.{mark}")
+        for position in (1, 2):
+            self.label(f"branch{position}.{mark}")
+            inside = dict(values)
+            self._write_region((*region, (node.index, position)), nodes, inside)
+            result = self._operand(node.operands[position], shape, inside)
+            ends.append(f"[{result}, %{self.block}]")
+            self.put(f"br label %after.{mark}")
+        self.label(f"after.{mark}")
+        return self.let(f"phi {shape.type} {', '.join(ends)}")
 
     def _operand(self, node: Node, shape: Shape, values: Values) -> str:
         if node.constant is not None:
