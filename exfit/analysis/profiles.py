@@ -18,7 +18,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
-from exfit.inference import LEVEL
+from exfit.inference import LEVEL, Interval
 from exfit.util.text import near
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class Profile:
     high: float | None
     ends: tuple[str, str]
     rise: float
-    linear: tuple[float, float] | None
+    linear: Interval | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,19 +109,18 @@ def profile(
     for _ in range(MOST_MINIMA):
         uncertainty = uncertainty_at(problem, x, records)
         rises = {index: uncertainty.rises[name] for name, index in wanted.items()}
-        cost_profiles = _cost_profiles(problem.compressed, x, rises, progress)
-        interrupted = any(_interrupted(cost_profile) for cost_profile in cost_profiles)
-        if interrupted or not cost_profiles[0].moved:
+        about_x = cost_profiles(problem.compressed, x, rises, progress)
+        interrupted = any(_interrupted(cost_profile) for cost_profile in about_x)
+        if interrupted or not about_x[0].moved:
             break
-        x = cost_profiles[0].x  # its residuals, and so the rise, are others
+        x = about_x[0].x  # its residuals, and so the rise, are others
     return Profiles(
         name=case.path.stem,
-        cost=cost_profiles[0].cost,
+        cost=about_x[0].cost,
         profiles=tuple(
-            _profile(case, problem.residuals, uncertainty, cost_profile)
-            for cost_profile in cost_profiles
+            _profile(case, problem.residuals, uncertainty, cost_profile) for cost_profile in about_x
         ),
-        notes=(*search_range_notes(case), *_notes(best, cost_profiles[0].x)),
+        notes=(*search_range_notes(case), *_notes(best, about_x[0].x)),
         interrupted=interrupted,
     )
 
@@ -170,7 +169,7 @@ def _interrupted(cost_profile: estimate.CostProfile) -> bool:
     return estimate.ProfileEnd.INTERRUPTED in cost_profile.ends
 
 
-def _cost_profiles(
+def cost_profiles(
     residuals: Residuals,
     x: Array,
     rises: Mapping[int, float],
@@ -186,7 +185,7 @@ def _cost_profiles(
         def announce(now: estimate.Progress, done: int = 2 * len(by_index)) -> None:
             progress(replace(now, done=done + now.done, total=2 * len(rises)))
 
-        cost_profiles = estimate.profiles(
+        alike_profiles = estimate.profiles(
             residuals,
             residuals.exact,
             x,
@@ -196,10 +195,10 @@ def _cost_profiles(
             x_scale=UNIT,
             watch=announce,
         )
-        by_index |= {cost_profile.index: cost_profile for cost_profile in cost_profiles}
-        if cost_profiles[0].moved:
-            return list(cost_profiles)
-        if any(_interrupted(cost_profile) for cost_profile in cost_profiles):
+        by_index |= {cost_profile.index: cost_profile for cost_profile in alike_profiles}
+        if alike_profiles[0].moved:
+            return list(alike_profiles)
+        if any(_interrupted(cost_profile) for cost_profile in alike_profiles):
             break
     return [by_index[index] for index in rises if index in by_index]
 

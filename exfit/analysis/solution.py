@@ -136,6 +136,7 @@ def fitted_parameters(
             of_record=name in of_records,
             std_error=own.std_error,
             interval=own.interval,
+            interval_method=own.method,
             why=own.why,
             unit=unit,
             meaning=meaning,

@@ -1,6 +1,7 @@
 """Whether the intervals of the linear theory hold: what the cost itself is at their ends."""
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,17 @@ Array = NDArray[np.float64]
 MOST_RISE = 2.0  # times the rise that the linear theory predicts: there an end may be 30 % off
 
 
+class TraceEnd(NamedTuple):
+    """Where a parameter reaches an end of its linear interval: all parameters there, scaled (N,).
+
+    ``within``: all of them lie within their bounds.
+    """
+
+    name: str
+    x: Array
+    within: bool
+
+
 def nonlinear_parameters(
     residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis, of_record: Sequence[str]
 ) -> tuple[str, ...]:
@@ -25,26 +37,47 @@ def nonlinear_parameters(
 
     Source: Bates & Watts 1988, chapter 7; Donaldson & Schnabel 1987.
     """
-    least, rises = half_square(residuals(theta)), uncertainty.rises
-    names = [
+    ends = [end for end in trace_ends(residuals, theta, uncertainty) if end.within]
+    if not ends:
+        return ()
+    rises = residuals.costs(np.stack([end.x for end in ends])) - half_square(residuals(theta))
+    expected = np.array([uncertainty.rises[end.name] for end in ends])
+    alike = (rises >= expected / MOST_RISE) & (rises <= expected * MOST_RISE)
+    names = dict.fromkeys(end.name for end, linear in zip(ends, alike, strict=True) if not linear)
+    return tuple(name for name in names if name not in of_record)
+
+
+def not_served_by_linear_theory(
+    residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis, of_record: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the parameters whose interval linear theory does not give, in their order.
+
+    These are `nonlinear_parameters`, which ``uncertainty`` names, those on a bound or correlated
+    with one there, those that reach a bound, or take others to one, within their interval, and
+    those without an interval. ``theta`` (N,) is the solution.
+    """
+    leaving = {end.name for end in trace_ends(residuals, theta, uncertainty) if not end.within}
+    failing = {*uncertainty.nonlinear, *uncertainty.leaning_on_bounds, *leaving}
+    return tuple(
         name
-        for name, end in _ends(residuals, theta, uncertainty)
-        if not 1.0 / MOST_RISE <= (half_square(residuals(end)) - least) / rises[name] <= MOST_RISE
-    ]
-    return tuple(name for name in dict.fromkeys(names) if name not in of_record)
+        for name, parameter in uncertainty.confidence.parameters.items()
+        if (name in failing or not parameter.determined) and name not in of_record
+    )
 
 
-def _ends(
+def trace_ends(
     residuals: Residuals, theta: Array, uncertainty: UncertaintyAnalysis
-) -> Iterator[tuple[str, Array]]:
-    """Yield both ends of each interval, with the others along, unless a bound comes before."""
+) -> Iterator[TraceEnd]:
+    """Yield both ends of each linear interval, with the other parameters along."""
     low, high = residuals.bounds
     own = np.array([free.slope(float(x)) for free, x in zip(residuals.free, theta, strict=True)])
     covariance = np.nan_to_num(uncertainty.confidence.covariance / np.outer(own, own))
     for k, free in enumerate(residuals.free):
         for limit in uncertainty.confidence.parameters[free.name].interval or ():
-            if free.low < limit < free.high:
+            if limit is not None:
                 along = covariance[:, k] / covariance[k, k] * (free.scaled(limit) - theta[k])
                 end = theta + along
-                if np.all((end >= low) & (end <= high)):
-                    yield free.name, end
+                within = free.low < limit < free.high
+                yield TraceEnd(
+                    free.name, end, within and bool(np.all((end >= low) & (end <= high)))
+                )

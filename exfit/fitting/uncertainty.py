@@ -1,7 +1,7 @@
 """How well the records of a fit determine its parameters, and which they do not."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import ClassVar, NamedTuple
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference import (
@@ -18,9 +19,11 @@ from exfit.inference import (
     ParameterEffect,
     PriorRow,
     ResidualBlock,
+    Uncertainty,
     confidence,
     effects,
     identifiability,
+    leaning_on_bounds,
     rises,
 )
 from exfit.inference.wording import listed
@@ -47,8 +50,9 @@ class UncertaintyAnalysis:
 
     ``nonlinear`` names the parameters over whose intervals the response is not linear;
     ``sensitivity`` is that of each channel over time, ``effects`` ranks the parameters by it;
-    ``rises`` is by how much the cost rises from its
-    minimum to the ends of each profile's interval, empty where that is not stored.
+    ``leaning_on_bounds`` names those that would be others if the parameters on a bound were let
+    go; ``rises`` is by how much the cost rises from its minimum to the ends of each profile's
+    interval, empty where that is not stored.
     """
 
     DERIVED: ClassVar = {"sentences": "sentences"}
@@ -58,6 +62,7 @@ class UncertaintyAnalysis:
     nonlinear: tuple[str, ...] = field(default=(), metadata={KEY: "not_linear"})
     effects: tuple[ParameterEffect, ...] = field(default=(), metadata={KEY: "sensitivities"})
     sensitivity: tuple[Sensitivity, ...] = field(default=(), metadata=IN_FILE)
+    leaning_on_bounds: tuple[str, ...] = ()
     rises: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
 
     @property
@@ -68,7 +73,11 @@ class UncertaintyAnalysis:
             for name, parameter in self.confidence.parameters.items()
             if parameter.why is not None
         }
-        vague = [name for name, parameter in without.items() if parameter.std_error is not None]
+        vague = [
+            name
+            for name, parameter in without.items()
+            if parameter.std_error is not None and parameter.method is None
+        ]
         if len(vague) < 2:
             vague = []  # its own reason says more
         reasons = [
@@ -81,7 +90,10 @@ class UncertaintyAnalysis:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What a reader must know of it, in words."""
-        names = ", ".join(self.nonlinear)
+        parameters = self.confidence.parameters
+        names = ", ".join(
+            name for name in self.nonlinear if parameters[name].method not in ("profile", "hull")
+        )
         sentence = f"the response is not linear over the intervals of {names}: see `exfit profile`"
         return (*self.confidence.sentences, *([sentence] if names else []), *self.open)
 
@@ -99,14 +111,28 @@ def uncertainty_at(
 
 def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> UncertaintyAnalysis:
     """Return the uncertainty that a linearisation at theta (N,) shows."""
-    intervals = confidence(linear)
+    intervals = within_bounds(confidence(linear), problem.residuals.free)
     return UncertaintyAnalysis(
         confidence=intervals,
         identifiability=identifiability(linear, intervals),
         effects=effects(linear, intervals.noise),
         sensitivity=tuple(sensitivity(problem, theta, linear)),
+        leaning_on_bounds=leaning_on_bounds(linear, intervals.noise),
         rises=rises(linear, intervals),
     )
+
+
+def within_bounds(intervals: Confidence, free: Sequence[FreeParameter]) -> Confidence:
+    """Return the same, no interval beyond the bounds of its parameter."""
+
+    def cut(parameter: FreeParameter) -> Uncertainty:
+        own = intervals.parameters[parameter.name]
+        low, high = own.interval or (None, None)
+        if low is None or high is None:
+            return own
+        return replace(own, interval=(max(low, parameter.low), min(high, parameter.high)))
+
+    return replace(intervals, parameters={parameter.name: cut(parameter) for parameter in free})
 
 
 def sensitivity(problem: FitProblem, theta: Array, linear: Linearisation) -> Iterator[Sensitivity]:

@@ -11,8 +11,12 @@ from exfit.inference.confidence import (
     UNDETERMINED,
     Confidence,
     Correlation,
+    Interval,
+    IntervalMethod,
     Uncertainty,
+    closed,
     confidence,
+    leaning_on_bounds,
     rises,
 )
 from exfit.inference.fixings import Fixing
@@ -30,6 +34,8 @@ __all__ = [
     "Correlation",
     "Fixing",
     "Identifiability",
+    "Interval",
+    "IntervalMethod",
     "Linearisation",
     "Noise",
     "ParameterEffect",
@@ -37,8 +43,10 @@ __all__ = [
     "ResidualBlock",
     "SignalChange",
     "Uncertainty",
+    "closed",
     "confidence",
     "effects",
     "identifiability",
+    "leaning_on_bounds",
     "rises",
 ]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import exp, inf, isfinite
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from exfit.util.typed import IN_FILE
 
 LEVEL = 0.95
 UNDETERMINED = 0.3  # relative standard error: the response is no longer linear over the interval
+CORRELATED = 0.2  # with a parameter on a bound: left free it would widen the interval by 2 %
+
+Interval = tuple[float | None, float | None]  # None: the record sets no limit on that side
+IntervalMethod = Literal["linear", "profile", "hull"]
 
 
 @dataclass(frozen=True)
@@ -24,13 +28,27 @@ class Uncertainty:
     std_error       in its own unit; None where nothing determines it
     relative_error  std_error / |value|; None also where the value is 0
     interval        that holds the true value with the level of the confidence
-    why             the reason where there is no interval
+    why             the reason where there is no interval, or where one side of it has no limit
+    method          how the interval, or that there is none, was found: by linear theory, from the
+                    profile likelihood, or as the hull of the profiles about several minima; None
+                    where linear theory gives none
     """
 
     std_error: float | None
     relative_error: float | None
-    interval: tuple[float, float] | None
+    interval: Interval | None
     why: str | None
+    method: IntervalMethod | None = None
+
+    @property
+    def determined(self) -> bool:
+        """Whether the record limits the parameter on both sides."""
+        return closed(self.interval)
+
+
+def closed(interval: Interval | None) -> bool:
+    """Return whether there is an interval with limits on both sides."""
+    return interval is not None and None not in interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +140,29 @@ def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
     return dict(zip(lin.names, (half * ratios).tolist(), strict=True))
 
 
+def leaning_on_bounds(lin: Linearisation, noise: tuple[Noise, ...]) -> tuple[str, ...]:
+    """Return the parameters whose estimates would be others if those on a bound were let go.
+
+    Those are all that correlate with one on a bound by more than CORRELATED, by linear theory for
+    all parameters free, or that cannot be distinguished from one.
+    """
+    held = ~lin.free
+    if not held.any():
+        return ()
+    factors = factored(lin, np.ones_like(held))
+    covariance = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
+    errors = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlated = np.abs(covariance / np.outer(errors, errors)) > CORRELATED
+    undetermined = np.flatnonzero(held & factors.has_effect & ~factors.determined)
+    alike = {name for k in undetermined for name in factors.others(int(k))}
+    return tuple(
+        name
+        for k, name in enumerate(lin.names)
+        if lin.free[k] and (correlated[k, held].any() or name in alike)
+    )
+
+
 def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
     """Return the effective samples less the parameters that they determine, at least 1."""
     if all(channel_noise.accepted and channel_noise.inflation == 1.0 for channel_noise in noise):
@@ -146,7 +187,7 @@ def uncertainty(factors: Factors, k: int, share: float, dof: float) -> Uncertain
         interval = (value * exp(-t * share), value * exp(t * share))
     else:
         interval = (value - t * std, value + t * std)
-    return Uncertainty(std, relative, interval, None)
+    return Uncertainty(std, relative, interval, None, "linear")
 
 
 def reason(factors: Factors, k: int, share: float) -> str | None:

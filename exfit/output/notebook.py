@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 from exfit.errors import ExfitError
 from exfit.output.plots import overlay
-from exfit.output.terminal.terminal import number
+from exfit.output.terminal.terminal import interval, number
 from exfit.results.model import FitResult, FittedParameter
 from exfit.util.text import near
 
@@ -58,16 +58,14 @@ def fit_html(result: FitResult) -> str:
 
 def _cells(name: str, parameter: FittedParameter) -> tuple[str, ...]:
     """Return what the table says of a parameter."""
-    error, interval = parameter.stderr, "-"
-    if parameter.interval is not None:
-        interval = " ... ".join(number(limit) for limit in parameter.interval)
+    note = f" ({parameter.interval_note})" if parameter.interval_note else ""
     bound = f", on its {parameter.at_bound}" if parameter.at_bound else ""
     return (
         name,
         number(parameter.start),
         f"{number(parameter.value)}{bound}",
-        number(error, 2),
-        interval,
+        number(parameter.stderr, 2),
+        f"{interval(parameter.interval)}{note}",
         parameter.unit,
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
 from exfit.util.typed import IN_FILE, KEY, plain
@@ -63,7 +64,9 @@ class Iteration:
 class FittedParameter:
     """A free parameter after a fit; ``of_record`` where it belongs to a record, not to the unit.
 
-    ``interval`` holds the true value with 95 % confidence; where it is None, ``why`` is the reason.
+    ``interval`` holds the true value with 95 % confidence; a side without a limit is None, and
+    ``why`` is the reason for that, or for no interval at all. ``interval_method`` says how it was
+    found: by linear theory, from the profile likelihood, or as the hull over several minima.
     ``min`` and ``max`` are infinite where there is no bound; ``physical`` says whether the value
     lies in the range of its data sheet.
     """
@@ -75,7 +78,8 @@ class FittedParameter:
     at_bound: Literal["min", "max"] | None = None
     of_record: bool = False
     std_error: float | None = None
-    interval: tuple[float, float] | None = None
+    interval: Interval | None = None
+    interval_method: IntervalMethod | None = None
     why: str | None = None
     unit: str = ""
     meaning: str = ""
@@ -85,6 +89,17 @@ class FittedParameter:
     def stderr(self) -> float | None:
         """The standard error, in its unit; None where nothing determines it."""
         return self.std_error
+
+    @property
+    def determined(self) -> bool:
+        """Whether the record limits the parameter on both sides."""
+        return closed(self.interval)
+
+    @property
+    def interval_note(self) -> str:
+        """How an interval was found that is not that of linear theory; else ""."""
+        method = None if self.interval is None else self.interval_method
+        return "" if method is None or method == "linear" else method
 
 
 class Minimum(NamedTuple):

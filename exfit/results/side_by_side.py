@@ -70,7 +70,7 @@ def _value(result: FitResult, values: Mapping[str, float], name: str) -> Paramet
     parameter = result.parameters.get(name)
     if parameter is None:
         return ParameterValue(values[name], False, None, True)
-    resolved = result.knowledge is None or parameter.interval is not None
+    resolved = result.knowledge is None or parameter.determined
     return ParameterValue(parameter.value, True, parameter.at_bound, resolved)
 
 

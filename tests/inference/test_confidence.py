@@ -10,7 +10,7 @@ from scipy.optimize import curve_fit, least_squares
 from scipy.stats import chi2, kstest
 from scipy.stats import t as student
 
-from exfit.inference import PriorRow, ResidualBlock, confidence, rises
+from exfit.inference import PriorRow, ResidualBlock, confidence, leaning_on_bounds, rises
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 from exfit.util import typed
 
@@ -333,6 +333,31 @@ def test_redundancies_that_have_nothing_to_do_with_each_other_are_distinguished(
     why = [one.why for one in known.parameters.values()]
     assert why[:2] == ["cannot be distinguished from c", "cannot be distinguished from d"]
     assert known.parameters["e"].std_error is not None
+
+
+@pytest.mark.parametrize(
+    ("column", "leaning"),
+    [
+        ("first + second", True),  # correlation 0.7
+        ("0.05 * first + second", False),  # 0.05
+        ("second", False),
+        ("2.0 * first", True),  # cannot be distinguished from it
+    ],
+)
+def test_a_parameter_leans_on_a_bound_if_letting_go_of_it_would_move_the_estimate(column, leaning):
+    rng = np.random.default_rng(18)
+    first, second, third = np.linalg.qr(rng.standard_normal((60, 3)))[0].T
+    other = {
+        "first + second": first + second,
+        "0.05 * first + second": 0.05 * first + second,
+        "second": second,
+        "2.0 * first": 2.0 * first,
+    }[column]
+    rows, errors = np.column_stack([first, other, third]), 0.1 * rng.standard_normal(60)
+    held = linearised(np.ones(3), errors, rows, held=("max", None, None))
+    assert leaning_on_bounds(held, confidence(held).noise) == (("b",) if leaning else ())
+    free = linearised(np.ones(3), errors, rows)
+    assert leaning_on_bounds(free, confidence(free).noise) == ()
 
 
 def test_on_a_bound_the_bound_decides_and_the_others_hold_for_it():

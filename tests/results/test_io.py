@@ -102,6 +102,20 @@ def test_a_file_of_the_version_before_does_not_know_which_steps_were_capped(save
         load_result(written(saved, history=history))
 
 
+def test_an_interval_of_the_version_before_is_that_of_linear_theory(saved):
+    _, content = saved
+    parameters = {
+        name: {key: value for key, value in parameter.items() if key != "interval_method"}
+        for name, parameter in content["parameters"].items()
+    }
+    assert {p["interval_method"] for p in content["parameters"].values()} == {"linear"}
+    back = load_result(written(saved, version=3, parameters=parameters))
+    assert all(parameter.determined for parameter in back.parameters.values())
+    assert {parameter.interval_note for parameter in back.parameters.values()} == {""}
+    with pytest.raises(ExfitError, match=r"parameters\.a\.interval_method: missing"):
+        load_result(written(saved, parameters=parameters))
+
+
 def test_no_damage_ends_in_a_traceback(saved):
     """Values of another kind, missing keys, cut files: ExfitError with the file, or no harm."""
     path, _ = saved

@@ -35,7 +35,7 @@ def _state(result: FitResult, name: str) -> str:
         return result.source_of(name)
     if parameter.at_bound:
         return f"fitted, on its {parameter.at_bound}"
-    return "fitted" if parameter.interval else "fitted, not determined"
+    return "fitted" if parameter.determined else "fitted, not determined"
 
 
 def translation_notes(
@@ -65,7 +65,7 @@ def _fit_notes(task: TranslationTask) -> Iterator[str]:
     if not result.success:
         yield f"the fit of {source} did not converge: {result.message}"
     own = {name: entry for name, entry in result.parameters.items() if name in task.own}
-    unknown = [name for name, entry in own.items() if entry.interval is None]
+    unknown = [name for name, entry in own.items() if not entry.determined]
     if unknown:
         yield f"the record of the fit did not determine {', '.join(unknown)} of {source}"
     outside = [f"{name} {entry.value:.4g}" for name, entry in own.items() if not entry.physical]

@@ -29,7 +29,7 @@ def verdict(result: FitResult) -> Verdict:
 
 def _determined(result: FitResult) -> str:
     own = {name: fitted for name, fitted in result.parameters.items() if not fitted.of_record}
-    vague = [name for name, parameter in own.items() if parameter.interval is None]
+    vague = [name for name, parameter in own.items() if not parameter.determined]
     if not vague:
         return "every parameter determined"
     return f"{len(vague)} of {len(own)} parameters not determined: {listed(vague)}"

@@ -11,6 +11,7 @@ from exfit.output.terminal.comparisons import comparisons, rejections
 from exfit.output.terminal.terminal import (
     NO_BREAK,
     error_of,
+    interval,
     notes,
     number,
     plain_table,
@@ -82,18 +83,17 @@ def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
     numbers = ("start", *former, "fitted", "95 % interval", "error")
     table = plain_table("parameter", *numbers, "unit", "", numbers=numbers)
     for name, parameter in result.parameters.items():
+        style = "yellow" if parameter.at_bound or not parameter.physical else ""
         mark = ", ".join(_marks(parameter))
-        style = "yellow" if mark else ""
-        interval, error = "-", "-"
+        error = "-"
         if result.knowledge is not None:
             uncertainty = result.knowledge.confidence.parameters[name]
             style = style or ("yellow" if uncertainty.why else "")
-            if uncertainty.interval is not None:
-                interval = " ... ".join(number(limit) for limit in uncertainty.interval)
             error = error_of(uncertainty, parameter.of_record)
         old = () if before is None else (number(before.values.get(name)),)
         values = (number(parameter.start), *old, number(parameter.value))
-        table.add_row(name, *values, interval, error, parameter.unit, mark, style=style)
+        limits = interval(parameter.interval)
+        table.add_row(name, *values, limits, error, parameter.unit, mark, style=style)
     return table
 
 
@@ -103,6 +103,8 @@ def _marks(parameter: FittedParameter) -> Iterator[str]:
         yield f"on its {parameter.at_bound}"
     if not parameter.physical:
         yield "not physical"
+    if parameter.interval_note:
+        yield parameter.interval_note
 
 
 def minima(console: Console, search: Minima, parameters: Iterable[str]) -> None:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from exfit.inference import Uncertainty
+from exfit.inference import Interval, Uncertainty
 
 NARROW = 80  # columns where the width is unknown
 UNBROKEN = re.compile(r"`[^`]*`|\d (?:%|pu|s|Hz)(?!\w)")  # commands, and figures with their units
@@ -36,6 +36,16 @@ def plain_table(*columns: str, numbers: Sequence[str] = ()) -> Table:
 def number(value: float | None, digits: int = 5) -> str:
     """Return a number in a few digits, a dash for None."""
     return "-" if value is None else f"{value:.{digits}g}"
+
+
+def interval(limits: Interval | None) -> str:
+    """Return an interval in a few digits, a dash for None; an open side by the other limit."""
+    low, high = limits or (None, None)
+    if low is not None and high is not None:
+        return f"{number(low)} ... {number(high)}"
+    if low is None:
+        return "-" if high is None else f"below {number(high)}"
+    return f"above {number(low)}"
 
 
 def waiting(console: Console, paths: Iterable[Path]) -> None:
