@@ -10,6 +10,7 @@ import numpy as np
 from exfit.inference.factors import Factors, factored
 from exfit.inference.linear import Array, Linearisation
 from exfit.inference.noise import Noise, noise_of
+from exfit.inference.quantiles import student_quantile
 from exfit.inference.wording import error, listed
 from exfit.util.typed import IN_FILE
 
@@ -100,13 +101,14 @@ def confidence(lin: Linearisation) -> Confidence:
     relative = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
     errors = np.sqrt(np.diag(relative))
     dof = degrees_of_freedom(factors, noise)
+    t = student_quantile(dof, 0.5 * (1.0 + LEVEL))
     with np.errstate(invalid="ignore"):
         correlation = relative / np.outer(errors, errors)  # nan for errors of 0
     return Confidence(
         level=LEVEL,
         dof=dof,
         parameters={
-            name: uncertainty(factors, k, float(errors[k]), dof) for k, name in enumerate(lin.names)
+            name: uncertainty(factors, k, float(errors[k]), t) for k, name in enumerate(lin.names)
         },
         correlation=Correlation(lin.names, correlation),
         noise=noise,
@@ -126,9 +128,7 @@ def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
     white (Bates & Watts 1988, section 6.1). What has no variance, as on a bound, takes the mean
     of the channels by their samples.
     """
-    from scipy.special import stdtrit
-
-    half = 0.5 * float(stdtrit(intervals.dof, 0.5 * (1.0 + LEVEL))) ** 2
+    half = 0.5 * student_quantile(intervals.dof, 0.5 * (1.0 + LEVEL)) ** 2
     squares = [channel_noise.spread**2 for channel_noise in intervals.noise]
     mean = float(
         np.average(squares, weights=[channel_noise.samples for channel_noise in intervals.noise])
@@ -170,10 +170,11 @@ def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
     return max(sum(channel_noise.effective for channel_noise in noise) - factors.leverage, 1.0)
 
 
-def uncertainty(factors: Factors, k: int, share: float, dof: float) -> Uncertainty:
-    """Return what is known of parameter k; ``share``: its standard error, of 100 %."""
-    from scipy.special import stdtrit
+def uncertainty(factors: Factors, k: int, share: float, t: float) -> Uncertainty:
+    """Return what is known of parameter k.
 
+    ``share``: its standard error, of 100 %; ``t``: half an interval in standard errors.
+    """
     lin = factors.lin
     why = reason(factors, k, share)
     if not isfinite(share):
@@ -182,7 +183,6 @@ def uncertainty(factors: Factors, k: int, share: float, dof: float) -> Uncertain
     relative = std / abs(value) if value else None
     if why is not None:
         return Uncertainty(std, relative, None, why)
-    t = float(stdtrit(dof, 0.5 * (1.0 + LEVEL)))
     if lin.logarithmic[k]:
         interval = (value * exp(-t * share), value * exp(t * share))
     else:

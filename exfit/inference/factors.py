@@ -105,15 +105,26 @@ def sparse(basis: Array) -> Array:
 
     So redundancies that have nothing to do with each other come apart. The largest component is 1.
     """
-    from scipy.linalg import qr
-
-    count = len(basis)
-    if not count:
+    if not len(basis):
         return basis
-    own = qr(basis, mode="r", pivoting=True)[1][:count]
+    own = pivots(basis)
     reduced = np.linalg.solve(basis[:, own], basis)
     largest = np.take_along_axis(reduced, np.abs(reduced).argmax(axis=1)[:, None], axis=1)
     return np.asarray(reduced / largest)
+
+
+def pivots(rows: Array) -> list[int]:
+    """Return the columns, one for each row (d, k), that are longest beside those before.
+
+    Source: Golub & Van Loan 2013, section 5.4.2 (QR with column pivoting), by Gram and Schmidt.
+    """
+    left, picked = np.array(rows), list[int]()
+    for _ in rows:
+        picked.append(int(np.argmax(np.linalg.norm(left, axis=0))))
+        direction = left[:, picked[-1]] / np.linalg.norm(left[:, picked[-1]])
+        left -= np.outer(direction, direction @ left)
+        left[:, picked] = 0.0
+    return picked
 
 
 def takes_part(directions: Array) -> Mask:

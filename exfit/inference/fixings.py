@@ -70,15 +70,13 @@ def errors_of(factors: Factors, noise: Sequence[Noise]) -> Array:
 
 def next_to_fix(factors: Factors, noise: Sequence[Noise], model: Mask) -> int:
     """Return the parameter of the model that moves most in what the record sees least."""
-    from scipy.linalg import qr
-
     singular, directions = seen_directions(factors, noise)
     own = np.flatnonzero(model[factors.has_effect])
     parts = np.round(directions[:, own], TIED)
     # the last one at least: a fit may determine less than its record, if it weights signals badly
     limit = 0.0 if singular[-1] == 0.0 else max(1.0 / WEAK, singular[-1])
-    pick = qr(parts[singular <= limit], mode="r", pivoting=True)[1][0]
-    return int(np.flatnonzero(factors.has_effect)[own[pick]])
+    longest = np.argmax(np.linalg.norm(parts[singular <= limit], axis=0))
+    return int(np.flatnonzero(factors.has_effect)[own[longest]])
 
 
 def fixing_sentence(

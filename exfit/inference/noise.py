@@ -9,6 +9,7 @@ import numpy as np
 
 from exfit.inference.factors import Factors
 from exfit.inference.linear import Array, ResidualBlock
+from exfit.inference.quantiles import chi_square_tail
 from exfit.inference.wording import digits
 
 SURPRISING = 0.01  # of tests of what is true reject it
@@ -116,10 +117,10 @@ def agrees(estimated: float, given: float | None, dof: float) -> bool | None:
 
     Without degrees of freedom nothing speaks against it.
     """
-    from scipy.special import chdtr, chdtrc
-
     if given is None or not dof or not estimated:
         return None if given is None else True
+    from scipy.special import chdtr, chdtrc
+
     ratio = dof * (estimated / given) ** 2
     return bool(min(chdtr(dof, ratio), chdtrc(dof, ratio)) >= SURPRISING / 2.0)
 
@@ -141,15 +142,13 @@ def whiteness(errors: Array) -> float | None:
     Over min(20, M / 5) lags. The loss of degrees of freedom to the parameters of a fit, few beside
     its samples, is left out.
     """
-    from scipy.special import chdtrc
-
     count = len(errors)
     lags = min(LAGS, count // SAMPLES_PER_LAG)
     if not lags or not np.any(errors):
         return None
     later = np.arange(1, lags + 1)
     statistic = count * (count + 2) * np.sum(autocorrelations(errors)[later] ** 2 / (count - later))
-    return float(chdtrc(lags, statistic))
+    return chi_square_tail(float(statistic), lags)
 
 
 def effective_samples(errors: Array) -> float:

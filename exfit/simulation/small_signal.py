@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import inf, log10, pi, sqrt
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -236,14 +236,16 @@ def _refuse_motion(
 
 
 def poles_of(linear: LinearSystem) -> tuple[Pole, ...]:
-    """Return the modes of a linear system, the slowest first."""
-    from scipy.linalg import eig
+    """Return the modes of a linear system, the slowest first.
 
-    modes: Any = eig(linear.A, left=True, right=True)
-    values, left, right = modes
+    A state takes part in a mode by its components in the right and the left eigenvector, the rows
+    of the inverse of the right ones (Kundur 1994, section 12.2.4). Of a mode that is there twice,
+    with one eigenvector, the pseudo-inverse is taken.
+    """
+    values, right = np.linalg.eig(linear.A)
     size = np.max(np.abs(values), initial=0.0)
     values = np.where(np.abs(values.imag) > SPLIT * np.abs(values), values, values.real + 0j)
-    taking_part = np.abs(left.conj() * right)
+    taking_part = np.abs(np.linalg.pinv(right).T * right)
     poles = [
         _pole(complex(value), taking_part[:, k], linear.states, size)
         for k, value in enumerate(values)

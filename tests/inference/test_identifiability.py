@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linearised import autoregressive, decay, linearised, std_errors
+from scipy.linalg import qr
 
 from exfit.inference import WEAK, PriorRow, ResidualBlock, confidence, identifiability
+from exfit.inference.factors import pivots
 from exfit.inference.wording import digits, listed, move
 from exfit.util.typed import plain
 
@@ -335,3 +337,10 @@ def test_nothing_free_leaves_nothing_to_say():
     assert found.names == ()
     assert found.sentences == ()
     assert all(one.std_error is None for one in known.parameters.values())
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_columns_are_picked_as_by_qr_with_pivoting(seed):
+    rng = np.random.default_rng(seed)
+    rows = rng.standard_normal((rng.integers(1, 5), 7)) * rng.uniform(0.1, 10.0, 7)
+    assert pivots(rows) == qr(rows, mode="r", pivoting=True)[1][: len(rows)].tolist()

@@ -9,6 +9,7 @@ from on_load import system as on_load
 from on_load import values_on_load
 from oracle import SURROUNDINGS, drawn_values, lively_values, system_of, typical_values
 from scipy import signal
+from scipy.linalg import eig
 
 from exfit.errors import SimulationError
 from exfit.models import MODELS
@@ -17,7 +18,7 @@ from exfit.models.sheet import typical
 from exfit.plants import MACHINE, MEASURED, SATURATION, playback
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
-from exfit.simulation.small_signal import StateSpace, linearised, margins, small_signal
+from exfit.simulation.small_signal import StateSpace, linearised, margins, poles_of, small_signal
 
 ALONE = "FIRST_ORDER"
 WITH_LOOP = [name for name in MODELS if name != ALONE]
@@ -424,3 +425,14 @@ def test_two_equal_lags_are_two_real_poles():
     same = [pole for pole in found if abs(pole.value + 1.0 / values["TR"]) < 1e-4]
     assert len(same) == 2
     assert all(pole.damping == 1.0 for pole in same)
+
+
+@pytest.mark.parametrize("name", ["AC1A", "ST4B", "AC8B"])
+def test_states_take_part_as_left_and_right_eigenvectors_say(name):
+    linear = linearised(system_of(name), typical_values(name))
+    values, left, right = eig(linear.A, left=True, right=True)
+    shares = np.abs(left.conj() * right)
+    strongest = {complex(v): linear.states[np.argmax(shares[:, k])] for k, v in enumerate(values)}
+    for pole in poles_of(linear):
+        nearest = min(strongest, key=lambda value: abs(value - pole.value))
+        assert pole.states[0] == strongest[nearest]
