@@ -6,13 +6,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit import __version__, estimate
-from exfit.analysis import experiment_design, model_check, profiles, validation
 from exfit.analysis.case_description import (
     fixed_values,
     input_hashes,
@@ -22,15 +21,12 @@ from exfit.analysis.case_description import (
     values_by_part,
 )
 from exfit.analysis.diagnostics import typical_notes, unphysical_notes
-from exfit.analysis.experiment_design import Design
 from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
 from exfit.analysis.iteration_responses import (
     LiveResponse,
     live_response,
 )
 from exfit.analysis.judgement import doubt_of
-from exfit.analysis.model_check import Check
-from exfit.analysis.profiles import Profiles
 from exfit.analysis.solution import (
     analysed,
     comparisons_of,
@@ -42,7 +38,6 @@ from exfit.analysis.solution import (
 )
 from exfit.case import load
 from exfit.case.case import Case
-from exfit.case.record_section import record_section
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
@@ -50,7 +45,6 @@ from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import fitted, search
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.system import values_of
-from exfit.fitting.unplanned_test import GivenSteps
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
@@ -58,6 +52,11 @@ from exfit.results.model import FitResult, Iteration
 from exfit.simulation.simulator import Response
 from exfit.util.strategies import STRATEGIES
 from exfit.util.text import near
+
+if TYPE_CHECKING:
+    from exfit.analysis.experiment_design import Design
+    from exfit.analysis.model_check import Check
+    from exfit.analysis.profiles import Profiles
 
 Array = NDArray[np.float64]
 CaseOrPath = Case | str | PathLike[str]
@@ -222,6 +221,8 @@ def read_record(
         >>> volts = {"column": "Ugen", "unit": "kV", "base": 15.75}
         >>> record = exfit.read_record("bump.csv", ["Date", "Time"], {"vt": volts})
     """
+    from exfit.case.record_section import record_section
+
     section = {
         "file": Path(path),
         "time": time,
@@ -329,6 +330,9 @@ def validate(
         >>> [match.rmse for match in exfit.validate("case.yaml", result)]
         >>> exfit.validate("case.yaml", result, "down.csv")[-1].accepted
     """
+    from exfit.analysis import validation
+    from exfit.fitting.unplanned_test import GivenSteps
+
     case = loaded(case, values)
     given = GivenSteps(_numbers(step), _numbers(at))
     return validation.validate(case, values_of(case, changes_of(case, values)), record, given)
@@ -342,7 +346,7 @@ def profile(
     case: CaseOrPath,
     names: str | Iterable[str] = (),
     progress: Callable[[estimate.Progress], None] = _ignore,
-) -> Profiles:
+) -> "Profiles":
     """Fit a case and find the 95 % intervals of its parameters from their profile likelihood.
 
     Args:
@@ -357,11 +361,13 @@ def profile(
         >>> for profile in exfit.profile("case.yaml", ["KA"]).profiles:
         ...     print(profile.name, profile.low, profile.high)
     """
+    from exfit.analysis import profiles
+
     names = [names] if isinstance(names, str) else names
     return profiles.profile(loaded(case), names, progress)
 
 
-def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> Design:
+def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Design":
     """Return how well tests would determine the free parameters of a case, at its start values.
 
     Args:
@@ -374,10 +380,12 @@ def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> Desi
     Example:
         >>> exfit.identify("case.yaml", {"vt": 1e-4}).sentences
     """
+    from exfit.analysis import experiment_design
+
     return experiment_design.identify(loaded(case), noise or {})
 
 
-def check(case: CaseOrPath) -> Check:
+def check(case: CaseOrPath) -> "Check":
     """Check a case before its fit: derivatives, bypasses, sub-steps, a run without a step.
 
     Raises ExfitError for input that cannot be used.
@@ -385,4 +393,6 @@ def check(case: CaseOrPath) -> Check:
     Example:
         >>> exfit.workflows.check("case.yaml").agrees
     """
+    from exfit.analysis import model_check
+
     return model_check.check(loaded(case))

@@ -9,8 +9,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from exfit.case.checks.content import contradictions
-from exfit.case.json_schema import json_schema
-from exfit.case.messages import form_faults
 from exfit.case.parts import Parts, parts_of, ties_of
 from exfit.case.schema import CaseDocument
 from exfit.case.ties import Ties
@@ -50,6 +48,9 @@ def _validated(content: dict[str, Any], faults: list[Fault]) -> CaseDocument | N
     try:
         return CaseDocument.model_validate(content)
     except ValidationError as error:
+        from exfit.case.json_schema import json_schema
+        from exfit.case.messages import form_faults
+
         places = {fault.place for fault in faults}
         wrong_forms = form_faults(error.errors(include_url=False), json_schema())
         faults += [fault for fault in wrong_forms if fault.place not in places]

@@ -157,9 +157,11 @@ class Given:
 
         Raises CaseError with all faults of the case, or for values that it cannot start from.
         """
+        path = self.parameters
+        if path is None and not self.changes:
+            return load(case)
         from exfit.fitting.overrides import fitted_model_hash, read_parameters, with_given_values
 
-        path = self.parameters
         loaded = load(case, fitted_model_hash(path) if path else "")
         if path:
             loaded = with_given_values(loaded, read_parameters(loaded, path), path)

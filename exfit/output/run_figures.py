@@ -7,25 +7,26 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from exfit.analysis.comparison import Agreement
-from exfit.analysis.experiment_design import Design
-from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
-from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.fleet.fits import FitSeries
-from exfit.records.inspection import Inspection
-from exfit.results.comparisons import Comparison
-from exfit.results.model import FitResult
-from exfit.results.translation import Translation
-from exfit.workflows import SimulationResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from exfit.analysis.comparison import Agreement
+    from exfit.analysis.experiment_design import Design
+    from exfit.analysis.profiles import Profiles
+    from exfit.fitting.uncertainty import UncertaintyAnalysis
+    from exfit.fleet.fits import FitSeries
+    from exfit.records.inspection import Inspection
+    from exfit.results.comparisons import Comparison
+    from exfit.results.model import FitResult
+    from exfit.results.translation import Translation
+    from exfit.workflows import SimulationResult
+
 Drawings = Mapping[str, Callable[[], "Figure"]]
 
 
-def of_fit(result: FitResult) -> Drawings:
+def of_fit(result: "FitResult") -> Drawings:
     """Return the figures of a fit."""
     from exfit.output import plots
 
@@ -47,7 +48,7 @@ def of_fit(result: FitResult) -> Drawings:
     return drawings
 
 
-def of_phase_ends(result: FitResult) -> Drawings:
+def of_phase_ends(result: "FitResult") -> Drawings:
     """Return the overlays of the points where a phase of the search handed over to the next."""
     from exfit.output import plots
 
@@ -65,14 +66,14 @@ def of_phase_ends(result: FitResult) -> Drawings:
     }
 
 
-def of_series(series: FitSeries) -> Drawings:
+def of_series(series: "FitSeries") -> Drawings:
     """Return the figure of the fits of several cases with several strategies."""
     from exfit.output import plots
 
     return {"fits.png": partial(plots.fit_series, series)}
 
 
-def of_uncertainty(uncertainty: UncertaintyAnalysis, name: str) -> Drawings:
+def of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> Drawings:
     """Return what each parameter does to each signal over time, and how they are correlated."""
     from exfit.output import plots
 
@@ -82,7 +83,7 @@ def of_uncertainty(uncertainty: UncertaintyAnalysis, name: str) -> Drawings:
     }
 
 
-def of_comparisons(comparisons: Sequence[Comparison]) -> Drawings:
+def of_comparisons(comparisons: "Sequence[Comparison]") -> Drawings:
     """Return the overlay of each comparison under its name."""
     from exfit.output import plots
 
@@ -94,26 +95,26 @@ def of_comparisons(comparisons: Sequence[Comparison]) -> Drawings:
     }
 
 
-def of_profiles(profiles: Profiles) -> Drawings:
+def of_profiles(profiles: "Profiles") -> Drawings:
     """Return the figure of the profiles of parameters."""
     from exfit.output import plots
 
     return {"profile.png": partial(plots.profiles, profiles)}
 
 
-def of_design(design: Design) -> Drawings:
+def of_design(design: "Design") -> Drawings:
     """Return the figures of a planned test."""
     return of_uncertainty(design.own, design.name)
 
 
-def of_inspection(inspection: Inspection) -> Drawings:
+def of_inspection(inspection: "Inspection") -> Drawings:
     """Return the figure of what a recorder's file holds."""
     from exfit.output import plots
 
     return {"inspect.png": partial(plots.inspection, inspection, inspection.path.name)}
 
 
-def of_simulation(simulation: SimulationResult, name: str) -> Drawings:
+def of_simulation(simulation: "SimulationResult", name: str) -> Drawings:
     """Return the figures of a response, beside its record where there is one."""
     from exfit.output import plots
 
@@ -124,14 +125,14 @@ def of_simulation(simulation: SimulationResult, name: str) -> Drawings:
     return drawings
 
 
-def of_agreement(agreement: Agreement) -> Drawings:
+def of_agreement(agreement: "Agreement") -> Drawings:
     """Return the figure of how responses differ."""
     from exfit.output import plots
 
     return {"compare.png": partial(plots.agreement, agreement)}
 
 
-def of_translation(translation: Translation) -> Drawings:
+def of_translation(translation: "Translation") -> Drawings:
     """Return the figure of a fitted exciter as another model."""
     from exfit.output import plots
 

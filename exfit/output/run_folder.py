@@ -7,25 +7,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.analysis.comparison import Agreement
-from exfit.analysis.curves import RECORD
-from exfit.analysis.experiment_design import Design
-from exfit.analysis.profiles import Profiles
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
-from exfit.fleet.fits import FitSeries
-from exfit.models.sheet import Model
 from exfit.output import run_figures
-from exfit.output.translated_files import files_of_translation
-from exfit.records.inspection import Inspection
 from exfit.results.comparisons import Comparison
 from exfit.results.io import WHOLE_FIT, result_text
 from exfit.results.model import FitResult
-from exfit.results.side_by_side import results_table
 from exfit.results.tables import (
     DIGITS,
     comparison_table,
@@ -36,14 +28,22 @@ from exfit.results.tables import (
     phase_end_file,
     table,
 )
-from exfit.results.translation import Translation
 from exfit.util.cache import cache_folder
 from exfit.util.files import write, write_together
 from exfit.util.interrupts import deferred_interrupts
 from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
 from exfit.util.typed import plain
-from exfit.workflows import SimulationResult
+
+if TYPE_CHECKING:
+    from exfit.analysis.comparison import Agreement
+    from exfit.analysis.experiment_design import Design
+    from exfit.analysis.profiles import Profiles
+    from exfit.fleet.fits import FitSeries
+    from exfit.models.sheet import Model
+    from exfit.records.inspection import Inspection
+    from exfit.results.translation import Translation
+    from exfit.workflows import SimulationResult
 
 Array = NDArray[np.float64]
 
@@ -143,11 +143,13 @@ def write_fit(result: FitResult, folder: Path, figures: bool) -> tuple[str, ...]
     return _draw(folder / WHOLE_FIT, partial(run_figures.of_fit, result)) if figures else ()
 
 
-def write_series(series: FitSeries, folder: Path, figures: bool) -> tuple[str, ...]:
+def write_series(series: "FitSeries", folder: Path, figures: bool) -> tuple[str, ...]:
     """Write the table of a series of fits as CSV and JSON, and their overlays.
 
     Of each case the values of the fit with the lowest cost are remembered as those of its last fit.
     """
+    from exfit.results.side_by_side import results_table
+
     runs = {run.name: (run.case_name, run.result) for run in series.runs}
     with deferred_interrupts():
         write_together(
@@ -265,7 +267,7 @@ def write_validation(
     return _draw(main, partial(run_figures.of_comparisons, comparisons)) if figures else ()
 
 
-def write_profiles(profiles: Profiles, folder: Path, figures: bool) -> tuple[str, ...]:
+def write_profiles(profiles: "Profiles", folder: Path, figures: bool) -> tuple[str, ...]:
     """Write the profiles of parameters as JSON, as a table and as a figure."""
     rows = [
         f"{profile.name},{value:.{DIGITS}g},{cost:.{DIGITS}g}\n"
@@ -281,7 +283,7 @@ def write_profiles(profiles: Profiles, folder: Path, figures: bool) -> tuple[str
     return _draw(folder / PROFILES, drawings) if figures else ()
 
 
-def write_design(design: Design, folder: Path, figures: bool) -> tuple[str, ...]:
+def write_design(design: "Design", folder: Path, figures: bool) -> tuple[str, ...]:
     """Write what a planned test would show as JSON, its sensitivities as CSV, and figures."""
     numbers = {
         SENSITIVITIES: effects_table(design.own.effects),
@@ -292,7 +294,7 @@ def write_design(design: Design, folder: Path, figures: bool) -> tuple[str, ...]
     return _draw(folder / DESIGN, drawings) if figures else ()
 
 
-def write_inspection(inspection: Inspection, folder: Path, figures: bool) -> tuple[str, ...]:
+def write_inspection(inspection: "Inspection", folder: Path, figures: bool) -> tuple[str, ...]:
     """Write what a recorder's file holds as JSON and as a figure."""
     write_together(folder, {INSPECTION: to_json(inspection.as_json())}, ["inspect.png"])
     drawings = partial(run_figures.of_inspection, inspection)
@@ -300,7 +302,7 @@ def write_inspection(inspection: Inspection, folder: Path, figures: bool) -> tup
 
 
 def write_simulation(
-    simulation: SimulationResult, name: str, folder: Path, figures: bool
+    simulation: "SimulationResult", name: str, folder: Path, figures: bool
 ) -> tuple[str, ...]:
     """Write a response, and its figures."""
     response = simulation.response
@@ -311,7 +313,7 @@ def write_simulation(
     return _draw(folder / RESPONSE, drawings) if figures else ()
 
 
-def write_agreement(agreement: Agreement, folder: Path, figures: bool) -> tuple[str, ...]:
+def write_agreement(agreement: "Agreement", folder: Path, figures: bool) -> tuple[str, ...]:
     """Write how responses differ as JSON, their samples on their clocks, and a figure."""
     record = record_table(agreement)
     numbers = {
@@ -325,9 +327,9 @@ def write_agreement(agreement: Agreement, folder: Path, figures: bool) -> tuple[
 
 
 def write_translation(
-    translation: Translation,
+    translation: "Translation",
     result: FitResult,
-    target: tuple[str, Model],
+    target: "tuple[str, Model]",
     folder: Path,
     figures: bool,
 ) -> tuple[str, ...]:
@@ -335,6 +337,8 @@ def write_translation(
 
     ``target`` is the model, behind its name as it was given.
     """
+    from exfit.output.translated_files import files_of_translation
+
     numbers = files_of_translation(translation, result, target, folder)
     numbers[TRANSLATION] = to_json(translation.to_dict())
     write_together(folder, numbers, ["translation.png"])
@@ -342,7 +346,7 @@ def write_translation(
     return _draw(folder / TRANSLATION, drawings) if figures else ()
 
 
-def agreement_table(agreement: Agreement) -> str:
+def agreement_table(agreement: "Agreement") -> str:
     """Return the responses and their differences from the first on their common clock, as CSV."""
     columns = {"t": agreement.time}
     several = len({entry.second for entry in agreement.between}) > 1
@@ -358,8 +362,10 @@ def agreement_table(agreement: Agreement) -> str:
     return table([*columns], [*columns.values()])
 
 
-def record_table(agreement: Agreement) -> str | None:
+def record_table(agreement: "Agreement") -> str | None:
     """Return the record and the responses at its instants, as CSV; None without a record."""
+    from exfit.analysis.curves import RECORD
+
     compared = [entry for entry in agreement.differences if entry.first == RECORD]
     if not compared:
         return None
