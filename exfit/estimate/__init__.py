@@ -10,8 +10,9 @@ time: a variable rests on a bound exactly as long as the model wants it there. D
 does not see at all are left alone; those it sees weakly are taken in full, but no variable moves
 farther than recent steps have proved good, unless a search takes the full step.
 
-Based on it are the search from many starts (`multistart`) and the profiles of single parameters
-(`profile`), both in threads.
+A search is a generator, which yields what it asks for and is sent the answer (`requests`); so
+many are advanced in lock-step (`lockstep`), and one alone is a stack of one. Based on it are the
+search from many starts (`multistart`) and the profiles of single parameters (`profile`).
 
 Sources: Levenberg 1944; Marquardt 1963; Armijo 1966; Moré 1978 (the Levenberg-Marquardt
 algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10; Kelley 1999,
@@ -21,19 +22,24 @@ Iterative methods for optimization, chapters 2 and 3.
 from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
 from exfit.estimate.damping_ratio import RatioDamping
 from exfit.estimate.gauss_newton import LineSearch
+from exfit.estimate.problem import half_square
 from exfit.estimate.profile import CostProfile, ProfileEnd, profile, profiles
+from exfit.estimate.requests import Functions, OneByOne
 from exfit.estimate.search import to_half, to_parabola
 from exfit.estimate.searches import Searches
-from exfit.estimate.solver import least_squares
-from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart
+from exfit.estimate.solver import Descent, least_squares
+from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
 from exfit.estimate.trust_region import TrustRegion
 
 __all__ = [
     "STATUS",
     "CostProfile",
+    "Descent",
+    "Functions",
     "LineSearch",
     "LocalMinimum",
     "MultistartResult",
+    "OneByOne",
     "ProfileEnd",
     "Progress",
     "RatioDamping",
@@ -42,10 +48,12 @@ __all__ = [
     "SolverIteration",
     "Stop",
     "TrustRegion",
+    "half_square",
     "least_squares",
     "multistart",
     "profile",
     "profiles",
+    "spread",
     "to_half",
     "to_parabola",
 ]

@@ -11,6 +11,7 @@ from exfit.estimate.arrays import EPS
 from exfit.estimate.bounded import bounded_minimum
 from exfit.estimate.linear import DampedStep, LinearModel, step_to
 from exfit.estimate.problem import Problem
+from exfit.estimate.requests import Steps
 from exfit.estimate.search import MOST_TRIALS, Move, gain_ratio
 
 LOW, HIGH = 0.25, 0.75  # gain ratios: nu is raised below the first, lowered above the second
@@ -41,7 +42,7 @@ class RatioDamping:
         """Return the same search: it goes on until it converges or meets its limit."""
         return self
 
-    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Raise nu until a trial does not raise the cost."""
         cost = linear.point.cost
         nu = first_nu = self.at_start(linear) if isnan(self.nu) else self.nu
@@ -50,7 +51,7 @@ class RatioDamping:
             promise = -0.5 * step.slope
             if not promise > EPS * cost:
                 break
-            trial = problem.evaluate(step.target)
+            trial = yield from problem.evaluate(step.target)
             ratio = gain_ratio(cost - trial.cost, promise)
             if ratio >= 0.0:
                 move = Move(trial, nu, rejections, ratio, capped=first_nu > 0.0)

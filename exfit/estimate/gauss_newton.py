@@ -8,6 +8,7 @@ import numpy as np
 from exfit.estimate.answer import Stop
 from exfit.estimate.linear import LinearModel, solve
 from exfit.estimate.problem import Problem
+from exfit.estimate.requests import Steps
 from exfit.estimate.search import ARMIJO, Cut, Move, gain_ratio, shorten, to_parabola
 
 WORST_CONDITION = 1e8  # beyond it a full Gauss-Newton step is a guess
@@ -22,13 +23,13 @@ class FullStep:
     retries: bool = False
     phase: str = "gn"
 
-    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Take the full step, the first one shortened once where that is necessary."""
         if linear.singular[0] > WORST_CONDITION * linear.singular[linear.rank - 1]:
             return Move(None, 1.0, 0, stop=Stop.ILL_CONDITIONED), self
         full, length, once = linear.full, 1.0, replace(self, retries=False)
         for rejections in range(2 if self.retries else 1):
-            trial = problem.evaluate(full.at(length))
+            trial = yield from problem.evaluate(full.at(length))
             decrease = linear.point.cost - trial.cost
             if decrease > 0.0:
                 quality = gain_ratio(decrease, full.promised(length))
@@ -54,10 +55,10 @@ class LineSearch:
     reach: float = 1.0
     phase: str = "dgn"
 
-    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Try lambda = 1, then less."""
         step = solve(linear, reach=self.reach) if self.capped else linear.full
-        move = shorten(problem, linear, step, armijo=self.armijo, cut=self.cut)
+        move = yield from shorten(problem, linear, step, armijo=self.armijo, cut=self.cut)
         if move.point is None:
             return move, self
         farthest = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))

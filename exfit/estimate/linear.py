@@ -10,6 +10,7 @@ from exfit.estimate.arrays import TINY, Array
 from exfit.estimate.bounded import bounded_minimum
 from exfit.estimate.box import Box
 from exfit.estimate.problem import Point, Problem
+from exfit.estimate.requests import Steps
 
 
 @dataclass(frozen=True)
@@ -76,9 +77,11 @@ class LinearModel:
         return float(np.linalg.norm(self.scale * (x - self.point.x)))
 
 
-def linearise(problem: Problem, point: Point, before: LinearModel | None = None) -> LinearModel:
+def linearise(
+    problem: Problem, point: Point, before: LinearModel | None = None
+) -> Steps[LinearModel]:
     """Return the linear model at a point, scaled no less than the one before."""
-    J = problem.jacobian(point)
+    J = yield from problem.jacobian(point)
     return factored(problem, point, J, before) if np.isfinite(J).all() else blind(problem, point, J)
 
 

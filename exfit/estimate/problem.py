@@ -1,17 +1,16 @@
-"""The user's functions: called, counted, differentiated, and never trusted to be finite."""
+"""What a search makes small: asked for, counted, differentiated, and never trusted to be finite."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from exfit.estimate.arrays import EPS, UNSEEN, Array
 from exfit.estimate.box import Box
+from exfit.estimate.requests import Functions, Steps, jacobian_at, residuals_at
 
-Function = Callable[[Array], ArrayLike]
 Differences = Literal["2-point", "3-point"]
 
 RELATIVE_STEP = {"2-point": EPS ** (1 / 2), "3-point": EPS ** (1 / 3)}
@@ -35,68 +34,79 @@ def half_square(residuals: Array) -> float:
 
 
 class Problem:
-    """Calls fun and jac, counts the calls and remembers the best trial."""
+    """Asks for residuals and Jacobians, counts them and remembers the best trial.
+
+    ``differences`` takes the Jacobian from residuals nearby; without it the functions give it.
+    """
 
     def __init__(
         self,
-        fun: Function,
-        jac: Differences | Function,
+        functions: Functions,
+        differences: Differences | None,
         box: Box,
         scaled: bool,
         jacobian_error: float | None = None,
     ) -> None:
-        self.fun, self.jac, self.box, self.scaled = fun, jac, box, scaled
-        usual = JACOBIAN_ERROR["exact" if callable(jac) else jac]
+        self.functions, self.differences, self.box, self.scaled = (
+            functions,
+            differences,
+            box,
+            scaled,
+        )
+        usual = JACOBIAN_ERROR[differences or "exact"]
         self.unseen = usual if jacobian_error is None else jacobian_error
         self.nfev = self.njev = 0
         self.best: Point | None = None
 
-    def evaluate(self, x: Array) -> Point:
+    def evaluate(self, x: Array) -> Steps[Point]:
         """Return the point x."""
-        r = self.residuals(x)
+        (r,) = yield from self.residuals([x])
         point = Point(x, r, half_square(r))
         if self.best is None or point.cost < self.best.cost:
             self.best = point
         return point
 
-    def residuals(self, x: Array) -> Array:
-        """Return fun(x), shape (M,), or one nan where arithmetic fails."""
-        self.nfev += 1
-        return residuals_at(self.fun, x)
+    def residuals(self, points: Sequence[Array]) -> Steps[Sequence[Array]]:
+        """Return the residuals (M,) at some points."""
+        self.nfev += len(points)
+        return (yield from residuals_at(self.functions, points))
 
-    def jacobian(self, point: Point) -> Array:
-        """Return J, shape (M, N); not finite where fun or jac fail."""
+    def jacobian(self, point: Point) -> Steps[Array]:
+        """Return J, shape (M, N); not finite where there is none."""
         self.njev += 1
         shape = (len(point.residuals), len(point.x))
-        try:
-            J = exact(self.jac, point.x) if callable(self.jac) else self.differences(point)
-        except ArithmeticError:
+        if self.differences is not None:
+            return (yield from self.quotients(point))
+        J = yield from jacobian_at(self.functions, point.x)
+        if J.shape == (1, 1) and not isfinite(J[0, 0]):
             return np.full(shape, nan)
         if J.shape != shape:
             raise ValueError(f"jac must return shape {shape}, not {J.shape}")
         return J
 
-    def differences(self, point: Point) -> Array:
-        """Return J by differences, column by column."""
-        return np.column_stack([self.column(point, j) for j in range(len(point.x))])
-
-    def column(self, point: Point, j: int) -> Array:
-        """Differentiate the line or parabola through the residuals here and nearby."""
-        offsets = self.offsets(point.x[j], j)
-        rises = [self.moved(point.x, j, h) - point.residuals for h in offsets]
-        if not offsets:
-            return np.zeros_like(point.residuals)
-        if len(offsets) == 1:
-            return rises[0] / offsets[0]
-        near, far = offsets
-        return (rises[0] * (far / near) - rises[1] * (near / far)) / (far - near)
+    def quotients(self, point: Point) -> Steps[Array]:
+        """Return J by differences: the slope of the line or parabola through residuals nearby."""
+        offsets = [self.offsets(x, j) for j, x in enumerate(point.x)]
+        nearby = [
+            self.shifted(point.x, j, h) for j, distances in enumerate(offsets) for h in distances
+        ]
+        residuals = iter((yield from self.residuals(nearby)) if nearby else ())
+        J = np.zeros((len(point.residuals), len(point.x)))
+        for j, distances in enumerate(offsets):
+            rises = [next(residuals) - point.residuals for _ in distances]
+            if len(distances) == 1:
+                J[:, j] = rises[0] / distances[0]
+            elif distances:
+                near, far = distances
+                J[:, j] = (rises[0] * (far / near) - rises[1] * (near / far)) / (far - near)
+        return J
 
     def offsets(self, x: float, j: int) -> tuple[float, ...]:
         """Return how far to go: both ways, or towards the farther bound; none if it is fixed."""
         below, above = x - self.box.low[j], self.box.high[j] - x
         if below == above == 0.0:
             return ()
-        central = self.jac == "3-point"
+        central = self.differences == "3-point"
         h = RELATIVE_STEP["3-point" if central else "2-point"] * max(abs(x), self.box.unit[j])
         if central and h <= min(below, above):
             wanted = [h, -h]
@@ -106,26 +116,8 @@ class Problem:
         offsets = tuple(float((x + w) - x) for w in wanted)
         return offsets if all(offsets) else ()  # a box as narrow as rounding leaves no room
 
-    def moved(self, x: Array, j: int, h: float) -> Array:
-        """Return the residuals a distance h along one variable."""
+    def shifted(self, x: Array, j: int, h: float) -> Array:
+        """Return the point a distance h away along one variable."""
         x = x.copy()
         x[j] += h
-        return self.residuals(self.box.inside(x))
-
-
-def residuals_at(fun: Function, x: Array) -> Array:
-    """Return fun(x), shape (M,), or one nan where arithmetic fails."""
-    try:
-        with np.errstate(all="ignore"):
-            r = np.array(fun(x.copy()), dtype=np.float64, ndmin=1)
-    except ArithmeticError:
-        return np.full(1, nan)
-    if r.ndim != 1:
-        raise ValueError(f"fun must return residuals in one dimension, not {r.shape}")
-    return r
-
-
-def exact(jac: Function, x: Array) -> Array:
-    """Return J as the given function has it."""
-    with np.errstate(all="ignore"):
-        return np.array(jac(x.copy()), dtype=np.float64, ndmin=2)
+        return self.box.inside(x)

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from exfit.estimate.answer import Progress, Stop
 from exfit.estimate.arrays import UNSEEN, Array
 from exfit.estimate.box import Box, checked
-from exfit.estimate.problem import Function, exact, half_square, residuals_at
+from exfit.estimate.problem import half_square
+from exfit.estimate.requests import Function, OneByOne
 from exfit.estimate.solver import least_squares
 from exfit.estimate.threads import side_by_side, until
 
@@ -104,8 +105,8 @@ class Valley:
             x[rest] = z
             return x
 
-        if len(guess) == 1 or half_square(residuals_at(self.fun, guess)) == inf:
-            cost = half_square(residuals_at(self.fun, guess))
+        if len(guess) == 1 or half_square(OneByOne(self.fun).residuals([guess])[0]) == inf:
+            cost = half_square(OneByOne(self.fun).residuals([guess])[0])
             return self.spot(guess, cost) if isfinite(cost) else None
         result = least_squares(
             lambda z: self.fun(whole(z)),
@@ -203,11 +204,11 @@ def profiles(
     stop, lower_found = Event(), False
     counted = until(stop, fun), until(stop, jac)
     for restarts in range(MOST_MINIMA + 1):
-        cost = half_square(residuals_at(fun, start))
+        cost = half_square(OneByOne(fun).residuals([start])[0])
         if cost == inf:
             raise ValueError("the residuals at x are not finite")
         bottom = Spot(start, cost, 0.0)
-        slopes = exact(jac, start)
+        slopes = OneByOne(fun, jac).jacobians([start])[0]
         valley = Valley(*counted, box, x_scale is not None, bottom, slopes, rise, points)
         limit = cost - LOWER * rise if restarts < MOST_MINIMA else -inf
         sides = [Side(index, sign, [bottom]) for index in indices for sign in (-1, 1)]

@@ -10,9 +10,14 @@ from exfit.estimate.answer import STATUS, Result, SolverIteration, Stop
 from exfit.estimate.arrays import Array
 from exfit.estimate.linear import LinearModel, blind, linearise
 from exfit.estimate.problem import Point, Problem
+from exfit.estimate.requests import Steps
 from exfit.estimate.search import Move, Search
 from exfit.estimate.searches import Searches
 from exfit.estimate.stopping import Rules
+
+
+class NotFinite(ValueError):
+    """Residuals that are not finite where a search should begin."""
 
 
 @dataclass(frozen=True)
@@ -44,23 +49,23 @@ class SearchRun:
         self.iterations = 0
         self.best: LinearModel | None = None
 
-    def begin(self, x0: Array) -> LinearModel:
-        """Return the linear model at the start, or raise ValueError."""
-        point = self.problem.evaluate(x0)
+    def begin(self, x0: Array) -> Steps[LinearModel]:
+        """Return the linear model at the start, or raise NotFinite."""
+        point = yield from self.problem.evaluate(x0)
         if point.cost == inf:
-            raise ValueError("the residuals at x0 are not finite")
-        start = self.linearise(point)
+            raise NotFinite("the residuals at x0 are not finite")
+        start = yield from self.linearise(point)
         self.rules = self.rules.starting_at(start)
         return start
 
-    def linearise(self, point: Point, before: LinearModel | None = None) -> LinearModel:
+    def linearise(self, point: Point, before: LinearModel | None = None) -> Steps[LinearModel]:
         """Return the linear model at a point; remember the best one."""
-        linear = linearise(self.problem, point, before)
+        linear = yield from linearise(self.problem, point, before)
         if self.best is None or point.cost <= self.best.point.cost:
             self.best = linear
         return linear
 
-    def descend(self, search: Search, linear: LinearModel) -> Outcome:
+    def descend(self, search: Search, linear: LinearModel) -> Steps[Outcome]:
         """Go down from a point until there is a reason to stop."""
         if not self.history or not np.array_equal(self.history[-1].x, linear.point.x):
             self.announce(search.phase, linear)
@@ -70,9 +75,9 @@ class SearchRun:
             if stop is not None:
                 return Outcome(linear, stop)
             before = linear
-            move, search = search.advance(self.problem, before)
+            move, search = yield from search.advance(self.problem, before)
             if move.point is not None:
-                linear = self.linearise(move.point, before)
+                linear = yield from self.linearise(move.point, before)
             self.iterations += 1
             self.announce(search.phase, linear, move, before)
             stop = self.rules.after(before, linear, move)
@@ -109,11 +114,11 @@ class SearchRun:
         if self.callback is not None:
             self.callback(line)
 
-    def best_of(self, outcome: Outcome) -> Outcome:
+    def best_of(self, outcome: Outcome) -> Steps[Outcome]:
         """Return the outcome, moved to a trial that was rejected and yet is the best."""
         best = self.problem.best
         if best is not None and best.cost < outcome.linear.point.cost:
-            return Outcome(linearise(self.problem, best), outcome.stop)
+            return Outcome((yield from linearise(self.problem, best)), outcome.stop)
         return outcome
 
     def interrupted(self) -> Outcome:

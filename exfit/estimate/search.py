@@ -11,6 +11,7 @@ from exfit.estimate.answer import Stop
 from exfit.estimate.arrays import EPS
 from exfit.estimate.linear import DampedStep, LinearModel
 from exfit.estimate.problem import Point, Problem
+from exfit.estimate.requests import Steps
 
 ARMIJO = 1e-4  # share of the promised decrease that makes a trial good enough
 MOST_TRIALS = 60
@@ -41,7 +42,7 @@ class Search(Protocol):
     def phase(self) -> str:
         """The name in the log."""
 
-    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Return the move made, and the search to go on with."""
 
 
@@ -79,7 +80,7 @@ def shorten(
     trials: int = MOST_TRIALS,
     armijo: float = ARMIJO,
     cut: Cut = to_parabola,
-) -> Move:
+) -> Steps[Move]:
     """Shorten the step until Armijo's rule holds or its promise can no longer be seen.
 
     Source: Armijo 1966.
@@ -87,7 +88,7 @@ def shorten(
     cost, length, reductions = linear.point.cost, 1.0, 0
     capped = held_back(linear, step)
     while reductions < trials and -length * step.slope > EPS * cost:
-        trial = problem.evaluate(step.at(length))
+        trial = yield from problem.evaluate(step.at(length))
         if trial.cost < cost and trial.cost <= cost + armijo * length * step.slope:
             quality = gain_ratio(cost - trial.cost, step.promised(length))
             return Move(trial, length, reductions, quality, capped=capped)

@@ -1,6 +1,7 @@
-"""Nonlinear least squares within bounds: the one function that chooses and runs a method."""
+"""Nonlinear least squares within bounds: one descent, by the method and tolerances chosen."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from math import inf
 
 from numpy.typing import ArrayLike
@@ -8,11 +9,63 @@ from numpy.typing import ArrayLike
 from exfit.estimate.answer import Result, SolverIteration
 from exfit.estimate.arrays import Array
 from exfit.estimate.box import checked
-from exfit.estimate.problem import RELATIVE_STEP, Differences, Function, Problem
+from exfit.estimate.lockstep import finish
+from exfit.estimate.problem import RELATIVE_STEP, Differences, Problem
+from exfit.estimate.requests import Function, Functions, OneByOne, Steps
 from exfit.estimate.run import SearchRun
 from exfit.estimate.searches import USUAL, Searches
 from exfit.estimate.stopping import MOST_ITERATIONS, Rules
 from exfit.estimate.strategies import STRATEGIES
+from exfit.util.strategies import DEFAULT_STRATEGY
+
+
+@dataclass(frozen=True, kw_only=True)
+class Descent:
+    """What is made small, within which bounds, by which method and how far.
+
+    `least_squares` says what the settings mean; ``differences`` takes the Jacobian from residuals.
+    """
+
+    functions: Functions
+    bounds: tuple[ArrayLike, ArrayLike] = (-inf, inf)
+    method: str = DEFAULT_STRATEGY
+    differences: Differences | None = None
+    max_iterations: int | Mapping[str, int] = MOST_ITERATIONS
+    gtol: float = 1e-8
+    gtol_absolute: float | None = None
+    ftol: float = 1e-10
+    xtol: float = 1e-10
+    x_scale: ArrayLike | None = None
+    jacobian_error: float | None = None
+    good_enough: float | None = None
+    matches: Callable[[Array], bool] | None = None
+    searches: Searches = USUAL
+
+    def begin(
+        self, x0: ArrayLike, callback: Callable[[SolverIteration], object] | None = None
+    ) -> Steps[Result]:
+        """Return the search from x0 (N,), to be advanced by `lockstep`.
+
+        Raises ValueError as `least_squares` does.
+        """
+        start, box = checked(x0, self.bounds, self.x_scale)
+        if self.method not in STRATEGIES:
+            raise ValueError(f"method: {self.method!r} is none of {', '.join(STRATEGIES)}")
+        scaled = self.x_scale is not None
+        problem = Problem(self.functions, self.differences, box, scaled, self.jacobian_error)
+        rules = Rules(
+            self.max_iterations, self.gtol, self.ftol, self.xtol, self.gtol_absolute, self.matches
+        )
+        return self._search(SearchRun(problem, rules, self.searches, callback), start)
+
+    def _search(self, run: SearchRun, start: Array) -> Steps[Result]:
+        try:
+            linear = yield from run.begin(start)
+            outcome = yield from STRATEGIES[self.method](run, linear, self.good_enough)
+            outcome = yield from run.best_of(outcome)
+        except KeyboardInterrupt:
+            outcome = run.interrupted()
+        return run.result(outcome)
 
 
 def least_squares(
@@ -64,16 +117,22 @@ def least_squares(
 
     Raises ValueError for bounds that cross, x0 outside them or residuals not finite there.
     """
-    start, box = checked(x0, bounds, x_scale)
-    if method not in STRATEGIES:
-        raise ValueError(f"method: {method!r} is none of {', '.join(STRATEGIES)}")
     if not callable(jac) and jac not in RELATIVE_STEP:
         raise ValueError(f"jac: {jac!r} is neither callable nor one of {', '.join(RELATIVE_STEP)}")
-    problem = Problem(fun, jac, box, x_scale is not None, jacobian_error)
-    rules = Rules(max_iterations, gtol, ftol, xtol, gtol_absolute, matches)
-    run = SearchRun(problem, rules, searches, callback)
-    try:
-        outcome = run.best_of(STRATEGIES[method](run, run.begin(start), good_enough))
-    except KeyboardInterrupt:
-        outcome = run.interrupted()
-    return run.result(outcome)
+    descent = Descent(
+        functions=OneByOne(fun, jac if callable(jac) else None),
+        bounds=bounds,
+        method=method,
+        differences=None if callable(jac) else jac,
+        max_iterations=max_iterations,
+        gtol=gtol,
+        gtol_absolute=gtol_absolute,
+        ftol=ftol,
+        xtol=xtol,
+        x_scale=x_scale,
+        jacobian_error=jacobian_error,
+        good_enough=good_enough,
+        matches=matches,
+        searches=searches,
+    )
+    return finish(descent.begin(x0, callback))

@@ -1,26 +1,25 @@
-"""Many starts over the bounds, each refined to a minimum, and the distinct minima they lead to."""
+"""Many starts, each refined to a minimum, and the distinct minima they lead to."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, inf, log2, nan
-from threading import Event
+from math import inf, nan
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exfit.estimate.answer import Progress, Result, SolverIteration, Stop
+from exfit.estimate.answer import Progress, Result, Stop
 from exfit.estimate.arrays import Array
 from exfit.estimate.box import checked
-from exfit.estimate.problem import Function, exact, half_square, residuals_at
-from exfit.estimate.searches import USUAL, Searches
-from exfit.estimate.solver import least_squares
-from exfit.estimate.stopping import MOST_ITERATIONS
-from exfit.estimate.threads import side_by_side, until
-from exfit.util.strategies import DEFAULT_STRATEGY
+from exfit.estimate.lockstep import finish_all
+from exfit.estimate.requests import Functions, Steps
+from exfit.estimate.run import NotFinite
+from exfit.estimate.sobol import sobol
+from exfit.estimate.solver import Descent
 
 SEED = 1  # any: what matters is that a run can be repeated
-SCREENED_AT_ONCE = 256  # points screened between two reports
 INDISTINGUISHABLE = 0.5  # standard errors: a difference that no record shows
+
+Watch = Callable[[Progress], object]
 
 
 @dataclass(frozen=True)
@@ -38,10 +37,10 @@ class MultistartResult:
     """What a search from many starts found: the distinct ``minima``, the lowest first.
 
     best         of the lowest minimum; after an interruption of the lowest point seen: that may be
-                 one of a refinement that was cut short, or a start that was only screened, with
-                 Stop.INTERRUPTED then; None where no point has a cost
-    start_costs  (count,) of the starts, the user's own first; inf where not finite, nan where an
-                 interruption came before
+                 one of a refinement that was cut short, with Stop.INTERRUPTED then; None where no
+                 start led anywhere
+    start_costs  (count,) of the starts, those of ``earlier`` first; inf where not finite, nan where
+                 an interruption came before
     end_costs    (count,) of what each start led to; nan where it was not refined
     failed       starts whose residuals are not finite
     unrefined    other starts that were not refined, or not to their end
@@ -56,121 +55,125 @@ class MultistartResult:
     interrupted: bool
 
 
-Screen = Callable[[Array], ArrayLike]
-Watch = Callable[[Progress], object]
-
-
 def multistart(
-    fun: Function,
-    jac: Function,
-    bounds: tuple[ArrayLike, ArrayLike],
-    count: int,
+    starts: ArrayLike,
+    legs: Sequence[Descent],
     *,
-    x0: ArrayLike | None = None,
-    screen: Screen | None = None,
-    refine: int | None = None,
+    counts: Sequence[int] | None = None,
     workers: int | None = None,
-    seed: int = SEED,
     watch: Watch = lambda _: None,
-    method: str = DEFAULT_STRATEGY,
-    max_iterations: int | Mapping[str, int] = MOST_ITERATIONS,
-    gtol: float = 1e-8,
-    gtol_absolute: float | None = None,
-    ftol: float = 1e-8,
-    xtol: float = 1e-10,
-    x_scale: ArrayLike | None = None,
-    jacobian_error: float | None = None,
-    good_enough: float | None = None,
-    matches: Callable[[Array], bool] | None = None,
-    searches: Searches = USUAL,
     earlier: Sequence[Result] = (),
 ) -> MultistartResult:
-    """Minimise f(x) = 1/2 sum(fun(x)^2) from ``count`` starts spread over finite bounds (N,).
+    """Refine each of some starts (S, N) to a minimum, and return the distinct minima.
 
-    The starts are x0, if there is one, and points of a scrambled Sobol sequence. The ``refine``
-    best of them (all by default), x0 always among them, are refined by `least_squares`, whose
-    method and tolerances these are (the cost's is wider: to distinguish minima needs less), in
-    ``workers`` threads (as many as there are processors by default); fun and jac must bear being
-    called from several at a time.
+    A start goes down one leg after the other: from where a descent on one form of the problem ended
+    the next one goes on. A leg that has no finite residuals where it would begin is left out; the
+    last one is what all costs and minima refer to. All starts are advanced together, in ``workers``
+    threads (as many as there are processors by default); no result depends on their number. The
+    functions of the legs must bear being called from several threads at a time.
 
-    screen  gives the costs (K,) of many points (K, N) at once; without it fun is called for each
+    counts  of how many starts each of these is the end already (by default of itself alone)
     watch   gets every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
             with what is done
-    earlier results of `least_squares` with the same fun: their starts and ends count, too, as the
-            first ones
+    earlier results of the last leg from other starts: their starts and ends count as the first
 
     Two ends are one minimum where half a standard error, in cost f / 4 (M - N), exceeds both the
     difference of their costs and what the linear model at the better one makes of their distance:
     then no record tells them apart, however flat the valley. Costs below gtol^2 times the starts'
     median are all nothing.
 
-    Raises ValueError for bounds that are not finite or cross, x0 outside them, or count < 1.
-
-    Source: Sobol 1967; Owen 1998 (scrambling).
+    Raises ValueError for bounds that cross or starts outside them.
     """
-    points = spread(bounds, count, x0, seed)
-    stop, ends, cut_short = Event(), dict[int, StartOutcome](), list[Result]()
-    costs = screened(until(stop, fun), points, screen, workers, watch, stop)
-    order = np.argsort(costs, kind="stable")[: np.count_nonzero(np.isfinite(costs))]
-    if x0 is not None and np.isfinite(costs[0]):
-        order = np.append(0, order[order != 0])
-    chosen = [] if stop.is_set() else [int(k) for k in order[:refine]]
-    nothing = gtol**2 * float(np.median(costs[chosen])) if chosen else 0.0
+    points = np.array(starts, dtype=np.float64, ndmin=2)
+    ends = dict[int, RefinedStart]()
 
-    def descend(k: int) -> None:
-        result = least_squares(
-            until(stop, fun),
-            points[k],
-            until(stop, jac),
-            bounds,
-            method,
-            max_iterations=max_iterations,
-            gtol=gtol,
-            gtol_absolute=gtol_absolute,
-            ftol=ftol,
-            xtol=xtol,
-            x_scale=x_scale,
-            jacobian_error=jacobian_error,
-            good_enough=good_enough,
-            matches=matches,
-            searches=searches,
-        )
-        if result.stop is Stop.INTERRUPTED:
-            cut_short.append(result)
+    def receive(place: int, end: RefinedStart) -> None:
+        ends[place] = end
+        if end.cut_short is not None:
             raise KeyboardInterrupt
-        ends[k] = end_of(result, nothing)
+        lowest = min((end.cost for end in ends.values() if end.end is not None), default=inf)
+        watch(Progress("refining", len(ends), len(points), lowest))
 
-    def report(_: None) -> None:
-        lowest = min(end.result.cost for end in tuple(ends.values()))
-        watch(Progress("refining", len(ends), len(chosen), lowest))
+    whole = finish_all([refined(x, legs) for x in points], workers, receive)
+    every = [
+        *(RefinedStart(result.history[0].cost, result) for result in earlier),
+        *(ends.get(k, RefinedStart(nan)) for k in range(len(points))),
+    ]
+    weights = [*([1] * len(earlier)), *([1] * len(points) if counts is None else counts)]
+    return summary(every, weights, legs[-1], interrupted=not whole)
 
-    side_by_side(descend, chosen, workers, report, stop)
-    end_costs = np.full(count, nan)
-    end_costs[list(ends)] = [end.result.cost for end in ends.values()]
-    failed = int(np.count_nonzero(np.isinf(costs)))
-    before = [end_of(result, nothing) for result in earlier]
-    minima = minima_of([*before, *(ends[k] for k in sorted(ends))], fun, jac)
-    candidates = [local.result for local in minima[:1]]
-    if stop.is_set() and np.isfinite(costs).any():
-        start = points[np.nanargmin(costs)]
-        candidates += [*cut_short, interrupted_at(fun, jac, bounds, start, x_scale)]
+
+@dataclass(frozen=True)
+class RefinedStart:
+    """What a start led to: its cost at first, and the end of the last leg if it came there.
+
+    That is ``end``, or ``cut_short`` where an interruption ended it.
+    """
+
+    first_cost: float
+    end: Result | None = None
+    cut_short: Result | None = None
+
+    @property
+    def cost(self) -> float:
+        """The cost where it ended, nan where it did not come to an end of its own."""
+        return nan if self.end is None else self.end.cost
+
+
+def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
+    """Return the way of one start down its legs, to be advanced by `lockstep`."""
+    first_cost, calls = inf, (0, 0)
+    result: Result | None = None
+    for number, leg in enumerate(legs, start=1):
+        last = number == len(legs)
+        try:
+            end = yield from leg.begin(x)
+        except NotFinite:
+            continue
+        first = end.history[0].cost if end.history else end.cost
+        first_cost, x = min(first_cost, first), end.x
+        calls = (calls[0] + end.nfev, calls[1] + end.njev)
+        if last:
+            result = replace(end, nfev=calls[0], njev=calls[1])
+        elif end.stop is Stop.INTERRUPTED:
+            raise KeyboardInterrupt
+    if result is not None and result.stop is Stop.INTERRUPTED:
+        return RefinedStart(first_cost, cut_short=result)
+    return RefinedStart(first_cost, result)
+
+
+def summary(
+    starts: Sequence[RefinedStart], weights: Sequence[int], leg: Descent, interrupted: bool
+) -> MultistartResult:
+    """Return what some starts came to, each of which counts by its weight."""
+    ends = [(s.end, s.first_cost, w) for s, w in zip(starts, weights, strict=True) if s.end]
+    nothing = leg.gtol**2 * float(np.median([first_cost for _, first_cost, _ in ends] or [0.0]))
+    outcomes = [end_of(end, nothing, weight) for end, _, weight in ends]
+    minima = minima_of(outcomes, leg.functions)
+    cut_short = [start.cut_short for start in starts if start.cut_short is not None]
+    candidates = [*(local.result for local in minima[:1]), *cut_short]
+    failed = sum(start.first_cost == inf for start in starts)
     return MultistartResult(
         minima=minima,
         best=min(candidates, key=lambda result: result.cost, default=None),
-        start_costs=np.append(starts_of(earlier), costs),
-        end_costs=np.append(ends_of(earlier), end_costs),
+        start_costs=np.repeat([start.first_cost for start in starts], weights),
+        end_costs=np.repeat([start.cost for start in starts], weights),
         failed=failed,
-        unrefined=count - failed - len(ends),
-        interrupted=stop.is_set(),
+        unrefined=len(starts) - failed - len(outcomes),
+        interrupted=interrupted,
     )
 
 
 def spread(
-    bounds: tuple[ArrayLike, ArrayLike], count: int, x0: ArrayLike | None, seed: int
+    bounds: tuple[ArrayLike, ArrayLike],
+    count: int,
+    x0: ArrayLike | None = None,
+    seed: int = SEED,
 ) -> Array:
-    """Return the starts (count, N), x0 first, or raise ValueError."""
-    from scipy.stats import qmc
+    """Return starts (count, N) over finite bounds: x0, if there is one, and a Sobol sequence.
 
+    Raises ValueError for bounds that are not finite or cross, x0 outside them, or count < 1.
+    """
     if count < 1:
         raise ValueError(f"count: {count} is below 1")
     low, high = (np.array(bound, dtype=np.float64, ndmin=1) for bound in bounds)
@@ -178,79 +181,31 @@ def spread(
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         raise ValueError("bounds must be finite: the starts are spread over them")
     first = checked(0.5 * (low + high) if x0 is None else x0, (low, high), None)[0]
-    # balanced only in powers of two
-    shares = qmc.Sobol(len(low), seed=seed).random_base2(ceil(log2(count)))[:count]
-    points = np.clip(low + (high - low) * shares, low, high)
+    points = np.clip(low + (high - low) * sobol(count, len(low), seed), low, high)
     return points if x0 is None else np.vstack([first, points])[:count]
-
-
-def screened(
-    fun: Function,
-    points: Array,
-    screen: Screen | None,
-    workers: int | None,
-    watch: Watch,
-    stop: Event,
-) -> Array:
-    """Return the cost of every point; inf where it is not finite, nan where ``stop`` came first."""
-    costs = np.full(len(points), nan)
-
-    def look(part: slice) -> int:
-        some = one_by_one(fun, points[part]) if screen is None else screen(points[part])
-        costs[part] = np.where(np.isfinite(some), some, inf)
-        return len(points[part])
-
-    def report(_: int) -> None:
-        done = int(np.count_nonzero(~np.isnan(costs)))
-        watch(Progress("screening", done, len(points), float(np.nanmin(costs))))
-
-    parts = [
-        slice(first, first + SCREENED_AT_ONCE) for first in range(0, len(points), SCREENED_AT_ONCE)
-    ]
-    side_by_side(look, parts, workers if screen is None else 1, report, stop)
-    return costs
-
-
-def one_by_one(fun: Function, points: Array) -> list[float]:
-    """Return the cost of each point."""
-    return [half_square(residuals_at(fun, x)) for x in points]
-
-
-def interrupted_at(
-    fun: Function,
-    jac: Function,
-    bounds: tuple[ArrayLike, ArrayLike],
-    start: Array,
-    x_scale: ArrayLike | None,
-) -> Result:
-    """Return a start as the result of a search that was interrupted there."""
-
-    def interrupt(_: SolverIteration) -> None:
-        raise KeyboardInterrupt
-
-    return least_squares(fun, start, jac, bounds, x_scale=x_scale, callback=interrupt)
 
 
 @dataclass(frozen=True)
 class StartOutcome:
     """Where a refinement ended, without residuals and J: thousands would not fit into the memory.
 
-    ``triangle`` (N, N) has the lengths of J; ``step`` is what half a standard error costs.
+    ``triangle`` (N, N) has the lengths of J; ``step`` is what half a standard error costs;
+    ``starts`` is how many led there.
     """
 
     result: Result
     triangle: Array
     step: float
+    starts: int
 
 
-def end_of(result: Result, nothing: float) -> StartOutcome:
+def end_of(result: Result, nothing: float, starts: int) -> StartOutcome:
     """Return the end that a refinement came to; ``nothing`` is what a perfect match may cost."""
     freedom = max(1, len(result.fun) - len(result.x))
     step = INDISTINGUISHABLE**2 * result.cost / freedom + nothing
     triangle = np.asarray(np.linalg.qr(result.jac, mode="r"), dtype=np.float64)
-    return StartOutcome(
-        replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x)))), triangle, step
-    )
+    small = replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x))))
+    return StartOutcome(small, triangle, step, starts)
 
 
 def distinct(ends: Iterable[StartOutcome]) -> list[list[StartOutcome]]:
@@ -273,25 +228,14 @@ def same(best: StartOutcome, other: StartOutcome) -> bool:
     return max(rise, 0.5 * float(way @ way)) <= best.step
 
 
-def starts_of(earlier: Sequence[Result]) -> list[float]:
-    """Return the costs at which searches began."""
-    return [result.history[0].cost for result in earlier]
-
-
-def ends_of(earlier: Sequence[Result]) -> list[float]:
-    """Return the costs at which searches ended."""
-    return [result.cost for result in earlier]
-
-
-def minima_of(
-    ends: Iterable[StartOutcome], fun: Function, jac: Function
-) -> tuple[LocalMinimum, ...]:
+def minima_of(ends: Iterable[StartOutcome], functions: Functions) -> tuple[LocalMinimum, ...]:
     """Return the distinct minima that ends are, the lowest first."""
-    return tuple(minimum(group, fun, jac) for group in distinct(ends))
+    return tuple(minimum(group, functions) for group in distinct(ends))
 
 
-def minimum(group: Sequence[StartOutcome], fun: Function, jac: Function) -> LocalMinimum:
+def minimum(group: Sequence[StartOutcome], functions: Functions) -> LocalMinimum:
     """Return the minimum that some ends are, with its residuals and Jacobian again."""
     best = group[0].result
-    result = replace(best, fun=residuals_at(fun, best.x), jac=exact(jac, best.x))
-    return LocalMinimum(best.x, best.cost, len(group), result)
+    (residuals,), (jacobian,) = functions.residuals([best.x]), functions.jacobians([best.x])
+    result = replace(best, fun=residuals, jac=jacobian)
+    return LocalMinimum(best.x, best.cost, sum(end.starts for end in group), result)

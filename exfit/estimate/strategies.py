@@ -6,11 +6,12 @@ from math import sqrt
 from exfit.estimate.answer import Stop
 from exfit.estimate.gauss_newton import FullStep
 from exfit.estimate.linear import LinearModel
+from exfit.estimate.requests import Steps
 from exfit.estimate.run import Outcome, SearchRun
 from exfit.estimate.search import Search
 from exfit.estimate.searches import Searches
 
-Strategy = Callable[[SearchRun, LinearModel, float | None], Outcome]
+Strategy = Callable[[SearchRun, LinearModel, float | None], Steps[Outcome]]
 
 
 def alone(search: Callable[[Searches], Search]) -> Strategy:
@@ -18,34 +19,34 @@ def alone(search: Callable[[Searches], Search]) -> Strategy:
     return lambda run, start, _: run.descend(search(run.searches), start)
 
 
-def lm_then_dgn(run: SearchRun, start: LinearModel, _: float | None) -> Outcome:
+def lm_then_dgn(run: SearchRun, start: LinearModel, _: float | None) -> Steps[Outcome]:
     """Let lm find the valley and dgn follow it; where a kink stops that, lm goes on."""
     lm, dgn = run.searches.lm, run.searches.dgn
-    outcome = relay(run, start, lm.handing_over(), dgn)
+    outcome = yield from relay(run, start, lm.handing_over(), dgn)
     if outcome.stop is not Stop.STALLED:
         return outcome
-    return run.descend(lm, outcome.linear)
+    return (yield from run.descend(lm, outcome.linear))
 
 
-def robust(run: SearchRun, start: LinearModel, _: float | None) -> Outcome:
+def robust(run: SearchRun, start: LinearModel, _: float | None) -> Steps[Outcome]:
     """Go on with lm where gn quits."""
     return relay(run, start, FullStep(), run.searches.lm)
 
 
-def relay(run: SearchRun, start: LinearModel, first: Search, second: Search) -> Outcome:
+def relay(run: SearchRun, start: LinearModel, first: Search, second: Search) -> Steps[Outcome]:
     """Go on with the second search where the first ends short of a minimum."""
-    outcome = run.descend(first, start)
+    outcome = yield from run.descend(first, start)
     if outcome.converged or outcome.stop is Stop.JACOBIAN:
         return outcome
-    return run.descend(second, outcome.linear)
+    return (yield from run.descend(second, outcome.linear))
 
 
-def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Outcome:
+def auto(run: SearchRun, start: LinearModel, good_enough: float | None) -> Steps[Outcome]:
     """Try dgn; where that is not good enough, lm and dgn from the same start."""
-    first = run.descend(run.searches.dgn, start)
+    first = yield from run.descend(run.searches.dgn, start)
     if matches(first, good_enough):
         return first
-    second = lm_then_dgn(run, start, good_enough)
+    second = yield from lm_then_dgn(run, start, good_enough)
     return second if second.linear.point.cost <= first.linear.point.cost else first
 
 

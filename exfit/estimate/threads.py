@@ -10,7 +10,7 @@ from typing import TypeVar
 from numpy.typing import ArrayLike
 
 from exfit.estimate.arrays import Array
-from exfit.estimate.problem import Function
+from exfit.estimate.requests import Function
 
 Item = TypeVar("Item")
 Done = TypeVar("Done")

@@ -10,6 +10,7 @@ from exfit.estimate.answer import Stop
 from exfit.estimate.arrays import EPS, TINY, Array
 from exfit.estimate.linear import DampedStep, LinearModel, solve
 from exfit.estimate.problem import Problem
+from exfit.estimate.requests import Steps
 from exfit.estimate.search import ARMIJO, MOST_TRIALS, Move, gain_ratio, shorten, to_parabola
 
 FIRST_RADIUS = 100.0  # as MINPACK; in units of x_scale the first radius is 1
@@ -45,19 +46,23 @@ class TrustRegion:
         """Return the search that ends where full Gauss-Newton steps prove good."""
         return replace(self, hand_over=True)
 
-    def advance(self, problem: Problem, linear: LinearModel) -> tuple[Move, Self]:
+    def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Shrink the radius until a trial lowers the cost, and enlarge it after a good one."""
         if self.timid < self.patience:
-            return self.within(problem, linear)
-        move = shorten(problem, linear, solve(linear, reach=1.0), BOLD_TRIALS, self.armijo)
+            return (yield from self.within(problem, linear))
+        move = yield from shorten(
+            problem, linear, solve(linear, reach=1.0), BOLD_TRIALS, self.armijo
+        )
         if move.point is None:
             wary = replace(self, timid=0, patience=2 * self.patience)
-            second, search = wary.within(problem, linear, move.inner)
+            second, search = yield from wary.within(problem, linear, move.inner)
             return replace(second, capped=move.capped), search
         radius = max(self.radius, linear.scaled_length(move.point.x))
         return replace(move, damping=0.0), replace(self, timid=0, patience=PATIENCE, radius=radius)
 
-    def within(self, problem: Problem, linear: LinearModel, spent: int = 0) -> tuple[Move, Self]:
+    def within(
+        self, problem: Problem, linear: LinearModel, spent: int = 0
+    ) -> Steps[tuple[Move, Self]]:
         """Return the best move that the trust region allows."""
         cost, search = linear.point.cost, self
         if self.radius == inf:
@@ -70,7 +75,7 @@ class TrustRegion:
             step = solve(linear, nu)
             if not step.promise > EPS * cost:
                 break
-            trial = problem.evaluate(step.target)
+            trial = yield from problem.evaluate(step.target)
             decrease = cost - trial.cost
             search = search.resized(linear, step, nu, decrease)
             quality = gain_ratio(decrease, step.promise)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.estimate.problem import half_square
+from exfit.estimate import half_square
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 
@@ -40,7 +40,7 @@ def nonlinear_parameters(
     ends = [end for end in trace_ends(residuals, theta, uncertainty) if end.within]
     if not ends:
         return ()
-    rises = residuals.costs(np.stack([end.x for end in ends])) - half_square(residuals(theta))
+    rises = residuals.costs([end.x for end in ends]) - half_square(residuals(theta))
     expected = np.array([uncertainty.rises[end.name] for end in ends])
     alike = (rises >= expected / MOST_RISE) & (rises <= expected * MOST_RISE)
     names = dict.fromkeys(end.name for end, linear in zip(ends, alike, strict=True) if not linear)

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from exfit.case.ties import TieError, Ties
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.robust_loss import Loss
-from exfit.engine.kernel import SIDE_BY_SIDE
 from exfit.errors import SimulationError
+from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter, Prior
-from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
 
@@ -209,23 +208,32 @@ class Residuals:
         count = len(theta)
         return np.asarray((columns[:, count:] - columns[:, :count]) / (up - down))
 
-    def costs(self, points: Array) -> Array:
-        """Return half the sum of squares at each of points (K, N), inf where there is none."""
-        blocks = [points[k : k + SIDE_BY_SIDE] for k in range(0, len(points), SIDE_BY_SIDE)]
-        return np.concatenate(list(in_threads(self._costs, blocks)))
-
-    def _costs(self, points: Array) -> Array:
+    def of_many(self, points: Sequence[Array]) -> list[Array]:
+        """Return the residuals at each of points (N,), infinite where there are none."""
+        if not len(points):
+            return []
         try:
-            residuals = self._of_many(points)
+            return self._of_many(points)
         except UNREACHABLE:
             if len(points) == 1:
-                return np.full(1, np.inf)
-            return np.concatenate([self._costs(point[None, :]) for point in points])
-        with np.errstate(all="ignore"):
-            costs = np.array([0.5 * float(r @ r) for r in residuals])
-        return np.where(np.isfinite(costs), costs, np.inf)
+                return [np.full(self.count + len(self.priors), np.inf)]
+            return [residuals for point in points for residuals in self.of_many([point])]
 
-    def _of_many(self, points: Array | Sequence[Array]) -> list[Array]:
+    def costs(self, points: Sequence[Array]) -> Array:
+        """Return half the sum of squares at each of points (N,), infinite where there are none."""
+        return np.array([half_square(residuals) for residuals in self.of_many(points)])
+
+    def exact_of_many(self, points: Sequence[Array]) -> list[Array]:
+        """Return the exact Jacobian at each of points (N,), nan where there is none."""
+        return [self._exact_or_nan(point) for point in points]
+
+    def _exact_or_nan(self, theta: Array) -> Array:
+        try:
+            return self.exact(theta)
+        except UNREACHABLE:
+            return np.full((self.count + len(self.priors), len(theta)), np.nan)
+
+    def _of_many(self, points: Sequence[Array]) -> list[Array]:
         """Return the residuals of several points, simulated side by side where that is possible."""
         self._count(len(points) * len(self.experiments))
         sets = [self.values(point) for point in points]
@@ -312,3 +320,21 @@ def jacobian_error(jacobian: str, difference_step: float | None = None) -> float
     central = jacobian == "central"
     step = difference_step or (CENTRAL_STEP if central else ONE_SIDED_STEP)
     return max(ROUNDING_OF_RUNS / step, step**2 if central else step)
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """Residuals and Jacobians of many points at once, as searches in lock-step ask for them."""
+
+    residuals_of: Residuals
+    jacobian: str = "exact"
+
+    def residuals(self, points: Sequence[Array]) -> Sequence[Array]:
+        """Return the residuals (M,) at each of points (N,)."""
+        return self.residuals_of.of_many(points)
+
+    def jacobians(self, points: Sequence[Array]) -> Sequence[Array]:
+        """Return the Jacobian (M, N) at each of points (N,)."""
+        if self.jacobian == "exact":
+            return self.residuals_of.exact_of_many(points)
+        return [JACOBIANS[self.jacobian](self.residuals_of)(point) for point in points]

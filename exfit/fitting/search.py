@@ -6,6 +6,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.case import Case
@@ -18,13 +19,17 @@ from exfit.fitting.residuals import (
     JACOBIANS,
     LEAST_NOISE,
     Residuals,
+    SideBySide,
     SimulationCounter,
     jacobian_error,
 )
 from exfit.fitting.setup import ExperimentSetup
 
+Array = NDArray[np.float64]
+
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
+TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
 UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
@@ -105,13 +110,8 @@ class CaseSearches:
 
     def from_starts(self, method: str, count: int) -> estimate.MultistartResult:
         """Return the minima from the start of the case and others over the bounds."""
-        return self._many(
-            method,
-            count,
-            x0=self.residuals.start,
-            screen=self.residuals.costs,
-            refine=self.options.refine,
-        )
+        start, bounds = self.residuals.start, self.residuals.bounds
+        return self._refined(method, estimate.spread(bounds, count, start))
 
     def many(
         self, method: str, count: int, earlier: Sequence[estimate.Result]
@@ -119,19 +119,19 @@ class CaseSearches:
         """Return the minima from starts over the bounds; None where these are not finite."""
         if not np.isfinite(self.residuals.bounds).all():
             return None
-        return self._many(method, count, earlier=earlier)
+        return self._refined(method, estimate.spread(self.residuals.bounds, count), earlier)
 
-    def _many(self, method: str, count: int, **more: Any) -> estimate.MultistartResult:
-        return estimate.multistart(
-            self.residuals,
-            JACOBIANS[self.options.jacobian](self.residuals),
-            self.residuals.bounds,
-            count,
-            watch=self.progress,
+    def _refined(
+        self, method: str, points: Array, earlier: Sequence[estimate.Result] = ()
+    ) -> estimate.MultistartResult:
+        descent = estimate.Descent(
+            functions=SideBySide(self.residuals, self.options.jacobian),
+            bounds=self.residuals.bounds,
             method=method,
+            ftol=TO_DISTINGUISH,
             **_settings(self.options, self.residuals),
-            **more,
         )
+        return estimate.multistart(points, [descent], watch=self.progress, earlier=earlier)
 
     def margin(self, cost: float) -> float:
         """Return by how much a cost may exceed this one and the records do not tell them apart.

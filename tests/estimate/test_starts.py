@@ -7,14 +7,15 @@ from time import sleep
 import numpy as np
 import pytest
 from known_minima import CERTIFIED
+from scipy.stats import qmc
 
-from exfit.estimate import Stop, least_squares, multistart
+from exfit.estimate import Descent, OneByOne, Stop, least_squares, multistart, spread
+from exfit.estimate.lockstep import ABREAST
 
 # the four zeros of Himmelblau's function (Himmelblau 1972), to the digits that are known
 ZEROS = [(3.0, 2.0), (-2.805118, 3.131312), (-3.779310, -3.283186), (3.584428, -1.848126)]
 BOX = (np.full(2, -6.0), np.full(2, 6.0))
 COUNT = 40
-STAGES = ("screening", "refining")
 
 
 def himmelblau(x):
@@ -26,6 +27,13 @@ def himmelblau_slopes(x):
 
 
 HIMMELBLAU = (himmelblau, himmelblau_slopes, BOX)
+
+
+def search(fun, jac, bounds, count=COUNT, *, x0=None, seed=1, **more):
+    """Search from starts over the bounds, with the tolerances that tell minima apart."""
+    running = {key: more.pop(key) for key in ("workers", "watch", "counts") if key in more}
+    leg = Descent(functions=OneByOne(fun, jac), bounds=bounds, **{"ftol": 1e-8, **more})
+    return multistart(spread(bounds, count, x0, seed), [leg], **running)
 
 
 def two_valleys(x):
@@ -48,7 +56,7 @@ def points_of(minima):
 
 
 def test_finds_every_minimum_and_counts_who_led_there():
-    found = multistart(*HIMMELBLAU, COUNT)
+    found = search(*HIMMELBLAU, COUNT)
     assert sum(one.starts for one in found.minima) == COUNT
     zeros = [one for one in found.minima if one.cost < 1e-12]
     assert sorted(one.x.round(3).tolist() for one in zeros) == sorted(np.round(ZEROS, 3).tolist())
@@ -56,14 +64,14 @@ def test_finds_every_minimum_and_counts_who_led_there():
 
 
 def test_the_lowest_minimum_comes_first():
-    found = multistart(two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
+    found = search(two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
     assert [round(one.x[0]) for one in found.minima] == [1, -1]
     costs = [one.cost for one in found.minima]
     assert costs == sorted(costs)
 
 
 def test_every_minimum_is_the_result_that_its_best_start_led_to():
-    found = multistart(two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
+    found = search(two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
     for one in found.minima:
         assert one.x.tolist() == one.result.x.tolist()
         assert one.result.fun.tolist() == two_valleys(one.x).tolist()
@@ -75,51 +83,100 @@ def test_every_minimum_is_the_result_that_its_best_start_led_to():
 
 
 def test_no_end_is_above_its_start():
-    found = multistart(*HIMMELBLAU, COUNT)
+    found = search(*HIMMELBLAU, COUNT)
     assert (found.end_costs <= found.start_costs).all()
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5])
 def test_a_run_repeats_whatever_the_threads(workers):
-    first, again = multistart(*HIMMELBLAU, COUNT), multistart(*HIMMELBLAU, COUNT, workers=workers)
+    first, again = search(*HIMMELBLAU, COUNT), search(*HIMMELBLAU, COUNT, workers=workers)
     assert points_of(first).tolist() == points_of(again).tolist()
     assert [one.starts for one in first.minima] == [one.starts for one in again.minima]
     assert first.end_costs.tolist() == again.end_costs.tolist()
 
 
 def test_another_seed_gives_other_starts():
-    first, other = multistart(*HIMMELBLAU, COUNT), multistart(*HIMMELBLAU, COUNT, seed=2)
+    first, other = search(*HIMMELBLAU, COUNT), search(*HIMMELBLAU, COUNT, seed=2)
     assert not np.isin(first.start_costs, other.start_costs).any()
 
 
-@pytest.mark.parametrize("count", [16, 50])
+@pytest.mark.parametrize("count", [16, 64])
 def test_the_starts_are_spread_evenly_over_the_bounds(count):
-    seen = []
-    screen = lambda points: seen.extend(points) or [1.0] * len(points)  # noqa: E731
-    multistart(*HIMMELBLAU, count, screen=screen, refine=0)
-    seen = np.array(seen)
-    assert seen.shape == (count, 2)
-    assert ((seen >= BOX[0]) & (seen <= BOX[1])).all()
-    # a Sobol sequence puts one of sixteen points into each sixteenth of every side
-    for side in seen[:16].T:
-        assert sorted(np.floor((side + 6.0) / 0.75)) == list(range(16))
+    starts = spread(BOX, count)
+    assert starts.shape == (count, 2)
+    # of a power of two of its points a Sobol sequence puts one into each such part of every side
+    for side in starts.T:
+        assert sorted(np.floor((side + 6.0) / 12.0 * count)) == list(range(count))
 
 
-def test_the_users_own_start_is_the_first_and_always_refined():
+def test_starts_fill_pairs_of_sides_more_evenly_than_chance():
+    """By the centred discrepancy: how far their share of a box is from its area."""
+    starts = spread((np.zeros(30), np.ones(30)), 256)
+    chance = np.random.default_rng(0).random((256, 30))
+    pairs = [(k, k + 1) for k in range(29)]
+    even, random = (
+        np.mean([qmc.discrepancy(points[:, pair]) for pair in pairs]) for points in (starts, chance)
+    )
+    assert even < 0.25 * random
+
+
+def test_the_users_own_start_is_the_first():
     start = [0.1, 0.0]  # near a summit: among the worst
-    found = multistart(*HIMMELBLAU, COUNT, x0=start, refine=1)
+    found = search(*HIMMELBLAU, x0=start)
     assert found.start_costs[0] == pytest.approx(cost_of(himmelblau, start))
-    assert np.isfinite(found.end_costs[0])
-    assert found.minima[0].result.history[0].x.tolist() == start
-    assert found.unrefined == COUNT - 1
+    assert len(found.start_costs) == COUNT
 
 
-def test_the_best_starts_are_refined():
-    found = multistart(*HIMMELBLAU, COUNT, refine=10)
-    refined = np.isfinite(found.end_costs)
-    assert np.count_nonzero(refined) == 10
-    assert found.start_costs[refined].max() <= found.start_costs[~refined].min()
-    assert found.unrefined == COUNT - 10
+def test_each_leg_goes_on_where_the_one_before_ended():
+    """A first leg of another problem, whose only minimum is near one of the four, leads to it."""
+    near = OneByOne(lambda x: x - [-3.0, 3.0], lambda x: np.eye(2))
+    legs = [
+        Descent(functions=near, bounds=BOX),
+        Descent(functions=OneByOne(himmelblau, himmelblau_slopes), bounds=BOX),
+    ]
+    found = multistart(spread(BOX, COUNT), legs)
+    (only,) = found.minima
+    assert only.x == pytest.approx(ZEROS[1], abs=1e-5)
+    assert only.starts == COUNT
+    assert only.result.history[0].x == pytest.approx([-3.0, 3.0])
+
+
+def test_a_leg_that_cannot_begin_is_left_out():
+    nowhere = OneByOne(lambda x: x * np.nan, lambda x: np.eye(2))
+    legs = [
+        Descent(functions=nowhere, bounds=BOX),
+        Descent(functions=OneByOne(himmelblau, himmelblau_slopes), bounds=BOX, ftol=1e-8),
+    ]
+    found, plain = multistart(spread(BOX, COUNT), legs), search(*HIMMELBLAU)
+    assert found.end_costs.tolist() == plain.end_costs.tolist()
+
+
+def test_a_start_counts_as_often_as_it_stands_for():
+    found = search(*HIMMELBLAU, 4, counts=[1, 2, 3, 4])
+    assert sum(minimum.starts for minimum in found.minima) == 10
+    assert len(found.end_costs) == len(found.start_costs) == 10
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_each_search_goes_the_way_it_goes_alone(workers):
+    together = search(*HIMMELBLAU, workers=workers)
+    for x, cost in zip(spread(BOX, COUNT), together.end_costs, strict=True):
+        alone = least_squares(himmelblau, x, himmelblau_slopes, BOX, "lm-then-dgn", ftol=1e-8)
+        assert alone.cost == cost
+
+
+def test_what_many_ask_for_is_asked_for_in_one_call():
+    sizes = []
+
+    class Counted(OneByOne):
+        def residuals(self, points):
+            sizes.append(len(points))
+            return super().residuals(points)
+
+    legs = [Descent(functions=Counted(himmelblau, himmelblau_slopes), bounds=BOX)]
+    multistart(spread(BOX, 32), legs, workers=1)
+    assert sizes[0] == 32
+    assert np.mean(sizes) > 4.0
 
 
 @pytest.mark.parametrize("kind", ["nan", "infinite", "fails"])
@@ -131,7 +188,7 @@ def test_starts_that_are_not_finite_are_dropped_and_counted(kind):
             return np.full(2, np.nan if kind == "nan" else np.inf)
         return himmelblau(x)
 
-    found = multistart(fun, himmelblau_slopes, BOX, 64)
+    found = search(fun, himmelblau_slopes, BOX, 64)
     assert found.failed == 32  # the sequence is balanced
     assert np.count_nonzero(np.isinf(found.start_costs)) == 32
     assert np.count_nonzero(np.isnan(found.end_costs)) == 32
@@ -140,23 +197,8 @@ def test_starts_that_are_not_finite_are_dropped_and_counted(kind):
 
 
 def test_where_nothing_is_finite_there_are_no_minima():
-    found = multistart(lambda x: x * np.nan, himmelblau_slopes, BOX, 8)
+    found = search(lambda x: x * np.nan, himmelblau_slopes, BOX, 8)
     assert (found.minima, found.failed, found.unrefined) == ((), 8, 0)
-
-
-@pytest.mark.long
-def test_a_screen_that_takes_many_points_changes_nothing():
-    sizes = []
-
-    def screen(points):
-        sizes.append(len(points))
-        return [cost_of(himmelblau, x) for x in points]
-
-    one, other = multistart(*HIMMELBLAU, 200), multistart(*HIMMELBLAU, 200, screen=screen)
-    assert one.start_costs == pytest.approx(other.start_costs, rel=1e-12)
-    assert points_of(one).tolist() == points_of(other).tolist()
-    assert sum(sizes) == 200
-    assert max(sizes) >= 16  # enough for the vectors of a processor
 
 
 def test_ends_along_a_flat_valley_are_one_minimum():
@@ -172,7 +214,7 @@ def test_ends_along_a_flat_valley_are_one_minimum():
         first, second = J[:, 0] * np.exp(z[0] + z[1]), J[:, 1] * np.exp(z[2])
         return np.column_stack([first, first, second])
 
-    found = multistart(fun, jac, (center - 1.0, center + 1.0), 30, x_scale=1.0)
+    found = search(fun, jac, (center - 1.0, center + 1.0), 30, x_scale=1.0)
     best = found.minima[0]
     assert best.starts == 30
     assert 2.0 * best.cost == pytest.approx(case.squares, rel=1e-7)
@@ -182,51 +224,34 @@ def test_minima_of_equal_cost_at_other_places_are_two():
     t = np.linspace(0.0, 1.0, 30)
     fun = lambda x: (x[0] ** 2 - 1.0) * (1.0 + t) + 0.1 * np.sin(40.0 * t)  # noqa: E731
     jac = lambda x: (2.0 * x[0] * (1.0 + t))[:, None]  # noqa: E731
-    found = multistart(fun, jac, ([-3.0], [3.0]), 20)
+    found = search(fun, jac, ([-3.0], [3.0]), 20)
     assert len(found.minima) == 2
     assert found.minima[0].x == pytest.approx(-found.minima[1].x, rel=1e-6)
     assert found.minima[0].cost == pytest.approx(found.minima[1].cost, rel=1e-9)
 
 
-def test_watch_receives_both_stages():
-    told = []
-    found = multistart(*HIMMELBLAU, COUNT, refine=10, watch=told.append)
-    for stage, total in zip(STAGES, (COUNT, 10), strict=True):
-        lines = [one for one in told if one.stage == stage]
-        assert [one.done for one in lines] == sorted(one.done for one in lines)
-        assert lines[-1].done == total
-        assert {one.total for one in lines} == {total}
-        assert [one.best for one in lines] == sorted((one.best for one in lines), reverse=True)
-    assert told[-1].best == found.minima[0].cost
+def test_watch_receives_how_far_the_search_is():
+    seen = []
+    found = search(*HIMMELBLAU, watch=seen.append)
+    assert [progress.done for progress in seen] == list(range(1, COUNT + 1))
+    assert {(progress.stage, progress.total) for progress in seen} == {("refining", COUNT)}
+    best = [progress.best for progress in seen]
+    assert best == sorted(best, reverse=True)
+    assert best[-1] == found.minima[0].cost
 
 
 @pytest.mark.parametrize("workers", [1, 3])
-@pytest.mark.parametrize("stage", STAGES)
-def test_an_interruption_from_watch_keeps_what_is_done(stage, workers):
+def test_an_interruption_from_watch_keeps_what_is_done(workers):
     def watch(progress):
-        if progress.stage == stage and progress.done >= 5:
+        if progress.done >= 5:
             raise KeyboardInterrupt
 
-    found = multistart(*HIMMELBLAU, 500, workers=workers, watch=watch)
+    found = search(*HIMMELBLAU, 500, workers=workers, watch=watch)
     assert found.interrupted
     refined = np.count_nonzero(np.isfinite(found.end_costs))
-    assert sum(one.starts for one in found.minima) == refined
+    assert sum(minimum.starts for minimum in found.minima) == refined
     assert found.unrefined == 500 - refined
-    assert (refined >= 5) if stage == "refining" else (refined == 0)
-    assert refined < 500
-
-
-@pytest.mark.parametrize("workers", [1, 3])
-def test_an_interruption_of_the_screening_keeps_the_best_start(workers):
-    def watch(progress):
-        raise KeyboardInterrupt
-
-    result = multistart(*HIMMELBLAU, 500, workers=workers, watch=watch)
-    assert result.minima == ()
-    assert result.best.stop is Stop.INTERRUPTED
-    assert result.best.cost == pytest.approx(np.nanmin(result.start_costs), rel=1e-12)
-    assert result.best.cost == pytest.approx(cost_of(himmelblau, result.best.x), rel=1e-12)
-    assert len(result.best.history) == 1
+    assert 5 <= refined < 500
 
 
 def test_an_interruption_of_the_first_refinement_keeps_its_best_point():
@@ -239,33 +264,17 @@ def test_an_interruption_of_the_first_refinement_keeps_its_best_point():
         costs.append(cost_of(himmelblau, x))
         return himmelblau(x)
 
-    result = multistart(fun, himmelblau_slopes, BOX, 1, x0=[0.0, 0.0])
+    result = search(fun, himmelblau_slopes, BOX, 1, x0=[0.0, 0.0])
     assert (result.minima, result.interrupted) == ((), True)
     assert result.best.stop is Stop.INTERRUPTED
     assert result.best.cost == pytest.approx(min(costs), rel=1e-12)
     assert result.best.history[0].cost == pytest.approx(costs[0], rel=1e-12)
 
 
-def test_an_interruption_keeps_a_start_that_is_better_than_the_minimum_found():
-    """The one start that is refined leads to the higher valley, where the search is stopped."""
-
-    def watch(progress):
-        if progress.stage == "refining":
-            raise KeyboardInterrupt
-
-    given = (two_valleys, two_valleys_slopes, ([-3.0], [3.0]), COUNT)
-    result = multistart(*given, x0=[-1.2], refine=1, watch=watch)
-    (higher,) = result.minima
-    assert higher.x[0] < 0.0 < result.best.x[0]
-    assert higher.cost > result.best.cost
-    assert result.best.cost == pytest.approx(np.min(result.start_costs), rel=1e-12)
-    assert result.best.stop is Stop.INTERRUPTED
-
-
 def test_without_an_interruption_the_best_is_the_lowest_minimum():
-    result = multistart(*HIMMELBLAU, COUNT)
+    result = search(*HIMMELBLAU, COUNT)
     assert result.best is result.minima[0].result
-    nothing = multistart(lambda x: x * np.nan, himmelblau_slopes, BOX, 8)
+    nothing = search(lambda x: x * np.nan, himmelblau_slopes, BOX, 8)
     assert nothing.best is None
 
 
@@ -292,10 +301,10 @@ def test_a_signal_ends_the_threads_at_once(place):
             released.wait(0.05)
         return himmelblau(x)
 
-    found = multistart(fun, himmelblau_slopes, BOX, 500, workers=3)
+    found = search(fun, himmelblau_slopes, BOX, 500, workers=3)
     assert found.interrupted
     after = len(calls)
-    assert after < place + 60  # those in the middle, and few more
+    assert after < place + 3 * ABREAST  # what each thread is in the middle of
     sleep(0.1)
     assert len(calls) == after  # no thread goes on
 
@@ -311,14 +320,14 @@ def test_a_mistake_in_fun_is_raised_and_ends_the_threads(place):
         return himmelblau(x)
 
     with pytest.raises(LookupError, match="a mistake"):
-        multistart(fun, himmelblau_slopes, BOX, 500, workers=3)
+        search(fun, himmelblau_slopes, BOX, 500, workers=3)
     after = len(calls)
     sleep(0.1)
     assert len(calls) == after
 
 
 def test_the_tolerances_reach_the_refinements():
-    loose = multistart(*HIMMELBLAU, 8, max_iterations=1, method="lm")
+    loose = search(*HIMMELBLAU, 8, max_iterations=1, method="lm")
     assert all(one.result.nit <= 1 for one in loose.minima)
     assert loose.end_costs.min() > 1e-12
 
@@ -326,16 +335,16 @@ def test_the_tolerances_reach_the_refinements():
 def test_what_cannot_be_searched_is_refused():
     given = (himmelblau, himmelblau_slopes)
     with pytest.raises(ValueError, match="finite"):
-        multistart(*given, (np.full(2, -6.0), np.full(2, np.inf)), 8)
+        search(*given, (np.full(2, -6.0), np.full(2, np.inf)), 8)
     with pytest.raises(ValueError, match="count"):
-        multistart(*given, BOX, 0)
+        search(*given, BOX, 0)
     with pytest.raises(ValueError, match="outside"):
-        multistart(*given, BOX, 8, x0=[7.0, 0.0])
+        search(*given, BOX, 8, x0=[7.0, 0.0])
     with pytest.raises(ValueError, match="exceeds"):
-        multistart(*given, (BOX[1], BOX[0]), 8)
+        search(*given, (BOX[1], BOX[0]), 8)
 
 
 def test_an_end_that_did_not_converge_says_so():
-    found = multistart(*HIMMELBLAU, 1, max_iterations=0)
+    found = search(*HIMMELBLAU, 1, max_iterations=0)
     assert [one.result.success for one in found.minima] == [False]
     assert found.end_costs.tolist() == found.start_costs.tolist()

@@ -4,12 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.translation.start import StartValue
 from exfit.analysis.translation.steps import TranslationTask
 from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.residuals import Residuals
+from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.fitting.search import UNIT
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Model, Parameter
@@ -56,26 +57,27 @@ def search(
     start = fixed | {parameter.name: parameter.start for parameter in free}
     experiments = [step.experiment(task.target, start) for step in task.fitted]
     residuals = Residuals(experiments, free, fixed)
-    minima = estimate.multistart(
-        residuals,
-        residuals.exact,
-        residuals.bounds,
-        effort.starts,
-        x0=residuals.start,
-        screen=residuals.costs,
-        refine=effort.refined,
-        watch=watch,
-        method="lm-then-dgn",
+    descent = estimate.Descent(
+        functions=SideBySide(residuals),
+        bounds=residuals.bounds,
         max_iterations=ITERATIONS,
         ftol=GAIN,
         x_scale=UNIT,
     )
+    minima = estimate.multistart(_best_starts(residuals, effort), [descent], watch=watch)
     if minima.interrupted:
         raise KeyboardInterrupt
     if minima.best is None:
         return None
     fitted = residuals.values(minima.best.x)
     return FittedValues({name: fitted[name] for name in names}, _unnoticed(residuals, minima.best))
+
+
+def _best_starts(residuals: Residuals, effort: Effort) -> list[NDArray[np.float64]]:
+    """Return the start of the residuals, and of others over the bounds those of the lowest cost."""
+    start, *others = estimate.spread(residuals.bounds, effort.starts, residuals.start)
+    order = np.argsort(residuals.costs(others), kind="stable")
+    return [start, *(others[k] for k in order[: effort.refined - 1])]
 
 
 def free_parameters(task: TranslationTask, values: Mapping[str, StartValue]) -> list[FreeParameter]:
