@@ -328,7 +328,7 @@ def test_a_record_that_cannot_be_drawn_is_refused(result):
 
 
 def test_a_result_is_read_back_from_its_folder(result, tmp_path):
-    run_folder.write_fit(result, tmp_path, figures=False)
+    run_folder.write_fit(result, tmp_path)
     for place in (tmp_path, str(tmp_path), tmp_path / "result.json"):
         read = exfit.load_result(place)
         assert read.to_dict() == result.to_dict()

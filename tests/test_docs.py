@@ -274,7 +274,7 @@ def test_every_model_is_named(name):
 @pytest.mark.long
 def test_a_fit_writes_the_files_of_the_table_and_no_others(tmp_path):
     result = workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))
-    run_folder.write_fit(result, tmp_path / "run", figures=True)
+    run_folder.write_fit(result, tmp_path / "run").draw()
     cells = first_column(PAGES["docs/reports.md"], "A fit writes these files")
     (validation,) = result.validation
     names = re.findall(r"`([^`]+)`", " ".join(cells))

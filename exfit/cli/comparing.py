@@ -5,12 +5,7 @@ from pathlib import Path
 
 import click
 
-from exfit.cli.options import (
-    Output,
-    output_options,
-    print_json,
-    warn,
-)
+from exfit.cli.options import Output, output_options, print_json
 from exfit.errors import ExfitError
 
 FEWEST_CURVES = 2  # without a record
@@ -89,7 +84,7 @@ def compare(
     run_folder.refuse_inputs("compare", [*curves, *([record] if record else ())], folder)
     choice = ColumnChoice(_columns(columns), time)
     agreement = compared(curves, record, choice, _shifts(shifts), align, step_at)
-    warn(run_folder.write_agreement(agreement, folder, output.figures))
+    figures = run_folder.write_agreement(agreement, folder)
     if output.as_json:
         print_json(agreement.as_json())
     elif output.shown:
@@ -98,6 +93,7 @@ def compare(
         console = terminal.console()
         terminal.agreement(console, agreement)
         terminal.written(console, folder)
+    output.draw(figures)
 
 
 def _shifts(texts: tuple[str, ...]) -> dict[str, float]:

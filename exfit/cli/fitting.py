@@ -17,7 +17,6 @@ from exfit.cli.options import (
     parameters_option,
     print_json,
     set_option,
-    warn,
 )
 from exfit.cli.several_fits import fit_several
 from exfit.util.strategies import EXPLAINED, STRATEGIES
@@ -79,16 +78,14 @@ def fit(
     if watch:
         if not output.shown:
             raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
-        fit_again_and_again(
-            case, given, output.folder(f"{case.stem}-fit"), strategy, output.figures
-        )
+        fit_again_and_again(case, given, output.folder(f"{case.stem}-fit"), strategy, output)
         return
     from exfit.results.side_by_side import CONVERGED, outcome_of
 
     loaded = given.load(case)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
-        result = fit_live(loaded, folder, strategy, output.figures)
+        result = fit_live(loaded, folder, strategy, output)
     else:
         result = _fit(loaded, folder, strategy, output)
     if outcome_of(result) != CONVERGED:
@@ -102,10 +99,11 @@ def _fit(case: "Case", folder: Path, strategy: str | None, output: Output) -> "F
 
     result = workflows.fit(case, strategy)
     try:
-        warn(run_folder.write_fit(result, folder, output.figures))
+        figures = run_folder.write_fit(result, folder)
     finally:  # whatever becomes of the files
         if output.as_json:
             print_json(result.to_dict())
+    output.draw(figures)
     return result
 
 

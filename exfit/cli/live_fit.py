@@ -4,7 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exfit.cli.options import Given, Refusal, refuse_own_files, warn
+from exfit.cli.options import Given, Output, Refusal, refuse_own_files
 from exfit.cli.streams import output_is_lost
 from exfit.errors import ExfitError
 
@@ -17,10 +17,13 @@ def fit_live(
     case: "Case",
     folder: Path,
     strategy: str | None,
-    plots: bool,
+    output: Output,
     before: "FitResult | None" = None,
 ) -> "FitResult":
-    """Fit a case, show its iterations and its result beside a former one, write its files."""
+    """Fit a case, show its iterations and its result beside a former one, write its files.
+
+    The figures come last: the result is written and shown before they are drawn.
+    """
     from exfit import workflows
     from exfit.output import run_folder, terminal
 
@@ -33,17 +36,17 @@ def fit_live(
         with terminal.LiveIterations(console, title, most).running() as shown:
             result = workflows.fit(case, strategy, shown, shown.starts, shown.live)
     try:
-        missing = run_folder.write_fit(result, folder, plots)
+        figures = run_folder.write_fit(result, folder)
     finally:  # whatever becomes of the files
         terminal.fit(console, result, before)
     console.print()
     terminal.written(console, folder)
-    warn(missing)
+    output.draw(figures)
     return result
 
 
 def fit_again_and_again(
-    case: Path, given: Given, folder: Path, strategy: str | None, plots: bool
+    case: Path, given: Given, folder: Path, strategy: str | None, output: Output
 ) -> None:
     """Fit a case, and again whenever a file of it or of its given values changes, until Ctrl-C.
 
@@ -63,7 +66,7 @@ def fit_again_and_again(
             try:
                 loaded = given.load(case)
                 refuse_own_files(loaded, folder, "fit")
-                before = fit_live(loaded, folder, strategy, plots, before)
+                before = fit_live(loaded, folder, strategy, output, before)
             except ExfitError as fault:
                 Refusal(str(fault)).show()
             if before is not None and before.interrupted:

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.output.figure_files import FigureFiles
 
 NOT_CONVERGED = 3
 NAMED_AFTER_RECORDS = ("fit", "validate")  # commands that name files so
@@ -76,6 +77,17 @@ class Output:
         folder = self.folder(f"{case.path.stem}-{command}")
         refuse_own_files(case, folder, command)
         return folder
+
+    def draw(self, figures: "FigureFiles") -> None:
+        """Draw the figures of a run, last of all it does, with a line for each."""
+        if not self.figures:
+            return
+        if self.shown:
+            from exfit.output import terminal
+
+            warn(figures.draw(partial(terminal.figure, terminal.console())))
+        else:
+            warn(figures.draw())
 
 
 def file_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -13,7 +13,6 @@ from exfit.cli.options import (
     output_options,
     print_json,
     refuse_existing,
-    warn,
     write_text,
 )
 
@@ -60,7 +59,7 @@ def inspect_(
     # files of one record in several formats have one stem
     folder = output.folder(f"{file.name}-inspect")
     inspection = _inspected(file, clock, unit, sheet)
-    warn(run_folder.write_inspection(inspection, folder, output.figures))
+    figures = run_folder.write_inspection(inspection, folder)
     if output.as_json:
         print_json(inspection.as_json())
     elif output.shown:
@@ -73,6 +72,7 @@ def inspect_(
             [*record_section(inspection, file.as_posix()), *bump_section(inspection)],
         )
         terminal.written(console, folder)
+    output.draw(figures)
 
 
 @click.command(short_help="Make a case from a model and a record.")

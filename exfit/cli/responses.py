@@ -15,7 +15,6 @@ from exfit.cli.options import (
     parameters_option,
     print_json,
     set_option,
-    warn,
 )
 from exfit.errors import CaseError
 
@@ -46,7 +45,7 @@ def simulate(
     values = read_parameters(loaded, parameters) if parameters else {}
     values |= changed_values(loaded, assignments(changes, "--set"), "--set")
     simulation = workflows.simulate(loaded, values)
-    warn(run_folder.write_simulation(simulation, case.stem, folder, output.figures))
+    figures = run_folder.write_simulation(simulation, case.stem, folder)
     if output.shown:
         from exfit.output import terminal
 
@@ -56,6 +55,7 @@ def simulate(
         console.print(f"sub-steps: {simulation.response.substeps}")
         terminal.notes(console, simulation.notes)
         terminal.written(console, folder)
+    output.draw(figures)
 
 
 @click.command(short_help="Compare fitted values with records that were not fitted.")
@@ -116,7 +116,7 @@ def validate(
         run_folder.refuse_inputs("validate", [record], folder, [record.stem])
     values = read_parameters(loaded, source)
     comparisons = workflows.validate(loaded, values, record, steps, instants)
-    warn(run_folder.write_validation(comparisons, folder, output.figures))
+    figures = run_folder.write_validation(comparisons, folder)
     if output.as_json:
         print_json({"validation": [plain(comparison) for comparison in comparisons]})
     elif output.shown:
@@ -127,5 +127,6 @@ def validate(
         terminal.validation(console, comparisons)
         console.print()
         terminal.written(console, folder)
+    output.draw(figures)
     if not all(comparison.accepted for comparison in comparisons):
         raise SystemExit(NOT_CONVERGED)

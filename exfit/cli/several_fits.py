@@ -1,7 +1,6 @@
 """Fits of several cases with several strategies, one after the other."""
 
-from collections.abc import Sequence
-from importlib import import_module
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from exfit.errors import CaseError, ExfitError
 
 if TYPE_CHECKING:
     from exfit.fleet.fits import FitRun, FitSeries, PlannedFit
+    from exfit.output.figure_files import FigureFiles
 
 SERIES = "fits"  # the folder of a series by default
 
@@ -26,6 +26,8 @@ def fit_several(
     cases: Sequence[Path], given: Given, strategies: Sequence[str], output: Output
 ) -> None:
     """Fit every case with every strategy, write the files of each fit and those of all.
+
+    The figures come last: all results are written and shown before they are drawn.
 
     Raises ExfitError with the faults of all cases before the first fit begins, and with those of
     fits that failed when all else is done; SystemExit where not all fits are done and well.
@@ -36,43 +38,47 @@ def fit_several(
     folder = output.folder(SERIES)
     plan = planned(cases, strategies, given.load)
     _refuse_own_files(plan, folder)
-    if output.figures:
-        # now: after Ctrl-C in the midst of it the figure of all fits could not be drawn
-        import_module("exfit.output.plots")
-    series = _shown(plan, folder, output) if output.shown else _quiet(plan, folder, output)
+    figures: dict[str, FigureFiles] = {}
+    series = _shown(plan, folder, figures) if output.shown else _quiet(plan, folder, figures)
     if not series.runs and series.interrupted:
         raise Interruption("no fit is done")
     try:
-        missing = run_folder.write_series(series, folder, output.figures)
+        of_all = run_folder.write_series(series, folder)
     finally:  # whatever becomes of the files
         if output.as_json:
             print_json(series.to_dict())
         elif output.shown:
             _show(series)
-    warn(missing)
     if output.shown:
         from exfit.output import terminal
 
         terminal.written(terminal.console(), folder)
+    output.draw(of_all)
+    if output.figures:
+        _draw(figures, output)
     if series.failed:
         raise ExfitError("\n".join(f"{name}: {fault}" for name, fault in series.failed.items()))
     if not series.all_converged:
         raise SystemExit(NOT_CONVERGED)
 
 
-def _quiet(plan: "Sequence[PlannedFit]", folder: Path, output: Output) -> "FitSeries":
-    """Run the fits and write their files, without a word."""
+def _quiet(
+    plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]"
+) -> "FitSeries":
+    """Run the fits, write their numbers and collect their figures, without a word."""
     from exfit.fleet.fits import run_all
     from exfit.output import run_folder
 
     def finished(run: "FitRun") -> None:
-        warn(run_folder.write_fit(run.result, folder / run.name, output.figures))
+        figures[run.name] = run_folder.write_fit(run.result, folder / run.name)
 
     return run_all(plan, finished=finished)
 
 
-def _shown(plan: "Sequence[PlannedFit]", folder: Path, output: Output) -> "FitSeries":
-    """Run the fits and write their files, and show how far they are."""
+def _shown(
+    plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]"
+) -> "FitSeries":
+    """Run the fits, write their numbers and collect their figures, and show how far they are."""
     from exfit.fleet.fits import run_all
     from exfit.output import run_folder, terminal
 
@@ -80,7 +86,7 @@ def _shown(plan: "Sequence[PlannedFit]", folder: Path, output: Output) -> "FitSe
 
         def finished(run: "FitRun") -> None:
             progress.finished(run)
-            warn(run_folder.write_fit(run.result, folder / run.name, output.figures))
+            figures[run.name] = run_folder.write_fit(run.result, folder / run.name)
 
         return run_all(plan, progress, finished)
 
@@ -89,6 +95,22 @@ def _show(series: "FitSeries") -> None:
     from exfit.output import terminal
 
     terminal.fit_series(terminal.console(), series)
+
+
+def _draw(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
+    """Draw the figures of each fit, with a line for each fit where results are shown."""
+    left = [*figures]
+    try:
+        for name, of_fit in figures.items():
+            warn(of_fit.draw())
+            left.remove(name)
+            if output.shown:
+                from exfit.output import terminal
+
+                terminal.figures_of_fit(terminal.console(), name)
+    except KeyboardInterrupt as interruption:
+        others = f", and those of {', '.join(left[1:])}" if left[1:] else ""
+        raise KeyboardInterrupt(f"{interruption}{others}") from None
 
 
 def _refuse_own_files(plan: "Sequence[PlannedFit]", folder: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from exfit.cli import completion
-from exfit.cli.options import NOT_CONVERGED, Output, output_options, print_json, warn
+from exfit.cli.options import NOT_CONVERGED, Output, output_options, print_json
 from exfit.errors import ExfitError
 
 
@@ -58,11 +58,12 @@ def translate(result: Path, model: str, steps: tuple[float, ...], output: Output
             translation = translated(fit, target, steps)
     except ExfitError as fault:
         raise ExfitError(f"{source}: {fault}") from None
-    warn(run_folder.write_translation(translation, fit, (model, target), folder, output.figures))
+    figures = run_folder.write_translation(translation, fit, (model, target), folder)
     if output.as_json:
         print_json(translation.to_dict())
     elif output.shown:
         terminal.translation(console, translation)
         terminal.written(console, folder)
+    output.draw(figures)
     if translation.poor:
         raise SystemExit(NOT_CONVERGED)

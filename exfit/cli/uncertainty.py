@@ -13,7 +13,6 @@ from exfit.cli.options import (
     load,
     output_options,
     print_json,
-    warn,
 )
 
 
@@ -51,12 +50,13 @@ def profile(
         console = terminal.console()
         with terminal.ProgressBar(console).running() as progress:
             profiles = workflows.profile(loaded, parameters, progress)
-    warn(run_folder.write_profiles(profiles, folder, output.figures))
+    figures = run_folder.write_profiles(profiles, folder)
     if output.as_json:
         print_json(profiles.as_json())
     elif output.shown:
         terminal.profiles(console, profiles)
         terminal.written(console, folder)
+    output.draw(figures)
     if profiles.interrupted:
         raise SystemExit(NOT_CONVERGED)
 
@@ -88,7 +88,7 @@ def identify(
     loaded = load(case)
     folder = output.folder_of(loaded, "identify")
     design = workflows.identify(loaded, assignments(noise, "--noise"))
-    warn(run_folder.write_design(design, folder, output.figures))
+    figures = run_folder.write_design(design, folder)
     if output.as_json:
         print_json(design.as_json())
     elif output.shown:
@@ -97,3 +97,4 @@ def identify(
         console = terminal.console()
         terminal.design(console, design)
         terminal.written(console, folder)
+    output.draw(figures)

@@ -4,6 +4,7 @@ What draws them is imported only where they are drawn.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -23,118 +24,155 @@ if TYPE_CHECKING:
     from exfit.results.translation import Translation
     from exfit.workflows import SimulationResult
 
-Drawings = Mapping[str, Callable[[], "Figure"]]
+
+@dataclass(frozen=True)
+class PlannedFigure:
+    """A figure to be drawn, and in a few words what it shows."""
+
+    shows: str
+    draw: Callable[[], "Figure"]
 
 
-def of_fit(result: "FitResult") -> Drawings:
+PlannedFigures = Mapping[str, PlannedFigure]
+
+
+def of_fit(result: "FitResult") -> PlannedFigures:
     """Return the figures of a fit."""
     from exfit.output import plots
 
-    drawings: dict[str, Callable[[], Figure]] = {}
+    drawings: dict[str, PlannedFigure] = {}
     single = result.comparison.name == SINGLE
     if single:
         title = f"{result.name}: {result.model} fitted to {result.comparison.record}"
-        drawings["overlay.png"] = partial(plots.overlay, result.comparison, title)
+        overlay = partial(plots.overlay, result.comparison, title)
+        drawings["overlay.png"] = PlannedFigure("measured, start values and fitted", overlay)
     drawings |= of_phase_ends(result)
     if any(match.iteration_responses is not None for match in result.comparisons):
-        drawings["iterations.png"] = partial(plots.iterations, result)
-    drawings["convergence.png"] = partial(plots.convergence, result)
-    drawings["trajectories.png"] = partial(plots.trajectories, result)
+        iterations = partial(plots.iterations, result)
+        drawings["iterations.png"] = PlannedFigure("the response after each iteration", iterations)
+    drawings["convergence.png"] = PlannedFigure(
+        "cost, gradient and damping after each iteration", partial(plots.convergence, result)
+    )
+    drawings["trajectories.png"] = PlannedFigure(
+        "the parameters after each iteration", partial(plots.trajectories, result)
+    )
     if result.knowledge is not None:
         drawings |= of_uncertainty(result.knowledge, result.name)
     if result.minima is not None:
-        drawings["starts.png"] = partial(plots.waterfall, result.minima, result.name)
+        waterfall = partial(plots.waterfall, result.minima, result.name)
+        drawings["starts.png"] = PlannedFigure("the cost that each start led to", waterfall)
     drawings |= of_comparisons([*(() if single else result.comparisons), *result.validation])
     return drawings
 
 
-def of_phase_ends(result: "FitResult") -> Drawings:
+def of_phase_ends(result: "FitResult") -> PlannedFigures:
     """Return the overlays of the points where a phase of the search handed over to the next."""
     from exfit.output import plots
 
     return {
-        f"overlay_{end.phase}.png"
-        if match.name == SINGLE
-        else f"{match.name}-{end.phase}.png": partial(
-            plots.overlay,
-            match,
-            f"{result.name}: end of {end.phase} (iteration {end.iteration}), {match.record}",
-            f"end of {end.phase}",
+        f"overlay_{end.phase}.png" if match.name == SINGLE else f"{match.name}-{end.phase}.png": (
+            PlannedFigure(
+                f"measured and the end of {end.phase}",
+                partial(
+                    plots.overlay,
+                    match,
+                    f"{result.name}: end of {end.phase} (iteration {end.iteration}), "
+                    f"{match.record}",
+                    f"end of {end.phase}",
+                ),
+            )
         )
         for end in result.phase_ends
         for match in end.comparisons
     }
 
 
-def of_series(series: "FitSeries") -> Drawings:
+def of_series(series: "FitSeries") -> PlannedFigures:
     """Return the figure of the fits of several cases with several strategies."""
     from exfit.output import plots
 
-    return {"fits.png": partial(plots.fit_series, series)}
+    if not series.runs:
+        return {}
+    shows = "responses, errors and costs of all fits"
+    return {"fits.png": PlannedFigure(shows, partial(plots.fit_series, series))}
 
 
-def of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> Drawings:
+def of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> PlannedFigures:
     """Return what each parameter does to each signal over time, and how they are correlated."""
     from exfit.output import plots
 
     return {
-        "sensitivity.png": partial(plots.sensitivity, uncertainty, name),
-        "correlation.png": partial(plots.correlation, uncertainty, name),
+        "sensitivity.png": PlannedFigure(
+            "what 1 % of each parameter does to the response",
+            partial(plots.sensitivity, uncertainty, name),
+        ),
+        "correlation.png": PlannedFigure(
+            "the correlation of the estimates", partial(plots.correlation, uncertainty, name)
+        ),
     }
 
 
-def of_comparisons(comparisons: "Sequence[Comparison]") -> Drawings:
+def of_comparisons(comparisons: "Sequence[Comparison]") -> PlannedFigures:
     """Return the overlay of each comparison under its name."""
     from exfit.output import plots
 
     return {
-        f"{match.name}.png": partial(
-            plots.overlay, match, f"{match.name}: simulated and {match.record}"
+        f"{match.name}.png": PlannedFigure(
+            f"measured and simulated, {match.record}",
+            partial(plots.overlay, match, f"{match.name}: simulated and {match.record}"),
         )
         for match in comparisons
     }
 
 
-def of_profiles(profiles: "Profiles") -> Drawings:
+def of_profiles(profiles: "Profiles") -> PlannedFigures:
     """Return the figure of the profiles of parameters."""
     from exfit.output import plots
 
-    return {"profile.png": partial(plots.profiles, profiles)}
+    shows = "the cost along each parameter"
+    return {"profile.png": PlannedFigure(shows, partial(plots.profiles, profiles))}
 
 
-def of_design(design: "Design") -> Drawings:
+def of_design(design: "Design") -> PlannedFigures:
     """Return the figures of a planned test."""
     return of_uncertainty(design.own, design.name)
 
 
-def of_inspection(inspection: "Inspection") -> Drawings:
+def of_inspection(inspection: "Inspection") -> PlannedFigures:
     """Return the figure of what a recorder's file holds."""
     from exfit.output import plots
 
-    return {"inspect.png": partial(plots.inspection, inspection, inspection.path.name)}
+    drawing = partial(plots.inspection, inspection, inspection.path.name)
+    return {"inspect.png": PlannedFigure("the channels, with steps, gaps and spikes", drawing)}
 
 
-def of_simulation(simulation: "SimulationResult", name: str) -> Drawings:
+def of_simulation(simulation: "SimulationResult", name: str) -> PlannedFigures:
     """Return the figures of a response, beside its record where there is one."""
     from exfit.output import plots
 
-    drawings = {"response.png": partial(plots.response, simulation.response, name)}
+    response = partial(plots.response, simulation.response, name)
+    drawings = {"response.png": PlannedFigure("every signal and state", response)}
     if simulation.comparison is not None:
         title = f"{name}: simulated and {simulation.comparison.record}"
-        drawings["overlay.png"] = partial(plots.overlay, simulation.comparison, title)
+        overlay = partial(plots.overlay, simulation.comparison, title)
+        drawings["overlay.png"] = PlannedFigure("measured and simulated", overlay)
     return drawings
 
 
-def of_agreement(agreement: "Agreement") -> Drawings:
+def of_agreement(agreement: "Agreement") -> PlannedFigures:
     """Return the figure of how responses differ."""
     from exfit.output import plots
 
-    return {"compare.png": partial(plots.agreement, agreement)}
+    shows = "the responses and their differences"
+    return {"compare.png": PlannedFigure(shows, partial(plots.agreement, agreement))}
 
 
-def of_translation(translation: "Translation") -> Drawings:
+def of_translation(translation: "Translation") -> PlannedFigures:
     """Return the figure of a fitted exciter as another model."""
     from exfit.output import plots
 
     title = f"{translation.name}: {translation.source} and {translation.target}"
-    return {"translation.png": partial(plots.translation, translation, title)}
+    drawing = partial(plots.translation, translation, title)
+    return {
+        "translation.png": PlannedFigure("the responses of both models to the same steps", drawing)
+    }

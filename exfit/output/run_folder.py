@@ -1,9 +1,9 @@
-"""The files that a run leaves behind: its numbers together, then its figures."""
+"""The files that a run leaves behind: its numbers, written together; its figures come after."""
 
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
 from exfit.output import run_figures
+from exfit.output.figure_files import FigureFiles
 from exfit.results.comparisons import Comparison
 from exfit.results.io import WHOLE_FIT, result_text
 from exfit.results.model import FitResult
@@ -129,22 +130,22 @@ def refuse_inputs(
             )
 
 
-def write_fit(result: FitResult, folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write a fit's numbers, and remember where they are, then its figures.
+def write_fit(result: FitResult, folder: Path) -> FigureFiles:
+    """Write a fit's numbers, and remember where they are; return its figures, still to be drawn.
 
-    Return which figures are missing, and why. Raises ExfitError where the folder cannot be
-    written, and KeyboardInterrupt at an interruption: the numbers are whole then.
+    Raises ExfitError where the folder cannot be written, and KeyboardInterrupt at an interruption:
+    the numbers are whole then.
     """
     with deferred_interrupts():
         numbers = dict(_numbers_of_fit(result))
         write_together(folder, numbers, {*FILES_OF_FIT, *_of_records(folder / WHOLE_FIT)})
         with suppress(ExfitError):  # a cache that cannot be written keeps nothing
             write(_last_parameters(result.case), numbers[PARAMETERS])
-    return _draw(folder / WHOLE_FIT, partial(run_figures.of_fit, result)) if figures else ()
+    return FigureFiles.beside(folder / WHOLE_FIT, partial(run_figures.of_fit, result))
 
 
-def write_series(series: "FitSeries", folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write the table of a series of fits as CSV and JSON, and their overlays.
+def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
+    """Write the table of a series of fits as CSV and JSON; return the figure of their overlays.
 
     Of each case the values of the fit with the lowest cost are remembered as those of its last fit.
     """
@@ -161,8 +162,7 @@ def write_series(series: "FitSeries", folder: Path, figures: bool) -> tuple[str,
             lowest = min((run.result for run in fits), key=lambda result: result.cost)
             with suppress(ExfitError):
                 write(_last_parameters(lowest.case), parameter_file(lowest))
-    drawings = partial(run_figures.of_series, series)
-    return _draw(folder / SERIES, drawings) if figures and series.runs else ()
+    return FigureFiles.beside(folder / SERIES, partial(run_figures.of_series, series))
 
 
 def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
@@ -209,53 +209,8 @@ def _named_after(records: Iterable[str]) -> set[str]:
     return {name + ending for name in records if name for ending in endings}
 
 
-def _draw(main: Path, drawings: Callable[[], run_figures.Drawings]) -> tuple[str, ...]:
-    """Draw figures beside the numbers of a run, and return which are missing, and why.
-
-    Raises KeyboardInterrupt at an interruption.
-    """
-    try:
-        return tuple(_missing(main, drawings))
-    except KeyboardInterrupt:
-        message = f"{main.parent}: the numbers are whole, figures are missing"
-        raise KeyboardInterrupt(message) from None
-
-
-def _missing(main: Path, drawings: Callable[[], run_figures.Drawings]) -> Iterator[str]:
-    """Draw figures, and yield which are missing, and why.
-
-    Where another run writes its numbers there meanwhile, it draws its own.
-    """
-    from exfit.output import plots
-
-    own = _version_of(main)
-    for name, drawing in drawings().items():
-        path = main.with_name(name)
-        try:
-            picture = plots.png(drawing())
-            if _version_of(main) != own:
-                yield f"{main.parent}: another run writes there: figures of this one are missing"
-                return
-            write(path, picture)
-        except ExfitError as fault:
-            yield str(fault)
-        except Exception as fault:  # whatever it is: the numbers are valid without the figure
-            yield f"{path}: not drawn: {type(fault).__name__}: {fault}"
-
-
-def _version_of(path: Path) -> tuple[int, ...]:
-    """Return what changes when a file is replaced."""
-    try:
-        state = path.stat()
-    except OSError:
-        return ()
-    return state.st_ino, state.st_mtime_ns, state.st_size
-
-
-def write_validation(
-    comparisons: Sequence[Comparison], folder: Path, figures: bool
-) -> tuple[str, ...]:
-    """Write a validation's figures as JSON, its samples and its overlays; return what is missing.
+def write_validation(comparisons: Sequence[Comparison], folder: Path) -> FigureFiles:
+    """Write a validation's numbers as JSON and its samples; return its overlays.
 
     As every function here: raises ExfitError where the folder cannot be written.
     """
@@ -264,11 +219,11 @@ def write_validation(
     with deferred_interrupts():
         numbers = {**dict(_tables(comparisons)), VALIDATION: to_json(content)}
         write_together(folder, numbers, _of_records(main))
-    return _draw(main, partial(run_figures.of_comparisons, comparisons)) if figures else ()
+    return FigureFiles.beside(main, partial(run_figures.of_comparisons, comparisons))
 
 
-def write_profiles(profiles: "Profiles", folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write the profiles of parameters as JSON, as a table and as a figure."""
+def write_profiles(profiles: "Profiles", folder: Path) -> FigureFiles:
+    """Write the profiles of parameters as JSON and as a table; return their figure."""
     rows = [
         f"{profile.name},{value:.{DIGITS}g},{cost:.{DIGITS}g}\n"
         for profile in profiles.profiles
@@ -279,42 +234,37 @@ def write_profiles(profiles: "Profiles", folder: Path, figures: bool) -> tuple[s
         PROFILES: to_json(profiles.as_json()),
     }
     write_together(folder, numbers, ["profile.png"])
-    drawings = partial(run_figures.of_profiles, profiles)
-    return _draw(folder / PROFILES, drawings) if figures else ()
+    return FigureFiles.beside(folder / PROFILES, partial(run_figures.of_profiles, profiles))
 
 
-def write_design(design: "Design", folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write what a planned test would show as JSON, its sensitivities as CSV, and figures."""
+def write_design(design: "Design", folder: Path) -> FigureFiles:
+    """Write what a planned test would show as JSON, its sensitivities as CSV; return figures."""
     numbers = {
         SENSITIVITIES: effects_table(design.own.effects),
         DESIGN: to_json(design.as_json()),
     }
     write_together(folder, numbers, ["sensitivity.png", "correlation.png"])
-    drawings = partial(run_figures.of_design, design)
-    return _draw(folder / DESIGN, drawings) if figures else ()
+    return FigureFiles.beside(folder / DESIGN, partial(run_figures.of_design, design))
 
 
-def write_inspection(inspection: "Inspection", folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write what a recorder's file holds as JSON and as a figure."""
+def write_inspection(inspection: "Inspection", folder: Path) -> FigureFiles:
+    """Write what a recorder's file holds as JSON; return its figure."""
     write_together(folder, {INSPECTION: to_json(inspection.as_json())}, ["inspect.png"])
-    drawings = partial(run_figures.of_inspection, inspection)
-    return _draw(folder / INSPECTION, drawings) if figures else ()
+    return FigureFiles.beside(folder / INSPECTION, partial(run_figures.of_inspection, inspection))
 
 
-def write_simulation(
-    simulation: "SimulationResult", name: str, folder: Path, figures: bool
-) -> tuple[str, ...]:
-    """Write a response, and its figures."""
+def write_simulation(simulation: "SimulationResult", name: str, folder: Path) -> FigureFiles:
+    """Write a response; return its figures."""
     response = simulation.response
     header = ["t", *response.signals]
     numbers = {RESPONSE: table(header, [response.time, *response.signals.values()])}
     write_together(folder, numbers, ["response.png", "overlay.png"])
     drawings = partial(run_figures.of_simulation, simulation, name)
-    return _draw(folder / RESPONSE, drawings) if figures else ()
+    return FigureFiles.beside(folder / RESPONSE, drawings)
 
 
-def write_agreement(agreement: "Agreement", folder: Path, figures: bool) -> tuple[str, ...]:
-    """Write how responses differ as JSON, their samples on their clocks, and a figure."""
+def write_agreement(agreement: "Agreement", folder: Path) -> FigureFiles:
+    """Write how responses differ as JSON, and their samples on their clocks; return a figure."""
     record = record_table(agreement)
     numbers = {
         "compare.csv": agreement_table(agreement),
@@ -322,8 +272,7 @@ def write_agreement(agreement: "Agreement", folder: Path, figures: bool) -> tupl
         AGREEMENT: to_json(agreement.as_json()),
     }
     write_together(folder, numbers, ["compare.png", AT_RECORD])
-    drawings = partial(run_figures.of_agreement, agreement)
-    return _draw(folder / AGREEMENT, drawings) if figures else ()
+    return FigureFiles.beside(folder / AGREEMENT, partial(run_figures.of_agreement, agreement))
 
 
 def write_translation(
@@ -331,9 +280,8 @@ def write_translation(
     result: FitResult,
     target: "tuple[str, Model]",
     folder: Path,
-    figures: bool,
-) -> tuple[str, ...]:
-    """Write a translation as JSON, its responses, a case and a PSS/E file of the target, a figure.
+) -> FigureFiles:
+    """Write a translation as JSON, its responses, a case and a PSS/E file; return its figure.
 
     ``target`` is the model, behind its name as it was given.
     """
@@ -343,7 +291,7 @@ def write_translation(
     numbers[TRANSLATION] = to_json(translation.to_dict())
     write_together(folder, numbers, ["translation.png"])
     drawings = partial(run_figures.of_translation, translation)
-    return _draw(folder / TRANSLATION, drawings) if figures else ()
+    return FigureFiles.beside(folder / TRANSLATION, drawings)
 
 
 def agreement_table(agreement: "Agreement") -> str:

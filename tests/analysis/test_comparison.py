@@ -530,7 +530,7 @@ def fits(tmp_path_factory):
     fixed = {"free": {"k": free["k"]}, "fixed": {"a": 2.0}}
     for name, parameters in (("both", FIRST_ORDER["parameters"]), ("one", fixed)):
         case = exfit.Case.from_dict({**FIRST_ORDER, "parameters": parameters}, record, name=name)
-        run_folder.write_fit(exfit.fit(case), folder / name, figures=False)
+        run_folder.write_fit(exfit.fit(case), folder / name)
     write(folder / "record.csv", t=TIME, vt=samples)
     return folder
 

@@ -67,7 +67,7 @@ def test_every_response_costs_what_its_iteration_did(fitted):
 def test_every_record_has_its_own_responses(tmp_path):
     case = case_of(several(recording("up"), recording("down")), tmp_path)
     result = workflows.fit(case)
-    run_folder.write_fit(result, tmp_path / "run", figures=False)
+    run_folder.write_fit(result, tmp_path / "run")
     for one in result.comparisons:
         table = columns(tmp_path / "run" / f"{one.name}-iterations.csv")
         assert table["vt_0"] == pytest.approx(judged(one).start, rel=10.0 ** (1 - DIGITS))
@@ -113,7 +113,7 @@ def test_an_iteration_without_a_response_is_left_out(fitted, monkeypatch, tmp_pa
     result = workflows.fit(load_case(CASE))
     assert 1 not in result.comparison.iteration_responses.numbers
     assert len(result.comparison.iteration_responses.numbers) == len(result.history) - 1
-    run_folder.write_fit(result, tmp_path / "run", figures=True)
+    run_folder.write_fit(result, tmp_path / "run").draw()
     assert "vt_1" not in columns(tmp_path / "run" / "iterations.csv")
 
 
@@ -129,17 +129,17 @@ def test_an_interruption_keeps_the_iterations_until_then():
 
 @pytest.mark.long
 def test_a_large_record_leaves_no_responses_and_says_so(fitted, monkeypatch, tmp_path):
-    run_folder.write_fit(fitted, tmp_path / "run", figures=True)
+    run_folder.write_fit(fitted, tmp_path / "run").draw()
     monkeypatch.setattr(iteration_responses, "MOST_SAMPLES", 100)
     result = workflows.fit(load_case(CASE))
     assert result.comparison.iteration_responses is None
     assert any("up to 100" in note for note in result.notes)
-    run_folder.write_fit(result, tmp_path / "run", figures=True)  # over the former ones
+    run_folder.write_fit(result, tmp_path / "run").draw()  # over the former ones
     assert not list((tmp_path / "run").glob("*iterations*"))
 
 
 def test_without_figures_the_table_is_written_on_the_record_s_clock(fitted, tmp_path):
-    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    run_folder.write_fit(fitted, tmp_path / "run")
     table = columns(tmp_path / "run" / "iterations.csv")
     np.testing.assert_array_equal(table["t"], fitted.comparison.time)
     assert list(table)[1:] == [f"vt_{line.number}" for line in fitted.history]

@@ -33,7 +33,7 @@ def test_the_end_of_lm_is_its_last_iteration_with_the_response_there(fit):
 
 @pytest.mark.long
 def test_its_files_start_a_fit_where_lm_ended(fit, tmp_path):
-    run_folder.write_fit(fit, tmp_path, figures=True)
+    run_folder.write_fit(fit, tmp_path).draw()
     (end,) = fit.phase_ends
     assert (tmp_path / "overlay_lm.png").is_file()
     values = read_parameters(load_case(CASE), tmp_path / "parameters_lm.yaml")
@@ -41,13 +41,13 @@ def test_its_files_start_a_fit_where_lm_ended(fit, tmp_path):
     again = exfit.fit(CASE, "dgn", values=values)
     assert again.history[0].cost == pytest.approx(end.cost, rel=1e-9)
     assert again.phase_ends == ()
-    run_folder.write_fit(again, tmp_path, figures=False)
+    run_folder.write_fit(again, tmp_path)
     assert not (tmp_path / "overlay_lm.png").exists()
     assert not (tmp_path / "parameters_lm.yaml").exists()
 
 
 def test_it_is_in_the_result_and_in_the_report(fit, tmp_path):
-    run_folder.write_fit(fit, tmp_path, figures=False)
+    run_folder.write_fit(fit, tmp_path)
     back = load_result(tmp_path)
     (end,), (read,) = fit.phase_ends, back.phase_ends
     assert (read.phase, read.iteration, read.values) == (end.phase, end.iteration, end.values)

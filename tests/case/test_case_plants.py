@@ -154,10 +154,9 @@ def test_data_of_exciter_machine_and_stabiliser_are_found_together(found):
     assert told["network"]["X"] == 0.3
 
 
-@pytest.mark.parametrize("figures", [False, pytest.param(True, marks=pytest.mark.long)])
-def test_fitted_values_of_all_parts_are_read_back(found, tmp_path, figures):
+def test_fitted_values_of_all_parts_are_read_back(found, tmp_path):
     case, result = found
-    write_fit(result, tmp_path / "run", figures=figures)
+    write_fit(result, tmp_path / "run")
     back = read_parameters(case, tmp_path / "run" / PARAMETERS)
     for name, one in result.parameters.items():
         assert back[name] == one.value

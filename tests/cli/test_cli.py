@@ -25,6 +25,7 @@ from exfit import cli, workflows
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.output import plots, terminal
+from exfit.output.figure_files import FigureFiles
 from exfit.results.model import Iteration
 from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel
 from exfit.util import files
@@ -765,9 +766,40 @@ def test_ctrl_c_while_drawing_ends_with_130_and_says_what_stands(run, monkeypatc
     ran = run("fit", case_file())
     place = Path("runs/case-fit")
     assert ran.code == 130
-    assert ran.err == f"Interrupted: {place}: the numbers are whole, figures are missing\n"
+    missing = "convergence.png, trajectories.png, sensitivity.png, correlation.png"
+    text = f"{place}: the numbers are whole, figures are missing: {missing}"
+    assert ran.err.startswith(f"Interrupted: {text}")
     assert "converged" in ran.out
+    assert "\n  overlay.png       measured, start values and fitted\n" in ran.out
     assert json.loads((place / "result.json").read_text())["success"]
+
+
+@pytest.mark.parametrize("option", [None, "--json", "-q"])
+def test_results_are_written_and_shown_before_a_figure_is_drawn(run, monkeypatch, capsys, option):
+    shown = []
+    draw = FigureFiles.draw
+
+    def drawn(self, *announce):
+        shown.append(capsys.readouterr().out)
+        assert json.loads(Path("runs/case-fit/result.json").read_text())["success"]
+        return draw(self, *announce)
+
+    monkeypatch.setattr(FigureFiles, "draw", drawn)
+    monkeypatch.setattr(plots, "png", lambda figure: b"")
+    ran = run("fit", case_file(), *filter(None, [option]))
+    assert ran.code == 0
+    (before,) = shown
+    if option is None:
+        assert "converged" in before
+        assert before.endswith("written to runs/case-fit\n")
+        lines = ran.out.splitlines()
+        figures = {name for name in FILES_OF_A_FIT if name.endswith(".png")}
+        assert {line.split()[0] for line in lines} == figures
+        assert len({line.index(line.split(None, 2)[1]) for line in lines}) == 1
+        assert max(map(len, lines)) <= WIDTH
+    else:
+        assert ran.out == ""
+        assert bool(before) == (option == "--json")
 
 
 def test_ctrl_c_elsewhere_ends_with_130_and_one_line(run, monkeypatch):

@@ -417,7 +417,7 @@ def test_every_option_of_both_commands_is_explained_and_the_names_are_found():
 
 def test_a_machine_that_was_fitted_alone_is_written_alone(run, tmp_path):
     case = load_case(ROOT / "configs" / "machine_playback.yaml")
-    write_fit(fit(case), tmp_path / "alone", figures=False)
+    write_fit(fit(case), tmp_path / "alone")
     code, out, _ = run("export", tmp_path / "alone")
     unit = [line for line in out.splitlines() if line.startswith("1 ")]
     assert code == 0

@@ -135,11 +135,11 @@ def test_a_folder_that_cannot_be_written_costs_no_other_fit(run, monkeypatch):
     """It appears after the check; the other fits are done, and the error comes last."""
     write = run_folder.write_fit
 
-    def failing(result, folder, figures):
+    def failing(result, folder):
         if folder.name == "a-dgn":
             folder.mkdir(parents=True)
             (folder / "result.json").mkdir()
-        return write(result, folder, figures)
+        return write(result, folder)
 
     monkeypatch.setattr(run_folder, "write_fit", failing)
     ran = run("fit", case_file("a.yaml"), *BOTH, "--no-plots")

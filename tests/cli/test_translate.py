@@ -19,7 +19,7 @@ FILES = {"ac1a_good-EXAC1.yaml", "ac1a_good-EXAC1.dyr", "translation.csv", "tran
 def fitted(tmp_path_factory):
     """Return the folder of a fit of AC1A."""
     folder = tmp_path_factory.mktemp("fit")
-    write_fit(workflows.fit(ROOT / "configs" / "ac1a_good.yaml"), folder, figures=False)
+    write_fit(workflows.fit(ROOT / "configs" / "ac1a_good.yaml"), folder)
     return folder
 
 
@@ -35,7 +35,7 @@ def test_it_leaves_a_case_and_records_of_the_other_model(run, fitted):
     assert out.lstrip().startswith("exact: EXAC1 responds as AC1A in all steps")
     assert max(map(len, out.splitlines()[:-1])) <= WIDTH
     folder = Path("runs/ac1a_good-EXAC1")
-    assert out.endswith(f"written to {folder}\n")
+    assert f"\nwritten to {folder}\n  translation.png  the responses of both" in out
     assert {path.name for path in folder.iterdir()} == {*FILES, "translation.png"}
     figures = json.loads((folder / "translation.json").read_text())
     case = load_case(folder / "ac1a_good-EXAC1.yaml")

@@ -292,7 +292,7 @@ def test_a_parameters_file_gives_the_fit_back(tmp_path):
     content["parameters"]["fixed"] |= {"TE": "=0.9*TE0", "VAMIN": "=-VAMAX"}
     case = case_of(content, tmp_path)
     found = fit(case)
-    write_fit(found, tmp_path / "run", figures=False)
+    write_fit(found, tmp_path / "run")
     back = read_parameters(case, tmp_path / "run" / "parameters.yaml")
     assert {"TE0", "up.delay", "down.vref.step"} <= back.keys()
     assert not {"TE", "VAMIN"} & back.keys()

@@ -42,7 +42,7 @@ def made(folder, content, strategy=None, watch=lambda _: None):
     path = folder / "case.yaml"
     path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
     result = workflows.fit(load_case(path), strategy, watch)
-    run_folder.write_fit(result, folder / "run", figures=False)
+    run_folder.write_fit(result, folder / "run")
     return folder / "run"
 
 

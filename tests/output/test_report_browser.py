@@ -80,7 +80,7 @@ def report(tmp_path_factory):
             path = room / f"{name}.yaml"
             path.write_text(text)
             folder = room / name
-            run_folder.write_fit(workflows.fit(parse_case(text, path)), folder, figures=False)
+            run_folder.write_fit(workflows.fit(parse_case(text, path)), folder)
             known[name] = write_report(folder)
         return known[name]
 

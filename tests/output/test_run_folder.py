@@ -33,7 +33,7 @@ def fitted():
 @pytest.fixture
 def folder(fitted, tmp_path, monkeypatch):
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
-    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    run_folder.write_fit(fitted, tmp_path / "run")
     return tmp_path / "run"
 
 
@@ -48,7 +48,7 @@ def names(folder):
 
 def test_a_fit_leaves_these_files_and_no_others(fitted, tmp_path, monkeypatch):
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
-    run_folder.write_fit(fitted, tmp_path / "run", figures=True)
+    run_folder.write_fit(fitted, tmp_path / "run").draw()
     assert names(tmp_path / "run") == FILES_OF_A_FIT
 
 
@@ -195,7 +195,7 @@ def test_a_last_fit_outlives_its_folder_and_another_case_that_takes_it(fitted, f
     """Two cases of one name write to one folder: each keeps its own values."""
     other = tmp_path / "first_order.yaml"
     values = {name: replace(one, value=7.0) for name, one in fitted.parameters.items()}
-    run_folder.write_fit(replace(fitted, case=other, parameters=values), folder, figures=False)
+    run_folder.write_fit(replace(fitted, case=other, parameters=values), folder)
     assert read_parameters(load_case(CASE), run_folder.last_fit(CASE)) == fitted.values
     assert set(read_parameters(load_case(CASE), run_folder.last_fit(other)).values()) == {7.0}
     shutil.rmtree(folder)
@@ -208,10 +208,10 @@ def test_a_fit_leaves_no_figure_or_table_of_a_former_one(fitted, tmp_path, monke
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
     others = [replace(fitted.comparison, name=name) for name in ("first", "second")]
     former = replace(fitted, comparisons=tuple(others))
-    run_folder.write_fit(former, tmp_path / "run", figures=True)
+    run_folder.write_fit(former, tmp_path / "run").draw()
     (tmp_path / "run" / "notes.csv").write_text("the user's own")
     assert {"first.csv", "second.png", "first-iterations.csv"} <= names(tmp_path / "run")
-    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    run_folder.write_fit(fitted, tmp_path / "run")
     tables = {name for name in FILES_OF_A_FIT if not name.endswith(".png")}
     assert names(tmp_path / "run") == tables | {"notes.csv"}
 
@@ -233,7 +233,7 @@ def test_a_result_that_is_no_fit_s_takes_nothing_along(fitted, tmp_path, monkeyp
         (tmp_path / name).parent.mkdir()
         (tmp_path / name).write_text("mine")
     (tmp_path / "run" / "result.json").write_bytes(content)
-    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    run_folder.write_fit(fitted, tmp_path / "run")
     assert (tmp_path / "outside" / "it.csv").read_text() == "mine"
     assert (tmp_path / "run" / ".csv").read_text() == "mine"
     assert json.loads((tmp_path / "run" / "result.json").read_text())["success"]
@@ -241,9 +241,9 @@ def test_a_result_that_is_no_fit_s_takes_nothing_along(fitted, tmp_path, monkeyp
 
 def test_a_validation_leaves_no_table_or_overlay_of_a_former_one(fitted, tmp_path):
     (match,) = fitted.validation
-    run_folder.write_validation([match, replace(match, name="former")], tmp_path, figures=True)
+    run_folder.write_validation([match, replace(match, name="former")], tmp_path).draw()
     assert {"former.csv", "former.png"} <= names(tmp_path)
-    run_folder.write_validation([match], tmp_path, figures=False)
+    run_folder.write_validation([match], tmp_path)
     assert names(tmp_path) == {"down-step.csv", "validation.json"}
 
 
@@ -266,7 +266,7 @@ def test_a_figure_that_fails_is_reported_and_all_else_stands(twice, monkeypatch)
         raise ZeroDivisionError("of its own")
 
     monkeypatch.setattr(plots, "trajectories", broken)
-    (missing,) = run_folder.write_fit(result, folder, figures=True)
+    (missing,) = run_folder.write_fit(result, folder).draw()
     assert missing == f"{folder / 'trajectories.png'}: not drawn: ZeroDivisionError: of its own"
     assert names(folder) == FILES_OF_A_FIT - {"trajectories.png"}
     assert value_in(folder) == 7.0
@@ -281,7 +281,7 @@ def test_a_disk_that_fills_up_while_drawing_costs_figures_alone(twice, monkeypat
             raise ExfitError(f"{path}: cannot be written: No space left on device")
 
     monkeypatch.setattr(run_folder, "write", full)
-    missing = run_folder.write_fit(result, folder, figures=True)
+    missing = run_folder.write_fit(result, folder).draw()
     assert len(missing) == sum(name.endswith(".png") for name in FILES_OF_A_FIT)
     assert all("No space left" in text for text in missing)
     assert value_in(folder) == 7.0
@@ -295,7 +295,7 @@ def test_an_interruption_while_drawing_leaves_the_numbers_and_nothing_half(twice
 
     monkeypatch.setattr(plots, "trajectories", interrupted)
     with pytest.raises(KeyboardInterrupt, match="the numbers are whole, figures are missing"):
-        run_folder.write_fit(result, folder, figures=True)
+        run_folder.write_fit(result, folder).draw()
     assert names(folder) < FILES_OF_A_FIT
     assert value_in(folder) == 7.0
     assert run_folder.last_fit(CASE).read_bytes() == (folder / "parameters.yaml").read_bytes()
@@ -313,7 +313,7 @@ def test_an_interruption_while_the_numbers_are_made_waits_for_all_of_them(twice,
     monkeypatch.setattr(run_folder, "history_table", interrupted)
     try:
         with pytest.raises(KeyboardInterrupt):
-            run_folder.write_fit(result, folder, figures=True)
+            run_folder.write_fit(result, folder).draw()
     finally:
         signal.signal(signal.SIGINT, former)
     assert names(folder) == {name for name in FILES_OF_A_FIT if not name.endswith(".png")}
@@ -327,11 +327,11 @@ def test_figures_do_not_come_beside_the_numbers_of_another_run(fitted, twice, mo
     draw = plots.trajectories
 
     def meanwhile(drawn):
-        run_folder.write_fit(result, folder, figures=False)
+        run_folder.write_fit(result, folder)
         return draw(drawn)
 
     monkeypatch.setattr(plots, "trajectories", meanwhile)
-    (missing,) = run_folder.write_fit(fitted, folder, figures=True)
+    (missing,) = run_folder.write_fit(fitted, folder).draw()
     assert "another run writes there" in missing
     assert value_in(folder) == 7.0
     assert not [name for name in names(folder) if name.endswith(".png")]
@@ -354,6 +354,6 @@ def test_a_damaged_memory_of_the_last_fit_is_refused(folder, tmp_path, content):
 def test_a_fit_is_written_even_where_it_cannot_be_remembered(fitted, tmp_path, monkeypatch):
     (tmp_path / "cache").write_text("a file in its place")
     monkeypatch.setenv("EXFIT_CACHE", str(tmp_path / "cache"))
-    run_folder.write_fit(fitted, tmp_path / "run", figures=False)
+    run_folder.write_fit(fitted, tmp_path / "run")
     assert "result.json" in names(tmp_path / "run")
     assert run_folder.last_fit(CASE) is None

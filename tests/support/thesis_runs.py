@@ -274,7 +274,7 @@ def simulated_twice(name: str) -> Simulated:
     simulation = exfit.simulate(thesis_case(case, RESULTS[case, method], "dgn"))
     with TemporaryDirectory() as folder:
         run = Path(folder)
-        run_folder.write_simulation(simulation, name, run, figures=False)
+        run_folder.write_simulation(simulation, name, run)
         sources = (run, SAMPLES / "andes" / f"{name}.csv")
         agreement = compare(sources, SAMPLES / "ac1a_up.csv")
     ours, andes = (entry for entry in agreement.from_reference if entry.signal == "vt")

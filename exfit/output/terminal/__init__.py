@@ -8,7 +8,15 @@ from exfit.output.terminal.fit_series import SeriesProgress, fit_series
 from exfit.output.terminal.fits import fit
 from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
 from exfit.output.terminal.records import inspection
-from exfit.output.terminal.terminal import again, console, notes, waiting, written
+from exfit.output.terminal.terminal import (
+    again,
+    console,
+    figure,
+    figures_of_fit,
+    notes,
+    waiting,
+    written,
+)
 from exfit.output.terminal.translations import translation
 from exfit.output.terminal.uncertainty import design, profiles
 
@@ -23,6 +31,8 @@ __all__ = [
     "comparisons",
     "console",
     "design",
+    "figure",
+    "figures_of_fit",
     "fit",
     "fit_series",
     "inspection",

@@ -48,7 +48,7 @@ class SeriesProgress:
         style = "" if outcome == CONVERGED else "yellow"
         line = self._line((run.name, f"{result.nit}", *numbers, outcome))
         self.console.print(Text(line, style), soft_wrap=True)
-        self._show(run.name, "writing files")
+        self._show(run.name, "writing numbers")
         self._done += 1
 
     def _show(self, name: str, state: str) -> None:

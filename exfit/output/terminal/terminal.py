@@ -5,12 +5,17 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from rich.cells import cell_len, set_cell_size
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from exfit.inference import Interval, Uncertainty
+
+if TYPE_CHECKING:
+    from exfit.output.run_figures import PlannedFigures
 
 NARROW = 80  # columns where the width is unknown
 UNBROKEN = re.compile(r"`[^`]*`|\d (?:%|pu|s|Hz)(?!\w)")  # commands, and figures with their units
@@ -65,6 +70,18 @@ def again(console: Console, paths: Iterable[Path]) -> None:
 def written(console: Console, folder: Path) -> None:
     """Say where the files are."""
     console.print(f"written to {folder}", soft_wrap=True, markup=False)
+
+
+def figure(console: Console, planned: "PlannedFigures", name: str) -> None:
+    """Say which of the figures is written now, and what it shows."""
+    width = max(map(cell_len, planned))
+    line = f"  {set_cell_size(name, width)}  {planned[name].shows}"
+    console.print(line, markup=False, no_wrap=True, overflow="ellipsis")
+
+
+def figures_of_fit(console: Console, name: str) -> None:
+    """Say that the figures of a fit of several are written."""
+    console.print(f"  {name}/*.png", markup=False, soft_wrap=True)
 
 
 def error_of(uncertainty: Uncertainty, of_record: bool = False) -> str:
