@@ -94,7 +94,8 @@ def _function(name: str, body: Writer, parts: Sequence[TracePart]) -> str:
     driven = [part for part in parts if name != "rest" and (part.inputs or not part.mark)]
     inputs = [f"ptr noalias %{part.mark}u" for part in driven]
     arguments = ", ".join([*arrays, *inputs, *STEPS[name]])
-    head = f'define void @{name}({arguments}) "prefer-vector-width"="512" {{'
+    # realigned: a vector of 512 bits on the stack else lies across two lines of the cache
+    head = f'define void @{name}({arguments}) "prefer-vector-width"="512" "stackrealign" {{'
     return "\n".join([head, "entry:", *body.lines, "  ret void", "}", ""])
 
 

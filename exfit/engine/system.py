@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from exfit.engine.trace import Graph, Node, Signal, tangents
+from exfit.engine.tangents import tangents
+from exfit.engine.trace import Graph, Node, Signal
 
 Signals = Mapping[str, Signal]
 

@@ -298,52 +298,6 @@ def in_order(targets: Iterable[Node]) -> Iterator[Node]:
     return (nodes[index] for index in sorted(needed))
 
 
-def tangents(targets: Iterable[Node], seeds: Mapping[Node, Node]) -> list[Node]:
-    """Return the exact derivative of each target, given the tangents of the symbols."""
-    targets = list(targets)
-    derivatives: dict[Node, Node] = dict(seeds)
-    for node in list(in_order(targets)):
-        if node not in derivatives and any(operand in derivatives for operand in node.operands):
-            zero = node.graph.constant(0.0)
-            inner = [derivatives.get(operand, zero) for operand in node.operands]
-            if node.op not in TRUTHS:
-                derivatives[node] = _tangent(node, inner)
-    return [derivatives.get(node, node.graph.constant(0.0)) for node in targets]
-
-
-def _tangent(node: Node, t: list[Node]) -> Node:
-    """Return the chain rule for one node; ``t`` holds the tangents of its operands."""
-    graph, args = node.graph, node.operands
-    match node.op:
-        case "+":
-            return t[0] + t[1]
-        case "-":
-            return t[0] - t[1]
-        case "*":
-            return args[1] * t[0] + args[0] * t[1]
-        case "/":
-            inverse = graph.divide(1.0, args[1])
-            return inverse * t[0] - (node * inverse) * t[1]
-        case "select":
-            return graph.select(args[0], t[1], t[2])
-        case "clip":
-            x, low, high = args
-            # a state that was put back on its limit is exactly there, and moves with it
-            return graph.select(x <= low, t[1], graph.select(high <= x, t[2], t[0]))
-        case "exp":
-            return node * t[0]
-        case "log":
-            return graph.divide(1.0, args[0]) * t[0]
-        case "sqrt":
-            return graph.divide(0.5, node) * t[0]
-        case "sin":
-            return graph.apply("cos", args[0]) * t[0]
-        case "cos":
-            return graph.subtract(0.0, graph.apply("sin", args[0])) * t[0]
-        case op:
-            raise KeyError(op)
-
-
 def evaluate(targets: Iterable[Node], values: Mapping[Node, Any]) -> dict[Node, Any]:
     """Return the value of every node that the targets need, given those of the symbols.
 

@@ -1,4 +1,4 @@
-"""The graph: functions on numbers and nodes, simplification, derivatives."""
+"""The graph: functions on numbers and nodes, simplification."""
 
 import math
 
@@ -10,16 +10,13 @@ from hypothesis import strategies as st
 from exfit.engine.trace import (
     Graph,
     clip,
-    cos,
     evaluate,
     exp,
     in_order,
     larger,
     log,
-    sin,
     smaller,
     sqrt,
-    tangents,
     where,
 )
 from exfit.errors import ModelError
@@ -74,41 +71,6 @@ def test_arrays_give_what_their_elements_give(points):
     # a power of an array may differ from a scalar's in the last bit
     expected = [formula(a, b) for a, b in points]
     assert formula(x, y) == pytest.approx(np.array(expected), rel=1e-12, abs=1e-12)
-
-
-@settings(deadline=None)
-@given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.sampled_from([0, 1]))
-def test_derivatives_equal_central_differences(x, y, direction):
-    def smooth(x, y):
-        a = 1.0 + x * x
-        wave = sin(1.3 * x) * cos(x - 0.7 * y)
-        return sqrt(a) * exp(0.3 * y) / (2.0 + y * y) - log(a + y * y) + (1.0 - x) / a + wave
-
-    _, node, symbols = traced(smooth, x, y)
-    seed = node.graph.constant(1.0)
-    (slope,) = tangents([node], {symbols[direction]: seed})
-    exact = evaluate([slope], dict(zip(symbols, (x, y), strict=True)))[slope]
-    h = 1e-3
-    shift = [(h, 0.0), (0.0, h)][direction]
-
-    def difference(k):
-        up = smooth(x + k * shift[0], y + k * shift[1])
-        return (up - smooth(x - k * shift[0], y - k * shift[1])) / (2 * k * h)
-
-    # two differences cancel the error of order h^2: what is left is h^4 = 1e-12 and rounding
-    assert exact == pytest.approx((4 * difference(1) - difference(2)) / 3, abs=1e-9)
-
-
-@pytest.mark.parametrize(("value", "moves_with"), [(0.3, "x"), (-1.0, "low"), (2.0, "high")])
-def test_what_lies_on_a_limit_moves_with_it(value, moves_with):
-    """There a limit puts a state back: it is exactly on it, not a hair beyond."""
-    graph = Graph()
-    x, low, high = nodes = [graph.symbol(name, varies=True) for name in ("x", "low", "high")]
-    held = clip(x, low, high)
-    for node in nodes:
-        (slope,) = tangents([held], {node: graph.constant(1.0)})
-        told = evaluate([slope], {x: value, low: -1.0, high: 2.0})[slope]
-        assert told == (1.0 if node.args[0] == moves_with else 0.0)
 
 
 @pytest.mark.parametrize("condition", ["x < y", "x > y", "x <= y", "x >= y"])
