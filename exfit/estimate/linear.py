@@ -10,7 +10,7 @@ from exfit.estimate.arrays import TINY, Array
 from exfit.estimate.bounded import bounded_minimum
 from exfit.estimate.box import Box
 from exfit.estimate.problem import Point, Problem
-from exfit.estimate.requests import Steps
+from exfit.estimate.requests import Steps, singular_values_of, triangle_of
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,9 @@ def linearise(
 ) -> Steps[LinearModel]:
     """Return the linear model at a point, scaled no less than the one before."""
     J = yield from problem.jacobian(point)
-    return factored(problem, point, J, before) if np.isfinite(J).all() else blind(problem, point, J)
+    if not np.isfinite(J).all():
+        return blind(problem, point, J)
+    return (yield from factored(problem, point, J, before))
 
 
 def blind(problem: Problem, point: Point, J: Array) -> LinearModel:
@@ -104,14 +106,15 @@ def blind(problem: Problem, point: Point, J: Array) -> LinearModel:
     )
 
 
-def factored(problem: Problem, point: Point, J: Array, before: LinearModel | None) -> LinearModel:
+def factored(
+    problem: Problem, point: Point, J: Array, before: LinearModel | None
+) -> Steps[LinearModel]:
     """Factor J: QR first, for the many residuals, then the singular values of the corner."""
     box, n = problem.box, len(point.x)
     gradient = J.T @ point.residuals
     scale = 1.0 / box.unit if problem.scaled else column_scale(J, before)
-    both = np.column_stack([J / scale, point.residuals])
-    corner = np.asarray(np.linalg.qr(both, mode="r"), dtype=np.float64)
-    left, singular, directions = np.linalg.svd(corner[:, :n], full_matrices=False)
+    corner = yield from triangle_of(np.column_stack([J, point.residuals]))
+    left, singular, directions = yield from singular_values_of(corner[:, :n] / scale)
     return LinearModel(
         point=point,
         jacobian=J,

