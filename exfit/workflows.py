@@ -4,6 +4,7 @@ import sys
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -246,12 +247,10 @@ def loaded(case: CaseOrPath, values: ValuesOrResult | None = None) -> Case:
 
 def versions() -> dict[str, str]:
     """Return the versions that a result depends on."""
-    from importlib.metadata import version
-
     return {
         "exfit": __version__,
         "python": ".".join(map(str, sys.version_info[:3])),
-        **{name: version(name) for name in LIBRARIES},
+        **{name: import_module(name).__version__ for name in LIBRARIES},
     }
 
 

@@ -186,7 +186,8 @@ class Case:
         """The records that are fitted; a single one is named fit."""
         if self.records or self.record is None or self.test is None:
             return self.records
-        return (Recording(name=SINGLE, test=self.test, record=self.record),)
+        # both sections are checked already
+        return (Recording.model_construct(name=SINGLE, test=self.test, record=self.record),)
 
     @property
     def tests(self) -> tuple[BumpTest, ...]:

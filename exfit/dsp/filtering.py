@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import even_step
+from exfit.util.median import median
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -134,7 +135,7 @@ class Filtering:
         """How many samples a window of the record's averages holds, 1 where it has none."""
         if self.averaged is None:
             return 1
-        return max(1, round(self.averaged.window / float(np.median(np.diff(self.time)))))
+        return max(1, round(self.averaged.window / float(median(np.diff(self.time)))))
 
     @cached_property
     def _nothing_to_do(self) -> bool:
@@ -224,12 +225,12 @@ def _from_lines(time: Array, samples: Array) -> Array:
     """Return how far each sample of each row lies from the row's repeated-median line."""
     others = [np.flatnonzero(np.arange(OUTLIER_WINDOW) != k) for k in range(OUTLIER_WINDOW)]
     slopes = [
-        np.median((samples[:, rest] - samples[:, [k]]) / (time[:, rest] - time[:, [k]]), axis=1)
+        median((samples[:, rest] - samples[:, [k]]) / (time[:, rest] - time[:, [k]]), axis=1)
         for k, rest in enumerate(others)
     ]
-    slope = np.median(slopes, axis=0)
+    slope = median(slopes, axis=0)
     level = samples - slope[:, None] * (time - time[:, [OUTLIER_WINDOW // 2]])
-    return np.asarray(level - np.median(level, axis=1, keepdims=True))
+    return np.asarray(level - median(level, axis=1, keepdims=True))
 
 
 def _check_filter(time: Array, cutoff: float) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from exfit.util.median import median
+
 Array = NDArray[np.float64]
 
 NEIGHBOURS = 3  # samples of a second difference; their median is free of a lone spike
@@ -37,12 +39,12 @@ def noise(samples: Array) -> float:
 
 def spread(values: Array, axis: int = -1) -> Array:
     """Return the median absolute deviation along an axis, scaled to the normal law's spread."""
-    away = np.abs(values - np.median(values, axis=axis, keepdims=True))
-    return np.asarray(np.median(away, axis=axis) / MEDIAN_DEVIATION)
+    away = np.abs(values - median(values, axis=axis, keepdims=True))
+    return np.asarray(median(away, axis=axis) / MEDIAN_DEVIATION)
 
 
 def _quantum(samples: Array) -> float:
     """Return the smallest step between two values that last longer than a spike, or 0."""
-    lasting = np.median(sliding_window_view(samples, NEIGHBOURS), axis=-1)
+    lasting = median(sliding_window_view(samples, NEIGHBOURS), axis=-1)
     steps = np.diff(np.unique(lasting))
     return float(np.min(steps)) if len(steps) else 0.0

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from exfit.dsp.filtering import OUTLIER_WINDOW, outliers
 from exfit.dsp.noise import noise
 from exfit.dsp.three_phase import MAINS_FREQUENCIES
+from exfit.util.median import median
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -94,7 +95,7 @@ def mains_frequency(time: Array, samples: Array) -> float | None:
     mean, deviation = float(np.mean(y)), float(np.std(y))
     if deviation == 0.0 or abs(mean) > LARGEST_MEAN * deviation:
         return None
-    step = float(np.median(np.diff(t)))
+    step = float(median(np.diff(t)))
     power = np.abs(np.fft.rfft((y - mean) * np.hanning(len(y)))) ** 2
     frequencies = np.fft.rfftfreq(len(y), step)
     top = int(np.argmax(power))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import SECOND_DIFFERENCE, spread
+from exfit.util.median import median
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def jumps(time: Array, samples: Array) -> NDArray[np.intp]:
     at_ends = np.pad(changes, 1)
     beside = np.maximum(at_ends[:-2], at_ends[2:])
     alone = beside <= NEIGHBOUR[0] * changes + NEIGHBOUR[1] * noise
-    close = spacing <= min(UNEVEN * float(np.median(spacing)), LONGEST_JUMP)
+    close = spacing <= min(UNEVEN * float(median(spacing)), LONGEST_JUMP)
     after = np.flatnonzero((changes > large) & alone & close)
     return after[(after >= FEWEST_SAMPLES - 1) & (after < len(changes) - 1)]
 
@@ -61,7 +62,7 @@ def rest_end(samples: Array) -> int:
     Raises ValueError where it never moves out of its noise, or moves from its first samples on.
     """
     noise, span = scatter(samples), float(np.ptp(samples))
-    away = np.abs(samples - np.median(samples[:FEWEST_SAMPLES]))
+    away = np.abs(samples - median(samples[:FEWEST_SAMPLES]))
     far = np.flatnonzero(away > max(DEPARTURE[0] * span, DEPARTURE[1] * noise))
     if span == 0.0 or not len(far):
         raise ValueError("never moves out of its noise: there is no test")

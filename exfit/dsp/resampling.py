@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.sampling import GAP_STEPS
+from exfit.util.median import median
 
 Array = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ def _mean_rate(time: Array, signals: Mapping[str, Array], rate: float) -> float:
             f"{len(time)} samples: resampling needs at least {FEWEST_SAMPLES_TO_RESAMPLE}"
         )
     steps = np.diff(time)
-    longest, usual = int(np.argmax(steps)), float(np.median(steps))
+    longest, usual = int(np.argmax(steps)), float(median(steps))
     if steps[longest] > GAP_STEPS * usual:
         raise ValueError(
             f"a gap of {steps[longest]:g} s after {time[longest]:g} s: resampling bridges at most "

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.util.median import median
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -88,7 +90,7 @@ def sampling_of(time: Array) -> Sampling:
     forward = increasing(time)
     valid = time[forward]
     steps = np.diff(valid)
-    step = float(np.median(steps)) if len(steps) else 0.0
+    step = float(median(steps)) if len(steps) else 0.0
     jumps = np.flatnonzero(steps > GAP_STEPS * step)
     gaps = tuple(
         Gap(float(valid[k]), float(valid[k + 1]), max(round(float(steps[k]) / step) - 1, 1))

@@ -7,6 +7,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise
+from exfit.util.median import median
 
 Array = NDArray[np.float64]
 
@@ -88,10 +89,10 @@ def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
         )
     scatter, smooth = noise(samples), _running_median(samples)
     departure = _departure(smooth, scatter)
-    left, gone = _crossing(time, np.abs(smooth - np.median(samples[:SAMPLES_AT_REST])), departure)
-    level = float(np.median(samples[max(left - REST_TIMES * (gone - left), 0) : left + 1]))
+    left, gone = _crossing(time, np.abs(smooth - median(samples[:SAMPLES_AT_REST])), departure)
+    level = float(median(samples[max(left - REST_TIMES * (gone - left), 0) : left + 1]))
     start, end = _settled(smooth, left, gone, scatter)
-    size = float(np.median(samples[start : end + 1])) - level
+    size = float(median(samples[start : end + 1])) - level
     if abs(size) < departure:
         raise ValueError(f"no step: what begins at {time[left]:g} s leaves no lasting change")
     far = min(max(FITTED_RISE[0] * abs(size), FITTED_RISE[1] * scatter), FITTED_RISE[2] * abs(size))
@@ -120,7 +121,7 @@ def _departure(smooth: Array, scatter: float) -> float:
 def _running_median(samples: Array) -> Array:
     """Return the running median (M,), mirrored at the ends."""
     padded = np.pad(samples, MEDIAN_SAMPLES // 2, mode="reflect")
-    return np.asarray(np.median(sliding_window_view(padded, MEDIAN_SAMPLES), axis=-1))
+    return np.asarray(median(sliding_window_view(padded, MEDIAN_SAMPLES), axis=-1))
 
 
 def _crossing(time: Array, way: Array, far: float) -> tuple[int, int]:

@@ -27,6 +27,7 @@ from exfit.plants import REFERENCES
 from exfit.records.reading import read_record
 from exfit.records.record import Record
 from exfit.simulation.inputs import RecordedInput
+from exfit.util.median import median
 from exfit.util.text import show
 
 Array = NDArray[np.float64]
@@ -134,7 +135,7 @@ def references_of(
 
 def is_table(record: Record) -> bool:
     """Return whether a file is a table of few rows and not the samples of a recorder."""
-    spacing = float(np.median(np.diff(record.time)))
+    spacing = float(median(np.diff(record.time)))
     return spacing > LONGEST_JUMP and len(record.time) <= MOST_ROWS
 
 

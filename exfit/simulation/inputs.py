@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.simulation.grid import ON_GRID, GridSegment
+from exfit.util.median import median
 
 Array = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ class RecordedInput:
         Where samples lie closer than these, it is averaged over the grid with a linear B-spline: so
         the area under it stays the same, and what lies between grid points is not lost.
         """
-        if float(np.median(np.diff(self.time))) >= part.step * (1.0 - ON_GRID):
+        if float(median(np.diff(self.time))) >= part.step * (1.0 - ON_GRID):
             return np.interp(part.times, self.time, self.samples)
         grid = part.start + part.step * np.arange(-1, part.steps + 2)  # one more on each side
         inside = self.time[(self.time > grid[0]) & (self.time < grid[-1])]
