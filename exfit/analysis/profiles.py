@@ -1,7 +1,7 @@
 """The profile likelihood of a case's parameters: how far each can move if the others follow."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import Residuals
+from exfit.fitting.residuals import Residuals, SideBySide
 from exfit.fitting.search import UNIT, fitted, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
@@ -24,7 +24,6 @@ from exfit.util.text import near
 Array = NDArray[np.float64]
 
 LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
-DIGITS_OF_RISE = 6  # rises that differ less are equal but for rounding
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 ENDS = {
@@ -109,7 +108,10 @@ def profile(
     for _ in range(MOST_MINIMA):
         uncertainty = uncertainty_at(problem, x, records)
         rises = {index: uncertainty.rises[name] for name, index in wanted.items()}
-        about_x = cost_profiles(problem.compressed, x, rises, progress)
+        residuals = problem.compressed
+        about_x = estimate.profiles(
+            SideBySide(residuals), x, rises, residuals.bounds, x_scale=UNIT, watch=progress
+        )
         interrupted = any(_interrupted(cost_profile) for cost_profile in about_x)
         if interrupted or not about_x[0].moved:
             break
@@ -167,40 +169,6 @@ def _notes(best: estimate.Result, x: Array) -> Iterator[str]:
 
 def _interrupted(cost_profile: estimate.CostProfile) -> bool:
     return estimate.ProfileEnd.INTERRUPTED in cost_profile.ends
-
-
-def cost_profiles(
-    residuals: Residuals,
-    x: Array,
-    rises: Mapping[int, float],
-    progress: Callable[[estimate.Progress], None],
-) -> list[estimate.CostProfile]:
-    """Return the profiles about x, those of like rises side by side; if x is a minimum, of all."""
-    alike: dict[str, list[int]] = {}
-    for index, rise in rises.items():
-        alike.setdefault(f"{rise:.{DIGITS_OF_RISE}e}", []).append(index)
-    by_index: dict[int, estimate.CostProfile] = {}
-    for indices in alike.values():
-
-        def announce(now: estimate.Progress, done: int = 2 * len(by_index)) -> None:
-            progress(replace(now, done=done + now.done, total=2 * len(rises)))
-
-        alike_profiles = estimate.profiles(
-            residuals,
-            residuals.exact,
-            x,
-            indices,
-            residuals.bounds,
-            rises[indices[0]],
-            x_scale=UNIT,
-            watch=announce,
-        )
-        by_index |= {cost_profile.index: cost_profile for cost_profile in alike_profiles}
-        if alike_profiles[0].moved:
-            return list(alike_profiles)
-        if any(_interrupted(cost_profile) for cost_profile in alike_profiles):
-            break
-    return [by_index[index] for index in rises if index in by_index]
 
 
 def _profile(

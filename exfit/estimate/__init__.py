@@ -23,7 +23,8 @@ from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Sto
 from exfit.estimate.damping_ratio import RatioDamping
 from exfit.estimate.gauss_newton import LineSearch
 from exfit.estimate.problem import half_square
-from exfit.estimate.profile import CostProfile, ProfileEnd, profile, profiles
+from exfit.estimate.profile import CostProfile, profile, profiles
+from exfit.estimate.profile_side import ProfileEnd
 from exfit.estimate.requests import Functions, OneByOne
 from exfit.estimate.search import to_half, to_parabola
 from exfit.estimate.searches import Searches

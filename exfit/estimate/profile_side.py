@@ -1,0 +1,317 @@
+"""One side of a profile: a parameter moves away from a minimum, and all others follow it.
+
+From point to point the others are predicted along the tangent of the profile and its bend, then
+refitted as far as the cost needs. A point has the slope of the profile as well as its cost, so that
+few are enough to find where the cost has risen as far as asked.
+
+Source: Bates & Watts 1988, sections 6.1 (profile t, profile traces) and A3.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from math import inf, isfinite, sqrt
+
+import numpy as np
+
+from exfit.estimate.arrays import TINY, UNSEEN, Array
+from exfit.estimate.box import Box
+from exfit.estimate.linear import LinearModel, linearise, solve
+from exfit.estimate.problem import Point, Problem, half_square
+from exfit.estimate.requests import Functions, Steps
+from exfit.estimate.search import ARMIJO
+
+FINE = 2e-3  # of the rise: what a refit may leave, a thousandth of the way to the crossing
+MOST_CORRECTIONS = 15  # of a refit: it starts near its end
+REACH = 1.0  # of a correction, in units of each variable
+DAMPINGS = tuple(10.0**-k for k in range(1, 10))  # of the largest squared singular value
+LENGTHS = (0.5, 0.25, 0.1, 0.05, 0.02, 0.01)  # of a correction that is too long
+LAST = 1.05  # height that the last step aims at: beyond the crossing
+LEAPS = 2.5  # times the height that a step aims at: take a shorter one instead
+MOST_HALVINGS = 5  # of a step: what then remains is a jump
+MOST_GROWTH = 2.0  # of a step
+MOST_POINTS = 4  # times the points: a side that needs more is flat
+CLOSE = 0.005  # of the way from the minimum: how certain the crossing must be
+MOST_REFITS = 12  # to make it so
+CUBICS = 4  # of them, then halves: a jump lets no interpolation come near
+
+
+class ProfileEnd(Enum):
+    """Why one side of a profile ends."""
+
+    RISE = "the cost has risen as far as asked"
+    BOUND = "the parameter is at its bound"
+    FLAT = "the cost hardly rises"
+    FAILED = "no residuals beyond are finite"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A point x (N,) of a profile, the others refitted.
+
+    place    the parameter's value
+    height   the root of the rise of the cost, in units of the rise asked
+    slope    of the height over the distance from the minimum; 0 where it has none, as at a kink
+    best     all parameters where the linear model here has its minimum (N,)
+    tangent  how fast all move with the parameter (N,)
+    """
+
+    x: Array
+    cost: float
+    place: float
+    height: float
+    slope: float
+    best: Array
+    tangent: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Valley:
+    """What all profiles about one minimum share; ``lowest`` is the cost that rises count from."""
+
+    functions: Functions
+    box: Box
+    scaled: bool
+    bottom: LinearModel
+    lowest: float
+    points: int
+
+
+@dataclass(eq=False)
+class Side:
+    """One side of a profile, as far as it has come; ``sign`` is -1 below the minimum."""
+
+    valley: Valley
+    index: int
+    sign: int
+    rise: float
+    spots: list[Spot] = field(init=False)
+    curvature: float = field(init=False)
+    end: ProfileEnd = ProfileEnd.INTERRUPTED
+    crossing: float | None = None
+
+    def __post_init__(self) -> None:
+        """Begin at the minimum."""
+        linear = self.valley.bottom
+        x, cost = linear.point.x, linear.point.cost
+        tangent, effect = self.tangent(linear, x)
+        self.curvature = effect / sqrt(2.0 * self.rise)
+        height = self.height(cost)
+        slope = 0.0 if height > 0.0 else self.curvature
+        self.spots = [Spot(x, cost, float(x[self.index]), height, slope, x, tangent)]
+
+    def walk(self, given_up: Callable[[], bool]) -> Steps["Side"]:
+        """Go to where the cost has risen as far as asked, or as far as there is a way.
+
+        An interruption ends it, and so does ``given_up``, which is asked at every point.
+        """
+        try:
+            end = None
+            while end is None and not given_up():
+                end = yield from self.go_on()
+            if end is ProfileEnd.RISE:
+                self.crossing = yield from self.crossed()
+            self.end = end or ProfileEnd.INTERRUPTED
+        except KeyboardInterrupt:
+            self.end = ProfileEnd.INTERRUPTED
+        return self
+
+    def go_on(self) -> Steps[ProfileEnd | None]:
+        """Add a point; return why there are no more to come, if so."""
+        last, points = self.spots[-1], self.valley.points
+        if last.place == self.bound:
+            return ProfileEnd.BOUND
+        if len(self.spots) > MOST_POINTS * points:
+            return ProfileEnd.FLAT
+        step = self.step()
+        for _ in range(MOST_HALVINGS + 1):
+            spot = yield from self.refit(self.predicted(step))
+            if spot is not None and spot.height - last.height <= LEAPS / points:
+                break
+            step *= 0.5
+        if spot is None:
+            return ProfileEnd.FAILED
+        self.spots.append(spot)
+        return ProfileEnd.RISE if spot.height >= 1.0 else None
+
+    @property
+    def bound(self) -> float:
+        """The bound that the parameter moves towards."""
+        box = self.valley.box
+        return float((box.high if self.sign > 0 else box.low)[self.index])
+
+    @property
+    def room(self) -> float:
+        """How far the bound is."""
+        return abs(self.bound - self.spots[-1].place)
+
+    def step(self) -> float:
+        """Return how far to go for the next height, by the slope of the profile and its bend."""
+        last, share = self.spots[-1], 1.0 / self.valley.points
+        higher = last.height + share
+        gain = (LAST if higher > 1.0 - 0.5 * share else higher) - last.height
+        if len(self.spots) == 1:
+            return self.first_step(last.height + gain)
+        before = self.spots[-2]
+        gone, risen = abs(last.place - before.place), last.height - before.height
+        longest = MOST_GROWTH * max(1.0, gain / share) * gone
+        steepness = last.slope or risen / gone
+        if not steepness > 0.0:
+            return longest
+        straight = min(gain / steepness, longest)
+        if not min(last.slope, before.slope, risen) > 0.0:
+            return straight
+        bend = (1.0 / last.slope - 1.0 / before.slope) / risen
+        return min(max(straight + 0.5 * bend * gain**2, 0.5 * straight), longest)
+
+    def first_step(self, height: float) -> float:
+        """Return how far a height is from the minimum, where the cost is a parabola."""
+        if self.curvature > 0.0:
+            way = sqrt(height**2 - self.spots[0].height ** 2) / self.curvature
+            if isfinite(way):
+                return way
+        unit = float(self.valley.box.unit[self.index])
+        return min(unit, self.room) / self.valley.points
+
+    def predicted(self, step: float) -> Array:
+        """Return all parameters a step farther, by the tangent of the profile and its bend."""
+        last, move = self.spots[-1], self.sign * step
+        x = last.best + move * last.tangent
+        if len(self.spots) > 1:
+            before = self.spots[-2]
+            x += 0.5 * move**2 * (last.tangent - before.tangent) / (last.place - before.place)
+        return self.at(self.bound if step >= self.room else last.place + move, x)
+
+    def at(self, place: float, x: Array) -> Array:
+        """Return x within the bounds, with the parameter at a place."""
+        inside = self.valley.box.inside(x)
+        inside[self.index] = place
+        return inside
+
+    def refit(self, guess: Array) -> Steps[Spot | None]:
+        """Fit all parameters but one, from a guess; None where the residuals are not finite."""
+        valley, fine = self.valley, FINE * self.rise
+        low, high = (
+            self.at(guess[self.index], valley.box.low),
+            self.at(guess[self.index], valley.box.high),
+        )
+        held = replace(valley.box, low=low, high=high)
+        problem = Problem(valley.functions, None, held, valley.scaled)
+        point = yield from problem.evaluate(guess)
+        if point.cost == inf:
+            return None
+        linear = yield from linearise(problem, point, valley.bottom)
+        for _ in range(MOST_CORRECTIONS):
+            if not linear.finite or linear.full.promise <= fine:
+                break
+            lower = yield from corrected(problem, linear)
+            gain = linear.point.cost - lower.cost
+            if lower is not linear.point:
+                linear = yield from linearise(problem, lower, linear)
+            if gain <= fine:
+                break
+        return self.spot(linear)
+
+    def spot(self, linear: LinearModel) -> Spot:
+        """Return the point of the profile that a linear model with the parameter held shows."""
+        x, cost = linear.point.x, linear.point.cost
+        place = float(x[self.index])
+        if not linear.finite:
+            return Spot(x, cost, place, self.height(cost), 0.0, x, self.alone())
+        smooth = linear.full.promise <= FINE * self.rise
+        best, left = (linear.full.target, linear.full.promise) if smooth else (x, 0.0)
+        tangent, _ = self.tangent(linear, best)
+        height = self.height(cost - left)
+        moved, along = effect_of(linear, best - x), effect_of(linear, tangent)
+        steepness = self.sign * float(along @ (linear.amounts + moved))
+        slope = steepness / (2.0 * self.rise * height) if smooth and height > FINE else 0.0
+        return Spot(x, cost, place, height, slope, best, tangent)
+
+    def height(self, cost: float) -> float:
+        """Return the root of the rise of a cost, in units of that asked."""
+        return sqrt(max(0.0, cost - self.valley.lowest) / self.rise)
+
+    def alone(self) -> Array:
+        """Return the direction in which the parameter moves and no other (N,)."""
+        direction = np.zeros(len(self.valley.box.low))
+        direction[self.index] = 1.0
+        return direction
+
+    def tangent(self, linear: LinearModel, x: Array) -> tuple[Array, float]:
+        """Return how fast all move with the parameter (N,), and the residuals with them.
+
+        Others on a bound stay there.
+        """
+        box, direction = self.valley.box, self.alone()
+        others = (x > box.low) & (x < box.high) & (direction == 0.0)
+        alone = effect_of(linear, direction)
+        if others.any():
+            scale = linear.scale[others]
+            rows = linear.singular[:, None] * linear.directions[:, others]
+            direction[others] = -np.linalg.lstsq(rows, alone, rcond=UNSEEN)[0] / scale
+        effect = float(np.linalg.norm(effect_of(linear, direction)))
+        flat = effect <= UNSEEN * float(np.linalg.norm(alone)) + TINY
+        return direction, 0.0 if flat else effect
+
+    def crossed(self) -> Steps[float]:
+        """Return where the cost has risen as far as asked, by refits between the last points."""
+        inside, outside = self.spots[-2:]
+        for count in range(MOST_REFITS):
+            place, doubt = interpolated(inside, outside)
+            if doubt <= CLOSE * abs(place - self.spots[0].place):
+                break
+            if count >= CUBICS:
+                place = 0.5 * (inside.place + outside.place)
+            share = (place - inside.place) / (outside.place - inside.place)
+            guess = self.at(place, inside.best + share * (outside.best - inside.best))
+            spot = yield from self.refit(guess)
+            if spot is None:
+                break
+            self.spots.append(spot)
+            inside, outside = (inside, spot) if spot.height >= 1.0 else (spot, outside)
+        self.spots.sort(key=lambda spot: self.sign * spot.place)
+        return interpolated(inside, outside)[0]
+
+
+def effect_of(linear: LinearModel, direction: Array) -> Array:
+    """Return by how much a move changes the residuals, in the directions that these have (K,)."""
+    along: Array = linear.directions @ (linear.scale * direction)
+    return linear.singular * along
+
+
+def corrected(problem: Problem, linear: LinearModel) -> Steps[Point]:
+    """Return a point with a lower cost, or that of the linear model where none is in sight.
+
+    The full step; where it fails, as at a kink, the best of many shorter ones, tried at once.
+    """
+    full = solve(linear, reach=REACH)
+    trial = yield from problem.evaluate(full.target)
+    if trial.cost <= linear.point.cost + ARMIJO * full.slope:
+        return trial
+    largest = float(linear.singular[0]) ** 2
+    targets = [solve(linear, share * largest, REACH).target for share in DAMPINGS]
+    targets += [full.at(length) for length in LENGTHS]
+    residuals = yield from problem.residuals(targets)
+    points = [Point(x, r, half_square(r)) for x, r in zip(targets, residuals, strict=True)]
+    return min([linear.point, trial, *points], key=lambda point: point.cost)
+
+
+def interpolated(inside: Spot, outside: Spot) -> tuple[float, float]:
+    """Return where the height is one between two points, and how uncertain that is.
+
+    The place is a cubic of the height, which both places and slopes give; without slopes a line.
+    """
+    risen, way = outside.height - inside.height, outside.place - inside.place
+    share = (1.0 - inside.height) / risen
+    straight = inside.place + share * way
+    near = min(share, 1.0 - share)
+    if not min(inside.slope, outside.slope) > 0.0:
+        return straight, abs(way) * near
+    bends = [risen / spot.slope / abs(way) - 1.0 for spot in (inside, outside)]
+    cubic = share + share * (1.0 - share) * ((1.0 - share) * bends[0] - share * bends[1])
+    if not 0.0 <= cubic <= 1.0:
+        return straight, abs(way)
+    # less the parabola through both places with the slope at the nearer one
+    doubt = share * (1.0 - share) * near * abs(sum(bends))
+    return inside.place + cubic * way, doubt * abs(way)
