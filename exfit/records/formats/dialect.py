@@ -31,12 +31,13 @@ TOKEN_WITH_UNIT = re.compile(r'"[^"]*"|\S+(?:[ \t]+(?:\[[^\[\]]*\]|\([^()]*\)))?
 
 
 class TextRow(NamedTuple):
-    """A line of the file, its cells without spaces around them, and whether it is a comment."""
+    """A line of the file: its cells without spaces around them, and which of them are values."""
 
     line: int
     cells: tuple[str, ...]
-    text: str = ""
-    comment: bool = False
+    values: tuple[bool, ...]
+    text: str
+    comment: bool
 
 
 @dataclass(frozen=True)
@@ -142,15 +143,24 @@ def find_dialect(path: Path, head: Sequence[str]) -> Dialect:
 
 
 def _layouts(path: Path, head: Sequence[str]) -> list[_Layout]:
-    """Return the readings of the head with each separator; spaces only where tabs give none."""
+    """Return the readings of the head with each separator that it has; spaces only without tabs."""
     layouts: list[_Layout] = []
     for separator in SEPARATORS:
-        if separator is None and any(layout.dialect.separator == "\t" for layout in layouts):
+        if separator is None:
+            tabs = any(layout.dialect.separator == "\t" for layout in layouts)
+            if tabs or (layouts and not any(map(_may_have_spaces, head))):
+                continue
+        elif not any(separator in line for line in head):
             continue
         layout = _layout(path, head, separator)
         if layout is not None and (layout.dialect.cells > 1 or separator is None):
             layouts.append(layout)
     return layouts
+
+
+def _may_have_spaces(line: str) -> bool:
+    """Return whether spaces may separate columns in a line; where it is quoted, they may."""
+    return len(line.split(maxsplit=1)) > 1 or '"' in line
 
 
 def _no_numbers(path: Path, head: Sequence[str]) -> RecordError:
@@ -207,7 +217,8 @@ def _row(line: int, cells: list[str], text: str, separator: str | None) -> TextR
         text = text.lstrip().removeprefix(mark)
         first = cells[0].lstrip().removeprefix(mark)
         cells = [first, *cells[1:]] if first or separator is not None else cells[1:]
-    return TextRow(line, tuple(cell.strip() for cell in cells), text, comment)
+    stripped = tuple(cell.strip() for cell in cells)
+    return TextRow(line, stripped, tuple(map(is_value, stripped)), text, comment)
 
 
 def _width(rows: Sequence[TextRow]) -> int:
@@ -223,7 +234,7 @@ def _width(rows: Sequence[TextRow]) -> int:
 
 def _share_of_full(row: TextRow) -> float:
     """Return the share of values in those cells of a row that hold something."""
-    full = [is_value(cell) for cell in row.cells if not is_missing(cell)]
+    full = [value for cell, value in _cells(row) if value or not is_missing(cell)]
     return sum(full) / len(full) if full else 0.0
 
 
@@ -231,16 +242,16 @@ def _value_columns(rows: Sequence[TextRow], cells: int) -> list[int]:
     """Return the columns in which at least half of the later rows have a value."""
     complete = [row for row in rows if len(row.cells) == cells]
     later = complete[len(complete) // 2 :]
-    counts = [sum(is_value(row.cells[at]) for row in later) for at in range(cells)]
+    counts = [sum(row.values[at] for row in later) for at in range(cells)]
     return [at for at, count in enumerate(counts) if count and 2 * count >= len(later)]
 
 
 def _is_full(row: TextRow, cells: int, columns: Sequence[int]) -> bool:
     if row.comment or len(row.cells) != cells:
         return False
-    values = [is_value(row.cells[at]) for at in columns]
-    gaps = [is_missing(row.cells[at]) for at in columns]
-    return any(values) and all(value or gap for value, gap in zip(values, gaps, strict=True))
+    return any(row.values[at] for at in columns) and all(
+        row.values[at] or is_missing(row.cells[at]) for at in columns
+    )
 
 
 def _is_partial(row: TextRow, shape: _Shape) -> bool:
@@ -248,8 +259,8 @@ def _is_partial(row: TextRow, shape: _Shape) -> bool:
     if row.comment:
         return False
     if len(row.cells) == shape.cells:
-        return any(is_value(row.cells[at]) for at in shape.columns)
-    return len(row.cells) > 1 and all(is_value(cell) or is_missing(cell) for cell in row.cells)
+        return any(row.values[at] for at in shape.columns)
+    return len(row.cells) > 1 and all(value or is_missing(cell) for cell, value in _cells(row))
 
 
 def _heading(above: Sequence[TextRow], first: TextRow, shape: _Shape) -> _Heading:
@@ -281,7 +292,7 @@ def _named(rows: Sequence[TextRow], shape: _Shape) -> _Heading | None:
 def _fault_of_names(plain: Sequence[TextRow], first: TextRow, shape: _Shape) -> str | None:
     """Return what is wrong with the row above the numbers, None where it may be a title."""
     last = plain[-1] if plain else first
-    if len(last.cells) > 1 and not any(map(is_value, last.cells)):
+    if len(last.cells) > 1 and not any(last.values):
         return f"{first.line}: cells in this row: {len(first.cells)}, columns: {len(last.cells)}"
     unfit = bool(plain) and len(last.cells) == shape.cells > 1
     if unfit or not _is_full(first, shape.cells, shape.columns):
@@ -313,5 +324,10 @@ def has_comma(rows: Iterable[Sequence[str]]) -> bool | None:
 
 def _share_of_values(rows: Sequence[TextRow]) -> float:
     """Return the share of cells that are values, or say that there is none."""
-    cells = [cell for row in rows for cell in row.cells]
-    return sum(is_value(cell) or is_missing(cell) for cell in cells) / len(cells)
+    known = [value or is_missing(cell) for row in rows for cell, value in _cells(row)]
+    return sum(known) / len(known)
+
+
+def _cells(row: TextRow) -> Iterator[tuple[str, bool]]:
+    """Return the cells of a row, each with whether it is a value."""
+    return zip(row.cells, row.values, strict=True)

@@ -7,6 +7,7 @@ no digit of the file is lost.
 
 import re
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ EITHER = "dmy or mdy"  # order of a date whose first two parts may be either
 TO_ZERO = np.array([ord("0") if chr(at).isdigit() and at < 128 else at for at in range(256)], "u1")
 MONTHS_A_YEAR = 12
 MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-FORM = re.compile(
+PATTERN = (
     r"[ \t]*"
     r"(?:(?P<year>\d{4})(?P<iso>[-/.])(?P<month>\d{1,2})(?P=iso)(?P<day>\d{1,2})"
     r"|(?P<left>\d{1,2})(?P<mark>[-/.])(?P<middle>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2})"
@@ -35,8 +36,7 @@ FORM = re.compile(
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
     r"(?:[ \t]*(?P<half>[AaPp])\.?[ \t]?[Mm]\.?)?"
     r"[ \t]*(?P<zone>Z|(?P<sign>[+-])(?P<zonehour>\d{2}):?(?P<zoneminute>\d{2}))?)?"
-    r"[ \t]*",
-    re.ASCII,
+    r"[ \t]*"
 )
 
 
@@ -61,7 +61,13 @@ class _Stamps:
 
 def is_timestamp(cell: str) -> bool:
     """Return whether a cell has the form of a date, a time of day, or both."""
-    return bool(cell.strip()) and FORM.fullmatch(cell) is not None
+    return cell.lstrip(" \t")[:1].isdigit() and _any_form().fullmatch(cell) is not None
+
+
+@cache
+def _any_form() -> re.Pattern[str]:
+    """Return the form of a timestamp; compiled where a cell may be one: it takes milliseconds."""
+    return re.compile(PATTERN, re.ASCII)
 
 
 def seconds_since_first(cells: Cells) -> NDArray[np.float64]:
@@ -130,7 +136,7 @@ def _read(all_cells: Cells, column: int) -> _Stamps:
 
 
 def _form(column: int, row: int, cell: bytes) -> re.Match[str]:
-    form = FORM.fullmatch(cell.decode("latin-1")) if cell.strip() else None
+    form = _any_form().fullmatch(cell.decode("latin-1")) if cell.strip() else None
     if form is None:
         what = f"{_quoted(cell)} is not a timestamp" if cell.strip() else "an empty cell"
         raise StampError(row, column, what)
