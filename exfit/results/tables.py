@@ -31,13 +31,9 @@ def table(header: Sequence[str], columns: Sequence[Array]) -> str:
     csv.writer(out, lineterminator="\n").writerow(header)
     signals = columns[1:]
     rows = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
-    np.savetxt(
-        out,
-        np.column_stack([column[rows] for column in columns]),
-        fmt=[f"%.{clock_digits(columns[0], DIGITS)}g", *[f"%.{DIGITS}g"] * (len(columns) - 1)],
-        delimiter=",",
-    )
-    return out.getvalue()
+    numbers = np.column_stack([column[rows] for column in columns])
+    line = ",".join([f"%.{clock_digits(columns[0], DIGITS)}g", *[f"%.{DIGITS}g"] * len(signals)])
+    return out.getvalue() + f"{line}\n" * len(numbers) % tuple(numbers.ravel().tolist())
 
 
 def clock_digits(time: Array, digits: int) -> int:

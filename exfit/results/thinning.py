@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 
 MOST_ROWS = 20_000  # of the samples of a comparison
 MOST_NUMBERS = 100_000  # of the iterations' responses, and of the sensitivities of a signal
+MOST_PLACES = 22  # a larger power of ten is no double
+MOST_WHOLE = 2.0**53  # beyond it not every whole number is a double
+POWERS = np.array([float(f"1e{k}") for k in range(MOST_PLACES + 1)])
+MIDDLE = 1e-5  # of the last digit: what scaling by a power of ten may lose
 MOST_RESPONSES = 12  # of iterations in one figure that can be distinguished
 
 
@@ -80,10 +84,10 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
 
 def _overlay(overlay: Overlay, rows: NDArray[np.intp]) -> Overlay:
     return Overlay(
-        _rounded(overlay.measured[rows]),
-        _rounded(overlay.simulated[rows]),
-        None if overlay.start is None else _rounded(overlay.start[rows]),
-        None if overlay.reference is None else _rounded(overlay.reference[rows]),
+        rounded(overlay.measured[rows]),
+        rounded(overlay.simulated[rows]),
+        None if overlay.start is None else rounded(overlay.start[rows]),
+        None if overlay.reference is None else rounded(overlay.reference[rows]),
     )
 
 
@@ -94,8 +98,8 @@ def _responses(responses: IterationResponses, iterations: int) -> IterationRespo
     return replace(
         drawn,
         time=_instants(drawn.time, rows),
-        measured=_rounded(drawn.measured[rows]),
-        samples=np.stack([_rounded(samples[rows]) for samples in drawn.samples]),
+        measured=rounded(drawn.measured[rows]),
+        samples=np.stack([rounded(samples[rows]) for samples in drawn.samples]),
     )
 
 
@@ -110,9 +114,7 @@ def _sensitivity(channel: Sensitivity) -> Sensitivity:
     if not signals:
         return channel
     rows = _rows(signals, MOST_NUMBERS // len(signals))
-    moved: Mapping[str, Array] = {
-        name: _rounded(line[rows]) for name, line in channel.moved.items()
-    }
+    moved: Mapping[str, Array] = {name: rounded(line[rows]) for name, line in channel.moved.items()}
     return Sensitivity(channel.label, _instants(channel.time, rows), moved)
 
 
@@ -130,8 +132,8 @@ def _small_signal(of_tests: SmallSignalView) -> SmallSignalView:
 
 
 def _bode(bode: Bode) -> Bode:
-    response = _rounded(bode.response.real) + 1j * _rounded(bode.response.imag)
-    return Bode(_rounded(bode.frequency), np.asarray(response, dtype=np.complex128))
+    response = rounded(bode.response.real) + 1j * rounded(bode.response.imag)
+    return Bode(rounded(bode.frequency), np.asarray(response, dtype=np.complex128))
 
 
 def _rows(signals: Sequence[Array], most: int) -> NDArray[np.intp]:
@@ -140,9 +142,24 @@ def _rows(signals: Sequence[Array], most: int) -> NDArray[np.intp]:
 
 
 def _instants(time: Array, rows: NDArray[np.intp]) -> Array:
-    return _rounded(time[rows], clock_digits(time, DIGITS)) if len(rows) else time[rows]
+    return rounded(time[rows], clock_digits(time, DIGITS)) if len(rows) else time[rows]
 
 
-def _rounded(samples: Array, digits: int = DIGITS) -> Array:
-    text = f"%.{digits}g " * len(samples) % tuple(samples.tolist())  # faster than one by one
-    return np.array(text.split(), dtype=np.float64)
+def rounded(samples: Array, digits: int = DIGITS) -> Array:
+    """Return samples (M,) as their text with so many significant digits reads back.
+
+    A whole number over a power of ten is the double nearest to that text as long as both are exact;
+    the others, and those next to the middle between two texts, go by way of the text.
+    """
+    size = np.abs(samples)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        places = np.nan_to_num(digits - 1.0 - np.floor(np.log10(size)), posinf=0.0, neginf=0.0)
+        power = POWERS[np.minimum(np.abs(places), MOST_PLACES).astype(np.intp)]
+        scaled = np.where(places < 0.0, samples / power, samples * power)
+        whole = np.rint(scaled)
+        rounded = np.where(places < 0.0, whole * power, whole / power)
+        exact = (np.abs(places) <= MOST_PLACES) & (np.abs(whole) <= min(10.0**digits, MOST_WHOLE))
+        doubtful = ~exact | (np.abs(np.abs(scaled - whole) - 0.5) < MIDDLE)
+    for row in np.flatnonzero(doubtful & np.isfinite(samples)):
+        rounded[row] = float(f"{samples[row]:.{digits}g}")
+    return np.asarray(rounded)

@@ -1,7 +1,7 @@
 """Words and numbers as messages and files have them."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import isfinite
 from types import NoneType
 from typing import Any
@@ -14,40 +14,43 @@ def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
 
     A list of numbers is written in one line.
     """
-    return "".join(_json(content, ascii_only, "\n")) + "\n"
+    encoder = json.JSONEncoder(ensure_ascii=ascii_only, allow_nan=False)
+    return "".join(_json(content, encoder.encode, "\n")) + "\n"
 
 
 NUMBERS = {int, float, NoneType, bool}
 
 
-def _json(content: Any, ascii_only: bool, line: str) -> Iterator[str]:
-    """Yield the pieces of a text of JSON; ``line`` begins one at this depth."""
+def _json(content: Any, encode: Callable[[Any], str], line: str) -> list[str]:
+    """Return the pieces of a text of JSON; ``line`` begins one at this depth."""
     inner = line + "  "
     if isinstance(content, Mapping) and content:
-        begin = "{"
-        for key, value in content.items():
-            yield f"{begin}{inner}{json.dumps(str(key), ensure_ascii=ascii_only)}: "
-            yield from _json(value, ascii_only, inner)
-            begin = ","
-        yield line + "}"
-    elif isinstance(content, list | tuple) and not {*map(type, content)} <= NUMBERS:
-        begin = "["
-        for value in content:
-            yield begin + inner
-            yield from _json(value, ascii_only, inner)
-            begin = ","
-        yield line + "]"
-    else:
-        yield _plain(content, ascii_only)
+        entries = (
+            [f"{inner}{encode(str(key))}: ", *_json(value, encode, inner)]
+            for key, value in content.items()
+        )
+        return ["{", *_separated(entries), line, "}"]
+    if isinstance(content, list | tuple) and not {*map(type, content)} <= NUMBERS:
+        return ["[", *_separated([inner, *_json(v, encode, inner)] for v in content), line, "]"]
+    return [_plain(content, encode)]
 
 
-def _plain(content: Any, ascii_only: bool) -> str:
+def _separated(entries: Iterable[list[str]]) -> Iterator[str]:
+    """Yield the pieces of entries with a comma before each but the first."""
+    for number, pieces in enumerate(entries):
+        if number:
+            yield ","
+        yield from pieces
+
+
+def _plain(content: Any, encode: Callable[[Any], str]) -> str:
     """Return a text of JSON in one line: of a single value, or of a list of numbers."""
+    if isinstance(content, float):
+        return repr(float(content)) if isfinite(content) else "null"
     try:
-        return json.dumps(content, ensure_ascii=ascii_only, allow_nan=False)
+        return encode(content)
     except ValueError:
-        finite = _finite(content) if isinstance(content, float) else [_finite(x) for x in content]
-        return json.dumps(finite)
+        return encode([_finite(x) for x in content])
 
 
 def _finite(value: Any) -> Any:
