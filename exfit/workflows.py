@@ -28,13 +28,13 @@ from exfit.analysis.iteration_responses import (
     live_response,
 )
 from exfit.analysis.judgement import doubt_of
+from exfit.analysis.minima import minima_notes, minima_of
 from exfit.analysis.solution import (
     analysed,
     comparisons_of,
     fit_notes,
     fitted_parameters,
     iteration_of,
-    minima_of,
     record_notes,
 )
 from exfit.case import load
@@ -43,7 +43,8 @@ from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
 from exfit.fitting.residuals import SimulationCounter
-from exfit.fitting.search import fitted, search
+from exfit.fitting.search import fitted
+from exfit.fitting.search import search as search_case
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.system import values_of
 from exfit.records.record import Record
@@ -51,7 +52,7 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult, Iteration
 from exfit.simulation.simulator import Response
-from exfit.util.strategies import STRATEGIES
+from exfit.util.strategies import SEARCHES, STRATEGIES
 from exfit.util.text import near
 
 if TYPE_CHECKING:
@@ -76,15 +77,17 @@ def fit(
     search_progress: Callable[[estimate.Progress], None] = _ignore,
     live: Callable[[LiveResponse], None] | None = None,
     values: ValuesOrResult | None = None,
+    search: str | None = None,
 ) -> FitResult:
     """Fit the free parameters of a case to its records, and validate the result on its others.
 
     Args:
         case: a case, or the path of its file.
-        strategy: of the estimator; None: the case's own.
-        progress: called with every iteration; after a search from many starts with those of the
-            best. A KeyboardInterrupt, raised in it too, ends the search with the best point so far.
-        search_progress: called with how far a search from many starts is.
+        strategy: of the descent from the start of the case; None: the case's own.
+        progress: called with every iteration of the path that leads from the start of the case to
+            the result. A KeyboardInterrupt, raised in it too, ends the search with the best point
+            so far.
+        search_progress: called with how far the search from further starts is.
         live: called before ``progress`` with the response of that iteration.
         values: in place of those of the case, by name, or those of an earlier fit: of a free
             parameter its start. The result says which.
@@ -98,6 +101,9 @@ def fit(
     began = clock.perf_counter()
     case = with_values(loaded(case, values), values)
     method = checked_strategy(strategy or case.estimate.strategy)
+    options = case.estimate
+    if search is not None:
+        options = options.model_copy(update={"search": checked_search(search)})
     start = case.values()
     setups, problem = fitted(case)
     residuals, counter = problem.residuals, SimulationCounter()
@@ -113,13 +119,14 @@ def fit(
         progress(iteration_of(line, residuals))
 
     doubt = doubt_of(case, problem, setups, unseen)
-    found = search(case, problem, method, announce, search_progress, counter, doubt=doubt)
+    found = search_case(case, problem, method, announce, search_progress, counter, options, doubt)
     best = found.best
     history = [iteration_of(line, residuals) for line in found.history]
     values = residuals.values(best.x)
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
     analysis = analysed(case, problem, best, fine, comparisons, unseen, history)
+    minima = minima_of(residuals, found, analysis.uncertainty)
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
     return FitResult(
@@ -141,7 +148,7 @@ def fit(
         cost=best.cost,
         comparisons=comparisons,
         knowledge=analysis.uncertainty,
-        minima=minima_of(residuals, found.minima),
+        minima=minima,
         status=best.status,
         message=best.message,
         success=best.success,
@@ -155,6 +162,7 @@ def fit(
         seconds=clock.perf_counter() - began,
         notes=(
             *found.notes,
+            *minima_notes(residuals, found, minima),
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
         ),
         validation=analysis.validation,
@@ -175,6 +183,13 @@ def checked_strategy(strategy: str) -> str:
     if strategy not in STRATEGIES:
         raise CaseError([f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}"])
     return strategy
+
+
+def checked_search(search: str) -> str:
+    """Return how far to search, or raise CaseError where there is no search of this name."""
+    if search not in SEARCHES:
+        raise CaseError([f"search: {search!r} is unknown; {near(search, SEARCHES)}"])
+    return search
 
 
 def _was_interrupted(search_result: estimate.MultistartResult | None) -> bool:

@@ -9,8 +9,8 @@ from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.errors import SimulationError
 from exfit.estimate import Result
+from exfit.fitting.descents import Doubt
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.recommended import Doubt
 from exfit.fitting.residuals import LEAST_NOISE, noise_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.noise import LEAST_P, SURPRISING, whiteness

@@ -39,7 +39,7 @@ from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour
-from exfit.results.model import FittedParameter, Iteration, Minima, Minimum, PhaseEnd
+from exfit.results.model import FittedParameter, Iteration, PhaseEnd
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -187,25 +187,6 @@ def comparisons_of(
         )
         for setup in fine
     )
-
-
-def minima_of(
-    residuals: Residuals, search_result: estimate.MultistartResult | None
-) -> Minima | None:
-    """Return the minima of a search from many starts, in the parameters' own values.
-
-    None where it was interrupted before it came to one.
-    """
-    if search_result is None or not search_result.minima:
-        return None
-    names = [parameter.name for parameter in residuals.free]
-
-    def minimum(local: estimate.LocalMinimum) -> Minimum:
-        values = residuals.values(local.x)
-        return Minimum({name: values[name] for name in names}, local.cost, local.starts)
-
-    minima = tuple(minimum(local) for local in search_result.minima)
-    return Minima(minima, search_result.start_costs, search_result.end_costs)
 
 
 def fit_notes(

@@ -19,7 +19,7 @@ from exfit.cli.options import (
     set_option,
 )
 from exfit.cli.several_fits import fit_several
-from exfit.util.strategies import EXPLAINED, STRATEGIES
+from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
@@ -35,6 +35,11 @@ if TYPE_CHECKING:
     multiple=True,
     help=f"Strategy in place of that of the case; may be repeated. {EXPLAINED}.",
 )
+@click.option(
+    "--search",
+    type=click.Choice([*SEARCHES]),
+    help=f"How far to search, in place of what the case says. {SEARCHES_EXPLAINED}.",
+)
 @set_option
 @parameters_option
 @click.option("--watch", is_flag=True, help="Fit again whenever the case or a file of it changes.")
@@ -42,12 +47,16 @@ if TYPE_CHECKING:
 def fit(
     cases: tuple[Path, ...],
     strategies: tuple[str, ...],
+    search: str | None,
     changes: tuple[str, ...],
     parameters: Path | None,
     watch: bool,
     output: Output,
 ) -> None:
     """Fit the free parameters of each CASE to its records.
+
+    By default the search is global: further descents, from points distributed over the bounds,
+    look for a lower minimum than the one that the start of CASE leads to.
 
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
     runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged, or ended
@@ -72,32 +81,35 @@ def fit(
     if watch and several:
         raise click.UsageError("--watch fits one case with one strategy.")
     if several:
-        fit_several(cases, given, strategies, output)
+        fit_several(cases, given, strategies, search, output)
         return
     (case,), strategy = cases, strategies[0] if strategies else None
     if watch:
         if not output.shown:
             raise click.UsageError("--watch shows every fit: not together with --quiet or --json.")
-        fit_again_and_again(case, given, output.folder(f"{case.stem}-fit"), strategy, output)
+        folder = output.folder(f"{case.stem}-fit")
+        fit_again_and_again(case, given, folder, strategy, search, output)
         return
     from exfit.results.side_by_side import CONVERGED, outcome_of
 
     loaded = given.load(case)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
-        result = fit_live(loaded, folder, strategy, output)
+        result = fit_live(loaded, folder, strategy, search, output)
     else:
-        result = _fit(loaded, folder, strategy, output)
+        result = _fit(loaded, folder, strategy, search, output)
     if outcome_of(result) != CONVERGED:
         raise SystemExit(NOT_CONVERGED)
 
 
-def _fit(case: "Case", folder: Path, strategy: str | None, output: Output) -> "FitResult":
+def _fit(
+    case: "Case", folder: Path, strategy: str | None, search: str | None, output: Output
+) -> "FitResult":
     """Fit a case, write its files, and print JSON or nothing."""
     from exfit import workflows
     from exfit.output import run_folder
 
-    result = workflows.fit(case, strategy)
+    result = workflows.fit(case, strategy, search=search)
     try:
         figures = run_folder.write_fit(result, folder)
     finally:  # whatever becomes of the files

@@ -17,6 +17,7 @@ def fit_live(
     case: "Case",
     folder: Path,
     strategy: str | None,
+    search: str | None,
     output: Output,
     before: "FitResult | None" = None,
 ) -> "FitResult":
@@ -28,13 +29,9 @@ def fit_live(
     from exfit.output import run_folder, terminal
 
     console = terminal.console()
-    if case.estimate.starts > 1:
-        with terminal.ProgressBar(console).running() as progress:
-            result = workflows.fit(case, strategy, search_progress=progress)
-    else:
-        title, most = terminal.task(case, strategy), case.estimate.most_iterations
-        with terminal.LiveIterations(console, title, most).running() as shown:
-            result = workflows.fit(case, strategy, shown, shown.starts, shown.live)
+    title, most = terminal.task(case, strategy), case.estimate.most_iterations
+    with terminal.LiveIterations(console, title, most).running() as shown:
+        result = workflows.fit(case, strategy, shown, shown.starts, shown.live, search=search)
     try:
         figures = run_folder.write_fit(result, folder)
     finally:  # whatever becomes of the files
@@ -46,7 +43,12 @@ def fit_live(
 
 
 def fit_again_and_again(
-    case: Path, given: Given, folder: Path, strategy: str | None, output: Output
+    case: Path,
+    given: Given,
+    folder: Path,
+    strategy: str | None,
+    search: str | None,
+    output: Output,
 ) -> None:
     """Fit a case, and again whenever a file of it or of its given values changes, until Ctrl-C.
 
@@ -66,7 +68,7 @@ def fit_again_and_again(
             try:
                 loaded = given.load(case)
                 refuse_own_files(loaded, folder, "fit")
-                before = fit_live(loaded, folder, strategy, output, before)
+                before = fit_live(loaded, folder, strategy, search, output, before)
             except ExfitError as fault:
                 Refusal(str(fault)).show()
             if before is not None and before.interrupted:

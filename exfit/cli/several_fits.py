@@ -23,7 +23,11 @@ SERIES = "fits"  # the folder of a series by default
 
 
 def fit_several(
-    cases: Sequence[Path], given: Given, strategies: Sequence[str], output: Output
+    cases: Sequence[Path],
+    given: Given,
+    strategies: Sequence[str],
+    search: str | None,
+    output: Output,
 ) -> None:
     """Fit every case with every strategy, write the files of each fit and those of all.
 
@@ -36,7 +40,7 @@ def fit_several(
     from exfit.output import run_folder
 
     folder = output.folder(SERIES)
-    plan = planned(cases, strategies, given.load)
+    plan = planned(cases, strategies, given.load, search)
     _refuse_own_files(plan, folder)
     figures: dict[str, FigureFiles] = {}
     series = _shown(plan, folder, figures) if output.shown else _quiet(plan, folder, figures)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
+from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
+from exfit.fitting.global_search import SearchResult, Way, global_search, local_search
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
-from exfit.fitting.recommended import Doubt, SearchResult, recommended
 from exfit.fitting.residuals import (
     JACOBIANS,
     LEAST_NOISE,
@@ -24,6 +26,7 @@ from exfit.fitting.residuals import (
     jacobian_error,
 )
 from exfit.fitting.setup import ExperimentSetup
+from exfit.util.strategies import DEFAULT_STRATEGY
 
 Array = NDArray[np.float64]
 
@@ -54,30 +57,23 @@ def search(
     case: Case,
     problem: FitProblem,
     method: str,
-    announce: Callable[[estimate.SolverIteration], None],
+    announce: Announce,
     progress: Callable[[estimate.Progress], None],
     counter: SimulationCounter | None = None,
     options: Estimate | None = None,
     doubt: Doubt | None = None,
 ) -> SearchResult:
-    """Return the best point found from the start of a case, or from all its starts.
+    """Return the best point found from the start of a case and, in a global search, from others.
 
     ``counter`` counts the simulations of the search alone; ``options`` are by default the case's.
     ``doubt`` says why an end may not be the one looked for: strategy auto goes on then.
     """
     options = options or case.estimate
     searches = CaseSearches(problem, options, progress, counter)
-    if options.starts > 1:
-        minima = searches.from_starts(method, options.starts)
-        if minima.best is None:
-            raise KeyboardInterrupt
-        for line in minima.best.history:
-            announce(line)
-        return SearchResult(minima.best, minima, minima.best.history)
-    if method == "auto" and doubt is not None:
-        return recommended(searches, doubt, announce)
-    best = searches.one(method, announce)
-    return SearchResult(best, None, best.history)
+    judge = doubt if method == "auto" else None
+    methods = (method,) if judge is None else STAGES
+    search_of = local_search if options.search == "local" else global_search
+    return search_of(searches, methods, judge or no_doubt, announce)
 
 
 @dataclass(frozen=True)
@@ -94,42 +90,46 @@ class CaseSearches:
         """What is made small."""
         return self.problem.compressed.counted_by(self.counter)
 
-    def one(
-        self, method: str, announce: Callable[[estimate.SolverIteration], None]
-    ) -> estimate.Result:
-        """Return the end of a search from the start of the case."""
+    @property
+    def unbounded(self) -> tuple[str, ...]:
+        """The parameters without finite bounds."""
+        free = self.residuals.free
+        return tuple(each.name for each in free if not isfinite(each.high - each.low))
+
+    def one(self, method: str, announce: Announce) -> estimate.Result:
+        """Return the end of a descent from the start of the case."""
+        return self._descent(self.residuals.start, method, self.options.jacobian, announce)
+
+    def refined(self, end: estimate.Result, announce: Announce) -> estimate.Result:
+        """Return the descent from an end with the full tolerances of the case."""
+        return self._descent(end.x, DEFAULT_STRATEGY, "exact", announce)
+
+    def _descent(self, x: Array, method: str, jacobian: str, announce: Announce) -> estimate.Result:
         return estimate.least_squares(
             self.residuals,
-            self.residuals.start,
-            jac=JACOBIANS[self.options.jacobian](self.residuals),
+            x,
+            jac=JACOBIANS[jacobian](self.residuals),
             bounds=self.residuals.bounds,
             method=method,
             callback=announce,
-            **_settings(self.options, self.residuals),
+            **_settings(self.options, self.residuals, jacobian),
         )
 
-    def from_starts(self, method: str, count: int) -> estimate.MultistartResult:
-        """Return the minima from the start of the case and others over the bounds."""
-        start, bounds = self.residuals.start, self.residuals.bounds
-        return self._refined(method, estimate.spread(bounds, count, start))
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """What the descent from each further start begins with."""
+        direct: tuple[Way, ...] = ("direct",)
+        return direct * self.options.starts
 
-    def many(
-        self, method: str, count: int, earlier: Sequence[estimate.Result]
-    ) -> estimate.MultistartResult | None:
-        """Return the minima from starts over the bounds; None where these are not finite."""
-        if not np.isfinite(self.residuals.bounds).all():
-            return None
-        return self._refined(method, estimate.spread(self.residuals.bounds, count), earlier)
-
-    def _refined(
-        self, method: str, points: Array, earlier: Sequence[estimate.Result] = ()
-    ) -> estimate.MultistartResult:
+    def further(self, earlier: Sequence[estimate.Result]) -> estimate.MultistartResult:
+        """Return the minima from further starts and of earlier descents."""
+        points = estimate.spread(self.residuals.bounds, self.options.starts)
         descent = estimate.Descent(
-            functions=SideBySide(self.residuals, self.options.jacobian),
+            functions=SideBySide(self.residuals, "exact"),
             bounds=self.residuals.bounds,
-            method=method,
+            method=DEFAULT_STRATEGY,
             ftol=TO_DISTINGUISH,
-            **_settings(self.options, self.residuals),
+            **_settings(self.options, self.residuals, "exact"),
         )
         return estimate.multistart(points, [descent], watch=self.progress, earlier=earlier)
 
@@ -144,7 +144,7 @@ class CaseSearches:
         return LIKELIHOOD_RATIO * cost / freedom + 0.5 * LEAST_NOISE**2 * sum(weights)
 
 
-def _settings(options: Estimate, residuals: Residuals) -> dict[str, Any]:
+def _settings(options: Estimate, residuals: Residuals, jacobian: str) -> dict[str, Any]:
     """Return the settings of a search, by the names that `exfit.estimate` has for them."""
     stop = options.stop
     return {
@@ -153,7 +153,7 @@ def _settings(options: Estimate, residuals: Residuals) -> dict[str, Any]:
         "gtol_absolute": options.tolerance.gradient_absolute,
         "xtol": options.tolerance.step,
         "x_scale": UNIT,
-        "jacobian_error": jacobian_error(options.jacobian, options.difference_step),
+        "jacobian_error": jacobian_error(jacobian, options.difference_step),
         "good_enough": _good_enough(options, residuals),
         "matches": None if stop is None else partial(residuals.match, rmse=stop.rmse),
         "searches": searches_of(options),

@@ -24,12 +24,14 @@ Progress = Iteration | estimate.Progress
 class PlannedFit:
     """A fit that has still to run: the name that no other of its series has, case and strategy.
 
-    ``case_name`` is that of the case, which no other case of the series has.
+    ``case_name`` is that of the case, which no other case of the series has; ``search`` is how far
+    to search, None: as the case says.
     """
 
     case_name: str
     case: Case
     strategy: str
+    search: str | None
     name: str
 
 
@@ -103,15 +105,18 @@ def fit_all(
     strategies: Iterable[str] = (),
     progress: Callable[[PlannedFit, Progress], None] = _ignore_progress,
     finished: Callable[[FitRun], None] = _ignore_run,
+    search: str | None = None,
 ) -> FitSeries:
     """Fit every case with every strategy; all cases are checked before the first fit.
 
     Args:
         cases: cases, or the paths of their files.
-        strategies: of the estimator; none: the own strategy of each case.
-        progress: called with the fit that runs and its iteration, or how far its search from many
-            starts is.
+        strategies: of the descent from the start of a case; none: the own strategy of each case.
+        progress: called with the fit that runs and its iteration, or how far its search from
+            further starts is.
         finished: called with every fit that has ended, so that its files can be written.
+        search: "global", or "local" for the descent from the start of each case alone; None: as
+            each case says.
 
     A KeyboardInterrupt ends the series: it has the fits that were done, and the best point of the
     one that was running. Raises CaseError with the faults of all cases.
@@ -120,13 +125,14 @@ def fit_all(
         >>> series = exfit.fit_all(["a.yaml", "b.yaml"], ["dgn", "lm"])
         >>> {name: result.cost for name, result in series.results.items()}
     """
-    return run_all(planned([*cases], [*strategies]), progress, finished)
+    return run_all(planned([*cases], [*strategies], search=search), progress, finished)
 
 
 def planned(
     cases: Sequence[CaseOrPath],
     strategies: Sequence[str],
     load: Callable[[Any], Case] = workflows.loaded,
+    search: str | None = None,
 ) -> tuple[PlannedFit, ...]:
     """Return the fits of every case with every strategy, or with its own where none is given.
 
@@ -138,6 +144,7 @@ def planned(
         *_repeated("case", files, [Path(file).resolve() for file in files]),
         *_repeated("strategy", strategies, strategies),
         *_faults(workflows.checked_strategy, strategies),
+        *_faults(workflows.checked_search, [] if search is None else [search]),
         *_faults(lambda source: read.append(_ready(load(source))), cases),
     ]
     if faults:
@@ -150,7 +157,8 @@ def planned(
     ]
     runs = _numbered([f"{name}-{strategy}" for name, _, strategy in combinations])
     return tuple(
-        PlannedFit(*combination, run) for combination, run in zip(combinations, runs, strict=True)
+        PlannedFit(*combination, search, run)
+        for combination, run in zip(combinations, runs, strict=True)
     )
 
 
@@ -167,7 +175,7 @@ def run_all(
         for fit in plan:
             shown = partial(progress, fit)
             try:
-                result = workflows.fit(fit.case, fit.strategy, shown, shown)
+                result = workflows.fit(fit.case, fit.strategy, shown, shown, search=fit.search)
                 runs.append(FitRun(fit.name, fit.case_name, result))
                 finished(runs[-1])
             except ExfitError as fault:

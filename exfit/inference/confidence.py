@@ -82,6 +82,13 @@ class Confidence:
         """The parameters."""
         return self.correlation.names
 
+    @property
+    def variance(self) -> float:
+        """The variance of a weighted error, widened where errors are not white: of all channels."""
+        squares = [channel_noise.spread**2 for channel_noise in self.noise]
+        samples = [channel_noise.samples for channel_noise in self.noise]
+        return float(np.average(squares, weights=samples))
+
 
 def confidence(lin: Linearisation) -> Confidence:
     """Return standard errors and 95 % intervals of the parameters of a fit, by linear theory.
@@ -129,14 +136,10 @@ def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
     of the channels by their samples.
     """
     half = 0.5 * student_quantile(intervals.dof, 0.5 * (1.0 + LEVEL)) ** 2
-    squares = [channel_noise.spread**2 for channel_noise in intervals.noise]
-    mean = float(
-        np.average(squares, weights=[channel_noise.samples for channel_noise in intervals.noise])
-    )
     plain = np.diag(factored(lin, lin.free).inverse) * lin.size**2
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = np.diag(intervals.covariance) / plain
-    ratios = np.where(np.isfinite(ratios), ratios, mean)
+    ratios = np.where(np.isfinite(ratios), ratios, intervals.variance)
     return dict(zip(lin.names, (half * ratios).tolist(), strict=True))
 
 

@@ -103,19 +103,27 @@ class FittedParameter:
 
 
 class Minimum(NamedTuple):
-    """A minimum of the cost: the values there, and how many starts led to it."""
+    """A minimum of the cost: the values there, and how many descents led to it.
+
+    ``chi_square`` is how far it lies above the lowest one, in variances of the residuals; it is
+    ``refuted`` where that exceeds the limit of the likelihood ratio at 95 %. None: not known.
+    """
 
     values: Mapping[str, float]
     cost: float
     starts: int
+    chi_square: float | None = None
+    refuted: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Minima:
-    """What a search from many starts found: the distinct minima, the lowest first.
+    """What a search from several starts found: the distinct minima, the lowest first.
 
     ``start_costs`` (starts,) are inf where there is no response, ``end_costs`` (starts,) nan where
-    a start was not refined.
+    a start was not refined; those of the case's own start come first. ``ways`` (starts,) says what
+    each descent began with: the strategy of the case, its linear phase, or the model itself; it is
+    empty in results of an earlier version.
     """
 
     DERIVED: ClassVar = {"starts": "starts", "refined": "refined", "failed": "failed"}
@@ -123,6 +131,7 @@ class Minima:
     minima: tuple[Minimum, ...]
     start_costs: Annotated[Array, inf]
     end_costs: Annotated[Array, nan]
+    ways: tuple[Literal["strategy", "linear", "direct"], ...] = ()
 
     @property
     def starts(self) -> int:

@@ -1,4 +1,7 @@
-"""The strategies of a search, in words; `exfit.estimate.strategies` holds their functions."""
+"""The strategies of a descent, and how far a search goes, in words.
+
+`exfit.estimate.strategies` holds the functions of the strategies.
+"""
 
 from collections.abc import Mapping
 
@@ -7,14 +10,22 @@ PHASES: Mapping[str, str] = {
     "dgn": "damped Gauss-Newton",
     "gn": "Gauss-Newton",
 }
+FROM_FURTHER_STARTS = "search"  # in the history: the point that the search from them found
 STRATEGIES: Mapping[str, str] = {
     "gn": "Gauss-Newton with full steps (a first one that fails is shortened once)",
     "dgn": "damped Gauss-Newton: each step capped, then shortened until Armijo's rule holds",
     "lm": "Levenberg-Marquardt",
     "lm-then-dgn": "lm to reach a better start, then dgn, and lm again where that stalls",
-    "auto": "dgn; where noise or validation casts doubt on its match lm-then-dgn, then 16 more "
-    "starts; the lowest minimum of all",
+    "auto": "dgn; where noise or validation casts doubt on its match lm-then-dgn; of minima that "
+    "the records do not distinguish, one on which the validation holds",
     "robust": "gn while it makes progress, then lm",
 }
 DEFAULT_STRATEGY = "lm-then-dgn"
+SEARCHES: Mapping[str, str] = {
+    "global": "the descent from the start of the case by its strategy, then further descents from "
+    "points distributed over the bounds; the lowest minimum is the result",
+    "local": "the descent from the start of the case alone",
+}
+DEFAULT_SEARCH = "local"
 EXPLAINED = "; ".join(f"{name}: {words}" for name, words in STRATEGIES.items())
+SEARCHES_EXPLAINED = "; ".join(f"{name}: {words}" for name, words in SEARCHES.items())

@@ -21,7 +21,7 @@ from rich.table import Table
 
 import exfit
 from exfit.case.load import load_case
-from exfit.fitting.recommended import MORE_STARTS
+from exfit.fitting.descents import MORE_STARTS
 from exfit.fitting.search import fitted
 from exfit.results.side_by_side import CONVERGED, outcome_of
 

@@ -14,6 +14,7 @@ from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
+from exfit.util.strategies import DEFAULT_SEARCH
 
 LM_UPDATES = {
     "radius": "radius",
@@ -91,9 +92,8 @@ def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
     for key, needed in LM_UPDATES.items():
         if key in lm and update in LM_UPDATES.values() and update != needed:
             yield lm.at(key).fault(f"only with estimate.lm.update: {needed}")
-    starts = estimate.at("starts").number
-    if "refine" in estimate and (starts is None or starts <= 1.0):
-        yield estimate.at("refine").fault("only with more than one of estimate.starts")
+    if "starts" in estimate and estimate.content.get("search", DEFAULT_SEARCH) == "local":
+        yield estimate.at("starts").fault("only with estimate.search: global")
     if (
         "loss_scale" in estimate
         and estimate.content.get("loss", "least-squares") == "least-squares"
@@ -104,11 +104,13 @@ def _estimate_faults(content: ContentNode) -> Iterator[Fault]:
 def _starts_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
     """Yield the bounds that are missing where starts are spread between them."""
     starts = content.at("estimate", "starts").number
-    if starts is None or starts <= 1.0:
+    if starts is None or content.at("estimate").content.get("search") == "local":
         return
     for part in parts.all:
         for _, parameter in () if part.free is None else content.at(*part.free).sections:
             for bound in ("min", "max"):
                 if parameter.is_section and bound not in parameter:
-                    text = f"is missing: estimate.starts spreads {starts:g} starts over the bounds"
+                    text = (
+                        f"is missing: estimate.starts distributes {starts:g} starts over the bounds"
+                    )
                     yield parameter.at(bound).fault(text)

@@ -16,15 +16,25 @@ from exfit.case.schema.values import (
     Section,
     nothing,
 )
-from exfit.util.strategies import DEFAULT_STRATEGY, EXPLAINED, STRATEGIES
+from exfit.util.strategies import (
+    DEFAULT_SEARCH,
+    DEFAULT_STRATEGY,
+    EXPLAINED,
+    SEARCHES,
+    SEARCHES_EXPLAINED,
+    STRATEGIES,
+)
 
 if TYPE_CHECKING:
     Strategy = str
+    SearchKind = str
 else:
     Strategy = Literal[tuple(STRATEGIES)]
+    SearchKind = Literal[tuple(SEARCHES)]
 
 MOST_ITERATIONS = 100  # of a phase, by default
 MOST_DIFFERENCE = 0.1  # a tenth of a parameter: beyond it no difference is a derivative
+FURTHER_STARTS = 16  # a power of two: its points are balanced
 MOST_STARTS = 1_000_000  # a day of simulations; their points alone fill 100 MB
 
 
@@ -127,7 +137,8 @@ class Estimate(Section):
     """How the free parameters are estimated."""
 
     strategy: Strategy = Field(
-        default=DEFAULT_STRATEGY, description=f"Method of the search. {EXPLAINED}."
+        default=DEFAULT_STRATEGY,
+        description=f"Method of the descent from the start of the case. {EXPLAINED}.",
     )
     jacobian: Literal["exact", "central", "forward", "backward"] = Field(
         default="exact", description="Derivatives: exact, or by differences."
@@ -174,12 +185,12 @@ class Estimate(Section):
         description="Size of a residual, in standard deviations of the noise, from which huber and "
         "soft-l1 count it less than its square.",
     )
-    starts: Annotated[Count, Field(le=MOST_STARTS)] = Field(
-        default=1,
-        description="Number of starts, distributed over the bounds; the first is that of the case.",
+    search: SearchKind = Field(
+        default=DEFAULT_SEARCH, description=f"How far the search goes. {SEARCHES_EXPLAINED}."
     )
-    refine: Count | None = Field(
-        default=None, description="Number of the best starts that are fitted; default: all."
+    starts: Annotated[Count, Field(le=MOST_STARTS)] = Field(
+        default=FURTHER_STARTS,
+        description="Number of further starts of the global search.",
     )
 
     @property

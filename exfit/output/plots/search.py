@@ -7,12 +7,23 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from exfit.output.plots.style import GREEN, LIMIT, MEASURED, SIMULATED, START, WIDTH, tidy
 from exfit.results.model import FitResult, Minima
-from exfit.util.strategies import PHASES
+from exfit.util.strategies import FROM_FURTHER_STARTS, PHASES
 
-COLOURS: Mapping[str, str] = dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False))
+COLOURS: Mapping[str, str] = {
+    **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
+    FROM_FURTHER_STARTS: LIMIT,
+}
+LABELS: Mapping[str, str] = {**PHASES, FROM_FURTHER_STARTS: "found from further starts"}
+
+WAYS = {
+    "strategy": ("the case's start", "D"),
+    "linear": ("by way of the linear phase", "o"),
+    "direct": ("other starts", "^"),
+}  # what a descent began with: its label and its mark
 
 
 def convergence(result: FitResult) -> Figure:
@@ -52,7 +63,7 @@ def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: st
             color=COLOURS[phase],
             markersize=4,
             clip_on=False,
-            label=PHASES[phase],
+            label=LABELS[phase],
         )
 
 
@@ -88,25 +99,38 @@ def trajectories(result: FitResult) -> Figure:
 
 
 def waterfall(search: Minima, title: str) -> Figure:
-    """Return the costs that all starts led to, in rising order, with those they began at."""
+    """Return the costs that all descents led to, in rising order, with those they began at."""
     figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     axes = figure.subplots()
-    refined = np.flatnonzero(np.isfinite(search.end_costs))
-    order = refined[np.argsort(search.end_costs[refined], kind="stable")]
-    ranks = np.arange(1, len(order) + 1)
-    axes.plot(ranks, search.start_costs[order], ".", color=MEASURED, markersize=3, label="start")
-    axes.step(
-        ranks, search.end_costs[order], where="mid", color=SIMULATED, linewidth=1.4, label="refined"
-    )
+    ended = np.flatnonzero(np.isfinite(search.end_costs))
+    order = ended[np.argsort(search.end_costs[ended], kind="stable")]
+    ranks, ends = np.arange(1, len(order) + 1), search.end_costs[order]
+    axes.plot(ranks, search.start_costs[order], "_", color=MEASURED, markersize=7, label="start")
+    axes.step(ranks, ends, where="mid", color=MEASURED, linewidth=0.8)
+    ways = np.array(search.ways or ("direct",) * search.starts)[order]
+    refuted = refuted_ends(search, ends)
+    for way, (label, marker) in WAYS.items():
+        for verdict, color in ((False, GREEN), (True, SIMULATED)):
+            own = (ways == way) & (refuted == verdict)
+            text = f"{label}, refuted" if verdict else label
+            if own.any():
+                axes.plot(ranks[own], ends[own], marker, color=color, markersize=5, label=text)
     axes.set_yscale("log")
-    axes.set_xlabel("start, by the cost that it led to")
+    axes.set_xlabel("descent, by the cost that it led to")
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.legend(loc="outside lower right", ncols=2, frameon=False)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     best = search.minima[0].starts
     axes.set_title(
-        f"{best} of {len(order)} refined starts led to the lowest minimum", fontsize=9, loc="right"
+        f"{best} of {search.starts} descents led to the lowest minimum", fontsize=9, loc="right"
     )
     tidy(axes)
-    figure.suptitle(f"{title}: the minima that {len(search.start_costs)} starts found", fontsize=11)
+    figure.suptitle(f"{title}: where {search.starts} descents ended", fontsize=11)
     return figure
+
+
+def refuted_ends(search: Minima, ends: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which ends the records refute: those of the minima at or next below them."""
+    minima = sorted(search.minima, key=lambda minimum: minimum.cost)
+    places = np.searchsorted([minimum.cost for minimum in minima], ends, side="right") - 1
+    return np.array([bool(minima[max(place, 0)].refuted) for place in places], dtype=np.bool_)

@@ -1,6 +1,6 @@
 """The result of a fit."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -18,9 +18,8 @@ from exfit.output.terminal.terminal import (
     remarks,
     unresolved,
 )
-from exfit.results.model import FitResult, FittedParameter, Minima
-
-MOST_MINIMA = 5  # columns that fit beside each other
+from exfit.results.model import FitResult, FittedParameter
+from exfit.results.search_summary import search_summary
 
 
 def fit(console: Console, result: FitResult, before: FitResult | None = None) -> None:
@@ -48,8 +47,7 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     _phase_ends(console, result)
     console.print(f"sub-steps: {result.substeps}")
     if result.minima is not None:
-        console.print()
-        minima(console, result.minima, result.parameters)
+        remarks(console, "search:", [search_summary(result.minima, result.cost)], "bold")
     if result.knowledge is not None:
         console.print()
         remarks(console, "sensitivity:", ranking(result.knowledge.effects), "bold")
@@ -105,22 +103,3 @@ def _marks(parameter: FittedParameter) -> Iterator[str]:
         yield "not physical"
     if parameter.interval_note:
         yield parameter.interval_note
-
-
-def minima(console: Console, search: Minima, parameters: Iterable[str]) -> None:
-    """Show the distinct minima of a search from many starts, the lowest first."""
-    refined = sum(minimum.starts for minimum in search.minima)
-    console.print(
-        f"{len(search.start_costs)} starts, {refined} refined, {search.failed} without a response; "
-        f"distinct minima: {len(search.minima)}"
-    )
-    lowest = search.minima[:MOST_MINIMA]
-    ranks = [str(rank) for rank, _ in enumerate(lowest, start=1)]
-    table = plain_table("minimum", *ranks, numbers=ranks)
-    table.add_row("cost", *(f"{minimum.cost:.3e}" for minimum in lowest))
-    table.add_row("starts", *(str(minimum.starts) for minimum in lowest))
-    for name in parameters:
-        table.add_row(name, *(number(minimum.values[name], 4) for minimum in lowest))
-    console.print(table)
-    if len(search.minima) > len(lowest):
-        console.print(f"and {len(search.minima) - len(lowest)} more, all in result.json")

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from exfit.fitting.recommended import MORE_STARTS, STAGES, recommended
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
-from exfit.fitting.recommended import MORE_STARTS, STAGES, recommended
 
 MARGIN = 0.01  # of a cost
 

@@ -1,0 +1,112 @@
+"""The minima that a search found: which of them the records refute, and what is said of them."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.fitting.global_search import SearchResult, is_same
+from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
+from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.results.model import Minima, Minimum
+
+Values = Mapping[str, float]
+
+TINY = float(np.finfo(float).tiny)
+REMARKABLE = 0.1  # difference between values of a parameter, as a share, that is worth a word
+MOST_VALUES = 6  # of a minimum, in a sentence
+
+
+def minima_of(
+    residuals: Residuals, search: SearchResult, uncertainty: UncertaintyAnalysis | None
+) -> Minima | None:
+    """Return the minima of a search from several starts, in the parameters' own values.
+
+    Half the likelihood ratio of two of them is the difference of their costs over the variance of
+    the residuals, which the ``uncertainty`` of the result widens where they are not white. None
+    where the search came to no minimum, or there were no further starts.
+    """
+    if search.minima is None or not search.minima.minima:
+        return None
+    found = search.minima
+    ends = [
+        (search.best.x, search.best.cost) if k == search.place else (local.x, local.cost)
+        for k, local in enumerate(found.minima)
+    ]
+    lowest = min(cost for _, cost in ends)
+    variance = variance_of(residuals, lowest, uncertainty)
+    chi_squares = [2.0 * (cost - lowest) / variance for _, cost in ends]
+    minima = tuple(
+        Minimum(own_values(residuals, x), cost, local.starts, chi_square, chi_square > REFUTED)
+        for local, (x, cost), chi_square in zip(found.minima, ends, chi_squares, strict=True)
+    )
+    return Minima(minima, found.start_costs, found.end_costs, search.ways)
+
+
+def variance_of(
+    residuals: Residuals, cost: float, uncertainty: UncertaintyAnalysis | None
+) -> float:
+    """Return the variance of the residuals at a minimum: no less than that of any recorder."""
+    freedom = max(1, residuals.count - len(residuals.free))
+    own = 2.0 * cost / freedom if uncertainty is None else uncertainty.confidence.variance
+    return max(own, LEAST_NOISE**2)
+
+
+def own_values(residuals: Residuals, x: NDArray[np.float64]) -> dict[str, float]:
+    """Return the values of the free parameters."""
+    values = residuals.values(x)
+    return {parameter.name: values[parameter.name] for parameter in residuals.free}
+
+
+def minima_notes(
+    residuals: Residuals, search: SearchResult, minima: Minima | None
+) -> Iterator[str]:
+    """Yield what must be known of the other minima beside the result of a search."""
+    if search.minima is not None and search.minima.interrupted:
+        ends = search.minima.end_costs
+        done = int(np.count_nonzero(np.isfinite(ends)))
+        yield (
+            f"interrupted in the search from further starts: {done} of {len(ends)} descents were "
+            "done, and this is the best of them"
+        )
+    if search.minima is None or minima is None:
+        return
+    best, own = search.best, search.own
+    here = own_values(residuals, best.x)
+    if own.cost > best.cost and not own.success and search.goes_on:
+        yield (
+            f"the descent from the start of the case ended at {times(own.cost, best.cost)} this "
+            f"cost: {own.message}"
+        )
+    for k, (local, minimum) in enumerate(zip(search.minima.minima, minima.minima, strict=True)):
+        is_own = search.goes_on and own.success and is_same(local.result, own)
+        if k == search.place or (minimum.refuted and not is_own):
+            continue
+        verdict = (
+            "which the record refutes"
+            if minimum.refuted
+            else f"which the record does not refute (chi-square {minimum.chi_square:.2g} above the "
+            f"lowest, limit {REFUTED})"
+        )
+        yield (
+            f"{'the descent from the start of the case ended at ' if is_own else 'there is '}"
+            f"another minimum, {times(minimum.cost, best.cost)} this cost, {verdict}: "
+            f"{differences(minimum.values, here)}"
+        )
+
+
+def times(cost: float, other: float) -> str:
+    """Return a cost in words, as a multiple of another one."""
+    return f"{cost / other:.4g} times" if other > 0.0 else f"{cost:.3g} pu² above"
+
+
+def differences(there: Values, here: Values) -> str:
+    """Return which values of a minimum are others than here, those that differ most first."""
+    apart = {
+        name: abs(value - here[name]) / max(abs(value), abs(here[name]), TINY)
+        for name, value in there.items()
+    }
+    remarkable = [name for name in apart if apart[name] > REMARKABLE] or [*apart]
+    names = sorted(remarkable, key=lambda name: -apart[name])[:MOST_VALUES]
+    return ", ".join(f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in names)

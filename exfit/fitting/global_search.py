@@ -1,0 +1,213 @@
+"""The global search: the descent from the start of a case, then others from further starts."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import nan
+from typing import Literal, NamedTuple, Protocol
+
+from exfit.estimate import MultistartResult, Result, SolverIteration, Stop
+from exfit.estimate.starts import end_of, same
+from exfit.fitting.descents import (
+    Announce,
+    Descents,
+    Doubt,
+    SearchMethods,
+    chosen,
+    confirmed,
+    count_like,
+    counted,
+    following,
+    from_start,
+    notes_of,
+    stopped,
+)
+from exfit.util.strategies import FROM_FURTHER_STARTS
+
+Way = Literal["strategy", "linear", "direct"]
+
+AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)
+
+
+class SearchResult(NamedTuple):
+    """The best point of a search, and how it was found.
+
+    ``minima`` are those of all descents, None where there were no further starts; ``history`` leads
+    from the start of the case to ``best``, which is that at ``place`` of the minima, None where it
+    is none of them; ``own`` is the best end of the descents from the start of the case. ``ways``
+    says what each descent began with: the strategy of the case, its linear phase, or the model
+    itself.
+    """
+
+    best: Result
+    minima: MultistartResult | None
+    history: tuple[SolverIteration, ...]
+    own: Result
+    place: int | None = None
+    ways: tuple[Way, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether the path goes on from a point that further starts led to."""
+        return any(line.phase == FROM_FURTHER_STARTS for line in self.history)
+
+
+class GlobalSearchMethods(SearchMethods, Protocol):
+    """The searches of a case, those from further starts among them."""
+
+    @property
+    def unbounded(self) -> tuple[str, ...]:
+        """The parameters without finite bounds: there no starts can be distributed."""
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """What the descent from each further start begins with."""
+
+    def further(self, earlier: Sequence[Result]) -> MultistartResult:
+        """Return the minima from further starts and of earlier descents."""
+
+    def refined(self, end: Result, announce: Announce) -> Result:
+        """Return the descent from an end with the full tolerances of the case."""
+
+
+def local_search(
+    searches: SearchMethods, methods: Sequence[str], doubt: Doubt, announce: Announce
+) -> SearchResult:
+    """Return the best point of the descents from the start of a case."""
+    return best_of(searches, from_start(searches, methods, doubt, announce))
+
+
+def global_search(
+    searches: GlobalSearchMethods, methods: Sequence[str], doubt: Doubt, announce: Announce
+) -> SearchResult:
+    """Return the best point of the descents from the start of a case and from further starts.
+
+    Of minima that the records do not tell apart it is one without doubt, if there is one. Where the
+    descents of the case came to the same minimum, theirs is the result; else a last descent from
+    the end found. An interruption keeps the best point so far.
+    """
+    descents = from_start(searches, methods, doubt, announce)
+    if descents.interrupted:
+        return best_of(searches, descents)
+    reason = why_local(searches, descents.best)
+    if reason:
+        alone = best_of(searches, descents)
+        return alone._replace(notes=(*alone.notes, f"no search from further starts: {reason}"))
+    return beyond(searches, descents, searches.further(descents.ends), doubt, announce)
+
+
+def why_local(searches: GlobalSearchMethods, own: Result) -> str:
+    """Return why there can be no search from further starts, "" where there can."""
+    if own.stop in AT_TOLERANCE:
+        return "a tolerance that the case gives ended the descent from its start"
+    if searches.unbounded:
+        names = ", ".join(searches.unbounded)
+        return f"they are distributed between bounds, and {names} has no min or no max"
+    return ""
+
+
+def best_of(searches: SearchMethods, descents: Descents) -> SearchResult:
+    """Return the best of the descents from the start of a case."""
+    best, notes = descents.best, tuple[str, ...]()
+    if not descents.interrupted:
+        costs = [end.cost for end in descents.ends]
+        like = count_like(min(costs), costs, searches)
+        best = confirmed(best, descents.doubts[-1], like)
+        notes = tuple(notes_of(descents.doubts, best, like, costs))
+    best = counted(best, descents.ends)
+    return SearchResult(best, None, descents.history, best, notes=notes)
+
+
+def beyond(
+    searches: GlobalSearchMethods,
+    descents: Descents,
+    minima: MultistartResult,
+    doubt: Doubt,
+    announce: Announce,
+) -> SearchResult:
+    """Return the best of the descents from the start of a case and of the minima found with it."""
+    ends = [minimum.result for minimum in minima.minima]
+    try:
+        if minima.interrupted:
+            raise KeyboardInterrupt
+        best, reason = chosen(searches, doubt, ends)
+    except KeyboardInterrupt:
+        best = min([*descents.ends, *filter(None, [minima.best])], key=lambda end: end.cost)
+        return interrupted(searches, descents, minima, best, announce)
+    like = count_like(ends[0].cost, minima.end_costs, searches)
+    own = own_end(descents, best)
+    if own is None:
+        path, last = refined(searches, descents, best, announce)
+    else:
+        path, last = descents._replace(best=own).history, counted(own, descents.ends)
+    last = confirmed(last, reason, like)
+    notes = notes_of((*descents.doubts, reason), last, like, minima.end_costs)
+    place = next(k for k, end in enumerate(ends) if end is best)
+    return SearchResult(
+        last, minima, path, descents.best, place, ways_of(searches, descents), tuple(notes)
+    )
+
+
+def own_end(descents: Descents, best: Result) -> Result | None:
+    """Return the end of the descents from the start of a case in a minimum, None where none is."""
+    for end in descents.ends:
+        if end.history is best.history:
+            return end
+    ends = [end for end in descents.ends if end.success and is_same(best, end)]
+    return min(ends, key=lambda end: end.cost, default=None)
+
+
+def is_same(best: Result, other: Result) -> bool:
+    """Return whether two ends are one minimum."""
+    return same(end_of(best, 0.0), end_of(other, 0.0))
+
+
+def refined(
+    searches: GlobalSearchMethods, descents: Descents, end: Result, announce: Announce
+) -> tuple[tuple[SolverIteration, ...], Result]:
+    """Return a last descent from an end that further starts led to, behind those of the case."""
+    path = [*descents.history]
+    last = path[-1]
+
+    def join(line: SolverIteration) -> None:
+        path.append(after_search(last, line) if path[-1] is last else following(last, line))
+        announce(path[-1])
+
+    result = searches.refined(end, join)
+    return tuple(path), replace(result, nfev=last.nfev + result.nfev, njev=last.njev + result.njev)
+
+
+def after_search(last: SolverIteration, point: SolverIteration) -> SolverIteration:
+    """Return the line of a point that further starts led to, behind the last one of the case."""
+    line = following(last, replace(point, number=0))
+    return replace(
+        line, phase=FROM_FURTHER_STARTS, step_norm=0.0, damping=nan, inner=0, capped=None
+    )
+
+
+def ways_of(searches: GlobalSearchMethods, descents: Descents) -> tuple[Way, ...]:
+    """Return what each descent began with, those from the start of the case first."""
+    own: tuple[Way, ...] = ("strategy",)
+    return own * len(descents.ends) + searches.ways
+
+
+def interrupted(
+    searches: GlobalSearchMethods,
+    descents: Descents,
+    minima: MultistartResult,
+    best: Result,
+    announce: Announce,
+) -> SearchResult:
+    """Return the best point of a search that an interruption ended."""
+    minima, own = replace(minima, interrupted=True), own_end(descents, best)
+    ways = ways_of(searches, descents)
+    if own is not None:
+        path = descents._replace(best=own).history
+        ends = enumerate(minima.minima)
+        place = next((k for k, end in ends if is_same(end.result, own)), None)
+        return SearchResult(counted(own, descents.ends), minima, path, own, place, ways)
+    last = descents.history[-1]
+    line = after_search(last, replace(best.history[-1], nfev=0, njev=0))
+    announce(line)
+    best = replace(stopped(best, Stop.INTERRUPTED), nfev=last.nfev, njev=last.njev)
+    return SearchResult(best, minima, (*descents.history, line), descents.best, ways=ways)

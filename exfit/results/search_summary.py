@@ -1,0 +1,47 @@
+"""A search from several starts in a sentence."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from exfit.results.model import Minima, Minimum
+
+
+def search_summary(minima: Minima, cost: float) -> str:
+    """Return from where a search went, and where its descents led; ``cost`` is of the result."""
+    own = max(1, minima.ways.count("strategy"))
+    further = minima.starts - own
+    starts = "1 further start" if further == 1 else f"{further} further starts"
+    return f"from the start of the case and {starts}: {', '.join(_ends(minima, cost))}"
+
+
+def _ends(minima: Minima, cost: float) -> Iterator[str]:
+    """Yield how many descents led to the minimum of the result, to others, nowhere."""
+    here = [minimum for minimum in minima.minima if minimum.cost == cost]
+    others = [minimum for minimum in minima.minima if minimum.cost != cost]
+    count = here[0].starts if here else 0
+    yield f"{count} of {minima.starts} descents lead to this {'minimum' if here else 'point'}"
+    for minimum in others:
+        if not minimum.refuted:
+            verdict = "" if minimum.refuted is None else " (not refuted)"
+            yield f"{minimum.starts} to one {_height(minimum, cost)}{verdict}"
+    yield from _refuted([minimum for minimum in others if minimum.refuted], cost)
+    if minima.failed:
+        yield f"{minima.failed} to none: no response"
+    unfinished = int(np.count_nonzero(np.isnan(minima.end_costs))) - minima.failed
+    if unfinished > 0:
+        yield f"{unfinished} not done"
+
+
+def _refuted(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
+    """Yield how many descents led to minima that the records refute."""
+    if len(minima) == 1:
+        yield f"{minima[0].starts} to one {_height(minima[0], cost)} (refuted)"
+    elif minima:
+        descents = sum(minimum.starts for minimum in minima)
+        yield f"{descents} to {len(minima)} others, {_height(minima[0], cost)} or more (refuted)"
+
+
+def _height(minimum: Minimum, cost: float) -> str:
+    """Return how high a minimum lies."""
+    return f"{minimum.cost / cost:.4g} times as high" if cost > 0.0 else f"at {minimum.cost:.3g}"
