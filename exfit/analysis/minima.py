@@ -102,11 +102,12 @@ def times(cost: float, other: float) -> str:
 
 
 def differences(there: Values, here: Values) -> str:
-    """Return which values of a minimum are others than here, those that differ most first."""
+    """Return which values of a minimum are others than here: those that differ most."""
     apart = {
         name: abs(value - here[name]) / max(abs(value), abs(here[name]), TINY)
         for name, value in there.items()
     }
     remarkable = [name for name in apart if apart[name] > REMARKABLE] or [*apart]
-    names = sorted(remarkable, key=lambda name: -apart[name])[:MOST_VALUES]
-    return ", ".join(f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in names)
+    most = sorted(remarkable, key=lambda name: -apart[name])[:MOST_VALUES]
+    own = [name for name in apart if name in most]
+    return ", ".join(f"{name} {there[name]:.4g} (here {here[name]:.4g})" for name in own)

@@ -1,7 +1,7 @@
 """Where each phase of a search handed over to the next: the thesis' P_LM, with its responses."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from math import isnan
 
 from exfit.analysis.case_description import fixed_values
@@ -11,6 +11,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.model import Iteration, PhaseEnd
+from exfit.util.strategies import FROM_FURTHER_STARTS
 
 
 def phase_ends(
@@ -19,13 +20,14 @@ def phase_ends(
     residuals: Residuals,
     history: Sequence[Iteration],
 ) -> Iterator[PhaseEnd]:
-    """Yield where the phases ended that led to the fit, but for the last one.
+    """Yield where the phases ended of the descent from the start of the case, but for the last one.
 
-    Where a search before that of the fit was given up, its phases are not among them, and an end
-    without a finite response is left out.
+    Where a descent before that one was given up, its phases are not among them, and an end without
+    a finite response is left out.
     """
-    starts = [k for k, line in enumerate(history) if isnan(line.damping)]
-    own = history[starts[-1] :] if starts else history
+    whole = [*takewhile(lambda line: line.phase != FROM_FURTHER_STARTS, history)]
+    starts = [k for k, line in enumerate(whole) if isnan(line.damping)]
+    own = whole[starts[-1] :] if starts else whole
     start = residuals.values(residuals.start)
     for line, following in pairwise(own):
         if line.phase == following.phase:

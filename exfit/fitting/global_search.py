@@ -158,8 +158,8 @@ def own_end(descents: Descents, best: Result) -> Result | None:
 
 
 def is_same(best: Result, other: Result) -> bool:
-    """Return whether two ends are one minimum."""
-    return same(end_of(best, 0.0), end_of(other, 0.0))
+    """Return whether an end is in the minimum that has this best one."""
+    return other.cost >= best.cost and same(end_of(best, 0.0), end_of(other, 0.0))
 
 
 def refined(

@@ -151,7 +151,7 @@ class Minima:
 
 @dataclass(frozen=True, eq=False)
 class PhaseEnd:
-    """Where a phase of the search handed over to the next, on its way to the fit.
+    """Where a phase of the descent from the start of the case handed over to the next.
 
     ``iteration`` is its number in the history, ``values`` are those of the free parameters and of
     all others of the exciter there, ``comparisons`` the response to them beside each record.

@@ -11,6 +11,7 @@ PHASES: Mapping[str, str] = {
     "gn": "Gauss-Newton",
 }
 FROM_FURTHER_STARTS = "search"  # in the history: the point that the search from them found
+HISTORY_PHASES: Mapping[str, str] = {**PHASES, FROM_FURTHER_STARTS: "found from further starts"}
 STRATEGIES: Mapping[str, str] = {
     "gn": "Gauss-Newton with full steps (a first one that fails is shortened once)",
     "dgn": "damped Gauss-Newton: each step capped, then shortened until Armijo's rule holds",

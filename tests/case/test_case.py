@@ -491,7 +491,7 @@ MEANING = {
     ),
     "many starts without a bound": (
         "max: 3.0, scale: linear}\nestimate:\n",
-        "scale: linear}\nestimate:\n  starts: 8\n",
+        "scale: linear}\nestimate:\n  search: global\n  starts: 8\n",
         "parameters.free.KD.max",
         ["is missing", "8 starts"],
     ),

@@ -46,7 +46,7 @@ parameters:
   free:
     TE0: {start: 1.0, min: 0.1, max: 9}
     KA: {start: 766, min: 10, max: 5000, prior: {mean: 700, std: 20 %}}
-estimate: {loss: huber, loss_scale: 1.5, starts: 4, refine: 2}
+estimate: {loss: huber, loss_scale: 1.5, search: global, starts: 4}
 validate:
   - name: again
     test: {vref: [{at: {start: auto}, step: {start: auto}}]}
@@ -222,7 +222,7 @@ FORM = {
         ("estimate", "loss_scale"),
         "0 is not above 0",
     ),
-    "no starts": (("estimate", "refine"), 0, ("estimate", "refine"), "0 is below 1"),
+    "no starts": (("estimate", "starts"), 0, ("estimate", "starts"), "0 is below 1"),
 }
 MEANING = {
     "no lower bound": ((*AT, "min"), GONE, (*AT, "min"), "is missing"),
@@ -409,7 +409,12 @@ MEANING = {
         ("estimate", "starts"),
         "1000000000 is above 1000000",
     ),
-    "starts that are none": (("estimate", "starts"), 1, ("estimate", "refine"), "only with more"),
+    "starts of a local search": (
+        ("estimate", "search"),
+        "local",
+        ("estimate", "starts"),
+        "only with estimate.search: global",
+    ),
 }
 FAULTS = FORM | MEANING
 
@@ -731,7 +736,8 @@ PLACES = [
     ("plant", "parameters"),
     ("estimate", "loss"),
     ("estimate", "loss_scale"),
-    ("estimate", "refine"),
+    ("estimate", "search"),
+    ("estimate", "starts"),
     ("validate", 0, "test", "vref"),
     ("validate", 0, "name"),
 ]

@@ -687,7 +687,7 @@ main()
 @pytest.mark.long
 @pytest.mark.parametrize("stage", ["screening", "refining"])
 def test_ctrl_c_in_a_search_from_many_starts_keeps_the_best_point_and_ends_with_3(stage):
-    case = case_file(changed(CASE, ("estimate", {"starts": 20})))
+    case = case_file(changed(CASE, ("estimate", {"search": "global", "starts": 20})))
     ran = program(SEARCH_INTERRUPTED.replace("STAGE", stage), "fit", case)
     assert (ran.code, ran.err) == (3, "")
     stored = json.loads(Path("runs/case-fit/result.json").read_text())

@@ -162,6 +162,6 @@ def test_of_many_starts_the_first_is_that_of_the_case(tmp_path):
     content["records"][0]["test"]["vt0"] = 1.0
     content["parameters"]["fixed"] |= {name: UNIT[name] for name in UNIT if name != "KA"}
     alone = fit(case_of(content, tmp_path))
-    many = fit(case_of({**content, "estimate": {"starts": 3}}, tmp_path))
+    many = fit(case_of({**content, "estimate": {"search": "global", "starts": 3}}, tmp_path))
     assert many.minima.start_costs[0] == pytest.approx(alone.start_cost, rel=1e-12)
     assert many.cost <= alone.cost * (1.0 + 1e-6)

@@ -530,7 +530,7 @@ def test_many_starts_end_at_one_minimum_with_nuisances_too(tmp_path):
     content["parameters"]["free"] = {"KA": found_in(300.0, 100.0, 1000.0)}
     content["parameters"]["fixed"] |= {"TE": 1.5238, "TF": 1.5754}
     plain = fit(case_of(content, tmp_path))
-    content["estimate"] = {"starts": 6, "refine": 2}
+    content["estimate"] = {"search": "global", "starts": 6}
     found = fit(case_of(content, tmp_path))
     assert found.minima is not None
     assert found.values == pytest.approx(plain.values, rel=1e-4)

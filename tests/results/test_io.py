@@ -33,7 +33,7 @@ def texts(tmp_path_factory):
         ),
         "starts": {
             **config("first_order"),
-            "estimate": {"strategy": "auto", "starts": 3},
+            "estimate": {"strategy": "auto", "search": "global", "starts": 3},
         },
     }
     found = {}

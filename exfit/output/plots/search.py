@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from exfit.output.plots.style import GREEN, LIMIT, MEASURED, SIMULATED, START, WIDTH, tidy
 from exfit.results.model import FitResult, Minima
-from exfit.util.strategies import FROM_FURTHER_STARTS, PHASES
+from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES
 
 COLOURS: Mapping[str, str] = {
     **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
     FROM_FURTHER_STARTS: LIMIT,
 }
-LABELS: Mapping[str, str] = {**PHASES, FROM_FURTHER_STARTS: "found from further starts"}
 
 WAYS = {
     "strategy": ("the case's start", "D"),
@@ -63,7 +62,7 @@ def _by_phase(axes: Axes, result: FitResult, values: Sequence[float], marker: st
             color=COLOURS[phase],
             markersize=4,
             clip_on=False,
-            label=LABELS[phase],
+            label=HISTORY_PHASES[phase],
         )
 
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from exfit.dsp.decimation import envelope
 from exfit.output.report.charts import SMALL, Chart, Panel, Rule, Series
-from exfit.output.report.layout import BINS, LOW, TALL, TIME
+from exfit.output.report.layout import BINS, HALF, LOW, TALL, TIME
 from exfit.results.comparisons import IterationResponses
-from exfit.results.model import FitResult, FittedParameter, Iteration, Minimum
+from exfit.results.model import FitResult, FittedParameter, Iteration, Minima, Minimum
+from exfit.results.search_summary import search_summary
 from exfit.results.thinning import drawn_responses
 from exfit.signals import label_of
-from exfit.util.strategies import PHASES
+from exfit.util.strategies import HISTORY_PHASES
 from exfit.util.text import show
 
 SHADES = 9  # of the style sheet, from the start to the fit
@@ -27,6 +28,7 @@ class SearchView:
     facts: tuple[tuple[str, str], ...]
     history: tuple[Iteration, ...]
     minima: tuple[Minimum, ...]
+    waterfall: Chart | None
     convergence: Chart | None
     trajectories: tuple[Chart, ...]
     iterations: tuple[Chart, ...]
@@ -50,6 +52,7 @@ def search(result: FitResult) -> SearchView:
         facts=tuple(_facts(result)),
         history=history,
         minima=() if result.minima is None else result.minima.minima,
+        waterfall=None if result.minima is None else waterfall(result.minima, result.cost),
         convergence=convergence(history) if history else None,
         trajectories=tuple(trajectories),
         iterations=tuple(
@@ -73,6 +76,8 @@ def _facts(result: FitResult) -> Iterator[tuple[str, str]]:
         )
     yield "residuals and Jacobians", f"{result.nfev:g} and {result.njev:g}"
     yield "simulations", show(result.simulations)
+    if result.minima is not None:
+        yield "search", search_summary(result.minima, result.cost)
     yield "sub-steps of a step", show(result.substeps)
 
 
@@ -99,6 +104,26 @@ def convergence(history: Sequence[Iteration]) -> Chart:
         f"{_short(last.gradient_norm)}.",
         x_title="iteration",
         panels=panels,
+        whole=True,
+    )
+
+
+def waterfall(search: Minima, cost: float) -> Chart:
+    """Return the costs that all descents led to, in rising order."""
+    ended = search.end_costs[np.isfinite(search.end_costs)]
+    order = np.argsort(search.end_costs[np.isfinite(search.end_costs)], kind="stable")
+    starts = search.start_costs[np.isfinite(search.end_costs)][order]
+    rank = np.arange(1.0, len(order) + 1.0)
+    series = (
+        Series("start", rank, starts, "measured", dots=True),
+        Series("end", rank, ended[order], "start", dots=True),
+    )
+    return Chart(
+        key="waterfall",
+        title="Where the descents of the search ended, in the order of their costs",
+        text=search_summary(search, cost),
+        x_title="descent, by the cost that it led to",
+        panels=(Panel("cost f (pu²)", series, HALF, logarithmic=True),),
         whole=True,
     )
 
@@ -153,7 +178,7 @@ def _by_phase(history: Sequence[Iteration], name: str) -> Iterator[Series]:
     yield Series("", number, values, "measured thin")
     for phase in dict.fromkeys(line.phase for line in history):
         rows = np.array([line.phase == phase for line in history])
-        label = PHASES.get(phase, phase)
+        label = HISTORY_PHASES.get(phase, phase)
         yield Series(label, number[rows], values[rows], f"phase-{phase}", dots=True)
 
 
