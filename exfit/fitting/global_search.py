@@ -25,6 +25,7 @@ from exfit.util.strategies import FROM_FURTHER_STARTS
 
 Way = Literal["strategy", "linear", "direct"]
 
+PERFECT = 1e-16  # of the cost at a start: what a perfect match may leave of it
 AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)
 
 
@@ -158,8 +159,10 @@ def own_end(descents: Descents, best: Result) -> Result | None:
 
 
 def is_same(best: Result, other: Result) -> bool:
-    """Return whether an end is in the minimum that has this best one."""
-    return other.cost >= best.cost and same(end_of(best, 0.0), end_of(other, 0.0))
+    """Return whether an end of a descent is in the minimum that has this best one."""
+    nothing = PERFECT * other.history[0].cost
+    lowest, higher = (end_of(end, nothing, 1) for end in (best, other))
+    return other.cost >= best.cost and same(lowest, higher)
 
 
 def refined(
