@@ -1,10 +1,11 @@
 """The minima that a search found: which of them the records refute, and what is said of them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.estimate import LocalMinimum
 from exfit.fitting.global_search import SearchResult, is_same
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
@@ -63,37 +64,52 @@ def minima_notes(
     residuals: Residuals, search: SearchResult, minima: Minima | None
 ) -> Iterator[str]:
     """Yield what must be known of the other minima beside the result of a search."""
-    if search.minima is not None and search.minima.interrupted:
+    if search.minima is None:
+        return
+    if search.minima.interrupted:
         ends = search.minima.end_costs
         done = int(np.count_nonzero(np.isfinite(ends)))
         yield (
             f"interrupted in the search from further starts: {done} of {len(ends)} descents were "
             "done, and this is the best of them"
         )
-    if search.minima is None or minima is None:
-        return
-    best, own = search.best, search.own
-    here = own_values(residuals, best.x)
-    if own.cost > best.cost and not own.success and search.goes_on:
+    own, best = search.own, search.best
+    if search.goes_on and not own.success:
         yield (
             f"the descent from the start of the case ended at {times(own.cost, best.cost)} this "
             f"cost: {own.message}"
         )
-    for k, (local, minimum) in enumerate(zip(search.minima.minima, minima.minima, strict=True)):
-        is_own = search.goes_on and own.success and is_same(local.result, own)
-        if k == search.place or (minimum.refuted and not is_own):
-            continue
+    if minima is not None:
+        yield from _of_others(residuals, search, search.minima.minima, minima.minima)
+
+
+def _of_others(
+    residuals: Residuals,
+    search: SearchResult,
+    ends: Sequence[LocalMinimum],
+    minima: Sequence[Minimum],
+) -> Iterator[str]:
+    """Yield where the start of the case led, if elsewhere, and what the records do not refute."""
+    here = own_values(residuals, search.best.x)
+    for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
+        from_start = search.goes_on and search.own.success and is_same(end.result, search.own)
+        if k != search.place and (from_start or not minimum.refuted):
+            subject = (
+                "the descent from the start of the case ended at" if from_start else "there is"
+            )
+            yield f"{subject} {minimum_in_words(minimum, search.best.cost, here)}"
+
+
+def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
+    """Return how another minimum lies to the result, and what the records say of it."""
+    verdict = "which the record refutes"
+    if not minimum.refuted:
         verdict = (
-            "which the record refutes"
-            if minimum.refuted
-            else f"which the record does not refute (chi-square {minimum.chi_square:.2g} above the "
+            f"which the record does not refute (chi-square {minimum.chi_square:.2g} above the "
             f"lowest, limit {REFUTED})"
         )
-        yield (
-            f"{'the descent from the start of the case ended at ' if is_own else 'there is '}"
-            f"another minimum, {times(minimum.cost, best.cost)} this cost, {verdict}: "
-            f"{differences(minimum.values, here)}"
-        )
+    height = times(minimum.cost, cost)
+    return f"another minimum, {height} this cost, {verdict}: {differences(minimum.values, here)}"
 
 
 def times(cost: float, other: float) -> str:

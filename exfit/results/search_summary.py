@@ -17,20 +17,23 @@ def search_summary(minima: Minima, cost: float) -> str:
 
 def _ends(minima: Minima, cost: float) -> Iterator[str]:
     """Yield how many descents led to the minimum of the result, to others, nowhere."""
-    here = [minimum for minimum in minima.minima if minimum.cost == cost]
     others = [minimum for minimum in minima.minima if minimum.cost != cost]
-    count = here[0].starts if here else 0
-    yield f"{count} of {minima.starts} descents lead to this {'minimum' if here else 'point'}"
-    for minimum in others:
-        if not minimum.refuted:
-            verdict = "" if minimum.refuted is None else " (not refuted)"
-            yield f"{minimum.starts} to one {_height(minimum, cost)}{verdict}"
+    here = sum(minimum.starts for minimum in minima.minima) - sum(each.starts for each in others)
+    yield f"{here} of {minima.starts} descents lead to this {'minimum' if here else 'point'}"
+    yield from _minima([minimum for minimum in others if not minimum.refuted], cost)
     yield from _refuted([minimum for minimum in others if minimum.refuted], cost)
     if minima.failed:
         yield f"{minima.failed} to none: no response"
     unfinished = int(np.count_nonzero(np.isnan(minima.end_costs))) - minima.failed
     if unfinished > 0:
         yield f"{unfinished} not done"
+
+
+def _minima(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
+    """Yield how many descents led to each minimum that the records do not refute."""
+    for minimum in minima:
+        verdict = "" if minimum.refuted is None else " (not refuted)"
+        yield f"{minimum.starts} to one {_height(minimum, cost)}{verdict}"
 
 
 def _refuted(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
