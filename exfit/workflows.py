@@ -39,11 +39,10 @@ from exfit.analysis.solution import (
 )
 from exfit.case import load
 from exfit.case.case import Case
-from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
 from exfit.fitting.residuals import SimulationCounter
-from exfit.fitting.search import fitted
+from exfit.fitting.search import checked_search, checked_strategy, fitted
 from exfit.fitting.search import search as search_case
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.system import values_of
@@ -52,8 +51,6 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult, Iteration
 from exfit.simulation.simulator import Response
-from exfit.util.strategies import SEARCHES, STRATEGIES
-from exfit.util.text import near
 
 if TYPE_CHECKING:
     from exfit.analysis.experiment_design import Design
@@ -152,7 +149,7 @@ def fit(
         status=best.status,
         message=best.message,
         success=best.success,
-        interrupted=analysis.interrupted or _was_interrupted(found.minima),
+        interrupted=analysis.interrupted or found.interrupted,
         phase_ends=analysis.phase_ends,
         history=tuple(history),
         nfev=best.nfev,
@@ -176,24 +173,6 @@ def fit(
         files=input_names(case, used),
         case_text=case_text,
     )
-
-
-def checked_strategy(strategy: str) -> str:
-    """Return a strategy, or raise CaseError where there is none of this name."""
-    if strategy not in STRATEGIES:
-        raise CaseError([f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}"])
-    return strategy
-
-
-def checked_search(search: str) -> str:
-    """Return how far to search, or raise CaseError where there is no search of this name."""
-    if search not in SEARCHES:
-        raise CaseError([f"search: {search!r} is unknown; {near(search, SEARCHES)}"])
-    return search
-
-
-def _was_interrupted(search_result: estimate.MultistartResult | None) -> bool:
-    return search_result is not None and search_result.interrupted
 
 
 def _text_of(case: Case) -> str:

@@ -48,6 +48,11 @@ class SearchResult(NamedTuple):
     notes: tuple[str, ...] = ()
 
     @property
+    def interrupted(self) -> bool:
+        """Whether an interruption ended the search from further starts."""
+        return self.minima is not None and self.minima.interrupted
+
+    @property
     def goes_on(self) -> bool:
         """Whether the path goes on from a point that further starts led to."""
         return any(line.phase == FROM_FURTHER_STARTS for line in self.history)

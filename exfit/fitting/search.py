@@ -26,7 +26,8 @@ from exfit.fitting.residuals import (
     jacobian_error,
 )
 from exfit.fitting.setup import ExperimentSetup
-from exfit.util.strategies import DEFAULT_STRATEGY
+from exfit.util.strategies import DEFAULT_STRATEGY, SEARCHES, STRATEGIES
+from exfit.util.text import near
 
 Array = NDArray[np.float64]
 
@@ -51,6 +52,20 @@ def fitted(case: Case) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
 def names_of_records(setups: Iterable[ExperimentSetup]) -> tuple[str, ...]:
     """Return the names of all that is found about the records themselves."""
     return tuple(parameter.name for setup in setups for parameter in setup.free)
+
+
+def checked_strategy(strategy: str) -> str:
+    """Return a strategy, or raise CaseError where there is none of this name."""
+    if strategy not in STRATEGIES:
+        raise CaseError([f"strategy: {strategy!r} is unknown; {near(strategy, STRATEGIES)}"])
+    return strategy
+
+
+def checked_search(search: str) -> str:
+    """Return how far to search, or raise CaseError where there is no search of this name."""
+    if search not in SEARCHES:
+        raise CaseError([f"search: {search!r} is unknown; {near(search, SEARCHES)}"])
+    return search
 
 
 def search(

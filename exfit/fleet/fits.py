@@ -11,7 +11,7 @@ from exfit import estimate, workflows
 from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.search import fitted
+from exfit.fitting.search import checked_search, checked_strategy, fitted
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import CONVERGED, outcome_of
 from exfit.util.typed import plain
@@ -143,8 +143,8 @@ def planned(
     faults = [
         *_repeated("case", files, [Path(file).resolve() for file in files]),
         *_repeated("strategy", strategies, strategies),
-        *_faults(workflows.checked_strategy, strategies),
-        *_faults(workflows.checked_search, [] if search is None else [search]),
+        *_faults(checked_strategy, strategies),
+        *_faults(checked_search, [] if search is None else [search]),
         *_faults(lambda source: read.append(_ready(load(source))), cases),
     ]
     if faults:

@@ -150,7 +150,7 @@ def test_a_folder_that_cannot_be_written_costs_no_other_fit(run, monkeypatch):
 
 
 def test_where_no_fit_could_be_run_the_faults_are_all_that_is_shown(run, monkeypatch):
-    def failing(*_):
+    def failing(*_, **__):
         raise ExfitError("the record has gone")
 
     monkeypatch.setattr(workflows, "fit", failing)
