@@ -108,9 +108,9 @@ def _rest(parts: Sequence[TracePart]) -> Writer:
     values: Values = {}
     for part in parts:
         values.update(_read(w, part, "p", part.p))
+    w.prepare([node for part in parts for node in part.rest], values)
     for part in parts:
-        results = w.compute(part.rest, values, part.shape)
-        for row, result in enumerate(results):
+        for row, result in enumerate(w.results(part.rest, values, part.shape)):
             states = len(part.x)
             array, offset = ("x", 0) if row < states else ("r", states)
             w.store(result, f"%{part.mark}{array}", row - offset, part.shape)
@@ -124,8 +124,9 @@ def _motion(parts: Sequence[TracePart]) -> Writer:
         for array, nodes in (("p", part.p), ("r", part.r), ("x", part.x)):
             values.update(_read(w, part, array, nodes))
     values.update(_read(w, parts[0], "u", parts[0].u))
+    w.prepare([node for part in parts for node in part.slopes], values)
     for part in parts:
-        for row, slope in enumerate(w.compute(part.slopes, values, part.shape)):
+        for row, slope in enumerate(w.results(part.slopes, values, part.shape)):
             w.store(slope, f"%{part.mark}out", row, part.shape)
     return w
 
@@ -203,8 +204,9 @@ def _write_substep(
     x = _states(w, parts, slots)
     stepped = _runge_kutta(w, parts, fixed, levels, x, fractions, row)
     values = {**fixed, **levels[2], **stepped}
+    w.prepare([node for part in parts for node in part.clamped], values)
     for part in parts:
-        for node, result in zip(part.x, w.compute(part.clamped, values, part.shape), strict=True):
+        for node, result in zip(part.x, w.results(part.clamped, values, part.shape), strict=True):
             w.put(f"store {part.shape.type} {result}, ptr {slots[node]}, align 64")
 
 
@@ -216,8 +218,8 @@ def _write_end(
     final = _states(w, parts, slots)
     levels = [_in_every_lane(w, part, u) for part, u in zip(parts, last, strict=True)]
     values = {**fixed, **_merged(levels), **final}
+    _write_outputs(w, parts, values, "%n")
     for part in parts:
-        _write_outputs(w, part, values, "%n")
         for row, node in enumerate(part.x):
             w.store(final[node], f"%{part.mark}x", row, part.shape)
 
@@ -286,11 +288,13 @@ def _merged(parts: Iterable[Values]) -> Values:
     return {node: name for values in parts for node, name in values.items()}
 
 
-def _write_outputs(w: Writer, part: TracePart, values: Values, row: str) -> None:
-    offset = w.let(f"mul i64 {row}, {len(part.outputs) * part.shape.lanes}")
-    base = w.address(f"%{part.mark}out", offset)
-    for column, result in enumerate(w.compute(part.outputs, values, part.shape)):
-        w.store(result, base, column, part.shape)
+def _write_outputs(w: Writer, parts: Sequence[TracePart], values: Values, row: str) -> None:
+    w.prepare([node for part in parts for node in part.outputs], values)
+    for part in parts:
+        offset = w.let(f"mul i64 {row}, {len(part.outputs) * part.shape.lanes}")
+        base = w.address(f"%{part.mark}out", offset)
+        for column, result in enumerate(w.results(part.outputs, values, part.shape)):
+            w.store(result, base, column, part.shape)
 
 
 def _runge_kutta(
@@ -304,15 +308,16 @@ def _runge_kutta(
 ) -> Values:
     """Write one step of the classical method and return the states after it."""
     total, stage = dict(x), dict(x)
+    slopes = [node for part in parts for node in part.slopes]
+    steps = w.plan(slopes, _merged([fixed, levels[0], x]))
     for weight, advance, level in (("6", "2", 0), ("3", "2", 1), ("3", "h", 1), ("6", None, 2)):
         values = {**fixed, **levels[level], **stage}
+        w.follow(steps, values)
         if level == 0:
-            for part in parts:
-                _write_outputs(w, part, values, row)
+            _write_outputs(w, parts, values, row)
         for part in parts:
-            slopes = w.compute(part.slopes, values, part.shape)
-            for node, slope in zip(part.x, slopes, strict=True):
-                shape = part.shape
+            shape = part.shape
+            for node, slope in zip(part.x, w.results(part.slopes, values, shape), strict=True):
                 total[node] = w.add_product(shape, total[node], fractions[weight][shape], slope)
                 if advance is not None:
                     stage[node] = w.add_product(shape, x[node], fractions[advance][shape], slope)

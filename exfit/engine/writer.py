@@ -2,14 +2,13 @@
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
-from exfit.engine.choices import Region, regions
+from exfit.engine.choices import Choice, Plan, plan
 from exfit.engine.trace import Node
 
 Values = dict[Node | tuple[Node, str], str]
-Regions = dict[Region, list[Node]]
 
 BINARY = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
 LOGIC = {"&": "and", "|": "or"}
@@ -105,40 +104,57 @@ class Writer:
         where = self.address(base, row, shape.lanes)
         self.put(f"store {shape.type} {value}, ptr {where}, align 8")
 
-    def compute(self, targets: Sequence[Node], values: Values, shape: Shape) -> list[str]:
-        """Write what the targets need beyond ``values`` (which grows), and return theirs."""
-        self.prepare(targets, values)
-        return [self._operand(node, shape, values) for node in targets]
-
     def prepare(self, targets: Sequence[Node], values: Values) -> None:
         """Write what the targets need beyond ``values``, which grows."""
-        self._write_region((), regions(targets, values, self._branches), values)
+        self.follow(self.plan(targets, values), values)
+
+    def results(self, targets: Sequence[Node], values: Values, shape: Shape) -> list[str]:
+        """Return the values of targets that are prepared, in a shape."""
+        return [self._operand(node, shape, values) for node in targets]
+
+    def plan(self, targets: Sequence[Node], known: Container[object]) -> Plan:
+        """Return the steps that compute targets from known nodes."""
+        return plan(targets, known, self._branches)
 
     def _branches(self, node: Node) -> bool:
         """Return whether a choice is a branch: a processor foresees it, and waits for nothing."""
         return node.op == "select" and node.varies and self.narrow.lanes == 1
 
-    def _write_region(self, region: Region, nodes: Regions, values: Values) -> None:
-        for node in nodes.get(region, ()):
-            if self._branches(node):
-                values[node] = self._branch(node, region, nodes, values)
+    def follow(self, steps: Plan, values: Values) -> None:
+        """Write the steps of a plan; ``values`` grows."""
+        for step in steps:
+            if isinstance(step, Choice):
+                self._choose(step, values)
             else:
-                values[node] = self._instruction(node, values)
+                values[step] = self._instruction(step, values)
 
-    def _branch(self, node: Node, region: Region, nodes: Regions, values: Values) -> str:
-        """Write both branches of a choice, each with what it alone needs."""
-        shape, mark, ends = self.shape(node), len(self.lines), []
-        condition = values[node.operands[0]]
-        self.put(f"br i1 {condition}, label %branch1.{mark}, label %branch2.{mark}")
-        for position in (1, 2):
+    def _choose(self, choice: Choice, values: Values) -> None:
+        """Write both branches of a choice."""
+        mark, ends = len(self.lines), {node: list[str]() for node in choice.nodes}
+        self._jump(choice.condition, f"branch1.{mark}", f"branch2.{mark}", values)
+        for position, steps in enumerate(choice.branches, 1):
             self.label(f"branch{position}.{mark}")
             inside = dict(values)
-            self._write_region((*region, (node.index, position)), nodes, inside)
-            result = self._operand(node.operands[position], shape, inside)
-            ends.append(f"[{result}, %{self.block}]")
+            self.follow(steps, inside)
+            for node, end in ends.items():
+                result = self._operand(node.operands[position], self.shape(node), inside)
+                end.append(f"[{result}, %{self.block}]")
             self.put(f"br label %after.{mark}")
         self.label(f"after.{mark}")
-        return self.let(f"phi {shape.type} {', '.join(ends)}")
+        for node, end in ends.items():
+            values[node] = self.let(f"phi {self.shape(node).type} {', '.join(end)}")
+
+    def _jump(self, condition: Node, yes: str, no: str, values: Values) -> None:
+        """Write a jump to either label, as soon as a condition is decided."""
+        if condition.op in LOGIC and condition.varies:
+            first, second = condition.operands
+            between = f"{no}.{condition.index}"
+            labels = (between, no) if condition.op == "&" else (yes, between)
+            self._jump(first, *labels, values)
+            self.label(between)
+            self._jump(second, yes, no, values)
+        else:
+            self.put(f"br i1 {values[condition]}, label %{yes}, label %{no}")
 
     def _operand(self, node: Node, shape: Shape, values: Values) -> str:
         if node.constant is not None:
