@@ -41,10 +41,10 @@ from exfit.case import load
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
-from exfit.fitting.residuals import SimulationCounter
 from exfit.fitting.search import checked_search, checked_strategy, fitted
 from exfit.fitting.search import search as search_case
 from exfit.fitting.setup import with_enough_substeps
+from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.system import values_of
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record

@@ -168,7 +168,7 @@ CHANGING = {
 
 
 # what a module may remember, and why stands there
-REMEMBERED = {"exfit.engine.kernel": {"_alive"}}
+REMEMBERED = {"exfit.engine.kernel": {"_alive"}, "exfit.engine.sampling": {"_scratch"}}
 
 
 def changes(function, names):

@@ -8,6 +8,7 @@ functions take are rows of such values; ``run`` is the classical Runge-Kutta met
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from exfit.engine.driver import at_rest, sampled
 from exfit.engine.functions import functions as inlined
 from exfit.engine.system import Tangents, Trace
 from exfit.engine.trace import Node, in_order
@@ -43,19 +44,22 @@ class TracePart:
 def simulation(traced: Trace, lanes: int) -> str:
     """Return the IR of ``rest`` and ``run`` for parameter sets side by side."""
     parts = [TracePart(Shape(lanes), "", *_fields(traced))]
-    return _module(parts, {"rest": _rest(parts), "run": _run(parts)})
+    around = sampled(lanes, len(traced.outputs), 0, 0)
+    return _module(parts, {"rest": _rest(parts), "run": _run(parts)}, around)
 
 
 def simulation_with_tangents(traced: Trace, derived: Tangents, directions: int) -> str:
     """Return the IR of ``rest`` and ``run`` for one parameter set and its derivatives."""
     parts = _with_tangents(traced, derived, directions)
-    return _module(parts, {"rest": _rest(parts), "run": _run(parts)})
+    around = sampled(1, len(traced.outputs), directions, len(parts[1].inputs))
+    return _module(parts, {"rest": _rest(parts), "run": _run(parts)}, around)
 
 
 def linearisation(traced: Trace, derived: Tangents, directions: int) -> str:
     """Return the IR of ``rest`` and ``motion``, the slopes at given states, with derivatives."""
     parts = _with_tangents(traced, derived, directions)
-    return _module(parts, {"rest": _rest(parts), "motion": _motion(parts)})
+    around = at_rest(len(traced.p), len(traced.x), directions)
+    return _module(parts, {"rest": _rest(parts), "motion": _motion(parts)}, around)
 
 
 def _with_tangents(traced: Trace, derived: Tangents, directions: int) -> list[TracePart]:
@@ -68,7 +72,8 @@ def _with_tangents(traced: Trace, derived: Tangents, directions: int) -> list[Tr
 STEPS = {"rest": [], "motion": [], "run": ["double %h", "i64 %n", "i64 %m"]}
 
 
-def _module(parts: Sequence[TracePart], functions: Mapping[str, Writer]) -> str:
+def _module(parts: Sequence[TracePart], functions: Mapping[str, Writer], around: str) -> str:
+    """Return the functions of a system, with those ``around`` that call them."""
     shapes = dict.fromkeys(part.shape for part in parts)
     declarations = [
         f"declare {shape.type} @llvm.{name}.{shape.suffix}({shape.type})\n"
@@ -79,7 +84,7 @@ def _module(parts: Sequence[TracePart], functions: Mapping[str, Writer]) -> str:
     called = [
         text for shape in shapes for name, text in inlined(shape).items() if f"{name}(" in bodies
     ]
-    return "".join([*declarations, *called, bodies])
+    return "".join([*declarations, *called, bodies, around])
 
 
 def _fields(source: Trace | Tangents) -> tuple[tuple[Node, ...], ...]:

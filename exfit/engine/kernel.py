@@ -14,11 +14,13 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.engine.calls import address, function
+from exfit.engine.driver import AT_REST
 from exfit.engine.emit import linearisation, simulation, simulation_with_tangents
+from exfit.engine.sampling import Course, Courses, Sampler, Segment, Sizes, whole
 from exfit.engine.system import System, differentiate, trace
 from exfit.util.cache import cache_folder
 from exfit.util.files import write_whole
-from exfit.util.threads import in_threads
 
 if TYPE_CHECKING:
     pass
@@ -144,19 +146,6 @@ def compiled(ir: str, *, long_vectors: bool) -> Any:
         return engine
 
 
-def _address(array: Array) -> int:
-    if array.dtype != np.float64 or not array.flags.c_contiguous:
-        raise TypeError("the kernel takes C-contiguous arrays of float64")
-    address: int = array.__array_interface__["data"][0]  # a third of the time of array.ctypes
-    return address
-
-
-def _function(engine: Any, name: str, arrays: int, extra: Sequence[Any] = ()) -> Any:
-    # a call through ctypes releases the interpreter's lock
-    prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arrays, *extra)
-    return prototype(engine.get_function_address(name))
-
-
 RUN_ARGUMENTS = (ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
 
@@ -166,14 +155,16 @@ class Kernel:
     def __init__(self, system: System, outputs: Sequence[str], lanes: int = 1) -> None:
         self.lanes, self.system, self.outputs = lanes, system, tuple(outputs)
         engine = compiled(simulation(trace(system, outputs), lanes), long_vectors=lanes > 1)
-        self._rest = _function(engine, "rest", 4)
-        self._run = _function(engine, "run", 4, RUN_ARGUMENTS)
+        self._rest = function(engine, "rest", 4)
+        self._run = function(engine, "run", 4, RUN_ARGUMENTS)
+        sizes = Sizes(len(system.setpoints), len(system.states), len(self.outputs), lanes)
+        self._sampled = Sampler(engine, sizes)
 
     def start(self, p: Array) -> Start:
         """Return the rest of parameter sets p (np, lanes)."""
         r = np.empty((len(self.system.setpoints), self.lanes))
         x = np.empty((len(self.system.states), self.lanes))
-        self._rest(_address(p), _address(r), _address(x), None)
+        self._rest(address(p), address(r), address(x), None)
         return Start(r, x)
 
     def run(self, p: Array, start: Start, spans: Sequence[Span]) -> list[Array]:
@@ -182,23 +173,49 @@ class Kernel:
         for span in spans:
             out = np.empty((len(span.u), len(self.outputs), self.lanes))
             arrays = (p, start.r, start.x, out, span.u)
-            self._run(*map(_address, arrays), span.step / span.parts, len(span.u) - 1, span.parts)
+            self._run(*map(address, arrays), span.step / span.parts, len(span.u) - 1, span.parts)
             results.append(out)
         return results
 
+    def samples(self, p: Array, courses: Courses) -> Array:
+        """Return the outputs (K, M, ny) of parameter sets p (K, np), each in its course.
 
-def _block(tangents: Array, first: int) -> Array:
-    """Return DIRECTIONS of the tangents (..., N) from the first on; what is missing is zero."""
-    given = tangents[..., first : first + DIRECTIONS]
-    block = np.zeros((*tangents.shape[:-1], DIRECTIONS))
-    block[..., : given.shape[-1]] = given
-    return block
+        The sets that run side by side must have the same inputs; those with equal sub-steps do.
+        """
+        sets = side_by_side(courses.parts, self.lanes)
+        together = np.ascontiguousarray(p[sets].transpose(0, 2, 1))
+        return self._sampled(together, courses, sets).outputs
+
+
+def side_by_side(parts: NDArray[np.int64], lanes: int) -> NDArray[np.intp]:
+    """Return the numbers of sets (jobs, lanes) that run together: those with equal sub-steps.
+
+    Lanes that are left are filled with the last set once more.
+    """
+    if lanes == 1:
+        return np.arange(len(parts))[:, None]
+    order = np.argsort(parts, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(parts[order])) + 1)
+    padded = [np.pad(group, (0, -len(group) % lanes), mode="edge") for group in groups]
+    return np.concatenate(padded).reshape(-1, lanes)
+
+
+def _blocks(tangents: Array, width: int) -> Array:
+    """Return tangents (K, ..., N) as blocks (K, blocks, ..., width) of directions, none missing."""
+    given = tangents.shape[-1]
+    missing = -given % width if given else width
+    if missing:
+        padding = np.zeros((*tangents.shape[:-1], missing))
+        tangents = np.concatenate([tangents, padding], axis=-1)
+    blocks = tangents.reshape(*tangents.shape[:-1], -1, width)
+    return np.ascontiguousarray(np.moveaxis(blocks, -2, 1))
 
 
 class TangentKernel:
     """Simulates one parameter set with its exact derivatives in any directions.
 
-    A direction may move the parameters that are ``free`` and the inputs that are ``moving``.
+    A direction may move the parameters that are ``free`` and the inputs that are ``moving``; as
+    many as ``directions`` run together.
     """
 
     def __init__(
@@ -207,51 +224,60 @@ class TangentKernel:
         outputs: Sequence[str],
         free: Sequence[str],
         moving: Sequence[str] = (),
+        directions: int = DIRECTIONS,
     ) -> None:
         self.system, self.outputs = system, tuple(outputs)
-        self.free, self.moving = tuple(free), tuple(moving)
+        self.free, self.moving, self.directions = tuple(free), tuple(moving), directions
         traced = trace(system, outputs)
         derived = differentiate(traced, system, free, moving)
-        engine = compiled(simulation_with_tangents(traced, derived, DIRECTIONS), long_vectors=True)
-        inputs = (ctypes.c_void_p,) if self.moving else ()
-        self._rest = _function(engine, "rest", 8)
-        self._run = _function(engine, "run", 8, (*inputs, *RUN_ARGUMENTS))
+        engine = compiled(simulation_with_tangents(traced, derived, directions), long_vectors=True)
+        counts = (len(system.setpoints), len(system.states), len(self.outputs))
+        sizes = Sizes(*counts, directions=directions, moving=len(self.moving))
+        self._sampled = Sampler(engine, sizes)
+
+    def samples(
+        self, p: Array, dp: Array, courses: Courses, rates: Array | None = None
+    ) -> tuple[Array, Array, Array | None]:
+        """Return outputs (K, M, ny) of sets p (K, np), their derivatives, and those to time.
+
+        ``dp`` (K, np, N) are the tangents of the parameters in N directions, zero but where these
+        are free; the inputs that move have theirs by ``rates`` (K, moving, columns, N) of the
+        shapes in their segments. The derivatives are (K, M, ny, N), those to time (K, M, ny) or
+        None where the readings have no weights for them. The derivative of the starting state is
+        part of the result.
+        """
+        sets = np.arange(len(p))[:, None]
+        moving = None if rates is None else _blocks(rates, self.directions)
+        outputs, slopes, change = self._sampled(
+            p, courses, sets, _blocks(dp, self.directions), moving
+        )
+        assert slopes is not None
+        flat = slopes[:, 0]
+        if slopes.shape[1] > 1:
+            flat = np.moveaxis(slopes, 1, -2).reshape(*flat.shape[:-1], -1)
+        return outputs, flat[..., : dp.shape[-1]], change
 
     def run(self, p: Array, dp: Array, spans: Sequence[Span]) -> tuple[list[Array], list[Array]]:
         """Return, for each span, outputs (n + 1, ny) and their derivatives (n + 1, ny, N).
 
-        ``p`` is (np,), and ``dp`` (np, N) its tangents in N directions, zero but where parameters
-        are free; inputs that move have theirs in the spans. The derivative of the starting state
-        is part of the result.
+        ``p`` is (np,), ``dp`` (np, N).
         """
-        directions = dp.shape[1]
-        firsts = range(0, max(directions, 1), DIRECTIONS)
-        blocks = list(in_threads(lambda first: self._directions(p, dp, spans, first), firsts))
-        values, slopes = blocks[0]
-        if len(blocks) > 1:
-            pairs = zip(*(block[1] for block in blocks), strict=True)
-            slopes = [np.concatenate(parts, axis=2) for parts in pairs]
-        return values, [slope[:, :, :directions] for slope in slopes]
+        count = dp.shape[1]
+        segments = [Segment(span.u, span.step, span.du) for span in spans]
+        ends = np.cumsum([len(span.u) for span in spans])
+        parts = np.array([[span.parts for span in spans]])
+        courses = Courses([Course(segments, whole(int(ends[-1])))], parts)
+        rates = np.tile(np.eye(count), (1, len(self.moving), 1, 1)) if self.moving else None
+        outputs, slopes, _ = self.samples(p[None], dp[None], courses, rates)
+        return np.split(outputs[0], ends[:-1]), np.split(slopes[0], ends[:-1])
 
-    def _directions(
-        self, p: Array, tangents: Array, spans: Sequence[Span], first: int
-    ) -> tuple[list[Array], list[Array]]:
-        dp = _block(tangents, first)
-        shapes = (len(self.system.setpoints), len(self.system.states))
-        r, x = (np.empty(rows) for rows in shapes)
-        dr, dx = (np.empty((rows, DIRECTIONS)) for rows in shapes)
-        starting = (_address(p), _address(r), _address(x), None)
-        self._rest(*starting, _address(dp), _address(dr), _address(dx), None)
-        values, slopes = [], []
-        for span in spans:
-            out = np.empty((len(span.u), len(self.outputs)))
-            dout = np.empty((*out.shape, DIRECTIONS))
-            du = () if span.du is None else (_block(span.du, first),)
-            arrays = (p, r, x, out, dp, dr, dx, dout, span.u, *du)
-            self._run(*map(_address, arrays), span.step / span.parts, len(span.u) - 1, span.parts)
-            values.append(out)
-            slopes.append(dout)
-        return values, slopes
+
+class AtRest(NamedTuple):
+    """K systems at rest: states x (K, nx), their slopes there, the slopes' Jacobian (K, nx, nx)."""
+
+    x: Array
+    slopes: Array
+    jacobian: Array
 
 
 class LinearKernel:
@@ -262,30 +288,45 @@ class LinearKernel:
         traced = trace(system, ())
         derived = differentiate(traced, system, ())
         engine = compiled(linearisation(traced, derived, DIRECTIONS), long_vectors=False)
-        self._rest = _function(engine, "rest", 8)
-        self._motion = _function(engine, "motion", 9)
-        sizes = (len(system.parameters), len(system.setpoints), len(system.states))
-        states = sizes[-1]
-        self._still = [np.zeros((rows, DIRECTIONS)) for rows in sizes]
-        self._fixed = [_address(zeros) for zeros in self._still[:2]]
-        whole = -(-states // DIRECTIONS) * DIRECTIONS
-        columns = np.split(np.eye(states, whole), whole // DIRECTIONS, axis=1)
-        self._blocks = [np.ascontiguousarray(block) for block in columns]
+        self._rest = function(engine, "rest", 8)
+        self._motion = function(engine, "motion", 9)
+        self._at_rest = function(engine, "at_rest", len(AT_REST), first=(ctypes.c_int64,))
+        states = len(system.states)
+        whole_blocks = -(-states // DIRECTIONS) * DIRECTIONS
+        columns = np.eye(states, whole_blocks).reshape(states, -1, DIRECTIONS)
+        self._units = np.ascontiguousarray(columns.transpose(1, 0, 2))
+
+    def _still(self) -> list[Array]:
+        """Return tangents of parameters, setpoints and states at rest: zero, and written over."""
+        sizes = (len(self.system.parameters), len(self.system.setpoints), len(self.system.states))
+        return [np.zeros((rows, DIRECTIONS)) for rows in sizes]
 
     def rest(self, p: Array) -> Start:
         """Return the rest of one parameter set (np,): setpoints (nr,) and states (nx,)."""
         r, x = np.empty(len(self.system.setpoints)), np.empty(len(self.system.states))
-        # its tangents are zero, written over with zero
-        still = (*self._fixed, _address(self._still[2]), None)
-        self._rest(_address(p), _address(r), _address(x), None, *still)
+        still = self._still()
+        self._rest(address(p), address(r), address(x), None, *map(address, still), None)
         return Start(r, x)
+
+    def at_rest(self, p: Array) -> AtRest:
+        """Return the states at rest of parameter sets p (K, np), and their linearisation there."""
+        count, states = len(p), len(self.system.states)
+        r, u = np.empty(len(self.system.setpoints)), np.zeros(len(self.system.inputs))
+        x, slopes = np.empty((count, states)), np.empty((count, states))
+        columns = np.empty((count, *self._units.shape))
+        arrays = (p, r, x, slopes, columns, *self._still(), self._units, u)
+        self._at_rest(count, *map(address, arrays))
+        return AtRest(x, slopes, self._joined(columns))
 
     def motion(self, p: Array, r: Array, x: Array, u: Array) -> tuple[Array, Array]:
         """Return the slopes (nx,) at states x and inputs u, and their Jacobian (nx, nx)."""
-        slopes, columns = np.empty(len(x)), []
-        for block in self._blocks:
-            column = np.empty((len(x), DIRECTIONS))
-            given = (*map(_address, (p, r, x, slopes)), *self._fixed)
-            self._motion(*given, _address(block), _address(column), _address(u))
-            columns.append(column)
-        return slopes, np.hstack(columns)[:, : len(x)]
+        slopes, columns = np.empty(len(x)), np.empty(self._units.shape)
+        still = self._still()[:2]
+        for unit, column in zip(self._units, columns, strict=True):
+            self._motion(*map(address, (p, r, x, slopes, *still, unit, column, u)))
+        return slopes, self._joined(columns)
+
+    def _joined(self, columns: Array) -> Array:
+        """Return Jacobians (..., nx, nx) of blocks (..., blocks, nx, DIRECTIONS) of columns."""
+        rows = np.moveaxis(columns, -3, -2)
+        return rows.reshape(*rows.shape[:-2], -1)[..., : rows.shape[-3]]

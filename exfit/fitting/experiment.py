@@ -14,6 +14,7 @@ from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
 
@@ -74,6 +75,12 @@ class Channel:
     def filtered(self, samples: Array) -> Array:
         """Return samples (M,) as they are compared: filtered, without those left out."""
         return samples if self.filtering is None else self.filtering.apply(samples)
+
+    def compared(self, simulated: Array) -> Array:
+        """Return what is compared of simulated signals (K, M), a row (errors,) of each."""
+        if self.filtering is None:
+            return simulated
+        return np.stack([self.filtered(self.as_recorded(samples)) for samples in simulated])
 
     def as_recorded(self, simulated: Array) -> Array:
         """Return simulated values (M, ...) as the recorder shows them, before they are filtered.
@@ -196,24 +203,39 @@ class Experiment:
         samples, parts = self.samples(values)
         return self.compared(samples, values), parts
 
-    def errors_of_many(self, sets: Sequence[Values]) -> list[Array]:
-        """Return the weighted errors of several sets of values."""
-        if self.moves:
-            return [self.errors(values)[0] for values in sets]
+    def errors_of_many(self, sets: Sequence[Values]) -> tuple[Array, Counts]:
+        """Return the weighted errors (K, errors) of several sets of values, and their sub-steps.
+
+        Of a set without a start at rest they are no numbers; see ``Simulator.samples_of_many``.
+        """
         systems = [self.parameters(values) for values in sets]
-        samples = self.simulator.samples_of_many(systems, self.signals)
-        return [self.compared(samples[:, :, k], values) for k, values in enumerate(sets)]
+        samples, parts = self.simulator.samples_of_many(systems, self.signals, self._tests(sets))
+        return self._compared_many(samples, sets), parts
 
     def compared(self, samples: Array, values: Values) -> Array:
         """Return the weighted errors of simulated signals (M, channels)."""
+        return np.asarray(self._compared_many(samples[None], [values])[0])
+
+    def _tests(self, sets: Sequence[Values]) -> list[Simulator] | None:
+        """Return the simulator of each set, None where they all have the same."""
+        return [self.with_inputs(values) for values in sets] if self.moves else None
+
+    def _compared_many(self, samples: Array, sets: Sequence[Values]) -> Array:
+        """Return the weighted errors (K, errors) of signals (K, M, channels) of several sets."""
         blocks = []
         for k, channel in enumerate(self.channels):
-            measured = self.measured(channel, values)
-            same = measured is channel.measured
-            theirs = channel.record if same else channel.filtered(measured)
-            ours = channel.filtered(channel.as_recorded(samples[:, k]))
+            ours = channel.compared(samples[:, :, k])
+            if self._moved_channel(channel):
+                records = [channel.filtered(self.measured(channel, values)) for values in sets]
+                theirs = np.stack(records)
+            else:
+                theirs = channel.record
             blocks.append(channel.weight * ours - channel.weight * theirs)
-        return np.concatenate(blocks)
+        return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
+
+    def _moved_channel(self, channel: Channel) -> bool:
+        """Return whether the scale or offset of a channel is found."""
+        return any(nuisance.signal == channel.signal for nuisance in self.nuisances)
 
     def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
         """Return the weighted errors and their derivatives (errors, N).
@@ -221,6 +243,31 @@ class Experiment:
         Each of ``moves`` (N) is a direction: by how much it changes which value.
         """
         samples, slopes = self.response_with_derivatives(values, moves)
+        errors = self._compared_many(samples[None], [values])
+        return errors[0], self._slopes_of(samples, slopes, values, moves)
+
+    def tangents_of_many(
+        self, sets: Sequence[Values], moves: Sequence[Sequence[Values]]
+    ) -> tuple[Array, list[Array], Counts]:
+        """Return weighted errors (K, errors), derivatives (errors, N) and sub-steps of sets.
+
+        Each set has its own N ``moves``. Of a set without a start at rest they are no numbers.
+        """
+        samples, slopes, parts = self.simulator.tangents_of_many(
+            [self.parameters(values) for values in sets],
+            self.signals,
+            [[self._direction(move) for move in own] for own in moves],
+            self._tests(sets),
+        )
+        derivatives = [
+            self._slopes_of(*own) for own in zip(samples, slopes, sets, moves, strict=True)
+        ]
+        return self._compared_many(samples, sets), derivatives, parts
+
+    def _slopes_of(
+        self, samples: Array, slopes: Array, values: Values, moves: Sequence[Values]
+    ) -> Array:
+        """Return the derivatives (errors, N) of weighted errors, of those of the signals."""
         blocks = []
         for k, channel in enumerate(self.channels):
             ours = channel.slopes(
@@ -228,22 +275,15 @@ class Experiment:
             )
             theirs = self._measured_slopes(channel, values, moves)
             blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
-        return self.compared(samples, values), np.concatenate(blocks)
+        return blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
 
     def response_with_derivatives(
         self, values: Values, moves: Sequence[Values]
     ) -> tuple[Array, Array]:
         """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
         directions = [self._direction(move) for move in moves]
-        moving = [k for k, direction in enumerate(directions) if direction != Direction()]
-        samples, derivatives = self.with_inputs(values).tangents(
-            self.parameters(values), self.signals, [directions[k] for k in moving]
-        )
-        if len(moving) == len(moves):
-            return samples, derivatives
-        slopes = np.zeros((*samples.shape, len(moves)))
-        slopes[:, :, moving] = derivatives
-        return samples, slopes
+        simulator = self.with_inputs(values)
+        return simulator.tangents(self.parameters(values), self.signals, directions)
 
     def _direction(self, move: Values) -> Direction:
         """Return a direction as the simulator takes it."""

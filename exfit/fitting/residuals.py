@@ -6,7 +6,6 @@ They are functions of the scaled free parameters; what is known beforehand adds 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,8 @@ from exfit.errors import SimulationError
 from exfit.estimate import half_square
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter, Prior
+from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.simulation.substeps import NO_SUBSTEPS
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,7 @@ CENTRAL_STEP = np.finfo(float).eps ** (1 / 3)
 ONE_SIDED_STEP = np.finfo(float).eps ** (1 / 2)
 ROUNDING_OF_RUNS = 2e3 * np.finfo(float).eps  # of signals, by what scaled parameters do to them
 UNREACHABLE = (SimulationError, TieError)  # why a set of values has no response
+MOST_NUMBERS_AT_ONCE = 1 << 21  # of Jacobians that are made together: 16 MB
 LEAST_NOISE = 1e-7  # pu: no recorder's noise is less
 
 
@@ -34,20 +36,6 @@ class Robust:
 
     loss: Loss
     scale: float
-
-
-class SimulationCounter:
-    """Counts simulations, in whatever threads they run, and the most sub-steps of any of them."""
-
-    def __init__(self) -> None:
-        self.simulations, self.substeps = 0, 1
-        self._lock = Lock()
-
-    def add(self, simulations: int, substeps: int = 1) -> None:
-        """Add simulations, with the sub-steps that they took where these are known."""
-        with self._lock:
-            self.simulations += simulations
-            self.substeps = max(self.substeps, substeps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +118,7 @@ class Residuals:
 
     def __call__(self, theta: Array) -> Array:
         """Return the residuals (samples + priors,)."""
-        self._count(len(self.experiments))
-        try:
-            values = self.values(theta)
-            each = [experiment.errors(values) for experiment in self.experiments]
-        except UNREACHABLE:
-            return np.full(self.count + len(self.priors), np.inf)
-        self._count(0, max(substeps for _, substeps in each))
-        return self._residuals(np.concatenate([errors for errors, _ in each]), values)
+        return self.of_many([theta])[0]
 
     def errors(self, theta: Array) -> tuple[Array, Array]:
         """Return the weighted errors (samples,) and their exact derivatives (samples, N).
@@ -152,7 +133,10 @@ class Residuals:
 
     def exact(self, theta: Array) -> Array:
         """Return the exact Jacobian (samples + priors, N)."""
-        errors, slopes = self.errors(theta)
+        return self._jacobian(*self.errors(theta), theta)
+
+    def _jacobian(self, errors: Array, slopes: Array, theta: Array) -> Array:
+        """Return the Jacobian of the residuals, given the errors and their derivatives."""
         if self.robust:
             slopes *= self.robust.loss.slope(errors, self._loss_scales)[:, None]
         if not self.priors:
@@ -200,24 +184,22 @@ class Residuals:
         down, up = np.clip(theta + below, low, high), np.clip(theta + above, low, high)
         stuck = down == up  # a one-sided difference at the bound that it points to
         down, up = np.where(stuck, theta - above, down), np.where(stuck, theta - below, up)
-        sets = [*self._moved(theta, down), *self._moved(theta, up)]
-        try:
-            columns = np.stack(self._of_many(sets), axis=1)
-        except TieError as fault:
-            raise SimulationError(str(fault)) from fault
+        points = [*self._moved(theta, down), *self._moved(theta, up)]
+        residuals = self._of_many(points)
+        for point, of_point in zip(points, residuals, strict=True):
+            if of_point is None:
+                self._refuse(point)
+        columns = np.stack([of_point for of_point in residuals if of_point is not None], axis=1)
         count = len(theta)
         return np.asarray((columns[:, count:] - columns[:, :count]) / (up - down))
 
     def of_many(self, points: Sequence[Array]) -> list[Array]:
-        """Return the residuals at each of points (N,), infinite where there are none."""
-        if not len(points):
-            return []
-        try:
-            return self._of_many(points)
-        except UNREACHABLE:
-            if len(points) == 1:
-                return [np.full(self.count + len(self.priors), np.inf)]
-            return [residuals for point in points for residuals in self.of_many([point])]
+        """Return the residuals at each of points (N,), infinite where there are none.
+
+        They run side by side; those of a point do not depend on what the others are.
+        """
+        nothing = np.full(self.count + len(self.priors), np.inf)
+        return [nothing.copy() if own is None else own for own in self._of_many(points)]
 
     def costs(self, points: Sequence[Array]) -> Array:
         """Return half the sum of squares at each of points (N,), infinite where there are none."""
@@ -225,23 +207,77 @@ class Residuals:
 
     def exact_of_many(self, points: Sequence[Array]) -> list[Array]:
         """Return the exact Jacobian at each of points (N,), nan where there is none."""
-        return [self._exact_or_nan(point) for point in points]
+        return [jacobian for _, jacobian in self.linearised_of_many(points)]
 
-    def _exact_or_nan(self, theta: Array) -> Array:
-        try:
-            return self.exact(theta)
-        except UNREACHABLE:
-            return np.full((self.count + len(self.priors), len(theta)), np.nan)
-
-    def _of_many(self, points: Sequence[Array]) -> list[Array]:
-        """Return the residuals of several points, simulated side by side where that is possible."""
-        self._count(len(points) * len(self.experiments))
-        sets = [self.values(point) for point in points]
-        parts = [experiment.errors_of_many(sets) for experiment in self.experiments]
+    def linearised_of_many(self, points: Sequence[Array]) -> list[tuple[Array, Array]]:
+        """Return residuals and exact Jacobian at each of points (N,), nan where there are none."""
+        at_once = max(1, MOST_NUMBERS_AT_ONCE // (self.count * max(1, len(self.free))))
         return [
-            self._residuals(np.concatenate([part[k] for part in parts]), values)
-            for k, values in enumerate(sets)
+            linearised
+            for first in range(0, len(points), at_once)
+            for linearised in self._linearised(points[first : first + at_once])
         ]
+
+    def _of_many(self, points: Sequence[Array]) -> list[Array | None]:
+        """Return the residuals of several points, None where there are none."""
+        self._count(len(points) * len(self.experiments))
+        residuals: list[Array | None] = [None] * len(points)
+        sets = {k: values for k, values in enumerate(map(self._reached, points)) if values}
+        if not sets:
+            return residuals
+        with np.errstate(all="ignore"):
+            runs = [experiment.errors_of_many([*sets.values()]) for experiment in self.experiments]
+            errors = _stacked([errors for errors, _ in runs], axis=1)
+            whole = self._with_loss(errors)
+        parts = np.stack([parts for _, parts in runs])
+        self._count(0, int(parts.max()))
+        reached = np.all(parts != NO_SUBSTEPS, axis=0)
+        for (k, values), own, has_response in zip(sets.items(), whole, reached, strict=True):
+            residuals[k] = self._with_priors(own, values) if has_response else None
+        return residuals
+
+    def _linearised(self, points: Sequence[Array]) -> list[tuple[Array, Array]]:
+        self._count(len(points) * len(self.experiments))
+        rows = self.count + len(self.priors)
+        linearised = [(np.full(rows, np.nan), np.full((rows, len(x)), np.nan)) for x in points]
+        directed = {k: own for k, own in enumerate(map(self._directed, points)) if own}
+        if not directed:
+            return linearised
+        sets, moves = ([*part] for part in zip(*directed.values(), strict=True))
+        with np.errstate(all="ignore"):
+            runs = [experiment.tangents_of_many(sets, moves) for experiment in self.experiments]
+            errors = _stacked([errors for errors, _, _ in runs], axis=1)
+            residuals = self._with_loss(errors)
+            reached = np.all([parts != NO_SUBSTEPS for _, _, parts in runs], axis=0)
+            for row in np.flatnonzero(reached).tolist():
+                k = [*directed][row]
+                slopes = _stacked([slopes[row] for _, slopes, _ in runs])
+                jacobian = self._jacobian(errors[row], slopes, points[k])
+                linearised[k] = self._with_priors(residuals[row], sets[row]), jacobian
+        return linearised
+
+    def _reached(self, theta: Array) -> dict[str, float] | None:
+        """Return every value by name, None where a tie has none."""
+        try:
+            return self.values(theta)
+        except TieError:
+            return None
+
+    def _directed(self, theta: Array) -> tuple[dict[str, float], list[dict[str, float]]] | None:
+        """Return every value by name, and which of them each parameter moves; None as above."""
+        try:
+            return self.values(theta), self.moves(theta)
+        except UNREACHABLE:
+            return None
+
+    def _refuse(self, theta: Array) -> None:
+        """Raise SimulationError where a point has no response."""
+        try:
+            values = self.values(theta)
+        except TieError as fault:
+            raise SimulationError(str(fault)) from fault
+        for experiment in self.experiments:
+            experiment.with_inputs(values).substeps(experiment.parameters(values))
 
     def _count(self, simulations: int, substeps: int = 1) -> None:
         if self.counter is not None:
@@ -255,8 +291,11 @@ class Residuals:
 
         Raises SimulationError where what follows them moves infinitely fast.
         """
+        tied: Mapping[str, Mapping[str, float]] = {}
         try:
-            tied = self.ties.slopes(self.values(theta), [free.name for free in self.free])
+            if self.ties.by_name:
+                names = [free.name for free in self.free]
+                tied = self.ties.slopes(self.values(theta), names)
         except TieError as fault:
             raise SimulationError(str(fault)) from fault
         moves = []
@@ -270,9 +309,14 @@ class Residuals:
             moves.append({free.name: slope, **followers})
         return moves
 
-    def _residuals(self, errors: Array, values: Mapping[str, float]) -> Array:
-        if self.robust:
-            errors = self.robust.loss.residual(errors, self._loss_scales)
+    def _with_loss(self, errors: Array) -> Array:
+        """Return residuals of errors (..., errors): by the robust loss, where there is one."""
+        if self.robust is None:
+            return errors
+        return self.robust.loss.residual(errors, self._loss_scales)
+
+    def _with_priors(self, errors: Array, values: Mapping[str, float]) -> Array:
+        """Return residuals with those of what is known beforehand."""
         if not self.priors:
             return errors
         of_priors = [
@@ -287,6 +331,11 @@ class Residuals:
         share = 1.0 if self.robust is None else self.robust.scale
         scales = [share * channel.weight * noise_of(channel) for channel in self.channels]
         return np.repeat(scales, self.sizes)
+
+
+def _stacked(blocks: Sequence[Array], axis: int = 0) -> Array:
+    """Return the blocks of all records as one, without a copy of a single one."""
+    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=axis)
 
 
 def noise_of(channel: Channel) -> float:

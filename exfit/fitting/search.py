@@ -22,10 +22,10 @@ from exfit.fitting.residuals import (
     LEAST_NOISE,
     Residuals,
     SideBySide,
-    SimulationCounter,
     jacobian_error,
 )
 from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.util.strategies import DEFAULT_STRATEGY, SEARCHES, STRATEGIES
 from exfit.util.text import near
 

@@ -4,13 +4,16 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import cache, cached_property
 from math import prod
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.engine.sampling import SampleRows, whole
 from exfit.simulation.grid import ON_GRID, GridSegment
 
 Array = NDArray[np.float64]
+Number = TypeVar("Number", np.int64, np.float64)
 
 BLOCK = 1 << 16  # samples whose interpolation is kept
 NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
@@ -86,9 +89,20 @@ class Interpolation:
         # each segment by itself: a copy of the whole run costs more than a simulation's tenth
         return np.concatenate([part[k] for part, k in zip(run, self._exact, strict=True)])
 
-    def slope(self, run: Sequence[Array]) -> Array:
-        """Return the time derivatives (M, ...), per s, of what a run gives as samples."""
-        return self._read(run, self._slopes)
+    def reading(self, changing: bool = False) -> SampleRows:
+        """Return what machine code reads; where it is ``changing``, its time derivatives too."""
+        return self._changing if changing else self._reading
+
+    @cached_property
+    def _reading(self) -> SampleRows:
+        if np.all(self._on_grid):
+            return SampleRows(self._nearest[:, None], np.ones((len(self.first), 1)))
+        return SampleRows(_sample_by_sample(self._all_rows), _sample_by_sample(self._all_weights))
+
+    @cached_property
+    def _changing(self) -> SampleRows:
+        weights = (self._all_weights, self._slopes(slice(0, len(self.first))))
+        return SampleRows(_sample_by_sample(self._all_rows), *map(_sample_by_sample, weights))
 
     def rows(self, block: slice) -> NDArray[np.int64]:
         """Return which points of a run each sample of a block is read from, (NEIGHBOURS, block)."""
@@ -149,15 +163,25 @@ class Interpolation:
 
 
 class WholeRun:
-    """Reads a run at all points of its grid, one segment behind the other."""
+    """Reads a run at all ``rows`` of its grid, one segment behind the other."""
+
+    def __init__(self, rows: int) -> None:
+        self._reading = whole(rows)
+
+    def reading(self, changing: bool = False) -> SampleRows:
+        """Return what machine code reads; raises for the derivative to a delay, one of samples."""
+        if changing:
+            raise NotImplementedError("a delay between points of the grid")
+        return self._reading
 
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return all points (G, ...) of a run."""
         return joined(run)
 
-    def slope(self, run: Sequence[Array]) -> Array:
-        """Raise: a delay is one of samples."""
-        raise NotImplementedError("a delay between points of the grid")
+
+def _sample_by_sample(of_points: NDArray[Number]) -> NDArray[Number]:
+    """Return rows (points, M) as those of samples (M, points)."""
+    return np.ascontiguousarray(of_points.T)
 
 
 def joined(run: Sequence[Array]) -> Array:

@@ -15,10 +15,14 @@ def kernel(system: System, outputs: tuple[str, ...], lanes: int) -> Kernel:
 
 @cache
 def tangent_kernel(
-    system: System, outputs: tuple[str, ...], free: tuple[str, ...], moving: tuple[str, ...]
+    system: System,
+    outputs: tuple[str, ...],
+    free: tuple[str, ...],
+    moving: tuple[str, ...],
+    directions: int,
 ) -> TangentKernel:
     """Return the machine code that simulates a system with its derivatives."""
-    return TangentKernel(system, outputs, free, moving)
+    return TangentKernel(system, outputs, free, moving, directions)
 
 
 @cache
@@ -35,3 +39,10 @@ def parameters_used(system: System) -> frozenset[str]:
     reached = {node.index for node in in_order(targets)}
     pairs = zip(system.parameters, traced.p, strict=True)
     return frozenset(name for name, node in pairs if node.index in reached)
+
+
+@cache
+def time_constants(system: System) -> tuple[str, ...]:
+    """Return the parameters in seconds that matter to the response."""
+    used = parameters_used(system)
+    return tuple(name for name in system.time_constants if name in used)

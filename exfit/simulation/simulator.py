@@ -1,33 +1,34 @@
 """From parameter values to a response: the start at rest, the sub-steps, the samples."""
 
-import math
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.kernel import SIDE_BY_SIDE, Span, Start, TangentKernel
+from exfit.engine.kernel import DIRECTIONS, SIDE_BY_SIDE, Span, TangentKernel
+from exfit.engine.sampling import Course, Courses, Segment
 from exfit.engine.system import System
-from exfit.errors import SimulationError
-from exfit.models.blocks import SHORTEST
-from exfit.simulation.grid import ON_GRID, GridSegment
+from exfit.simulation.directions import Moves, moves_of
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import Interpolation, WholeRun, joined
-from exfit.simulation.kernels import kernel, linear_kernel, parameters_used, tangent_kernel
-from exfit.simulation.limits import limits_passed
+from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel, time_constants
+from exfit.simulation.substeps import (
+    NO_SUBSTEPS,
+    spectral_radii,
+    substeps_at_rest,
+    substeps_for,
+    why_unreachable,
+)
 from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
-MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
-REST_TOLERANCE = 1e-6  # pu/s: below any real motion
-STATE_ROUNDING = 1e-13  # of a state, relative
-REMEMBERED = 64  # sets of values: several threads use a few of theirs again
+WORTH_A_BLOCK = 3  # sets that take longer one by one than SIDE_BY_SIDE of them together
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +77,8 @@ class Simulator:
             {name: recorded.on(segment) for name, recorded in inputs.recorded.items()}
             for segment in self._grid
         ]
-        self._input_samples = self._inputs_on_grid()
+        self._segments = self._segments_of()
         self._sampling: Interpolation | WholeRun = Interpolation(self._grid, times, delay)
-        self._substeps_of: dict[bytes, int] = {}  # of the parameters of late
 
     def with_inputs(self, steps: tuple[InputStep, ...], delay: float) -> "Simulator":
         """Return the simulator of the same test with other steps and another delay (s).
@@ -93,7 +93,7 @@ class Simulator:
         result = copy(self)
         result.inputs, result.delay = replace(self.inputs, steps=steps), delay
         if changed:
-            result._input_samples = result._inputs_on_grid(changed)
+            result._segments = result._segments_of(changed)
         if delay != self.delay:
             result._sampling = Interpolation(self._grid, self.times, delay)
         return result
@@ -106,7 +106,7 @@ class Simulator:
         result = copy(self)
         result.times, result._sampling = (
             np.concatenate([segment.times for segment in self._grid]),
-            WholeRun(),
+            WholeRun(sum(len(segment.u) for segment in self._segments)),
         )
         return result
 
@@ -116,44 +116,40 @@ class Simulator:
             return self._sampling
         return Interpolation(self._grid, self.times, self.delay)
 
-    @cached_property
+    @property
     def time_constants(self) -> tuple[str, ...]:
         """The parameters in seconds that matter to the response."""
-        used = parameters_used(self.system)
-        return tuple(name for name in self.system.time_constants if name in used)
+        return time_constants(self.system)
 
     def substeps(self, values: Values) -> int:
         """Return into how many parts each step is divided for these values.
 
-        The rule is ceil(step * fastest rate), where the rate is the largest of the spectral radius
-        of the slopes' Jacobian at rest and 1/T of every time constant that is not bypassed:
-        Runge-Kutta of order four is unstable beyond 2.785, and a limit would hide it. It depends
-        on the values alone, and a change of one sub-step moves a response by less than the
-        method's own error. What is faster away from rest is for ``with_enough_substeps``.
-
-        Raises SimulationError where the start is no rest, or beyond ``MOST_SUBSTEPS``.
+        The rule is that of ``substeps_at_rest``; what is faster away from rest is for
+        ``with_enough_substeps``. Raises SimulationError where the start is no rest, or the rule
+        asks for too many.
         """
-        p = self._vector(values)
-        key = p.tobytes()
-        parts = self._substeps_of.get(key)
-        if parts is None:
-            parts = max(self.least, self._parts(values, self._rate_at_rest(values, p)))
-            if len(self._substeps_of) >= REMEMBERED:
-                self._substeps_of.clear()
-            self._substeps_of[key] = parts
+        p = self._vectors([values])
+        parts = int(self._substeps_of_many(p)[0])
+        if parts == NO_SUBSTEPS:
+            raise why_unreachable(self.system, self.step, values, p[0])
         return parts
+
+    def _substeps_of_many(self, p: Array) -> Counts:
+        """Return the sub-steps of parameter sets p (K, np), NO_SUBSTEPS where there are none."""
+        parts = substeps_at_rest(self.system, self.step, p)
+        return np.where(parts == NO_SUBSTEPS, parts, np.maximum(parts, self.least))
 
     def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
         """Return the sub-steps that the rule requires along a response with all its states."""
-        p = self._vector(values)
+        p = self._vectors([values])[0]
         rest = linear_kernel(self.system).rest(p)
-        inputs = self._sampling(self._input_samples)
+        inputs = self._sampling([segment.u for segment in self._segments])
         rows = np.linspace(0, len(response.time) - 1, points).astype(int)
         states = np.stack([response.signals[name][rows] for name in self.system.states], axis=1)
         code, r = linear_kernel(self.system), rest.r
         pairs = zip(np.ascontiguousarray(states), np.ascontiguousarray(inputs[rows]), strict=True)
         jacobians = np.stack([code.motion(p, r, x, u)[1] for x, u in pairs])
-        return self._parts(values, fastest(jacobians))
+        return substeps_for(self.system, self.step, values, float(spectral_radii(jacobians).max()))
 
     def with_enough_substeps(self, values: Values) -> "Simulator":
         """Return a simulator whose sub-steps are enough all along the response to these values.
@@ -194,42 +190,56 @@ class Simulator:
 
     def samples(self, values: Values, outputs: tuple[str, ...]) -> tuple[Array, int]:
         """Return outputs (M, ny) and the number of sub-steps."""
-        parts = self.substeps(values)
-        code = kernel(self.system, outputs, 1)
-        p = self._vector(values)[:, None]
-        run = code.run(p, code.start(p), self._spans(parts))
-        return self._sampling(run)[:, :, 0], parts
+        samples, parts = self.samples_of_many([values], outputs)
+        if parts[0] == NO_SUBSTEPS:
+            self.substeps(values)
+        return samples[0], int(parts[0])
 
     def input(self, signal: str) -> Array:
         """Return an input (M,) at the sample times, which the recorder delays."""
-        inputs = self._sampling(self._input_samples)
+        inputs = self._sampling([segment.u for segment in self._segments])
         return inputs[:, self.system.inputs.index(signal)]
 
     def run(self, values: Values) -> Run:
         """Return all outputs and inputs of the system on the grid, without the recorder's delay."""
         code = kernel(self.system, self.system.outputs, 1)
-        p = self._vector(values)[:, None]
-        run = code.run(p, code.start(p), self._spans(self.substeps(values)))
+        p, parts = self._vectors([values]).T.copy(), self.substeps(values)
+        spans = [Span(segment.u, segment.step, parts) for segment in self._segments]
+        run = code.run(p, code.start(p), spans)
         return Run(
             np.concatenate([segment.times for segment in self._grid]),
             dict(zip(self.system.outputs, joined(run)[:, :, 0].T, strict=True)),
-            dict(zip(self.system.inputs, joined(self._input_samples).T, strict=True)),
+            dict(
+                zip(
+                    self.system.inputs,
+                    np.concatenate([segment.u for segment in self._segments]).T,
+                    strict=True,
+                )
+            ),
         )
 
-    def samples_of_many(self, sets: Sequence[Values], outputs: tuple[str, ...]) -> Array:
-        """Return outputs (M, ny, sets): side by side, in threads, and with equal sub-steps."""
-        spans = self._spans(max(self.substeps(values) for values in sets))
-        code = kernel(self.system, outputs, SIDE_BY_SIDE)
-        vectors = np.stack([self._vector(values) for values in sets], axis=1)
-        missing = -len(sets) % SIDE_BY_SIDE
-        padded = np.pad(vectors, ((0, 0), (0, missing)), mode="edge")
+    def samples_of_many(
+        self,
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        tests: "Sequence[Simulator] | None" = None,
+    ) -> tuple[Array, Counts]:
+        """Return outputs (K, M, ny) of K sets, each with its own sub-steps (K,).
 
-        def block(first: int) -> Array:
-            p = np.ascontiguousarray(padded[:, first : first + SIDE_BY_SIDE])
-            return self._sampling(code.run(p, code.start(p), spans))
-
-        firsts = range(0, padded.shape[1], SIDE_BY_SIDE)
-        return np.concatenate(list(in_threads(block, firsts)), axis=2)[:, :, : len(sets)]
+        ``tests`` are the simulators of the sets, made of this one by ``with_inputs``, where they
+        are not all the same. A set without a start at rest has outputs that are no numbers, and
+        NO_SUBSTEPS sub-steps; the others are what they are alone.
+        """
+        p = self._vectors(sets)
+        parts = self._substeps_of_many(p)
+        courses = [test.course() for test in tests or [self]]
+        alike = tests is None or all(test._segments is tests[0]._segments for test in tests)
+        samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
+        for lanes, group in groups(parts, SIDE_BY_SIDE if alike else 1):
+            own = courses if tests is None else [courses[k] for k in group]
+            code = kernel(self.system, outputs, lanes)
+            samples[group] = code.samples(p[group], Courses(own, parts[group]))
+        return samples, parts
 
     def tangents(
         self, values: Values, outputs: tuple[str, ...], directions: Sequence[Direction]
@@ -237,151 +247,126 @@ class Simulator:
         """Return outputs (M, ny) and their exact derivatives (M, ny, directions).
 
         A direction costs the same whatever moves in it; one of the delay alone costs nothing.
-        Raises ValueError where one moves the instant of a step that is not smooth.
+        Raises SimulationError as ``substeps``, and ValueError where a direction moves the instant
+        of a step that is not smooth.
         """
-        columns = [k for k, d in enumerate(directions) if d.parameters or d.steps]
-        driving = [directions[k] for k in columns]
-        code = self._tangent_code(outputs, driving)
-        spans = self._spans(self.substeps(values))
-        if code.moving:
-            spans = [
-                span._replace(du=self._moving(segment, code.moving, driving))
-                for span, segment in zip(spans, self._grid, strict=True)
+        samples, slopes, parts = self.tangents_of_many([values], outputs, [directions])
+        if parts[0] == NO_SUBSTEPS:
+            self.substeps(values)
+        return samples[0], slopes[0]
+
+    def tangents_of_many(
+        self,
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        directions: Sequence[Sequence[Direction]],
+        tests: "Sequence[Simulator] | None" = None,
+    ) -> tuple[Array, Array, Counts]:
+        """Return outputs (K, M, ny) of K sets, their derivatives (K, M, ny, N), and sub-steps.
+
+        Each set has its own N directions; all else is as in ``samples_of_many``.
+        """
+        p = self._vectors(sets)
+        parts = self._substeps_of_many(p)
+        reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()
+        count = len(directions[0])
+        samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
+        slopes = np.full((*samples.shape, count), np.nan)
+        if not reached:
+            return samples, slopes, parts
+        own = [directions[k] for k in reached]
+        moves = moves_of(self.system, self.inputs, own)
+        delays = np.array([[direction.delay for direction in some] for some in own])
+        of_set = [self] if tests is None else [tests[k] for k in reached]
+        courses = [test.course(moves, changing=bool(np.any(delays))) for test in of_set]
+        code = self._tangent_code(outputs, moves)
+        tangents, rates = moves.tangents(self.system, own), moves.rates(own)
+        together = Courses(courses, parts[reached])
+        outs, derived, change = _in_blocks(code, p[reached], together, tangents, rates)
+        samples[reached] = outs
+        derivatives = np.zeros((*outs.shape, count))
+        derivatives[..., moves.columns] = derived
+        if change is not None:
+            derivatives -= change[..., None] * delays[:, None, None, :]
+        slopes[reached] = derivatives
+        return samples, slopes, parts
+
+    def course(self, moves: Moves | None = None, changing: bool = False) -> Course:
+        """Return what the machine code runs through, with the tangents of inputs that move.
+
+        A run that is ``changing`` is sampled with its time derivative.
+        """
+        segments = self._segments
+        if moves is not None and moves.shapes:
+            segments = [
+                segment._replace(shapes=moves.shapes_on(part, self.inputs))
+                for segment, part in zip(segments, self._grid, strict=True)
             ]
-        run, derived = code.run(self._vector(values), self._seeds(driving), spans)
-        slopes = np.zeros((len(self.times), len(outputs), len(directions)))
-        slopes[:, :, columns] = self._sampling(derived)
-        delays = np.array([direction.delay for direction in directions])
-        if np.any(delays):
-            slopes -= self._sampling.slope(run)[:, :, None] * delays
-        return self._sampling(run), slopes
+        return Course(segments, self._sampling.reading(changing))
 
-    def _tangent_code(
-        self, outputs: tuple[str, ...], directions: Sequence[Direction]
-    ) -> TangentKernel:
-        """Return the machine code whose derivatives cover what these directions move."""
-        free = {name for direction in directions for name in direction.parameters}
-        moving = {
-            self.inputs.steps[index].signal for direction in directions for index in direction.steps
-        }
-        return tangent_kernel(
-            self.system,
-            outputs,
-            tuple(name for name in self.system.parameters if name in free),
-            tuple(name for name in self.system.inputs if name in moving),
-        )
-
-    def _seeds(self, directions: Sequence[Direction]) -> Array:
-        """Return how each parameter moves in each direction, (np, N)."""
-        seeds = np.zeros((len(self.system.parameters), len(directions)))
-        for column, direction in enumerate(directions):
-            for name, rate in direction.parameters.items():
-                seeds[self.system.parameters.index(name), column] = rate
-        return seeds
-
-    def _moving(
-        self, segment: GridSegment, inputs: Sequence[str], directions: Sequence[Direction]
-    ) -> Array:
-        """Return how inputs move in each direction at a segment's grid points, (n + 1, nu, N)."""
-        du = np.zeros((segment.steps + 1, len(inputs), len(directions)))
-        for column, direction in enumerate(directions):
-            for index, (at, step) in direction.steps.items():
-                change = self.inputs.steps[index]
-                if change.signal in inputs:
-                    row = du[:, inputs.index(change.signal), column]
-                    if at:
-                        row += at * change.step * change.share_slope(segment)
-                    if step:
-                        row += step * change.share(segment)
-        return du
+    def _tangent_code(self, outputs: tuple[str, ...], moves: Moves) -> TangentKernel:
+        """Return the machine code whose derivatives cover what moves."""
+        width = DIRECTIONS if len(moves.columns) <= DIRECTIONS else 2 * DIRECTIONS
+        return tangent_kernel(self.system, outputs, moves.free, moves.moving, width)
 
     def _with(self, step: float, least: int) -> "Simulator":
         return Simulator(self.system, self.inputs, self.times, step, least, self.delay)
 
-    def _inputs_on_grid(self, changed: Container[str] | None = None) -> list[Array]:
+    def _segments_of(self, changed: Container[str] | None = None) -> list[Segment]:
         """Return the inputs at the grid points of each segment, (n + 1, nu).
 
         Only those ``changed`` are computed anew, where these are given.
         """
-        samples = []
-        for k, (segment, recorded) in enumerate(
-            zip(self._grid, self._recorded_samples, strict=True)
-        ):
-            u = np.empty((segment.steps + 1, len(self.system.inputs)))
+        segments = []
+        for k, (part, recorded) in enumerate(zip(self._grid, self._recorded_samples, strict=True)):
+            u = np.empty((part.steps + 1, len(self.system.inputs)))
             for column, name in enumerate(self.system.inputs):
                 if changed is None or name in changed:
-                    u[:, column] = self.inputs.stepped(name, segment) + recorded.get(name, 0.0)
+                    u[:, column] = self.inputs.stepped(name, part) + recorded.get(name, 0.0)
                 else:
-                    u[:, column] = self._input_samples[k][:, column]
-            samples.append(u)
-        return samples
+                    u[:, column] = self._segments[k].u[:, column]
+            segments.append(Segment(u, part.step))
+        return segments
 
-    def _vector(self, values: Values) -> Array:
-        return np.array([values[name] for name in self.system.parameters], dtype=np.float64)
+    def _vectors(self, sets: Sequence[Values]) -> Array:
+        """Return the parameters of sets as the machine code takes them, (K, np)."""
+        names = self.system.parameters
+        return np.array([[values[name] for name in names] for values in sets], dtype=np.float64)
 
-    def _spans(self, parts: int) -> list[Span]:
-        return [
-            Span(u, segment.step, parts)
-            for u, segment in zip(self._input_samples, self._grid, strict=True)
-        ]
 
-    def _rate_at_rest(self, values: Values, p: Array) -> float:
-        """Return the fastest rate (1/s) at the start; raises SimulationError if that is no rest."""
-        rest = linear_kernel(self.system).rest(p)
-        slopes, rate = self._motion(p, rest, rest.x, np.zeros(len(self.system.inputs)))
-        # what the rounding of a state leaves of its slope, at the fastest rate
-        rounding = STATE_ROUNDING * float(np.max(np.abs(rest.x))) * rate
-        moving = ~(np.abs(slopes) <= REST_TOLERANCE + rounding)
-        if np.any(moving) or not math.isfinite(rounding):
-            why = self._why_moving(values, slopes, moving)
-            at = f" at vt0 = {values['vt0']:g} pu" if "vt0" in values else ""
-            raise SimulationError(f"no state of rest{at}: {why}")
-        return rate
+def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Yield which sets run together, and in how many lanes: sets with equal sub-steps in many."""
+    for count in np.unique(parts[parts != NO_SUBSTEPS]):
+        group = np.flatnonzero(parts == count)
+        rest = len(group) % lanes
+        side_by_side = len(group) - rest if rest < WORTH_A_BLOCK else len(group)
+        if lanes > 1 and side_by_side:
+            yield lanes, group[:side_by_side]
+        else:
+            side_by_side = 0
+        if side_by_side < len(group):
+            yield 1, group[side_by_side:]
 
-    def _motion(self, p: Array, rest: Start, x: Array, u: Array) -> tuple[Array, float]:
-        """Return the slopes at states x and the spectral radius (1/s) of their Jacobian."""
-        slopes, jacobian = linear_kernel(self.system).motion(p, rest.r, x, u)
-        rate = fastest(jacobian)
-        return slopes if math.isfinite(rate) else np.full(len(x), np.nan), rate
 
-    def _parts(self, values: Values, radius: float) -> int:
-        lags = {name: values[name] for name in self.time_constants if values[name] >= SHORTEST}
-        shortest = min(lags, key=lambda name: lags[name], default=None)
-        rate = max(radius, 1.0 / lags[shortest] if shortest else 0.0)
-        if not math.isfinite(rate):
-            raise SimulationError("the response does not stay finite")
-        parts = max(1, math.ceil(self.step * rate - ON_GRID))
-        if parts > MOST_SUBSTEPS:
-            smallest = (
-                f"; the smallest time constant is {shortest} = {lags[shortest]:g} s"
-                if shortest
-                else ""
-            )
-            raise SimulationError(
-                f"simulation.step: {self.step:g} s would need {parts} sub-steps "
-                f"(limit {MOST_SUBSTEPS}) for a rate of {rate:.4g} 1/s{smallest}"
-            )
-        return parts
+def _in_blocks(
+    code: TangentKernel, p: Array, courses: Courses, tangents: Array, rates: Array | None
+) -> tuple[Array, Array, Array | None]:
+    """Return samples with derivatives; of a single set each block of directions in a thread."""
+    width = code.directions
+    firsts = range(0, tangents.shape[-1], width)
+    if len(p) > 1 or len(firsts) <= 1:
+        return code.samples(p, tangents, courses, rates)
 
-    def _why_moving(self, values: Values, slopes: Array, moving: NDArray[np.bool_]) -> str:
-        states = zip(self.system.states, slopes, moving, strict=True)
-        moved = [
-            f"{name} moves by {slope:.3g} pu/s"
-            for name, slope, moves in states
-            if moves and math.isfinite(slope)
-        ]
-        return (
-            limits_passed(self.system, values) or ", ".join(moved) or "the values do not define one"
-        )
+    def block(first: int) -> tuple[Array, Array, Array | None]:
+        own = slice(first, first + width)
+        growing = None if rates is None else rates[..., own]
+        return code.samples(p, tangents[..., own], courses, growing)
+
+    blocks = list(in_threads(block, firsts))
+    outputs, _, change = blocks[0]
+    return outputs, np.concatenate([slopes for _, slopes, _ in blocks], axis=-1), change
 
 
 def _fixed(change: InputStep) -> InputStep:
     """Return what of a step cannot be moved."""
     return change._replace(at=0.0 if change.smooth else change.at, step=0.0)
-
-
-def fastest(jacobians: Array) -> float:
-    """Return the largest spectral radius of Jacobians (..., nx, nx), inf where one is infinite."""
-    if not np.isfinite(jacobians).all():
-        return math.inf
-    return float(np.abs(np.linalg.eigvals(jacobians)).max())

@@ -18,7 +18,7 @@ from exfit.engine.trace import Node, evaluate
 from exfit.errors import SimulationError
 from exfit.plants import MEASURED
 from exfit.simulation.limits import at_rest, limits_passed
-from exfit.simulation.simulator import REST_TOLERANCE, STATE_ROUNDING, fastest
+from exfit.simulation.substeps import REST_TOLERANCE, STATE_ROUNDING, spectral_radii
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -229,7 +229,11 @@ def _refuse_motion(
     system: System, values: Values, x: Array, moving: Array, jacobian: Array
 ) -> None:
     """Raise SimulationError where slopes at rest are not zero, but for rounding."""
-    rounding = STATE_ROUNDING * float(np.max(np.abs(x), initial=0.0)) * fastest(jacobian)
+    rounding = (
+        STATE_ROUNDING
+        * float(np.max(np.abs(x), initial=0.0))
+        * float(spectral_radii(jacobian[None])[0])
+    )
     if not (np.isfinite(rounding) and np.all(np.abs(moving) <= REST_TOLERANCE + rounding)):
         why = limits_passed(system, values) or "the values do not define one"
         raise SimulationError(f"no state of rest: {why}")

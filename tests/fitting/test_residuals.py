@@ -107,8 +107,8 @@ def test_a_jacobian_at_a_bound_stays_within(exciter):
         seen = []
         simulator = residuals.experiments[0].simulator
         run = simulator.samples_of_many
-        simulator.samples_of_many = lambda sets, out, run=run, seen=seen: (
-            seen.extend(one[name] for one in sets) or run(sets, out)
+        simulator.samples_of_many = lambda sets, out, tests, run=run, seen=seen: (
+            seen.extend(one[name] for one in sets) or run(sets, out, tests)
         )
         exact = residuals.exact(residuals.start)
         for kind, _, step in KINDS:

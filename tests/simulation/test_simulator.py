@@ -32,7 +32,8 @@ from exfit.simulation.inputs import (
 )
 from exfit.simulation.interpolation import Interpolation
 from exfit.simulation.kernels import parameters_used
-from exfit.simulation.simulator import MOST_SUBSTEPS, Simulator
+from exfit.simulation.simulator import Simulator
+from exfit.simulation.substeps import MOST_SUBSTEPS
 
 UP = Inputs(0.0, 2.0, (InputStep(0.5, 3e-4),))  # off the limits
 AT_REST = Inputs(0.0, 2.0, ())
@@ -158,12 +159,12 @@ def test_a_response_has_every_signal_and_state_on_its_clock(model):
 def test_many_sets_give_what_each_gives(model):
     simulator = Simulator(system_of(model), UP, CLOCK, 1e-3)
     sets = [drawn_values(model, seed) for seed in range(19)]
-    together = simulator.samples_of_many(sets, ("vt",))
-    assert together.shape == (201, 1, 19)
-    for lane, values in enumerate(sets):
-        # all take the most sub-steps that any of them needs
-        expected, _ = simulator.samples(values, ("vt",))
-        assert np.abs(together[:, :, lane] - expected).max() < 1e-7
+    together, parts = simulator.samples_of_many(sets, ("vt",))
+    assert together.shape == (19, 201, 1)
+    for samples, substeps, values in zip(together, parts, sets, strict=True):
+        expected, own_substeps = simulator.samples(values, ("vt",))
+        assert substeps == own_substeps
+        assert np.abs(samples - expected).max() < 1e-12  # rounding
 
 
 # --- what a fit may move --------------------------------------------------------------------------

@@ -1,0 +1,203 @@
+"""Loops around the machine code of a system: many parameter sets in one call, sampled as they run.
+
+A call releases the interpreter's lock once, however many sets it runs. What it works on stands in
+tables of addresses and counts, a row of eight bytes each, in the order of the tuples below.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from exfit.engine.writer import Shape, Writer
+
+JOB = ("p", "dp", "rates", "spans")  # sets side by side, from rest through all segments
+SPAN = ("u", "shapes", "row", "n", "parts", "h")  # a segment of a run
+SAMPLES = ("rows", "weights", "slopes", "out", "dout", "change")  # of one of the sets of a job
+WORK = ("r", "x", "out", "dr", "dx", "dout", "du")  # where a job leaves what is not asked for
+ARGUMENTS = (
+    *("i64 %count", "ptr %jobs", "ptr %lanes", "i64 %segments"),
+    *("i64 %samples", "i64 %points", "i64 %columns", "ptr %work"),
+)
+
+AT_REST = ("p", "r", "x", "slopes", "jacobian", "dp", "dr", "dx", "units", "u")
+
+ONE = Shape(1)
+
+
+def sampled(sets: int, outputs: int, directions: int, moving: int) -> str:
+    """Return the IR of ``sampled``: ``rest``, ``run`` of all segments and samples of many jobs.
+
+    A job has so many sets side by side; without ``directions`` there are no derivatives. ``moving``
+    is how many inputs move: their tangents are sums of ``columns`` shapes over the grid, each at
+    the rate that it has in a direction.
+    """
+    w = Writer(ONE, ONE)
+    work = _row(w, "%work", "0", WORK)
+    with _loop(w, "job", "%count") as k:
+        job = _row(w, "%jobs", k, JOB)
+        states = [work["r"], work["x"]]
+        tangents = [job["dp"], work["dr"], work["dx"]] if directions else []
+        last = ["null"] if directions else []
+        w.put(f"call void @rest({_pointers(job['p'], *states, 'null', *tangents, *last)})")
+        with _loop(w, "segment", "%segments") as number:
+            span = _row(w, job["spans"], number, SPAN)
+            row = w.let(f"mul i64 {_whole(w, span['row'])}, {outputs * sets}")
+            arrays = [job["p"], *states, w.address(work["out"], row), *tangents]
+            if directions:
+                wide = w.let(f"mul i64 {row}, {directions}")
+                arrays += [w.address(work["dout"], wide)]
+            arrays += [span["u"]]
+            n = _whole(w, span["n"])
+            if moving:
+                arrays += [work["du"]]
+                given = _pointers(span["shapes"], job["rates"], work["du"])
+                w.put(f"call void @moved({given}, i64 {n}, i64 %columns)")
+            h = w.let(f"bitcast i64 {_whole(w, span['h'])} to double")
+            steps = f"double {h}, i64 {n}, i64 {_whole(w, span['parts'])}"
+            w.put(f"call void @run({_pointers(*arrays)}, {steps})")
+        with _loop(w, "lane", str(sets)) as lane:
+            place = w.let(f"add i64 {w.let(f'mul i64 {k}, {sets}')}, {lane}")
+            _read_set(w, place, lane, work, (sets, outputs, directions))
+    w.put("ret void")
+    heads = [_reader(ONE), *([_reader(Shape(directions))] if directions else [])]
+    if moving:
+        heads.append(_moved(Shape(directions), moving))
+    return "".join([*heads, _defined("void @sampled", ARGUMENTS, w)])
+
+
+def _read_set(
+    w: Writer, place: str, lane: str, work: dict[str, str], sizes: tuple[int, int, int]
+) -> None:
+    """Write the reading of one set's samples, and of their derivatives."""
+    sets, outputs, directions = sizes
+    reading = _row(w, "%lanes", place, SAMPLES)
+    still = w.let(f"icmp eq ptr {reading['slopes']}, null")
+    changing = w.let(f"select i1 {still}, i64 0, i64 %samples")
+    with _loop(w, "output", str(outputs)) as y:
+        column = w.let(f"add i64 {w.let(f'mul i64 {y}, {sets}')}, {lane}")
+
+        def read(shape: Shape, run: str, weights: str, out: str, samples: str) -> None:
+            lanes = shape.lanes
+            first = w.address(run, w.let(f"mul i64 {column}, {lanes}"))
+            into = w.address(out, w.let(f"mul i64 {y}, {lanes}"))
+            arrays = _pointers(first, reading["rows"], weights, into)
+            counts = f"i64 {samples}, i64 %points, i64 {outputs * sets}, i64 {outputs}"
+            w.put(f"call void @read_{shape.suffix}({arrays}, {counts})")
+
+        read(ONE, work["out"], reading["weights"], reading["out"], "%samples")
+        if directions:
+            read(ONE, work["out"], reading["slopes"], reading["change"], changing)
+            wide = Shape(directions)
+            read(wide, work["dout"], reading["weights"], reading["dout"], "%samples")
+
+
+def at_rest(parameters: int, states: int, directions: int) -> str:
+    """Return the IR of ``at_rest``: the states, slopes and Jacobian at rest of many sets."""
+    w = Writer(ONE, ONE)
+    blocks = -(-states // directions)
+    with _loop(w, "set", "%count") as k:
+        p, x, slopes = (
+            w.address(array, w.let(f"mul i64 {k}, {size}"))
+            for array, size in (("%p", parameters), ("%x", states), ("%slopes", states))
+        )
+        starting = _pointers(p, "%r", x, "null", "%dp", "%dr", "%dx", "null")
+        w.put(f"call void @rest({starting})")
+        with _loop(w, "block", str(blocks)) as block:
+            size = states * directions
+            units = w.address("%units", w.let(f"mul i64 {block}, {size}"))
+            place = w.let(f"add i64 {w.let(f'mul i64 {k}, {blocks}')}, {block}")
+            columns = w.address("%jacobian", w.let(f"mul i64 {place}, {size}"))
+            arrays = (p, "%r", x, slopes, "%dp", "%dr", units, columns, "%u")
+            w.put(f"call void @motion({_pointers(*arrays)})")
+    w.put("ret void")
+    arguments = ("i64 %count", *(f"ptr %{name}" for name in AT_REST))
+    return _defined("void @at_rest", arguments, w)
+
+
+def _reader(shape: Shape) -> str:
+    """Return the function that samples a column of a run: sums of weighted rows."""
+    w = Writer(shape, shape)
+    total = w.let(f"alloca {shape.type}, align 64")
+    with _loop(w, "sample", "%samples") as m:
+        w.put(f"store {shape.type} {shape.number(0.0)}, ptr {total}, align 64")
+        begin = w.let(f"mul i64 {m}, %points")
+        with _loop(w, "point", "%points") as k:
+            place = w.let(f"add i64 {begin}, {k}")
+            row = w.let(f"load i64, ptr {w.address('%rows', place)}, align 8")
+            first = w.let(f"mul i64 {w.let(f'mul i64 {row}, %pitch')}, {shape.lanes}")
+            value = w.load(w.address("%run", first), 0, shape)
+            weight = w.spread(w.load("%weights", place, ONE), shape)
+            so_far = w.let(f"load {shape.type}, ptr {total}, align 64")
+            summed = w.add_product(shape, so_far, value, weight)
+            w.put(f"store {shape.type} {summed}, ptr {total}, align 64")
+        result = w.let(f"load {shape.type}, ptr {total}, align 64")
+        into = w.let(f"mul i64 {w.let(f'mul i64 {m}, %apart')}, {shape.lanes}")
+        w.store(result, w.address("%into", into), 0, shape)
+    w.put("ret void")
+    arrays = ("run", "rows", "weights", "into")
+    counts = ("samples", "points", "pitch", "apart")
+    arguments = (*(f"ptr noalias %{a}" for a in arrays), *(f"i64 %{c}" for c in counts))
+    return _defined(f"internal void @read_{shape.suffix}", arguments, w)
+
+
+def _moved(shape: Shape, moving: int) -> str:
+    """Return the function that writes the tangents of moving inputs at the points of a segment."""
+    w = Writer(shape, shape)
+    total = w.let(f"alloca {shape.type}, align 64")
+    rows = w.let(f"mul i64 {w.let('add i64 %n, 1')}, {moving}")
+    with _loop(w, "row", rows) as row:
+        w.put(f"store {shape.type} {shape.number(0.0)}, ptr {total}, align 64")
+        begin = w.let(f"mul i64 {row}, %columns")
+        own = w.let(f"mul i64 {w.let(f'urem i64 {row}, {moving}')}, %columns")
+        with _loop(w, "column", "%columns") as column:
+            height = w.load("%shapes", w.let(f"add i64 {begin}, {column}"), ONE)
+            place = w.let(f"mul i64 {w.let(f'add i64 {own}, {column}')}, {shape.lanes}")
+            rate = w.load(w.address("%rates", place), 0, shape)
+            so_far = w.let(f"load {shape.type}, ptr {total}, align 64")
+            summed = w.add_product(shape, so_far, w.spread(height, shape), rate)
+            w.put(f"store {shape.type} {summed}, ptr {total}, align 64")
+        result = w.let(f"load {shape.type}, ptr {total}, align 64")
+        w.store(result, w.address("%du", w.let(f"mul i64 {row}, {shape.lanes}")), 0, shape)
+    w.put("ret void")
+    arrays = (f"ptr noalias %{name}" for name in ("shapes", "rates", "du"))
+    return _defined("internal void @moved", (*arrays, "i64 %n", "i64 %columns"), w)
+
+
+def _defined(name: str, arguments: Sequence[str], body: Writer) -> str:
+    head = f'define {name}({", ".join(arguments)}) "prefer-vector-width"="512" {{'
+    return "\n".join([head, "entry:", *body.lines, "}", ""])
+
+
+@contextmanager
+def _loop(w: Writer, name: str, count: str) -> Iterator[str]:
+    """Write a loop over what is written within, and give its counter."""
+    labels = [line[:-1] for line in w.lines if not line.startswith(" ")]
+    before = labels[-1] if labels else "entry"
+    w.put(f"br label %{name}")
+    w.label(name)
+    w.put(f"%{name}.k = phi i64 [0, %{before}], [%{name}.next, %{name}.end]")
+    inside = w.let(f"icmp slt i64 %{name}.k, {count}")
+    w.put(f"br i1 {inside}, label %{name}.body, label %{name}.done")
+    w.label(f"{name}.body")
+    yield f"%{name}.k"
+    w.put(f"br label %{name}.end")
+    w.label(f"{name}.end")
+    w.put(f"%{name}.next = add i64 %{name}.k, 1")
+    w.put(f"br label %{name}")
+    w.label(f"{name}.done")
+
+
+def _row(w: Writer, table: str, number: str, fields: Sequence[str]) -> dict[str, str]:
+    """Read a row of a table, as addresses."""
+    first = w.address(table, w.let(f"mul i64 {number}, {len(fields)}"))
+    return {
+        field: w.let(f"load ptr, ptr {w.address(first, column)}, align 8")
+        for column, field in enumerate(fields)
+    }
+
+
+def _whole(w: Writer, address: str) -> str:
+    return w.let(f"ptrtoint ptr {address} to i64")
+
+
+def _pointers(*names: str) -> str:
+    return ", ".join(f"ptr {name}" for name in names)

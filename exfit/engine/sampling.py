@@ -1,0 +1,219 @@
+"""Runs of many parameter sets in one call of machine code, sampled where a record is."""
+
+import ctypes
+import threading
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.calls import address, place_of
+from exfit.engine.driver import SAMPLES, SPAN
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+
+CACHE_LINE = 8  # numbers: what a vector is read from begins at a multiple
+MOST_KEPT = 1 << 23  # numbers (64 MB) of a scratch buffer that is used again
+
+_scratch = threading.local()  # new pages for every run would cost a fifth of it
+
+
+class Segment(NamedTuple):
+    """A segment of a run: inputs u (n + 1, nu) at its grid points, a ``step`` (s) apart.
+
+    ``shapes`` (n + 1, moving, columns): what the tangents of the inputs that move consist of.
+    """
+
+    u: Array
+    step: float
+    shapes: Array | None = None
+
+
+class SampleRows(NamedTuple):
+    """Where M samples are read: sums of ``rows`` (M, points) of a run times ``weights``, as large.
+
+    ``slopes`` (M, points) are the weights that give their time derivatives, where these are wanted.
+    """
+
+    rows: Table
+    weights: Array
+    slopes: Array | None = None
+
+    def padded(self, points: int) -> "SampleRows":
+        """Return the same of more points, of which the last ones count nothing."""
+        missing = points - self.weights.shape[1]
+        if not missing:
+            return self
+        ends = ((0, 0), (0, missing))
+        slopes = None if self.slopes is None else np.pad(self.slopes, ends)
+        return SampleRows(np.pad(self.rows, ends, mode="edge"), np.pad(self.weights, ends), slopes)
+
+
+class Course(NamedTuple):
+    """What a parameter set runs through from rest, and where it is sampled."""
+
+    segments: Sequence[Segment]
+    reading: SampleRows
+
+
+def whole(rows: int) -> SampleRows:
+    """Return what reads all rows of a run."""
+    return SampleRows(np.arange(rows)[:, None], np.ones((rows, 1)))
+
+
+class Sizes(NamedTuple):
+    """How large is what one job of the machine code works on; ``directions`` may be 0."""
+
+    setpoints: int
+    states: int
+    outputs: int
+    sets: int = 1
+    directions: int = 0
+    moving: int = 0
+
+
+class Samples(NamedTuple):
+    """Outputs (K, M, ny) of K sets and their derivatives (K, blocks, M, ny, directions).
+
+    ``change`` (K, M, ny) are their time derivatives, where the readings have weights for them.
+    """
+
+    outputs: Array
+    slopes: Array | None
+    change: Array | None
+
+
+class Courses:
+    """The courses of K sets: one that all share, or each its own on the same grid.
+
+    ``parts`` (K,) are the sub-steps of each step, or (K, segments) where they are not the same.
+    """
+
+    def __init__(self, courses: Sequence[Course], parts: NDArray[np.int64]) -> None:
+        shared = len(courses) == 1
+        of_set: Any = np.zeros(len(parts), np.intp) if shared else slice(None)
+        self.parts, self.sets = parts, len(parts)
+        lengths = [len(segment.u) for segment in courses[0].segments]
+        self.rows, self.longest, self.segments = sum(lengths), max(lengths), len(lengths)
+        self.points = max(course.reading.weights.shape[1] for course in courses)
+        readings = [course.reading.padded(self.points) for course in courses]
+        self.samples = len(readings[0].weights)
+        self.arrays = courses, readings  # what the addresses below point into
+        shapes = courses[0].segments[0].shapes
+        self.columns = 0 if shapes is None else shapes.shape[-1]
+        self.readings = np.array([_places(reading) for reading in readings])[of_set]
+        tables = np.array([_table(course.segments) for course in courses])[of_set]
+        parts = parts.reshape(self.sets, -1)
+        tables[:, :, SPAN.index("parts")] = parts
+        steps = [[segment.step for segment in course.segments] for course in courses]
+        h = np.array(steps)[of_set] / parts
+        tables[:, :, SPAN.index("h")] = h.view(np.int64)
+        self.spans = np.ascontiguousarray(tables)
+
+
+def _places(reading: SampleRows) -> tuple[int, int, int]:
+    slopes = 0 if reading.slopes is None else address(reading.slopes)
+    return place_of(reading.rows), address(reading.weights), slopes
+
+
+def _table(segments: Sequence[Segment]) -> list[tuple[int, ...]]:
+    table: list[tuple[int, ...]] = []
+    row = 0
+    for u, _, shapes in segments:
+        table.append((address(u), 0 if shapes is None else address(shapes), row, len(u) - 1, 0, 0))
+        row += len(u)
+    return table
+
+
+class Sampler:
+    """Calls the function ``sampled`` of some machine code."""
+
+    def __init__(self, engine: Any, sizes: Sizes) -> None:
+        self.sizes = sizes
+        numbers, pointer = ctypes.c_int64, ctypes.c_void_p
+        arguments = (numbers, pointer, pointer, *[numbers] * 4, pointer)
+        prototype = ctypes.CFUNCTYPE(None, *arguments)
+        self._call = prototype(engine.get_function_address("sampled"))
+
+    def __call__(
+        self,
+        p: Array,
+        courses: Courses,
+        sets: NDArray[np.intp],
+        dp: Array | None = None,
+        rates: Array | None = None,
+    ) -> Samples:
+        """Run jobs of sets side by side, and return the samples of all K sets of ``courses``.
+
+        ``p`` (jobs, np, lanes) are their parameters, ``sets`` (jobs, lanes) the numbers of these
+        sets; ``dp`` (K, blocks, np, directions) the tangents of sets that run one by one, a job
+        for each block, and ``rates`` (K, blocks, moving, columns, directions) those of the inputs
+        that move.
+        """
+        sizes, count = self.sizes, courses.sets
+        blocks = 1 if dp is None else dp.shape[1]
+        shape = (courses.samples, sizes.outputs)
+        outputs = np.empty((count, *shape))
+        slopes = None if dp is None else np.empty((count, blocks, *shape, sizes.directions))
+        changing = dp is not None and courses.readings[0, 2] != 0
+        changes = np.empty((count, *shape)) if changing else None
+        jobs = np.zeros((len(sets), blocks, 4), np.int64)
+        jobs[:, :, 0] = _places_in(p, len(sets))[:, None]
+        if dp is not None:
+            jobs[:, :, 1] = _places_in(dp, len(sets) * blocks).reshape(-1, blocks)
+        if rates is not None:
+            jobs[:, :, 2] = _places_in(rates, len(sets) * blocks).reshape(-1, blocks)
+        jobs[:, :, 3] = _places_in(courses.spans, count)[sets[:, 0]][:, None]
+        lanes = np.zeros((len(sets), blocks, sets.shape[1], len(SAMPLES)), np.int64)
+        lanes[..., :3] = courses.readings[sets][:, None]
+        lanes[..., 3] = _places_in(outputs, count)[sets][:, None]
+        if slopes is not None:
+            lanes[..., 4] = _places_in(slopes, count * blocks).reshape(-1, blocks)[:, :, None]
+        if changes is not None:
+            lanes[..., 5] = _places_in(changes, count)[sets][:, None]
+        work, scratch = self._work(courses)
+        self._call(
+            len(sets) * blocks,
+            place_of(jobs),
+            place_of(lanes),
+            courses.segments,
+            courses.samples,
+            courses.points,
+            courses.columns,
+            place_of(work),
+        )
+        del scratch
+        return Samples(outputs, slopes, changes)
+
+    def _work(self, courses: Courses) -> tuple[Table, Array]:
+        """Return where a job works, and the buffer that holds it."""
+        setpoints, states, outputs, sets, directions, moving = self.sizes
+        wide = sets * directions
+        lengths = [
+            *(setpoints * sets, states * sets, courses.rows * outputs * sets),
+            *(setpoints * wide, states * wide, courses.rows * outputs * wide),
+            courses.longest * moving * directions,
+        ]
+        ends = np.cumsum([-(-length // CACHE_LINE) * CACHE_LINE for length in lengths])
+        scratch = _scratch_of(int(ends[-1]) + CACHE_LINE)
+        begin = -(-address(scratch) // (8 * CACHE_LINE)) * (8 * CACHE_LINE)
+        return begin + 8 * np.concatenate([[0], ends[:-1]]), scratch
+
+
+def _places_in(array: NDArray[Any], count: int) -> Table:
+    """Return where each of ``count`` equal parts of an array begins."""
+    begin = place_of(array) if array.dtype == np.int64 else address(array)
+    return begin + np.arange(count) * (array.nbytes // max(count, 1))
+
+
+def _scratch_of(size: int) -> Array:
+    """Return a buffer of at least so many numbers, this thread's own."""
+    kept: Array | None = getattr(_scratch, "buffer", None)
+    if kept is not None and len(kept) >= size:
+        return kept
+    buffer = np.empty(size)
+    if size <= MOST_KEPT:
+        _scratch.buffer = buffer
+    return buffer

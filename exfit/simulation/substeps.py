@@ -1,0 +1,149 @@
+"""Into how many parts a step of a simulation is divided: a rule of the start at rest."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.engine.kernel import AtRest
+from exfit.engine.system import System
+from exfit.errors import SimulationError
+from exfit.models.blocks import SHORTEST
+from exfit.plants import VT0
+from exfit.simulation.grid import ON_GRID
+from exfit.simulation.kernels import linear_kernel, time_constants
+from exfit.simulation.limits import limits_passed
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Values = Mapping[str, float]
+
+MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
+REST_TOLERANCE = 1e-6  # pu/s: below any real motion
+STATE_ROUNDING = 1e-13  # of a state, relative
+SQUARINGS = 5  # of a Jacobian, to bound its spectral radius
+UNDERFLOW = 1e-200  # a smaller norm of a power may have lost all digits
+NO_SUBSTEPS = 0  # sub-steps of a set of values that has no response
+
+
+def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]:
+    """Return into how many parts each step (s) is divided for parameter sets p (K, np).
+
+    The rule is ceil(step * fastest rate), where the rate is the largest of the spectral radius
+    of the slopes' Jacobian at rest and 1/T of every time constant that is not bypassed:
+    Runge-Kutta of order four is unstable beyond 2.785, and a limit would hide it. It depends
+    on the values alone, and a change of one sub-step moves a response by less than the
+    method's own error. NO_SUBSTEPS where the start is no rest, or beyond MOST_SUBSTEPS.
+    """
+    rest = linear_kernel(system).at_rest(p)
+    lag_rate = _lag_rates(system, p)
+    least = _parts(step, lag_rate)
+    with np.errstate(all="ignore"):
+        sure = _surely_still(rest)
+        sure &= _parts(step, np.maximum(lag_rate, _radius_bounds(rest.jacobian))) == least
+    if np.all(sure):
+        return least
+    unsure = AtRest(*(part[~sure] for part in rest))
+    radius = spectral_radii(unsure.jacobian)
+    parts = _parts(step, np.maximum(lag_rate[~sure], radius))
+    least[~sure] = np.where(np.any(_moving(unsure, radius), axis=1), NO_SUBSTEPS, parts)
+    return least
+
+
+def why_unreachable(system: System, step: float, values: Values, p: Array) -> SimulationError:
+    """Return what is to be reported of values, as a vector p (np,), that have no sub-steps."""
+    rest = linear_kernel(system).at_rest(p[None])
+    radius = spectral_radii(rest.jacobian)
+    moving = _moving(rest, radius)[0]
+    if not np.any(moving):
+        return too_fast(system, step, values, float(radius[0]))
+    finite = bool(np.isfinite(rest.jacobian).all())
+    states = zip(system.states, rest.slopes[0], moving, strict=True)
+    moved = [
+        f"{name} moves by {slope:.3g} pu/s"
+        for name, slope, moves in states
+        if finite and moves and math.isfinite(slope)
+    ]
+    why = limits_passed(system, values) or ", ".join(moved) or "the values do not define one"
+    at = f" at vt0 = {values[VT0]:g} pu" if VT0 in values else ""
+    return SimulationError(f"no state of rest{at}: {why}")
+
+
+def substeps_for(system: System, step: float, values: Values, radius: float) -> int:
+    """Return the sub-steps for slopes whose Jacobian has a spectral radius (1/s).
+
+    Raises SimulationError where it is not finite, or they are more than MOST_SUBSTEPS.
+    """
+    if not math.isfinite(radius):
+        raise SimulationError("the response does not stay finite")
+    p = np.array([[values[name] for name in system.parameters]])
+    parts = int(_parts(step, np.maximum(_lag_rates(system, p), radius))[0])
+    if parts == NO_SUBSTEPS:
+        raise too_fast(system, step, values, radius)
+    return parts
+
+
+def too_fast(system: System, step: float, values: Values, radius: float) -> SimulationError:
+    """Return what is to be reported of values that need more than MOST_SUBSTEPS."""
+    lags = {name: values[name] for name in time_constants(system) if values[name] >= SHORTEST}
+    shortest = min(lags, key=lambda name: lags[name], default=None)
+    rate = max(radius, 1.0 / lags[shortest] if shortest else 0.0)
+    smallest = (
+        f"; the smallest time constant is {shortest} = {lags[shortest]:g} s" if shortest else ""
+    )
+    return SimulationError(
+        f"simulation.step: {step:g} s would need {math.ceil(step * rate - ON_GRID)} sub-steps "
+        f"(limit {MOST_SUBSTEPS}) for a rate of {rate:.4g} 1/s{smallest}"
+    )
+
+
+def spectral_radii(jacobians: Array) -> Array:
+    """Return the spectral radius of each of Jacobians (K, nx, nx), inf where one is infinite."""
+    radii = np.full(len(jacobians), np.inf)
+    finite = np.isfinite(jacobians).all(axis=(1, 2))
+    if np.any(finite):
+        radii[finite] = np.abs(np.linalg.eigvals(jacobians[finite])).max(axis=1)
+    return radii
+
+
+def _lag_rates(system: System, p: Array) -> Array:
+    """Return 1/T of the shortest time constant of each set that is not bypassed."""
+    lags = p[:, [system.parameters.index(name) for name in time_constants(system)]]
+    shortest = np.min(np.where(lags >= SHORTEST, lags, np.inf), axis=1, initial=np.inf)
+    return np.asarray(1.0 / shortest)
+
+
+def _parts(step: float, rates: Array) -> NDArray[np.int64]:
+    """Return ceil(step * rate), at least one, and NO_SUBSTEPS beyond MOST_SUBSTEPS."""
+    parts = np.maximum(np.ceil(step * rates - ON_GRID), 1.0)
+    # also where a rate is not a number
+    return np.where(parts <= MOST_SUBSTEPS, parts, NO_SUBSTEPS).astype(np.int64)
+
+
+def _surely_still(rest: AtRest) -> Mask:
+    """Return which systems are at rest whatever their spectral radius."""
+    finite = np.isfinite(rest.jacobian).all(axis=(1, 2)) & np.isfinite(rest.x).all(axis=1)
+    return np.asarray(finite & (np.abs(rest.slopes) <= REST_TOLERANCE).all(axis=1))
+
+
+def _moving(rest: AtRest, radius: Array) -> Mask:
+    """Return which states (K, nx) move: more than what the rounding of a state leaves."""
+    with np.errstate(all="ignore"):
+        rounding = STATE_ROUNDING * np.max(np.abs(rest.x), axis=1) * radius
+    limit = np.where(np.isfinite(rounding), REST_TOLERANCE + rounding, np.nan)
+    return ~(np.abs(rest.slopes) <= limit[:, None])
+
+
+def _radius_bounds(jacobians: Array) -> Array:
+    """Return bounds above the spectral radii of Jacobians (K, nx, nx), without eigenvalues.
+
+    A power's norm is a bound of the radius' power (Gelfand): the 32nd is near enough.
+    """
+    size = np.abs(jacobians).max(axis=(1, 2))
+    power = jacobians / size[:, None, None]
+    for _ in range(SQUARINGS):
+        power = power @ power
+    norm = np.abs(power).sum(axis=2).max(axis=1)
+    bound = size * norm ** (0.5**SQUARINGS)
+    return np.asarray(np.where(norm > UNDERFLOW, bound, np.inf))
