@@ -19,18 +19,22 @@ algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10
 Iterative methods for optimization, chapters 2 and 3.
 """
 
-from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
-from exfit.estimate.damping_ratio import RatioDamping
-from exfit.estimate.gauss_newton import LineSearch
-from exfit.estimate.problem import half_square
-from exfit.estimate.profile import CostProfile, profile, profiles
-from exfit.estimate.profile_side import ProfileEnd
-from exfit.estimate.requests import Functions, OneByOne
-from exfit.estimate.search import to_half, to_parabola
-from exfit.estimate.searches import Searches
-from exfit.estimate.solver import Descent, least_squares
-from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
-from exfit.estimate.trust_region import TrustRegion
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
+    from exfit.estimate.damping_ratio import RatioDamping
+    from exfit.estimate.gauss_newton import LineSearch
+    from exfit.estimate.problem import half_square
+    from exfit.estimate.profile_side import ProfileEnd
+    from exfit.estimate.profiling import CostProfile, profile, profiles
+    from exfit.estimate.requests import Functions, OneByOne
+    from exfit.estimate.search import to_half, to_parabola
+    from exfit.estimate.searches import Searches
+    from exfit.estimate.solver import Descent, least_squares
+    from exfit.estimate.starts import LocalMinimum, MultistartResult, multistart, spread
+    from exfit.estimate.trust_region import TrustRegion
 
 __all__ = [
     "STATUS",
@@ -58,3 +62,37 @@ __all__ = [
     "to_half",
     "to_parabola",
 ]
+
+_MODULES = {
+    "CostProfile": "exfit.estimate.profiling",
+    "Descent": "exfit.estimate.solver",
+    "Functions": "exfit.estimate.requests",
+    "LineSearch": "exfit.estimate.gauss_newton",
+    "LocalMinimum": "exfit.estimate.starts",
+    "MultistartResult": "exfit.estimate.starts",
+    "OneByOne": "exfit.estimate.requests",
+    "ProfileEnd": "exfit.estimate.profile_side",
+    "Progress": "exfit.estimate.answer",
+    "RatioDamping": "exfit.estimate.damping_ratio",
+    "Result": "exfit.estimate.answer",
+    "STATUS": "exfit.estimate.answer",
+    "Searches": "exfit.estimate.searches",
+    "SolverIteration": "exfit.estimate.answer",
+    "Stop": "exfit.estimate.answer",
+    "TrustRegion": "exfit.estimate.trust_region",
+    "half_square": "exfit.estimate.problem",
+    "least_squares": "exfit.estimate.solver",
+    "multistart": "exfit.estimate.starts",
+    "profile": "exfit.estimate.profiling",
+    "profiles": "exfit.estimate.profiling",
+    "spread": "exfit.estimate.starts",
+    "to_half": "exfit.estimate.search",
+    "to_parabola": "exfit.estimate.search",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name from the module that defines it, imported when it is first used."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULES[name]), name)
