@@ -15,17 +15,21 @@ from math import inf, isfinite, sqrt
 import numpy as np
 
 from exfit.estimate.arrays import TINY, UNSEEN, Array
+from exfit.estimate.bounded import bounded_minimum
 from exfit.estimate.box import Box
 from exfit.estimate.linear import LinearModel, linearise, solve
 from exfit.estimate.problem import Point, Problem, half_square
 from exfit.estimate.requests import Functions, Steps
-from exfit.estimate.search import ARMIJO
 
 FINE = 2e-3  # of the rise: what a refit may leave, a thousandth of the way to the crossing
 MOST_CORRECTIONS = 15  # of a refit: it starts near its end
+NEXT_TO = 1e-6  # units: a variable no farther from its bound lies on it
 REACH = 1.0  # of a correction, in units of each variable
-DAMPINGS = tuple(10.0**-k for k in range(1, 10))  # of the largest squared singular value
-LENGTHS = (0.5, 0.25, 0.1, 0.05, 0.02, 0.01)  # of a correction that is too long
+FAR = 30.0  # rises that a correction promises: where it fails, take a shorter step instead
+ENOUGH = 0.1  # of what a correction promises: it is not too long
+DAMPINGS = tuple(10.0**-k for k in range(2, 9))  # of the largest squared singular value
+LENGTHS = (0.5, 0.2, 0.05)  # of a correction that is too long
+SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the linear model on the other side of a kink
 LAST = 1.05  # height that the last step aims at: beyond the crossing
 LEAPS = 2.5  # times the height that a step aims at: take a shorter one instead
 MOST_HALVINGS = 5  # of a step: what then remains is a jump
@@ -124,9 +128,10 @@ class Side:
             return ProfileEnd.BOUND
         if len(self.spots) > MOST_POINTS * points:
             return ProfileEnd.FLAT
-        step = self.step()
-        for _ in range(MOST_HALVINGS + 1):
-            spot = yield from self.refit(self.predicted(step))
+        step = min(self.step(), self.way_to_corner())
+        for tries in range(MOST_HALVINGS + 1):
+            patient = tries == MOST_HALVINGS
+            spot = yield from self.refit(self.predicted(step), patient)
             if spot is not None and spot.height - last.height <= LEAPS / points:
                 break
             step *= 0.5
@@ -165,6 +170,15 @@ class Side:
         bend = (1.0 / last.slope - 1.0 / before.slope) / risen
         return min(max(straight + 0.5 * bend * gain**2, 0.5 * straight), longest)
 
+    def way_to_corner(self) -> float:
+        """Return how far the parameter goes until another, which follows it, meets its bound."""
+        last, box = self.spots[-1], self.valley.box
+        moves = self.sign * last.tangent
+        room = np.where(moves > 0.0, box.high - last.best, last.best - box.low)
+        meeting = (moves != 0.0) & (room > 0.0)
+        meeting[self.index] = False
+        return float(np.min(room[meeting] / np.abs(moves[meeting]), initial=inf))
+
     def first_step(self, height: float) -> float:
         """Return how far a height is from the minimum, where the cost is a parabola."""
         if self.curvature > 0.0:
@@ -185,12 +199,21 @@ class Side:
 
     def at(self, place: float, x: Array) -> Array:
         """Return x within the bounds, with the parameter at a place."""
-        inside = self.valley.box.inside(x)
+        inside = self.snapped(x)
         inside[self.index] = place
         return inside
 
-    def refit(self, guess: Array) -> Steps[Spot | None]:
-        """Fit all parameters but one, from a guess; None where the residuals are not finite."""
+    def snapped(self, x: Array) -> Array:
+        """Return x within the bounds, on those that it is next to."""
+        box = self.valley.box
+        near = NEXT_TO * box.unit
+        return np.where(x <= box.low + near, box.low, np.where(x >= box.high - near, box.high, x))
+
+    def refit(self, guess: Array, patient: bool = True) -> Steps[Spot | None]:
+        """Fit all parameters but one, from a guess; None where the residuals are not finite.
+
+        Not ``patient``: also where the full step fails far from the minimum.
+        """
         valley, fine = self.valley, FINE * self.rise
         low, high = (
             self.at(guess[self.index], valley.box.low),
@@ -201,14 +224,20 @@ class Side:
         point = yield from problem.evaluate(guess)
         if point.cost == inf:
             return None
-        linear = yield from linearise(problem, point, valley.bottom)
+        linear, before = (yield from linearise(problem, point, valley.bottom)), None
         for _ in range(MOST_CORRECTIONS):
             if not linear.finite or linear.full.promise <= fine:
                 break
-            lower = yield from corrected(problem, linear)
-            gain = linear.point.cost - lower.cost
-            if lower is not linear.point:
-                linear = yield from linearise(problem, lower, linear)
+            trial = yield from problem.evaluate(solve(linear, reach=REACH).target)
+            if trial.cost > point.cost - ENOUGH * linear.full.promise:
+                if not patient and linear.full.promise > FAR * self.rise:
+                    return None
+                shorter = yield from best_of_shorter(problem, linear, before)
+                trial = min(trial, shorter, key=lambda point: point.cost)
+            gain = point.cost - trial.cost
+            if gain > 0.0:
+                point, before = trial, linear
+                linear = yield from linearise(problem, point, linear)
             if gain <= fine:
                 break
         return self.spot(linear)
@@ -220,7 +249,7 @@ class Side:
         if not linear.finite:
             return Spot(x, cost, place, self.height(cost), 0.0, x, self.alone())
         smooth = linear.full.promise <= FINE * self.rise
-        best, left = (linear.full.target, linear.full.promise) if smooth else (x, 0.0)
+        best, left = (self.snapped(linear.full.target), linear.full.promise) if smooth else (x, 0.0)
         tangent, _ = self.tangent(linear, best)
         height = self.height(cost - left)
         moved, along = effect_of(linear, best - x), effect_of(linear, tangent)
@@ -280,21 +309,40 @@ def effect_of(linear: LinearModel, direction: Array) -> Array:
     return linear.singular * along
 
 
-def corrected(problem: Problem, linear: LinearModel) -> Steps[Point]:
-    """Return a point with a lower cost, or that of the linear model where none is in sight.
+def best_of_shorter(
+    problem: Problem, linear: LinearModel, before: LinearModel | None
+) -> Steps[Point]:
+    """Return the best of many steps that are shorter than the full one, tried at once.
 
-    The full step; where it fails, as at a kink, the best of many shorter ones, tried at once.
+    At a kink, whose other side the linear model ``before`` shows, steps along it are among them.
     """
-    full = solve(linear, reach=REACH)
-    trial = yield from problem.evaluate(full.target)
-    if trial.cost <= linear.point.cost + ARMIJO * full.slope:
-        return trial
     largest = float(linear.singular[0]) ** 2
     targets = [solve(linear, share * largest, REACH).target for share in DAMPINGS]
-    targets += [full.at(length) for length in LENGTHS]
+    targets += [linear.full.at(length) for length in LENGTHS]
+    if before is not None:
+        targets += [along_kink(linear, before, share) for share in SHARES]
     residuals = yield from problem.residuals(targets)
     points = [Point(x, r, half_square(r)) for x, r in zip(targets, residuals, strict=True)]
-    return min([linear.point, trial, *points], key=lambda point: point.cost)
+    return min(points, key=lambda point: point.cost)
+
+
+def along_kink(linear: LinearModel, before: LinearModel, share: float) -> Array:
+    """Return where the weighted mean of two linear models has its minimum within the bounds."""
+    x, box = linear.point.x, linear.box
+    rows = np.vstack(
+        [
+            sqrt(1.0 - share) * (linear.singular[:, None] * linear.directions * linear.scale),
+            sqrt(share) * (before.singular[:, None] * before.directions * before.scale),
+        ]
+    )
+    amounts = np.append(
+        sqrt(1.0 - share) * linear.amounts,
+        sqrt(share) * (before.amounts + effect_of(before, x - before.point.x)),
+    )
+    unit = box.unit
+    low, high = np.maximum(box.low - x, -REACH * unit), np.minimum(box.high - x, REACH * unit)
+    y = bounded_minimum(rows * unit, amounts, low / unit, high / unit, linear.unseen)
+    return box.inside(x + y * unit)
 
 
 def interpolated(inside: Spot, outside: Spot) -> tuple[float, float]:
