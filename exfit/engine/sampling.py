@@ -41,6 +41,18 @@ class SampleRows(NamedTuple):
     weights: Array
     slopes: Array | None = None
 
+    def enlarged(self, factor: float) -> "SampleRows":
+        """Return what reads the deviations from the first row so many times as large."""
+        if factor == 1.0:
+            return self
+        count = len(self.rows)
+        rows = np.column_stack([self.rows, np.zeros(count, dtype=np.int64)])
+        weights = np.column_stack([factor * self.weights, np.full(count, 1.0 - factor)])
+        slopes = self.slopes
+        if slopes is not None:
+            slopes = np.column_stack([factor * slopes, np.zeros(count)])
+        return SampleRows(rows, weights, slopes)
+
     def padded(self, points: int) -> "SampleRows":
         """Return the same of more points, of which the last ones count nothing."""
         missing = points - self.weights.shape[1]

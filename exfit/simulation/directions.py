@@ -72,10 +72,8 @@ class Moves:
                     row[place] = [shape.rate(own[k]) for k in self.columns]
         return rates
 
-    def shapes_on(self, segment: GridSegment, inputs: Inputs) -> Array | None:
+    def shapes_on(self, segment: GridSegment, inputs: Inputs) -> Array:
         """Return the shapes at the grid points of a segment, (n + 1, moving, shapes)."""
-        if not self.shapes:
-            return None
         heights = np.zeros((segment.steps + 1, len(self.shapes), self._most_shapes))
         for row, shapes in enumerate(self.shapes.values()):
             for place, shape in enumerate(shapes):

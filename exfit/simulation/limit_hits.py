@@ -1,11 +1,13 @@
 """Which limits a response has met, for how long, and how near it came to the others."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.engine.system import System
 from exfit.engine.trace import evaluate
 from exfit.simulation.limits import EquationLimit, at_rest, equation_limits, traced
 from exfit.simulation.simulator import Run, Simulator
@@ -75,6 +77,23 @@ def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
         for limiters in _alike(_followed(simulator, values, run))
     ]
     return tuple(sorted((hit for hit in hits if hit is not None), key=lambda hit: hit.first))
+
+
+def limits_at_rest(system: System, values: Values) -> tuple[str, ...]:
+    """Return the limits that a system rests on, so that even a small deviation may meet them.
+
+    ``values`` are the parameters of the system.
+    """
+    limiters = equation_limits(system)
+    targets = [node for limiter in limiters for node in (limiter.value, limiter.bound)]
+    rest = evaluate(targets, at_rest(traced(system), values))
+    names = []
+    for limiter in limiters:
+        value, bound = float(rest[limiter.value]), float(rest[limiter.bound])
+        near = LIMIT_ROUNDING * max(abs(value), abs(bound))
+        if isfinite(bound) and abs(value - bound) <= near:
+            names.append(limiter.limit)
+    return tuple(dict.fromkeys(names))
 
 
 def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:

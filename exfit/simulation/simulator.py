@@ -28,6 +28,7 @@ Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
+SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 WORTH_A_BLOCK = 3  # sets that take longer one by one than SIDE_BY_SIDE of them together
 
 
@@ -71,6 +72,7 @@ class Simulator:
     ) -> None:
         self.system, self.inputs, self.times = system, inputs, times
         self.step, self.least, self.delay = step, least, delay
+        self._share = 1.0  # of the inputs
         self._grid = grid_segments(inputs, step)
         # a long record is read on the grid once, whatever else a fit moves
         self._recorded_samples = [
@@ -108,6 +110,17 @@ class Simulator:
             np.concatenate([segment.times for segment in self._grid]),
             WholeRun(sum(len(segment.u) for segment in self._segments)),
         )
+        return result
+
+    def small_signal(self) -> "Simulator":
+        """Return the simulator of the response that is linear in the inputs.
+
+        It simulates a small share of them, so that no limit is met, and enlarges how the response
+        deviates from the rest.
+        """
+        result = copy(self)
+        result.least, result._share = 1, SMALL_SHARE
+        result._segments = result._segments_of()
         return result
 
     def sampling(self) -> Interpolation:
@@ -299,10 +312,11 @@ class Simulator:
         segments = self._segments
         if moves is not None and moves.shapes:
             segments = [
-                segment._replace(shapes=moves.shapes_on(part, self.inputs))
+                segment._replace(shapes=self._share * moves.shapes_on(part, self.inputs))
                 for segment, part in zip(segments, self._grid, strict=True)
             ]
-        return Course(segments, self._sampling.reading(changing))
+        reading = self._sampling.reading(changing)
+        return Course(segments, reading.enlarged(1.0 / self._share))
 
     def _tangent_code(self, outputs: tuple[str, ...], moves: Moves) -> TangentKernel:
         """Return the machine code whose derivatives cover what moves."""
@@ -322,7 +336,8 @@ class Simulator:
             u = np.empty((part.steps + 1, len(self.system.inputs)))
             for column, name in enumerate(self.system.inputs):
                 if changed is None or name in changed:
-                    u[:, column] = self.inputs.stepped(name, part) + recorded.get(name, 0.0)
+                    whole = self.inputs.stepped(name, part) + recorded.get(name, 0.0)
+                    u[:, column] = self._share * whole
                 else:
                     u[:, column] = self._segments[k].u[:, column]
             segments.append(Segment(u, part.step))

@@ -1,6 +1,7 @@
 """What a fit finds about a record itself: instants, sizes, levels, delay, base of a signal."""
 
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from records import (
 from tables import read_columns
 
 from exfit.fitting.build import build_experiments
+from exfit.fitting.linear_form import linear_form
 from exfit.fitting.nuisance import names_of
 from exfit.fitting.problem import residuals_of
 from exfit.results.compare_with_record import compare_with_record
@@ -95,6 +97,18 @@ def test_the_exact_jacobian_is_that_of_differences_with_all_that_can_be_found(ev
     size = np.abs(exact).max(axis=0)
     # a sample that passes a kink of the loss or of the median within the step: 1e-6 of a column
     assert (np.abs(differences - exact).max(axis=0) <= 1e-5 * size).all()
+
+
+def test_the_exact_jacobian_of_the_linear_form_is_that_of_differences(everything_open):
+    residuals = linear_form(replace(everything_open, robust=None))
+    exact = residuals.exact(residuals.start)
+    differences = residuals.differences(residuals.start, -1e-4, 1e-4)
+    size = np.abs(exact).max(axis=0)
+    # samples of the median that change places, and the curvature of an instant: 1e-3 of a column
+    assert (np.abs(differences - exact).max(axis=0) <= 0.02 * size).all()
+    assert (
+        np.linalg.norm(differences - exact, axis=0) <= 1e-3 * np.linalg.norm(exact, axis=0)
+    ).all()
 
 
 def test_differences_of_what_moves_are_those_of_runs_one_by_one(everything_open):
