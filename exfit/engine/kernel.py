@@ -4,7 +4,7 @@ import ctypes
 import hashlib
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -129,16 +129,45 @@ def _keep(path: Path, code: bytes) -> None:
         write_whole(path, hashlib.sha256(code).digest() + code)
 
 
-def compiled(ir: str, *, long_vectors: bool) -> Any:
-    """Return LLVM's engine holding the functions of an IR, built or from the cache."""
-    with _lock:
-        machine, name = _machine(target(long_vectors))
-        key = hashlib.sha256(f"{name}\n{ir}".encode()).hexdigest()[:32]
-        path = cache_folder() / f"{key}.code"
+@cache
+def _sources() -> str:
+    """Return the hash of the modules that write the IR of a trace."""
+    files = sorted(Path(__file__).parent.glob("*.py*"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+
+
+def _key(*texts: str) -> str:
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:32]
+
+
+def _code(traced: str, write_ir: Callable[[], str], machine: Any, name: str) -> bytes:
+    """Return machine code, built or from the cache, where it lies under the key of its IR.
+
+    Which IR a trace leads to is kept as well: to write it takes longer than to load the code.
+    """
+    folder = cache_folder()
+    place = folder / "traces" / _key(name, _sources(), traced)
+    key = _cached(place)
+    code = None if key is None else _cached(folder / f"{key.decode()}.code")
+    if code is None:
+        ir = write_ir()
+        path = folder / f"{_key(name, ir)}.code"
         code = _cached(path)
         if code is None:
             code = _build(ir, machine)
             _keep(path, code)
+        _keep(place, path.stem.encode())
+    return code
+
+
+def compiled(traced: str, write_ir: Callable[[], str], *, long_vectors: bool) -> Any:
+    """Return LLVM's engine holding the functions of an IR.
+
+    ``traced`` is a text that the IR follows from, with these modules.
+    """
+    with _lock:
+        machine, name = _machine(target(long_vectors))
+        code = _code(traced, write_ir, machine, name)
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
@@ -154,7 +183,12 @@ class Kernel:
 
     def __init__(self, system: System, outputs: Sequence[str], lanes: int = 1) -> None:
         self.lanes, self.system, self.outputs = lanes, system, tuple(outputs)
-        engine = compiled(simulation(trace(system, outputs), lanes), long_vectors=lanes > 1)
+        traced = trace(system, outputs)
+        engine = compiled(
+            f"simulation {lanes} {traced.text}",
+            lambda: simulation(traced, lanes),
+            long_vectors=lanes > 1,
+        )
         self._rest = function(engine, "rest", 4)
         self._run = function(engine, "run", 4, RUN_ARGUMENTS)
         sizes = Sizes(len(system.setpoints), len(system.states), len(self.outputs), lanes)
@@ -229,8 +263,13 @@ class TangentKernel:
         self.system, self.outputs = system, tuple(outputs)
         self.free, self.moving, self.directions = tuple(free), tuple(moving), directions
         traced = trace(system, outputs)
-        derived = differentiate(traced, system, free, moving)
-        engine = compiled(simulation_with_tangents(traced, derived, directions), long_vectors=True)
+
+        def ir() -> str:
+            derived = differentiate(traced, system, free, moving)
+            return simulation_with_tangents(traced, derived, directions)
+
+        text = f"tangents {self.free} {self.moving} {directions} {traced.text}"
+        engine = compiled(text, ir, long_vectors=True)
         counts = (len(system.setpoints), len(system.states), len(self.outputs))
         sizes = Sizes(*counts, directions=directions, moving=len(self.moving))
         self._sampled = Sampler(engine, sizes)
@@ -286,8 +325,11 @@ class LinearKernel:
     def __init__(self, system: System) -> None:
         self.system = system
         traced = trace(system, ())
-        derived = differentiate(traced, system, ())
-        engine = compiled(linearisation(traced, derived, DIRECTIONS), long_vectors=False)
+
+        def ir() -> str:
+            return linearisation(traced, differentiate(traced, system, ()), DIRECTIONS)
+
+        engine = compiled(f"linearisation {DIRECTIONS} {traced.text}", ir, long_vectors=False)
         self._rest = function(engine, "rest", 8)
         self._motion = function(engine, "motion", 9)
         self._at_rest = function(engine, "at_rest", len(AT_REST), first=(ctypes.c_int64,))

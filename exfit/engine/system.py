@@ -56,6 +56,13 @@ class Trace:
     outputs: tuple[Node, ...]
     clamped: tuple[Node, ...]  # the states after a step, back within their limits
 
+    @property
+    def text(self) -> str:
+        """The graph in full, and which of its nodes these are; before it is differentiated."""
+        lines = [str(node) for node in self.x[0].graph.nodes]
+        groups = [[node.index for node in group] for group in vars(self).values()]
+        return "\n".join([*lines, *map(str, groups)])
+
 
 @dataclass(frozen=True)
 class Tangents:

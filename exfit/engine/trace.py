@@ -38,6 +38,10 @@ class Node:
         self.varies, self.wide = varies, wide
         self.index = len(graph.nodes)
 
+    def __str__(self) -> str:
+        """Return the operation, its operands by their places in the graph."""
+        return f"{self.op} {[arg.index if isinstance(arg, Node) else arg for arg in self.args]}"
+
     @property
     def constant(self) -> float | None:
         """The number this node always is, or None."""

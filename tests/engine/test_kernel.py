@@ -489,6 +489,11 @@ def cache(tmp_path, monkeypatch):
     return tmp_path / "kept"
 
 
+def codes(cache):
+    """Return the files of machine code, beside which each trace has one that names its code."""
+    return list(cache.glob("*.code"))
+
+
 @pytest.fixture
 def builds(monkeypatch):
     """Count what is compiled."""
@@ -501,14 +506,38 @@ def builds(monkeypatch):
 
 def test_what_was_compiled_once_is_read_the_next_time(cache, builds):
     assert (nine(), nine()) == (9.0, 9.0)
-    assert len(builds) == len(list(cache.iterdir())) == 1
+    assert len(builds) == len(codes(cache)) == 1
+
+
+def test_no_ir_is_written_for_code_that_is_kept(cache, monkeypatch):
+    nine()
+    monkeypatch.setattr(engine, "simulation", None)
+    assert nine() == 9.0
+
+
+@pytest.mark.parametrize("damage", [lambda key: b"", lambda key: key[:-1], lambda key: key[::-1]])
+def test_a_trace_whose_code_is_not_known_is_compiled_again(cache, builds, damage):
+    nine()
+    (place,) = (cache / "traces").iterdir()
+    sound = place.read_bytes()
+    place.write_bytes(damage(sound))
+    assert nine() == 9.0
+    assert len(builds) == 1  # the code itself is there
+    assert place.read_bytes() == sound
+
+
+def test_each_trace_names_the_code_of_its_own_equations(cache, builds):
+    assert (nine(), apply(lambda x: x * x + 1.0, np.array([3.0]), lanes=1)[0]) == (9.0, 10.0)
+    named = {engine._cached(place).decode() for place in (cache / "traces").iterdir()}
+    assert named == {path.stem for path in codes(cache)}
+    assert len(named) == len(builds) == 2
 
 
 def test_other_equations_are_other_code(cache, builds):
     assert nine() == 9.0
     assert apply(lambda x: x * x + 1.0, np.array([3.0]), lanes=1)[0] == 10.0
     assert apply(square, np.array([3.0]), lanes=LANES)[0] == 9.0
-    assert len(builds) == len(list(cache.iterdir())) == 3
+    assert len(builds) == len(codes(cache)) == 3
 
 
 def test_code_for_another_processor_is_other_code_that_gives_the_same(cache, builds, monkeypatch):
@@ -517,7 +546,7 @@ def test_code_for_another_processor_is_other_code_that_gives_the_same(cache, bui
     monkeypatch.setenv("EXFIT_CPU", "x86-64")
     assert engine.target(long_vectors=True) == ("x86-64", "")
     assert nine() == own
-    assert len(builds) == len(list(cache.iterdir())) == 2
+    assert len(builds) == len(codes(cache)) == 2
 
 
 @pytest.mark.parametrize(
@@ -534,13 +563,13 @@ def test_code_for_another_processor_is_other_code_that_gives_the_same(cache, bui
 )
 def test_a_damaged_cache_is_rebuilt_in_silence(cache, builds, damage, capfd):
     nine()
-    (path,) = cache.iterdir()
+    (path,) = codes(cache)
     sound = path.read_bytes()
     path.write_bytes(damage(sound))
     assert nine() == 9.0
     assert len(builds) == 2
     assert path.read_bytes() == sound
-    assert list(cache.iterdir()) == [path]
+    assert codes(cache) == [path]
     assert capfd.readouterr() == ("", "")
 
 
@@ -555,9 +584,9 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch, b
 
 def test_a_folder_in_the_place_of_a_cache_file_is_left_alone(cache, builds):
     nine()
-    (path,) = cache.iterdir()
+    (path,) = codes(cache)
     path.unlink()
     path.mkdir()
     assert nine() == 9.0
     assert path.is_dir()
-    assert list(cache.iterdir()) == [path]
+    assert codes(cache) == [path]
