@@ -12,7 +12,7 @@ from exfit.engine.driver import at_rest, sampled
 from exfit.engine.functions import functions as inlined
 from exfit.engine.system import Tangents, Trace
 from exfit.engine.trace import Node, in_order
-from exfit.engine.writer import INTRINSICS, Shape, Values, Writer
+from exfit.engine.writer import INTRINSICS, WEIGHTS, Shape, Values, Writer
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def _module(parts: Sequence[TracePart], functions: Mapping[str, Writer], around:
     called = [
         text for shape in shapes for name, text in inlined(shape).items() if f"{name}(" in bodies
     ]
-    return "".join([*declarations, *called, bodies, around])
+    return "".join([*declarations, *called, bodies, around, WEIGHTS])
 
 
 def _fields(source: Trace | Tangents) -> tuple[tuple[Node, ...], ...]:

@@ -6,7 +6,7 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from exfit.engine.choices import Choice, Plan, plan
-from exfit.engine.trace import Node
+from exfit.engine.trace import TRUTHS, Node
 
 Values = dict[Node | tuple[Node, str], str]
 
@@ -15,6 +15,7 @@ LOGIC = {"&": "and", "|": "or"}
 COMPARISON = {"<": "olt", "<=": "ole"}
 INTRINSICS = ("sqrt", "log")
 TRANSCENDENTAL = ("exp", "sin", "cos")
+UNLIKELY, WEIGHTS = ", !prof !0", '!0 = !{!"branch_weights", i32 1, i32 100}\n'
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,9 @@ class Writer:
             self.label(between)
             self._jump(second, yes, no, values)
         else:
-            self.put(f"br i1 {values[condition]}, label %{yes}, label %{no}")
+            # what is below a limit or bypassed is the exception
+            hint = UNLIKELY if condition.op == "<" or not condition.varies else ""
+            self.put(f"br i1 {values[condition]}, label %{yes}, label %{no}{hint}")
 
     def _operand(self, node: Node, shape: Shape, values: Values) -> str:
         if node.constant is not None:
@@ -168,9 +171,8 @@ class Writer:
 
     def _instruction(self, node: Node, values: Values) -> str:
         shape = self.shape(node)
-        if node.op in LOGIC:
-            a, b = (values[operand] for operand in node.operands)
-            return self.let(f"{LOGIC[node.op]} {shape.of('i1')} {a}, {b}")
+        if node.op in TRUTHS:
+            return self._truth(node, shape, values)
         if node.op == "select":
             condition, *branches = node.operands
             a, b = (self._operand(branch, shape, values) for branch in branches)
@@ -183,8 +185,6 @@ class Writer:
         args = [self._operand(operand, shape, values) for operand in node.operands]
         if node.op in BINARY:
             return self.arithmetic(BINARY[node.op], shape, *args)
-        if node.op in COMPARISON:
-            return self.let(f"fcmp {COMPARISON[node.op]} {shape.type} {args[0]}, {args[1]}")
         if node.op in INTRINSICS:
             return self.let(
                 f"call {shape.type} @llvm.{node.op}.{shape.suffix}({shape.type} {args[0]})"
@@ -192,6 +192,16 @@ class Writer:
         if node.op in TRANSCENDENTAL:
             return self.let(f"call {shape.type} @{node.op}_{shape.suffix}({shape.type} {args[0]})")
         raise KeyError(f"{node.op} {node.args}")
+
+    def _truth(self, node: Node, shape: Shape, values: Values) -> str:
+        if node.op in LOGIC:
+            a, b = (values[operand] for operand in node.operands)
+            truth = self.let(f"{LOGIC[node.op]} {shape.of('i1')} {a}, {b}")
+        else:
+            a, b = (self._operand(operand, shape, values) for operand in node.operands)
+            truth = self.let(f"fcmp {COMPARISON[node.op]} {shape.type} {a}, {b}")
+        # frozen: what stays is a bit that is kept, else it is compared again at each branch
+        return truth if node.varies else self.let(f"freeze {shape.of('i1')} {truth}")
 
     def _clip(self, node: Node, shape: Shape, values: Values) -> str:
         x, *limits = node.operands
