@@ -59,6 +59,7 @@ def multistart(
     starts: ArrayLike,
     legs: Sequence[Descent],
     *,
+    first_legs: Sequence[int] | None = None,
     counts: Sequence[int] | None = None,
     workers: int | None = None,
     watch: Watch = lambda _: None,
@@ -72,6 +73,7 @@ def multistart(
     threads (as many as there are processors by default); no result depends on their number. The
     functions of the legs must bear being called from several threads at a time.
 
+    first_legs  which leg each start begins with (by default with the first one)
     counts  of how many starts each of these is the end already (by default of itself alone)
     watch   gets every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
             with what is done
@@ -94,7 +96,9 @@ def multistart(
         lowest = min((end.cost for end in ends.values() if end.end is not None), default=inf)
         watch(Progress("refining", len(ends), len(points), lowest))
 
-    whole = finish_all([refined(x, legs) for x in points], workers, receive)
+    firsts = [0] * len(points) if first_legs is None else first_legs
+    ways = [refined(x, legs[first:]) for x, first in zip(points, firsts, strict=True)]
+    whole = finish_all(ways, workers, receive)
     every = [
         *(RefinedStart(result.history[0].cost, result) for result in earlier),
         *(ends.get(k, RefinedStart(nan)) for k in range(len(points))),

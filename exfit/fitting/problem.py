@@ -7,7 +7,7 @@ from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.dsp.robust_loss import LOSSES
 from exfit.errors import CaseError
-from exfit.fitting.compression import compressed
+from exfit.fitting.forms.compression import compressed
 from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.fitting.residuals import Residuals, Robust
 from exfit.fitting.setup import ExperimentSetup

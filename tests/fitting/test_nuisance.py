@@ -22,7 +22,7 @@ from records import (
 from tables import read_columns
 
 from exfit.fitting.build import build_experiments
-from exfit.fitting.linear_form import linear_form
+from exfit.fitting.forms.linear import linear_form
 from exfit.fitting.nuisance import names_of
 from exfit.fitting.problem import residuals_of
 from exfit.results.compare_with_record import compare_with_record

@@ -10,8 +10,8 @@ from records import TEST, TIME, UNIT, case_of, one, synthetic, write
 
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiments
-from exfit.fitting.compression import compressed
-from exfit.fitting.linear_form import linear_form
+from exfit.fitting.forms.compression import compressed
+from exfit.fitting.forms.linear import linear_form
 from exfit.fitting.problem import residuals_of
 
 STEPS = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}, {"at": 3.0, "step": -0.08}]}

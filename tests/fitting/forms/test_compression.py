@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from records import UNIT, case_of, found_in, one, synthetic
 
-from exfit.fitting import compression as module
 from exfit.fitting.build import build_experiments
-from exfit.fitting.compression import compressed
+from exfit.fitting.forms import compression as module
+from exfit.fitting.forms.compression import compressed
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import search

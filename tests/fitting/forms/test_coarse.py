@@ -6,8 +6,8 @@ from places import ROOT
 from records import case_of, config
 
 from exfit.case.load import load_case
-from exfit.fitting.coarse_form import COARSENESS, coarse_form
-from exfit.fitting.linear_form import linear_form
+from exfit.fitting.forms.coarse import COARSENESS, coarse_form
+from exfit.fitting.forms.linear import linear_form
 from exfit.fitting.search import fitted
 
 KNOWN = {

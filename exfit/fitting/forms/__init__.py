@@ -1,0 +1,1 @@
+"""Other forms of the residuals of a fit, on which searches descend."""
