@@ -17,7 +17,8 @@ from exfit.output.plots.style import (
     SIMULATED,
     START,
     STYLES,
-    WIDTH,
+    new_figure,
+    panels,
     tidy,
 )
 from exfit.signals import label_of
@@ -35,17 +36,15 @@ def agreement(compared: Agreement) -> Figure:
     signals = compared.signals
     responses = [curve for curve in compared.curves if not curve.measured]
     looks = _looks([curve.name for curve in responses])
-    figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * len(signals)), layout="constrained")
-    axes = figure.subplots(
-        2 * len(signals), 1, sharex=True, height_ratios=[3.0, 1.3] * len(signals), squeeze=False
-    )[:, 0]
+    figure = new_figure(1.0 + 4.2 * len(signals))
+    ratios = [3.0, 1.3] * len(signals)
+    axes = panels(figure, 2 * len(signals), sharex=True, height_ratios=ratios)[:, 0]
     for k, signal in enumerate(signals):
         _curves(axes[2 * k], compared, signal, looks)
         two = len(responses) <= len(OF_TWO)
         drawn = compared.differences if two else compared.from_reference
         _differences(axes[2 * k + 1], [each for each in drawn if each.signal == signal], looks)
     axes[-1].set_xlabel("time (s)")
-    figure.align_ylabels()
     figure.suptitle("\n".join(map(_title, compared.curves)), fontsize=10)
     return figure
 

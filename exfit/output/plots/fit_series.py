@@ -9,7 +9,8 @@ from matplotlib.ticker import MaxNLocator
 
 from exfit.dsp.decimation import envelope
 from exfit.fleet.fits import FitRun, FitSeries
-from exfit.output.plots.style import COLORS, MEASURED, MILLI, STYLES, WIDTH, tidy
+from exfit.output.plots.axes import QuickAxes, logarithmic
+from exfit.output.plots.style import COLORS, MEASURED, MILLI, STYLES, new_figure, tidy
 from exfit.results.side_by_side import CONVERGED, outcome_of
 from exfit.signals import label_of
 
@@ -26,19 +27,18 @@ def fit_series(series: FitSeries) -> Figure:
     """
     cases = series.by_case
     drawn = [*cases.items()][:MOST_CASES]
-    figure = Figure(figsize=(WIDTH, 0.6 + CASE_HEIGHT * len(drawn)), layout="constrained")
+    figure = new_figure(0.6 + CASE_HEIGHT * len(drawn))
     grid = figure.add_gridspec(
         2 * len(drawn), 2, width_ratios=[2.2, 1.0], height_ratios=[2.6, 1.0] * len(drawn)
     )
     for k, (name, runs) in enumerate(drawn):
-        overlay = figure.add_subplot(grid[2 * k, 0])
-        errors = figure.add_subplot(grid[2 * k + 1, 0], sharex=overlay)
-        costs = figure.add_subplot(grid[2 * k : 2 * k + 2, 1])
+        overlay = figure.add_subplot(grid[2 * k, 0], axes_class=QuickAxes)
+        errors = figure.add_subplot(grid[2 * k + 1, 0], sharex=overlay, axes_class=QuickAxes)
+        costs = figure.add_subplot(grid[2 * k : 2 * k + 2, 1], axes_class=QuickAxes)
         overlay.tick_params(labelbottom=False)
         overlay.set_title(f"{name}: {runs[0].result.model}", fontsize=10, loc="left")
         _responses(overlay, errors, runs)
         _costs(costs, runs)
-    figure.align_ylabels()
     left_out = [*cases][MOST_CASES:]
     if left_out:
         figure.supxlabel(f"not drawn: {', '.join(left_out)}", fontsize=SMALL)
@@ -84,7 +84,7 @@ def _costs(axes: Axes, runs: Sequence[FitRun]) -> None:
             markersize=3 + 2 * look["linewidth"],
             clip_on=False,
         )
-    axes.set_yscale("log")
+    logarithmic(axes)
     axes.set_title("f (pu²) over the iterations", fontsize=9, loc="left")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     tidy(axes)

@@ -4,16 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.axes import QuickAxes
+from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, new_figure, tidy
 from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult
 from exfit.signals import label_of
 
 FADING = LinearSegmentedColormap.from_list("fading", ["#b9d2ee", START, "#5b2a86", SIMULATED])
+BAR = 0.025  # width of the colour bar, of that of the axes
 MOST_TICKS = 12  # of the colour bar
 EARLY = 0.5  # power of the place: most of the way is made in the first iterations
 
@@ -30,23 +31,25 @@ def iterations(result: FitResult) -> Figure:
         if comparison.iteration_responses is not None
     ]
     count = len(recorded)
-    figure = Figure(figsize=(WIDTH, 1.0 + 4.4 * max(count, 1)), layout="constrained")
+    figure = new_figure(1.0 + 4.4 * max(count, 1))
     figure.suptitle(f"{result.name}: the response after each iteration", fontsize=11)
     if not recorded:
         return figure
-    axes = figure.subplots(2 * count, 1, height_ratios=[3.0, 1.2] * count, squeeze=False)[:, 0]
+    grid = figure.add_gridspec(
+        2 * count, 2, width_ratios=[1.0, BAR], height_ratios=[3.0, 1.2] * count
+    )
     for k, (comparison, responses) in enumerate(recorded):
-        upper, lower = axes[2 * k], axes[2 * k + 1]
-        lower.sharex(upper)
+        upper = figure.add_subplot(grid[2 * k, 0], axes_class=QuickAxes)
+        lower = figure.add_subplot(grid[2 * k + 1, 0], sharex=upper, axes_class=QuickAxes)
         upper.tick_params(labelbottom=False)
         _responses(upper, responses)
         _errors(lower, responses)
         if count > 1:
             upper.set_title(f"{comparison.name}: {comparison.record}", fontsize=9, loc="left")
-    axes[-1].set_xlabel("time (s)")
-    figure.align_ylabels()
+    lower.set_xlabel("time (s)")
     numbers = sorted({number for _, responses in recorded for number in responses.numbers})
-    _colour_bar(figure, list(axes), numbers)
+    if len(numbers) > 1:  # a single one needs no bar
+        _colour_bar(figure.add_subplot(grid[:, 1], axes_class=QuickAxes), numbers)
     return figure
 
 
@@ -80,18 +83,20 @@ def _errors(axes: Axes, responses: IterationResponses) -> None:
     tidy(axes)
 
 
-def _colour_bar(figure: Figure, axes: list[Axes], numbers: Sequence[int]) -> None:
-    """Say which colour is which iteration; a single one needs no bar."""
-    if len(numbers) < 2:
-        return
-    norm = BoundaryNorm(np.arange(len(numbers) + 1) - 0.5, len(numbers))
-    steps = LinearSegmentedColormap.from_list("steps", _colours(numbers), N=len(numbers))
-    every = -(-len(numbers) // MOST_TICKS)
-    # the fit is always named: what would be right beside it gives way
-    ticks = [k for k in range(0, len(numbers) - 1, every) if 2 * (len(numbers) - 1 - k) >= every]
-    ticks.append(len(numbers) - 1)
-    bar = figure.colorbar(
-        ScalarMappable(norm, steps), ax=axes, ticks=ticks, label="iteration", aspect=40
+def _colour_bar(axes: Axes, numbers: Sequence[int]) -> None:
+    """Say which colour is which iteration."""
+    count = len(numbers)
+    axes.imshow(
+        np.array(_colours(numbers))[:, np.newaxis, :],
+        aspect="auto",
+        extent=(0.0, 1.0, -0.5, count - 0.5),
+        origin="lower",
     )
-    bar.ax.set_yticklabels([str(numbers[k]) for k in ticks])
-    bar.ax.tick_params(which="both", length=0)
+    every = -(-count // MOST_TICKS)
+    # the fit is always named: what would be right beside it gives way
+    ticks = [k for k in range(0, count - 1, every) if 2 * (count - 1 - k) >= every]
+    ticks.append(count - 1)
+    axes.set_xticks([])
+    axes.set_yticks(ticks, [str(numbers[k]) for k in ticks])
+    axes.tick_params(length=0)
+    axes.set_ylabel("iteration")

@@ -4,7 +4,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.decimation import envelope
-from exfit.output.plots.style import LIMIT, MEASURED, MILLI, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import (
+    LIMIT,
+    MEASURED,
+    MILLI,
+    SIMULATED,
+    START,
+    new_figure,
+    panels,
+    tidy,
+)
 from exfit.results.comparisons import REFERENCE, Comparison, Overlay
 from exfit.signals import label_of
 
@@ -15,15 +24,12 @@ def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
     ``label`` names the simulated ones, by default fitted or simulated.
     """
     count = len(comparison.overlays)
-    figure = Figure(figsize=(WIDTH, 1.0 + 4.2 * count), layout="constrained")
-    axes = figure.subplots(
-        2 * count, 1, sharex=True, height_ratios=[3.0, 1.0] * count, squeeze=False
-    )
+    figure = new_figure(1.0 + 4.2 * count)
+    axes = panels(figure, 2 * count, sharex=True, height_ratios=[3.0, 1.0] * count)
     for k, (signal, overlaid) in enumerate(comparison.overlays.items()):
         _signal(axes[2 * k, 0], comparison, signal, overlaid, label)
         _error(axes[2 * k + 1, 0], comparison, overlaid)
     axes[-1, 0].set_xlabel("time (s)")
-    figure.align_ylabels()
     figure.suptitle(title, fontsize=11)
     return figure
 

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from exfit.dsp.decimation import PIXELS, envelope
-from exfit.output.plots.style import LIMIT, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import LIMIT, SIMULATED, START, new_figure, panels, short, tidy
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 from exfit.records.steps import RecordedStep
@@ -21,7 +21,6 @@ FEWEST_BINS = 50  # of a segment between two gaps
 SMALL = 8  # points, the size of letters
 MOST_SPIKES_RINGED = 200
 MOST_NAMES = 4  # of channels that are not drawn
-LONGEST_NAME = 20  # letters
 SHADE = "#d7dbe0"
 
 
@@ -42,13 +41,12 @@ def inspection(inspected: Inspection, title: str) -> Figure:
     )
     drawn = ordered[:MOST_PANELS]
     left_out = [channel.name for channel in ordered[MOST_PANELS:]]
-    figure = Figure(figsize=(WIDTH, 1.2 + 1.5 * len(drawn)), layout="constrained")
-    panels = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, channel in zip(panels, drawn, strict=True):
+    figure = new_figure(1.2 + 1.5 * len(drawn))
+    column = panels(figure, len(drawn), sharex=True)[:, 0]
+    for axes, channel in zip(column, drawn, strict=True):
         _channel(axes, inspected, channel)
-    _instants(panels[0], inspected.steps)
-    panels[-1].set_xlabel("time (s)" + _not_drawn(left_out))
-    figure.align_ylabels()
+    _instants(column[0], inspected.steps)
+    column[-1].set_xlabel("time (s)" + _not_drawn(left_out))
     figure.suptitle(title, fontsize=11)
     return figure
 
@@ -67,7 +65,7 @@ def _channel(axes: Axes, inspected: Inspection, channel: InspectedChannel) -> No
         axes.axvline(step.at, color=SIMULATED, linewidth=1.0, linestyle="-" if detected else ":")
     signal = f"\n{channel.signal}" if channel.signal not in (None, "", channel.name) else ""
     unit = channel.unit or "unit?"
-    axes.set_ylabel(f"{_short(channel.name)}{signal}\n({unit})", fontsize=SMALL)
+    axes.set_ylabel(f"{short(channel.name)}{signal}\n({unit})", fontsize=SMALL)
     axes.yaxis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=SMALL)
     tidy(axes)
@@ -100,14 +98,10 @@ def _instants(axes: Axes, steps: Sequence[RecordedStep]) -> None:
         )
 
 
-def _short(name: str) -> str:
-    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "…"
-
-
 def _not_drawn(names: Sequence[str]) -> str:
     """Return the names of what is not drawn, as many as fit."""
     if not names:
         return ""
-    text = ", ".join(map(_short, names[:MOST_NAMES]))
+    text = ", ".join(map(short, names[:MOST_NAMES]))
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"\nnot drawn: {text}{more}"

@@ -4,7 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.output.plots.style import MEASURED, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.axes import QuickAxes
+from exfit.output.plots.style import MEASURED, SIMULATED, START, new_figure, panels, tidy
 from exfit.signals import label_of, unit_of_signal
 from exfit.simulation.simulator import Response
 
@@ -15,22 +16,22 @@ DRAWN_OTHERWISE = ("dw",)  # as speed
 
 def response(simulated: Response, title: str) -> Figure:
     """Return every signal of a simulation over time; vref and vt share an axis."""
-    panels, at_rest = _others(simulated)
-    columns = 2 if len(panels) > 2 else 1
-    rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(WIDTH, 2.6 + 1.6 * rows), layout="constrained")
+    changing, at_rest = _others(simulated)
+    columns = 2 if len(changing) > 2 else 1
+    rows = -(-len(changing) // columns)
+    figure = new_figure(2.6 + 1.6 * rows)
     grid = figure.add_gridspec(1 + rows, columns, height_ratios=[1.6, *[1.0] * rows])
-    first = figure.add_subplot(grid[0, :])
+    first = figure.add_subplot(grid[0, :], axes_class=QuickAxes)
     _voltages(first, simulated)
-    for k, name in enumerate(panels):
-        axes = figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first)
+    for k, name in enumerate(changing):
+        place = grid[1 + k // columns, k % columns]
+        axes = figure.add_subplot(place, sharex=first, axes_class=QuickAxes)
         axes.plot(simulated.time, simulated.signals[name], color=START, linewidth=1.1)
         axes.set_ylabel(f"{name} ({unit_of_signal(name)})")
-        axes.tick_params(labelbottom=k + columns >= len(panels))
+        axes.tick_params(labelbottom=k + columns >= len(changing))
         tidy(axes)
     # one column lies on the same axis as the panels below it, two do not
-    first.tick_params(labelbottom=columns > 1 or not panels)
-    figure.align_ylabels()
+    first.tick_params(labelbottom=columns > 1 or not changing)
     rest = f"   (unused or at rest: {', '.join(at_rest)})" if at_rest else ""
     figure.supxlabel(f"time (s){rest}", fontsize=10)
     figure.suptitle(title, fontsize=11)
@@ -61,19 +62,19 @@ def overview(title: str, drawing: str, simulated: Response) -> Figure:
     lines = drawing.count("\n") + 1
     signals = [name for name in ("vt", "efd") if name in simulated.signals]
     text_height, height = 0.5 + 0.165 * lines, 2.2 * len(signals)
-    figure = Figure(figsize=(WIDTH, text_height + height), layout="constrained")
+    figure = new_figure(text_height + height)
     ratios = [text_height, *[2.2] * len(signals)]
-    panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
-    panels[0].axis("off")
-    panels[0].text(
-        0.0, 1.0, drawing, family="monospace", fontsize=8.5, va="top", transform=panels[0].transAxes
+    page, *others = panels(figure, len(ratios), height_ratios=ratios)[:, 0]
+    page.axis("off")
+    page.text(
+        0.0, 1.0, drawing, family="monospace", fontsize=8.5, va="top", transform=page.transAxes
     )
-    for axes, name in zip(panels[1:], signals, strict=True):
-        axes.sharex(panels[-1])
-        axes.tick_params(labelbottom=axes is panels[-1])
+    for axes, name in zip(others, signals, strict=True):
+        axes.sharex(others[-1])
+        axes.tick_params(labelbottom=axes is others[-1])
         axes.plot(simulated.time, simulated.signals[name], color=SIMULATED, linewidth=1.4)
         axes.set_ylabel(label_of(name))
         tidy(axes)
-    panels[-1].set_xlabel("time (s)")
+    others[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=12)
     return figure

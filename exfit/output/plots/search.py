@@ -9,10 +9,22 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from exfit.output.plots.style import GREEN, LIMIT, MEASURED, SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.axes import QuickAxes, logarithmic
+from exfit.output.plots.style import (
+    GREEN,
+    LIMIT,
+    MEASURED,
+    SIMULATED,
+    START,
+    new_figure,
+    panels,
+    short,
+    tidy,
+)
 from exfit.results.model import FitResult, Minima
 from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES
 
+LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
     **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
     FROM_FURTHER_STARTS: LIMIT,
@@ -27,8 +39,8 @@ WAYS = {
 
 def convergence(result: FitResult) -> Figure:
     """Return cost, gradient and damping over the iterations."""
-    figure = Figure(figsize=(WIDTH, 7.0), layout="constrained")
-    axes = figure.subplots(3, 1, sharex=True)
+    figure = new_figure(7.0)
+    axes = panels(figure, 3, sharex=True)[:, 0]
     rows = (
         ("cost", "cost f (pu²)", "o"),
         ("gradient_norm", "norm of the gradient", "o"),
@@ -39,13 +51,12 @@ def convergence(result: FitResult) -> Figure:
         # an undamped step and a vanished gradient have no place on a logarithmic axis
         _by_phase(ax, result, [v if v > 0.0 else float("nan") for v in values], marker)
         if any(value > 0.0 for value in values):
-            ax.set_yscale("log")
+            logarithmic(ax)
         ax.set_ylabel(label)
         tidy(ax)
     axes[0].legend(loc="upper right", frameon=False)
     axes[-1].set_xlabel("iteration")
     axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.align_ylabels()
     figure.suptitle(f"{result.name}: {result.strategy}; {result.message}", fontsize=11)
     return figure
 
@@ -71,36 +82,37 @@ def trajectories(result: FitResult) -> Figure:
     names = list(result.parameters)
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
-    figure = Figure(figsize=(WIDTH, 1.0 + 2.0 * rows), layout="constrained")
-    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
-    for ax, name in zip(grid.flat, names, strict=False):
+    figure = new_figure(1.0 + 2.0 * rows)
+    grid = figure.add_gridspec(rows, columns)
+    ax = None
+    for k, name in enumerate(names):
+        ax = figure.add_subplot(grid[divmod(k, columns)], sharex=ax, axes_class=QuickAxes)
         parameter = result.parameters[name]
         values = [line.values[name] for line in result.history]
         _by_phase(ax, result, values, "o")
         for limit in (parameter.min, parameter.max):
             if min(values) <= limit <= max(values):
                 ax.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
+        unit = f" {parameter.unit}" if parameter.unit else ""
         bound = f" (on its {parameter.at_bound})" if parameter.at_bound else ""
-        ax.set_title(f"{name} = {parameter.value:.5g} {parameter.unit}{bound}", fontsize=9)
+        ax.set_title(f"{short(name, LONGEST)} = {parameter.value:.5g}{unit}{bound}", fontsize=9)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         tidy(ax)
-    for k, ax in enumerate(grid.flat):
         lowest = k + columns >= len(names)
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel("iteration" if lowest else "")
-        ax.set_visible(k < len(names))
     phases = dict.fromkeys(line.phase for line in result.history)
     if len(phases) > 1:
-        handles = grid[0, 0].get_legend_handles_labels()
-        figure.legend(*handles, loc="outside lower right", ncols=len(phases), frameon=False)
+        handles = figure.axes[0].get_legend_handles_labels()
+        figure.legend(*handles, ncols=len(phases), frameon=False)
     figure.suptitle(f"{result.name}: the parameters after each iteration", fontsize=11)
     return figure
 
 
 def waterfall(search: Minima, title: str) -> Figure:
     """Return the costs that all descents led to, in rising order, with those they began at."""
-    figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure = new_figure(4.2)
+    axes = panels(figure, 1)[0, 0]
     ended = np.flatnonzero(np.isfinite(search.end_costs))
     order = ended[np.argsort(search.end_costs[ended], kind="stable")]
     ranks, ends = np.arange(1, len(order) + 1), search.end_costs[order]
@@ -114,11 +126,11 @@ def waterfall(search: Minima, title: str) -> Figure:
             text = f"{label}, refuted" if verdict else label
             if own.any():
                 axes.plot(ranks[own], ends[own], marker, color=color, markersize=5, label=text)
-    axes.set_yscale("log")
+    logarithmic(axes)
     axes.set_xlabel("descent, by the cost that it led to")
     axes.set_ylabel("cost f (pu²)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    figure.legend(ncols=4, frameon=False, fontsize=8)
     best = search.minima[0].starts
     axes.set_title(
         f"{best} of {search.starts} descents led to the lowest minimum", fontsize=9, loc="right"

@@ -1,27 +1,45 @@
 """How all figures look, and how one becomes a file."""
 
-import io
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from exfit.output.plots.axes import QuickAxes
+from exfit.output.plots.layout import Layout
+from exfit.output.plots.page import as_png, pixels
 
 MEASURED, SIMULATED, START, LIMIT = "#8a8f98", "#c1272d", "#2b6cb0", "#b7791f"
 GREEN = "#2f855a"
 WIDTH = 9.0  # inches
 DPI = 120
 MILLI = 1e3
+LONGEST_NAME = 20  # letters
 COLORS = ("#1f4e9c", "#c1272d", GREEN, "#b7791f", "#6b46c1", "#0e7490", "#4a5568")
 STYLES = ("-", "--", ":")
 
 
+def new_figure(height: float, width: float = WIDTH, legend: str = "below") -> Figure:
+    """Return an empty figure of a size in inches; a legend of the whole is right or below."""
+    return Figure(figsize=(width, height), layout=Layout(legend))
+
+
+def panels(figure: Figure, rows: int, columns: int = 1, **grid: Any) -> NDArray[np.object_]:
+    """Return axes of a figure in rows and columns; see Figure.subplots."""
+    own = {"axes_class": QuickAxes}
+    return np.asarray(figure.subplots(rows, columns, squeeze=False, subplot_kw=own, **grid))
+
+
+def short(name: str, most: int = LONGEST_NAME) -> str:
+    """Return a name, cut off where it has more letters than there is room for."""
+    return name if len(name) <= most else name[: most - 1] + "…"
+
+
 def png(figure: Figure) -> bytes:
     """Return a figure as the bytes of a PNG file."""
-    out = io.BytesIO()
-    FigureCanvasAgg(figure)
-    figure.savefig(out, format="png", dpi=DPI)
-    return out.getvalue()
+    return as_png(pixels(figure, DPI), DPI)
 
 
 def tidy(axes: Axes) -> None:

@@ -4,7 +4,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.decimation import envelope
-from exfit.output.plots.style import SIMULATED, START, WIDTH, tidy
+from exfit.output.plots.style import SIMULATED, START, new_figure, panels, tidy
 from exfit.results.translation import StepComparison, Translation
 from exfit.signals import label_of
 
@@ -17,10 +17,8 @@ def translation(result: Translation, title: str) -> Figure:
     Each plant has a column.
     """
     plants = list(dict.fromkeys(step.plant for step in result.steps))
-    figure = Figure(figsize=(WIDTH, 8.5), layout="constrained")
-    grid = figure.subplots(
-        3, len(plants), sharex=True, squeeze=False, height_ratios=[2.0, 1.6, 1.2]
-    )
+    figure = new_figure(8.5)
+    grid = panels(figure, 3, len(plants), sharex=True, height_ratios=[2.0, 1.6, 1.2])
     for column, plant in enumerate(plants):
         steps = [step for step in result.steps if step.plant == plant]
         for row, signal in enumerate(("vt", "efd")):
@@ -28,7 +26,6 @@ def translation(result: Translation, title: str) -> Figure:
         _errors(grid[2, column], result, steps)
         grid[0, column].set_title(plant, fontsize=10)
     grid[1, 0].legend(loc="upper right", frameon=False)
-    figure.align_ylabels()
     figure.suptitle(title, fontsize=11)
     return figure
 

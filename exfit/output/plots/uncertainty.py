@@ -8,10 +8,23 @@ from numpy.typing import NDArray
 from exfit.analysis.profiles import Profiles
 from exfit.dsp.decimation import envelope
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.output.plots.style import COLORS, LIMIT, MILLI, SIMULATED, START, STYLES, WIDTH, tidy
+from exfit.output.plots.axes import QuickAxes
+from exfit.output.plots.style import (
+    COLORS,
+    LIMIT,
+    MILLI,
+    SIMULATED,
+    START,
+    STYLES,
+    new_figure,
+    panels,
+    tidy,
+)
 
 Array = NDArray[np.float64]
 PERCENT = 1e-2
+COLOUR_MAP, SHADES = "RdBu_r", 256  # of correlations
+BAR = 0.05  # width of the colour bar, of that of the map
 
 
 def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
@@ -20,9 +33,9 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
     What belongs to a record is left out.
     """
     responses = analysis.sensitivity
-    figure = Figure(figsize=(WIDTH, 1.2 + 3.0 * len(responses)), layout="constrained")
-    panels = figure.subplots(len(responses), 1, squeeze=False)[:, 0]
-    for axes, response in zip(panels, responses, strict=True):
+    figure = new_figure(1.2 + 3.0 * len(responses), legend="right")
+    column = panels(figure, len(responses))[:, 0]
+    for axes, response in zip(column, responses, strict=True):
         for place, (name, change) in enumerate(response.moved.items()):
             axes.plot(
                 *envelope(response.time, PERCENT * MILLI * change),
@@ -34,8 +47,8 @@ def sensitivity(analysis: UncertaintyAnalysis, title: str) -> Figure:
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_ylabel(f"change of {response.label}\nfor +1 % (1e-3 pu)")
         tidy(axes)
-    panels[-1].set_xlabel("time (s)")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper", frameon=False)
+    column[-1].set_xlabel("time (s)")
+    figure.legend(*column[0].get_legend_handles_labels(), frameon=False)
     figure.suptitle(f"{title}: what each parameter does to the response", fontsize=11)
     return figure
 
@@ -44,10 +57,10 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     """Return the correlations of the estimates as a map; what has none is left blank."""
     names, values = analysis.confidence.names, analysis.confidence.correlation.matrix
     side = max(4.2, 1.6 + 0.62 * len(names))
-    figure = Figure(figsize=(side + 1.2, side), layout="constrained")
-    axes = figure.subplots()
-    image = axes.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    axes.set_xticks(range(len(names)), names, rotation=45, ha="right")
+    figure = new_figure(side, side + 0.8)
+    axes, bar = panels(figure, 1, 2, width_ratios=[1.0, BAR])[0]
+    axes.imshow(values, cmap=COLOUR_MAP, vmin=-1.0, vmax=1.0, aspect="auto")
+    axes.set_xticks([])
     axes.set_yticks(range(len(names)), names)
     for row, line in enumerate(values):
         for column, value in enumerate(line):
@@ -55,10 +68,25 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
                 color = "white" if abs(value) > 0.7 else "black"
                 axes.text(
                     column, row, f"{value:.2f}", ha="center", va="center", color=color, fontsize=8
-                )
+                ).set_in_layout(False)
+    below = axes.get_xaxis_transform()
+    for column, name in enumerate(names):
+        axes.text(
+            column,
+            -0.01,
+            name,
+            rotation=45,
+            ha="right",
+            va="top",
+            rotation_mode="anchor",
+            transform=below,
+        )
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
-    figure.colorbar(image, ax=axes, label="correlation of the estimates", shrink=0.8)
+    shades = np.linspace(-1.0, 1.0, SHADES)[:, np.newaxis]
+    bar.imshow(shades, cmap=COLOUR_MAP, aspect="auto", extent=(0.0, 1.0, -1.0, 1.0), origin="lower")
+    bar.set_xticks([])
+    bar.set_ylabel("correlation of the estimates")
     figure.suptitle(f"{title}: which parameters move together", fontsize=11)
     return figure
 
@@ -67,9 +95,12 @@ def profiles(profiled: Profiles) -> Figure:
     """Return the profile of each parameter: the rise of the cost in units of that at the limit."""
     columns = min(3, len(profiled.profiles))
     rows = -(-len(profiled.profiles) // columns)
-    figure = Figure(figsize=(WIDTH, 1.1 + 2.4 * rows), layout="constrained")
-    grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    for axes, profile in zip(grid.flat, profiled.profiles, strict=False):
+    figure = new_figure(1.1 + 2.4 * rows)
+    grid = figure.add_gridspec(rows, columns)
+    axes = None
+    for k, profile in enumerate(profiled.profiles):
+        axes = figure.add_subplot(grid[divmod(k, columns)], sharey=axes, axes_class=QuickAxes)
+        axes.tick_params(labelleft=k % columns == 0)
         rise = (profile.costs - profiled.cost) / profile.rise
         axes.plot(profile.at, rise, "o-", color=SIMULATED, linewidth=1.3, markersize=3)
         axes.axhline(1.0, color=LIMIT, linewidth=1.0, linestyle=":")
@@ -81,8 +112,6 @@ def profiles(profiled: Profiles) -> Figure:
         axes.set_ylim(-0.05, 1.5)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         tidy(axes)
-    for k, axes in enumerate(grid.flat):
-        axes.set_visible(k < len(profiled.profiles))
     figure.supylabel("rise of the cost / rise at the 95 % limit", fontsize=10)
     figure.suptitle(
         f"{profiled.name}: the cost along each parameter, the others fitted", fontsize=11
