@@ -15,6 +15,7 @@ LOGIC = {"&": "and", "|": "or"}
 COMPARISON = {"<": "olt", "<=": "ole"}
 INTRINSICS = ("sqrt", "log")
 TRANSCENDENTAL = ("exp", "sin", "cos")
+COSTLY = ("/", *INTRINSICS, *TRANSCENDENTAL)
 UNLIKELY, WEIGHTS = ", !prof !0", '!0 = !{!"branch_weights", i32 1, i32 100}\n'
 
 
@@ -118,19 +119,21 @@ class Writer:
         return plan(targets, known, self._branches)
 
     def _branches(self, node: Node) -> bool:
-        """Return whether a choice is a branch: a processor foresees it, and waits for nothing."""
-        return node.op == "select" and node.varies and self.narrow.lanes == 1
+        """Return whether what one side of a choice alone needs is computed apart."""
+        return node.op == "select" and node.varies
 
     def follow(self, steps: Plan, values: Values) -> None:
         """Write the steps of a plan; ``values`` grows."""
         for step in steps:
-            if isinstance(step, Choice):
-                self._choose(step, values)
-            else:
+            if not isinstance(step, Choice):
                 values[step] = self._instruction(step, values)
+            elif self.narrow.lanes == 1:
+                self._branch(step, values)
+            else:
+                self._blend(step, values)
 
-    def _choose(self, choice: Choice, values: Values) -> None:
-        """Write both branches of a choice."""
+    def _branch(self, choice: Choice, values: Values) -> None:
+        """Write both branches of a choice: a processor foresees it, and waits for nothing."""
         mark, ends = len(self.lines), {node: list[str]() for node in choice.nodes}
         self._jump(choice.condition, f"branch1.{mark}", f"branch2.{mark}", values)
         for position, steps in enumerate(choice.branches, 1):
@@ -144,6 +147,41 @@ class Writer:
         self.label(f"after.{mark}")
         for node, end in ends.items():
             values[node] = self.let(f"phi {self.shape(node).type} {', '.join(end)}")
+
+    def _blend(self, choice: Choice, values: Values) -> None:
+        """Write both branches of a choice, and which of their results each set takes."""
+        sides = []
+        for position, steps in enumerate(choice.branches, 1):
+            wanted = [node.operands[position] for node in choice.nodes]
+            if _costly(steps):
+                sides.append(self._where_any(choice, position, values))
+            else:
+                self.follow(steps, values)
+                sides.append([self._operand(node, self.narrow, values) for node in wanted])
+        truth = f"{self.narrow.of('i1')} {values[choice.condition]}"
+        for node, a, b in zip(choice.nodes, *sides, strict=True):
+            values[node] = self.let(
+                f"select {truth}, {self.narrow.type} {a}, {self.narrow.type} {b}"
+            )
+
+    def _where_any(self, choice: Choice, position: int, values: Values) -> list[str]:
+        """Write what one branch needs, computed only where any of the sets takes it."""
+        shape, mark, before = self.narrow, len(self.lines), self.block
+        bits = f"i{shape.lanes}"
+        taken = self.let(f"bitcast {shape.of('i1')} {values[choice.condition]} to {bits}")
+        some = self.let(f"icmp ne {bits} {taken}, {0 if position == 1 else -1}")
+        self.put(f"br i1 {some}, label %some.{mark}, label %after.{mark}")
+        self.label(f"some.{mark}")
+        inside = dict(values)
+        self.follow(choice.branches[position - 1], inside)
+        results = [self._operand(n.operands[position], shape, inside) for n in choice.nodes]
+        end = self.block
+        self.put(f"br label %after.{mark}")
+        self.label(f"after.{mark}")
+        return [
+            self.let(f"phi {shape.type} [{result}, %{end}], [poison, %{before}]")
+            for result in results
+        ]
 
     def _jump(self, condition: Node, yes: str, no: str, values: Values) -> None:
         """Write a jump to either label, as soon as a condition is decided."""
@@ -218,3 +256,11 @@ class Writer:
         return self.let(
             f"select {shape.of('i1')} {outside}, {shape.type} {limit}, {shape.type} {x}"
         )
+
+
+def _costly(steps: Plan) -> bool:
+    """Return whether any of the steps takes long."""
+    return any(
+        any(map(_costly, step.branches)) if isinstance(step, Choice) else step.op in COSTLY
+        for step in steps
+    )

@@ -86,6 +86,23 @@ def test_sets_side_by_side_give_what_each_gives_alone(model):
             assert (np.abs(a[:, :, lane] - b) / size_of(alone)).max() < AS_FLOATS
 
 
+def test_the_sets_beside_it_change_no_bit_of_a_set():
+    """Some of them load the rectifier so much that it takes another of its arcs."""
+    system = system_of("AC1A")
+    code = compiled(system, system.outputs, LANES)
+    loads = [{"KC": 0.02 + 0.08 * seed} for seed in range(LANES)]  # from the first arc to the last
+    values = [drawn_values("AC1A", seed) | load for seed, load in enumerate(loads)]
+    vectors = [vector(system, one) for one in values]
+
+    def run_of(beside):
+        p = np.ascontiguousarray(np.stack([vectors[0], *beside], axis=1))
+        return [out[:, :, 0] for out in code.run(p, code.start(p), bump(0.05))]
+
+    others, copies = run_of(vectors[1:]), run_of([vectors[0]] * (LANES - 1))
+    for a, b in zip(others, copies, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
 def test_arrays_of_sets_give_what_each_set_gives(model):
     system = system_of(model)
     sets = [drawn_values(model, seed) for seed in range(5)]
