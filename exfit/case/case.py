@@ -281,13 +281,13 @@ class Case:
 
     def typical(self) -> tuple[str, ...]:
         """Return the parameters that the file does not give, as the system names them."""
-        return tuple(
-            part.prefix + row.symbol
+        in_file = {
+            part.prefix + symbol
             for part in self.parts.all
-            for row in part.sheet
-            if row.symbol not in {**self._fixed(part), **self._free(part)}
-            and part.prefix + row.symbol not in {**self.given_values, **self.ties.by_name}
-        )
+            for symbol in (*self._fixed(part), *self._free(part))
+        }
+        given = {*in_file, *self.given_values, *self.ties.by_name}
+        return tuple(name for name in self.rows() if name not in given)
 
     def units(self) -> dict[str, str]:
         """Return the unit of every parameter."""
@@ -295,11 +295,13 @@ class Case:
 
     def _fixed(self, part: Part) -> Mapping[str, float | str]:
         given: Mapping[str, float | str] = _at(self, part.fixed)
-        return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
+        own = part.symbols
+        return {symbol: given[symbol] for symbol in given if symbol in own}
 
     def _free(self, part: Part) -> Mapping[str, FreeSection]:
         given: Mapping[str, FreeSection] = {} if part.free is None else _at(self, part.free)
-        return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
+        own = part.symbols
+        return {symbol: given[symbol] for symbol in given if symbol in own}
 
     def _helpers(self, given: Mapping[str, Value]) -> dict[str, Value]:
         """Return the names among the exciter's parameters that are none of them."""

@@ -1,7 +1,7 @@
 """Words and numbers as messages and files have them."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import isfinite
 from types import NoneType
 from typing import Any
@@ -15,32 +15,24 @@ def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
     A list of numbers is written in one line.
     """
     encoder = json.JSONEncoder(ensure_ascii=ascii_only, allow_nan=False)
-    return "".join(_json(content, encoder.encode, "\n")) + "\n"
+    return _json(content, encoder.encode, "\n") + "\n"
 
 
 NUMBERS = {int, float, NoneType, bool}
 
 
-def _json(content: Any, encode: Callable[[Any], str], line: str) -> list[str]:
-    """Return the pieces of a text of JSON; ``line`` begins one at this depth."""
+def _json(content: Any, encode: Callable[[Any], str], line: str) -> str:
+    """Return a text of JSON; ``line`` begins one at this depth."""
     inner = line + "  "
     if isinstance(content, Mapping) and content:
-        entries = (
-            [f"{inner}{encode(str(key))}: ", *_json(value, encode, inner)]
+        entries = [
+            f"{inner}{encode(str(key))}: {_json(value, encode, inner)}"
             for key, value in content.items()
-        )
-        return ["{", *_separated(entries), line, "}"]
+        ]
+        return f"{{{','.join(entries)}{line}}}"
     if isinstance(content, list | tuple) and not {*map(type, content)} <= NUMBERS:
-        return ["[", *_separated([inner, *_json(v, encode, inner)] for v in content), line, "]"]
-    return [_plain(content, encode)]
-
-
-def _separated(entries: Iterable[list[str]]) -> Iterator[str]:
-    """Yield the pieces of entries with a comma before each but the first."""
-    for number, pieces in enumerate(entries):
-        if number:
-            yield ","
-        yield from pieces
+        return f"[{','.join(inner + _json(value, encode, inner) for value in content)}{line}]"
+    return _plain(content, encode)
 
 
 def _plain(content: Any, encode: Callable[[Any], str]) -> str:
