@@ -3,6 +3,7 @@
 Everything but click is imported in the command that needs it, so that help appears at once.
 """
 
+import atexit
 import gc
 import os
 from typing import Any
@@ -28,6 +29,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 # a look for circles of dead objects at every 700 new ones takes a twentieth of a short fit
 gc.set_threshold(100_000)
+# and at the end of the program, where all memory goes anyway, a sixth
+atexit.register(gc.freeze)
 
 
 class Commands(click.Group):
