@@ -233,14 +233,13 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[Experim
     if setup.free:
         robust = robust_of(case)
         residuals = Residuals([fine.experiment], setup.free, values, robust=robust)
-        best = estimate.least_squares(
-            residuals,
-            residuals.start,
-            jac=residuals.exact,
+        descent = estimate.Descent(
+            functions=estimate.OneByOne(residuals, residuals.exact),
             bounds=residuals.bounds,
             method="lm-then-dgn",
             x_scale=UNIT,
         )
+        best = descent.run(residuals.start)
         if best.stop is estimate.Stop.INTERRUPTED:
             raise KeyboardInterrupt
         values = residuals.values(best.x)

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from exfit.estimate.arrays import Array
 
 
@@ -19,6 +22,7 @@ class Stop(Enum):
     CREEPING = "ten iterations, all with rejected trials, gained less than a millionth of the cost"
     UNCONFIRMED = "the lowest minimum is in doubt, and no other start led to it"
     ITERATIONS = "the iteration limit was reached"
+    EVALUATIONS = "the limit of evaluations was reached"
     INTERRUPTED = "interrupted: this is the best point seen until then"
     JACOBIAN = "the Jacobian is not finite here"
     STALLED = "no trial lowers the cost visibly, although the linear model promises a lower one"
@@ -29,6 +33,10 @@ class Stop(Enum):
     ILL_CONDITIONED = (
         "the Jacobian is too ill-conditioned for full Gauss-Newton steps: "
         "use strategy dgn or lm-then-dgn"
+    )
+    LOST = (
+        "the search ran off to where the residuals depend no longer on one of the variables: "
+        "set bounds or x_scale, or begin elsewhere"
     )
     MATCH = "the curves differ by less than the tolerance given: the search went no farther"
     FLAT = "the gradient fell below the tolerance given: the search went no farther"
@@ -44,6 +52,7 @@ STATUS = {
     Stop.MATCH: 6,
     Stop.FLAT: 7,
     Stop.ITERATIONS: 0,
+    Stop.EVALUATIONS: -9,
     Stop.INTERRUPTED: -1,
     Stop.JACOBIAN: -2,
     Stop.STALLED: -3,
@@ -51,6 +60,7 @@ STATUS = {
     Stop.ILL_CONDITIONED: -5,
     Stop.TRUSTED: -6,
     Stop.UNCONFIRMED: -7,
+    Stop.LOST: -8,
 }
 
 
@@ -92,10 +102,11 @@ class Result:
 
     status: 1 gradient, 2 floor, 3 step, 4 kink, 5 creeping (converged); 6 match, 7 flat (ended at
     a tolerance given, perhaps before a minimum); 0 iteration limit; -1 interrupted, -2 Jacobian not
-    finite, -3 stalled, -4 full step failed, -5 ill-conditioned, -7 unconfirmed (not converged).
-    message is the sentence, stop the member of Stop. optimality is the largest component of the
-    projected gradient; promise is the decrease of the cost that the linear model at x still
-    promises. After an interruption jac, grad and promise may be nan.
+    finite, -3 stalled, -4 full step failed, -5 ill-conditioned, -7 unconfirmed, -8 lost, -9
+    evaluation limit (not converged). message is the sentence, stop the member of Stop. optimality
+    is the largest component of the projected gradient; promise is the decrease of the cost that the
+    linear model at x still promises; active_mask is -1 for a variable at its lower bound, 1 at its
+    upper one, else 0. After an interruption jac, grad and promise may be nan.
     """
 
     x: Array
@@ -113,6 +124,7 @@ class Result:
     success: bool
     history: tuple[SolverIteration, ...]
     stop: Stop
+    active_mask: NDArray[np.int_]
 
 
 @dataclass(frozen=True)

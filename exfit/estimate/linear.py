@@ -12,6 +12,8 @@ from exfit.estimate.box import Box
 from exfit.estimate.problem import Point, Problem
 from exfit.estimate.requests import Steps, singular_values_of, triangle_of
 
+WEAKEST = 0.03  # of the norm of the largest column, in units: a smaller one counts as this
+
 
 @dataclass(frozen=True)
 class DampedStep:
@@ -112,7 +114,7 @@ def factored(
     """Factor J: QR first, for the many residuals, then the singular values of the corner."""
     box, n = problem.box, len(point.x)
     gradient = J.T @ point.residuals
-    scale = 1.0 / box.unit if problem.scaled else column_scale(J, before)
+    scale = 1.0 / box.unit if problem.scaled else column_scale(J, box.unit, before)
     corner = yield from triangle_of(np.column_stack([J, point.residuals]))
     left, singular, directions = yield from singular_values_of(corner[:, :n] / scale)
     return LinearModel(
@@ -131,9 +133,14 @@ def factored(
     )
 
 
-def column_scale(J: Array, before: LinearModel | None) -> Array:
-    """Return the largest norm each column has had (Moré 1978, section 6)."""
+def column_scale(J: Array, unit: Array, before: LinearModel | None) -> Array:
+    """Return the largest norm each column has had (Moré 1978, section 6), or what counts as one.
+
+    A variable that is hardly seen from here would else be free to go anywhere: no step may change
+    it, in units, by more than 1 / `WEAKEST` times what the one that is seen best may change.
+    """
     norms: Array = np.linalg.norm(J, axis=0)
+    norms = np.maximum(norms, WEAKEST * np.max(norms * unit) / unit)
     if before is not None and before.finite:
         return np.maximum(norms, before.scale)
     return np.where(norms > 0.0, norms, 1.0)

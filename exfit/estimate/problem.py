@@ -17,6 +17,10 @@ RELATIVE_STEP = {"2-point": EPS ** (1 / 2), "3-point": EPS ** (1 / 3)}
 JACOBIAN_ERROR = {"2-point": 1e-7, "3-point": 1e-9, "exact": UNSEEN}  # with a margin
 
 
+class EvaluationLimit(Exception):
+    """More residuals were asked for than a search may have."""
+
+
 @dataclass(frozen=True)
 class Point:
     """A point, its residuals (M,) and their cost."""
@@ -46,6 +50,7 @@ class Problem:
         box: Box,
         scaled: bool,
         jacobian_error: float | None = None,
+        most_evaluations: int | None = None,
     ) -> None:
         self.functions, self.differences, self.box, self.scaled = (
             functions,
@@ -55,6 +60,7 @@ class Problem:
         )
         usual = JACOBIAN_ERROR[differences or "exact"]
         self.unseen = usual if jacobian_error is None else jacobian_error
+        self.most_evaluations = most_evaluations
         self.nfev = self.njev = 0
         self.best: Point | None = None
 
@@ -67,7 +73,10 @@ class Problem:
         return point
 
     def residuals(self, points: Sequence[Array]) -> Steps[Sequence[Array]]:
-        """Return the residuals (M,) at some points."""
+        """Return the residuals (M,) at some points, or raise EvaluationLimit."""
+        most = self.most_evaluations
+        if most is not None and self.nfev + len(points) > most:
+            raise EvaluationLimit
         self.nfev += len(points)
         return (yield from residuals_at(self.functions, points))
 

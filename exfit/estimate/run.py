@@ -5,15 +5,19 @@ from dataclasses import dataclass
 from math import inf, nan
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exfit.estimate.answer import STATUS, Result, SolverIteration, Stop
 from exfit.estimate.arrays import Array
+from exfit.estimate.box import Box
 from exfit.estimate.linear import LinearModel, blind, linearise
 from exfit.estimate.problem import Point, Problem
 from exfit.estimate.requests import Steps
 from exfit.estimate.search import Move, Search
 from exfit.estimate.searches import Searches
 from exfit.estimate.stopping import Rules
+
+NOT_FINITE = "the residuals at x0 are not finite"
 
 
 class NotFinite(ValueError):
@@ -53,9 +57,9 @@ class SearchRun:
         """Return the linear model at the start, or raise NotFinite."""
         point = yield from self.problem.evaluate(x0)
         if point.cost == inf:
-            raise NotFinite("the residuals at x0 are not finite")
+            raise NotFinite(NOT_FINITE)
         start = yield from self.linearise(point)
-        self.rules = self.rules.starting_at(start)
+        self.rules = self.rules.starting_at(start, self.problem.scaled)
         return start
 
     def linearise(self, point: Point, before: LinearModel | None = None) -> Steps[LinearModel]:
@@ -73,7 +77,7 @@ class SearchRun:
         for _ in range(self.rules.most_iterations(search.phase)):
             stop = self.rules.at_rest(linear)
             if stop is not None:
-                return Outcome(linear, stop)
+                return self.end(linear, stop)
             before = linear
             move, search = yield from search.advance(self.problem, before)
             if move.point is not None:
@@ -83,8 +87,14 @@ class SearchRun:
             stop = self.rules.after(before, linear, move)
             stop = stop or self.rules.creeping(self.history[first:], linear)
             if stop is not None:
-                return Outcome(linear, stop)
-        return Outcome(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)
+                return self.end(linear, stop)
+        return self.end(linear, self.rules.at_rest(linear) or Stop.ITERATIONS)
+
+    def end(self, linear: LinearModel, stop: Stop) -> Outcome:
+        """Return where a phase ended, which is no minimum where a variable got lost."""
+        outcome = Outcome(linear, stop)
+        lost = outcome.converged and self.rules.lost(linear)
+        return Outcome(linear, Stop.LOST) if lost else outcome
 
     def announce(
         self,
@@ -112,7 +122,10 @@ class SearchRun:
         )
         self.history.append(line)
         if self.callback is not None:
-            self.callback(line)
+            try:
+                self.callback(line)
+            except StopIteration:
+                raise KeyboardInterrupt from None
 
     def best_of(self, outcome: Outcome) -> Steps[Outcome]:
         """Return the outcome, moved to a trial that was rejected and yet is the best."""
@@ -120,6 +133,15 @@ class SearchRun:
         if best is not None and best.cost < outcome.linear.point.cost:
             return Outcome((yield from linearise(self.problem, best)), outcome.stop)
         return outcome
+
+    def exhausted(self) -> Steps[Outcome]:
+        """Return the best point seen within the limit of evaluations, with its Jacobian."""
+        self.problem.most_evaluations = None
+        point = self.problem.best
+        if point is None or point.cost == inf:
+            raise NotFinite(NOT_FINITE)
+        linear = self.best or (yield from linearise(self.problem, point))
+        return (yield from self.best_of(Outcome(linear, Stop.EVALUATIONS)))
 
     def interrupted(self) -> Outcome:
         """Return the best point seen, with its Jacobian if that was there in time.
@@ -153,4 +175,10 @@ class SearchRun:
             success=outcome.converged,
             history=tuple(self.history),
             stop=stop,
+            active_mask=active(linear.point.x, linear.box),
         )
+
+
+def active(x: Array, box: Box) -> NDArray[np.int_]:
+    """Return -1 where a variable is at its lower bound, 1 at its upper one, else 0."""
+    return np.where(x <= box.low, -1, np.where(x >= box.high, 1, 0))

@@ -17,3 +17,4 @@ class Searches:
 
 
 USUAL = Searches()
+BENDING = Searches(lm=TrustRegion(bends=True))  # smooth residuals, of which nothing is known

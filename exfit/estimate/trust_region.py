@@ -9,17 +9,19 @@ import numpy as np
 from exfit.estimate.answer import Stop
 from exfit.estimate.arrays import EPS, TINY, Array
 from exfit.estimate.linear import DampedStep, LinearModel, solve
-from exfit.estimate.problem import Problem
+from exfit.estimate.problem import Point, Problem
 from exfit.estimate.requests import Steps
 from exfit.estimate.search import ARMIJO, MOST_TRIALS, Move, gain_ratio, shorten, to_parabola
 
-FIRST_RADIUS = 100.0  # as MINPACK; in units of x_scale the first radius is 1
 BAD, PROVED, GOOD = 0.25, 0.5, 0.75  # gain ratios that shrink, hand over, enlarge
 TIMID = 0.1  # share of what the full step promises: an iteration that gains less gained little
 PATIENCE = 2  # iterations that may gain little
 BOLD_TRIALS = 2
 SLACK = 0.1  # of the radius: how far the step may be from it
 NEWTON_STEPS = 30
+VALLEY = 10  # damped steps in a row: the search follows a valley
+PROBE = 0.1  # of a step: where its curvature is looked at
+STRAIGHT = 0.75  # of a step: what its curvature may add, at most
 
 
 @dataclass(frozen=True)
@@ -31,14 +33,18 @@ class TrustRegion:
     promises, the next one is the full step, shortened a few times at most; if that
     fails, it is tried half as often.
 
-    ``first`` is the first radius in units of each variable, where these are given.
+    ``first`` is the first radius in units of each variable. ``bends``: ten damped steps in a row
+    follow a valley, and from then on a step bends with it, by the second derivative of the
+    residuals along it (one evaluation; Transtrum & Sethna 2012).
     """
 
     first: float = 1.0
     armijo: float = ARMIJO
     radius: float = inf
     hand_over: bool = False
+    bends: bool = False
     timid: int = 0
+    damped: int = 0
     patience: int = PATIENCE
     phase: str = "lm"
 
@@ -75,17 +81,29 @@ class TrustRegion:
             step = solve(linear, nu)
             if not step.promise > EPS * cost:
                 break
-            trial = yield from problem.evaluate(step.target)
+            trial = yield from self.trial(problem, linear, step, nu)
             decrease = cost - trial.cost
             search = search.resized(linear, step, nu, decrease)
             quality = gain_ratio(decrease, step.promise)
             if quality > self.armijo:
                 trusted = self.hand_over and nu == 0.0 and quality > PROVED
-                timid = self.timid + 1 if decrease < TIMID * linear.full.promise else 0
                 stop = Stop.TRUSTED if trusted else None
                 move = Move(trial, nu, rejections, quality, stop, capped)
-                return move, replace(search, timid=timid)
+                return move, search.after(linear, nu, decrease)
         return Move(None, nu, rejections, stop=Stop.STALLED, capped=capped), search
+
+    def trial(
+        self, problem: Problem, linear: LinearModel, step: DampedStep, nu: float
+    ) -> Steps[Point]:
+        """Return the end of a step, bent where the search follows a valley."""
+        if self.bends and nu > 0.0 and self.damped >= VALLEY:
+            return (yield from problem.evaluate((yield from bent(problem, linear, step, nu))))
+        return (yield from problem.evaluate(step.target))
+
+    def after(self, linear: LinearModel, nu: float, decrease: float) -> Self:
+        """Return the search after an accepted trial: how many were timid, or damped, in a row."""
+        timid = self.timid + 1 if decrease < TIMID * linear.full.promise else 0
+        return replace(self, timid=timid, damped=self.damped + 1 if nu > 0.0 else 0)
 
     def resized(self, linear: LinearModel, step: DampedStep, nu: float, decrease: float) -> Self:
         """Return the search with the radius that the trial suggests."""
@@ -99,11 +117,30 @@ class TrustRegion:
         return replace(self, radius=share * min(self.radius, 10.0 * length))
 
 
+def bent(problem: Problem, linear: LinearModel, step: DampedStep, nu: float) -> Steps[Array]:
+    """Return where a step ends that follows the curvature of the residuals, if that is small.
+
+    Source: Transtrum & Sethna 2012, Improvements to the Levenberg-Marquardt algorithm, section 4.
+    """
+    d = step.target - linear.point.x
+    probe = yield from problem.evaluate(linear.box.inside(linear.point.x + PROBE * d))
+    rise = probe.residuals - linear.point.residuals
+    second = 2.0 / PROBE * (rise / PROBE - linear.jacobian @ d)
+    if not np.isfinite(second).all():
+        return step.target
+    k = linear.rank
+    s, V = linear.singular[:k], linear.directions[:k]
+    y = -V.T @ (V @ (linear.jacobian.T @ second / linear.scale) / (s**2 + nu))
+    if 2.0 * float(np.linalg.norm(y)) > STRAIGHT * linear.scaled_length(step.target):
+        return step.target
+    return linear.box.inside(step.target + 0.5 * y / linear.scale)
+
+
 def first_radius(problem: Problem, linear: LinearModel, first: float) -> float:
     """Return the radius to begin with, no longer than the full step."""
     full = linear.scaled_length(linear.full.target)
     size = float(np.linalg.norm(linear.scale * linear.box.unit))
-    return min(first * (1.0 if problem.scaled else FIRST_RADIUS * size), max(full, TINY))
+    return min(first * (1.0 if problem.scaled else size), max(full, TINY))
 
 
 def damping(linear: LinearModel, radius: float) -> float:

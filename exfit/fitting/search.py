@@ -120,15 +120,13 @@ class CaseSearches:
         return self._descent(end.x, DEFAULT_STRATEGY, "exact", announce)
 
     def _descent(self, x: Array, method: str, jacobian: str, announce: Announce) -> estimate.Result:
-        return estimate.least_squares(
-            self.residuals,
-            x,
-            jac=JACOBIANS[jacobian](self.residuals),
+        descent = estimate.Descent(
+            functions=estimate.OneByOne(self.residuals, JACOBIANS[jacobian](self.residuals)),
             bounds=self.residuals.bounds,
             method=method,
-            callback=announce,
             **_settings(self.options, self.residuals, jacobian),
         )
+        return descent.run(x, announce)
 
     @property
     def ways(self) -> tuple[Way, ...]:

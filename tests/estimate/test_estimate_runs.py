@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from known_minima import CERTIFIED, KNOWN, TEXTBOOK, beale, random_problem, rosenbrock
+from known_minima import CERTIFIED, KNOWN, TEXTBOOK, random_problem
+from more_garbow_hillstrom import beale, rosenbrock
 
 from exfit.estimate import STATUS, Stop, least_squares
 from exfit.estimate.problem import half_square
@@ -211,11 +212,16 @@ def ended(stop):
         case Stop.GRADIENT:
             return least_squares(line, [3.0])
         case Stop.FLOOR:
-            return least_squares(case.fun, case.starts[1], case.jac, gtol=0.0)
+            return least_squares(case.fun, case.starts[1], case.jac, ftol=1e-10, gtol=0.0)
         case Stop.STEP:
             return least_squares(case.fun, case.starts[1], case.jac, xtol=1e-3)
         case Stop.ITERATIONS:
             return least_squares(rosenbrock, start, jac, max_iterations=3)
+        case Stop.EVALUATIONS:
+            return least_squares(rosenbrock, start, jac, max_nfev=3)
+        case Stop.LOST:
+            far = CERTIFIED["BoxBOD"]  # by dgn, to a rate so high that no sample shows it
+            return least_squares(far.fun, far.starts[0], far.jac, method="dgn")
         case Stop.INTERRUPTED:
             return least_squares(rosenbrock, start, jac, callback=interrupt)
         case Stop.JACOBIAN:

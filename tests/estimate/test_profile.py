@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from known_minima import numbers
+from more_garbow_hillstrom import numbers
 from scipy.stats import t as student
 
 from exfit.estimate import OneByOne, ProfileEnd, least_squares, profile, profiles

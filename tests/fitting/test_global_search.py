@@ -27,6 +27,7 @@ def end(cost, stop=Stop.GRADIENT, phases=("dgn",)):
     return Result(
         x, cost, nothing, np.ones((2, 1)), np.zeros(1), 0.0, 0.0, len(lines), len(lines),
         len(lines), 1 if converged else 0, stop.value, converged, lines, stop,
+        np.zeros(1, dtype=int),
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ def linearised(values, errors, jacobian, **changes):
     values, errors = np.asarray(values, dtype=float), np.asarray(errors, dtype=float)
     count = len(values)
     plain = {
-        "names": tuple("abcdefgh"[:count]),
+        "names": tuple("abcdefghi"[:count]),
         "units": ("pu",) * count,
         "values": values,
         "logarithmic": np.zeros(count, dtype=bool),

@@ -119,15 +119,15 @@ def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
     """What is known beforehand is one more residual of both."""
     asked = {}
 
-    def stopped(residuals, start, *, good_enough, **_):
-        asked[len(residuals(start))] = good_enough
+    def stopped(descent, start, _):
+        asked[len(descent.functions.fun(start))] = descent.good_enough
         raise KeyboardInterrupt
 
     match = {"estimate": {"good_enough": {"rmse": 2e-4}}}
     case = dense_case(tmp_path, sections=match)
     every = residuals(case)
     few = compressed(every)
-    monkeypatch.setattr("exfit.fitting.search.estimate.least_squares", stopped)
+    monkeypatch.setattr("exfit.estimate.Descent.run", stopped)
     for problem in (FitProblem(every, every), FitProblem(every, few)):
         with pytest.raises(KeyboardInterrupt):
             search(case, problem, "auto", print, print)
