@@ -21,6 +21,7 @@ from exfit.analysis.case_description import (
     tests_of,
     values_by_part,
 )
+from exfit.analysis.determination import determination
 from exfit.analysis.diagnostics import typical_notes, unphysical_notes
 from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
 from exfit.analysis.iteration_responses import (
@@ -41,7 +42,7 @@ from exfit.case import load
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
-from exfit.fitting.search import checked_search, checked_strategy, fitted
+from exfit.fitting.search import checked_search, checked_strategy, continued_from, fitted
 from exfit.fitting.search import search as search_case
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.simulation_counter import SimulationCounter
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 CaseOrPath = Case | str | PathLike[str]
 
+MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
 
 
@@ -117,12 +119,19 @@ def fit(
 
     doubt = doubt_of(case, problem, setups, unseen)
     found = search_case(case, problem, method, announce, search_progress, counter, options, doubt)
+    profiled = options.search != "local"
+    determined = determination(problem, found, setups, profiled, search_progress)
+    for _ in range(MOST_MINIMA):
+        if determined.lower is None:
+            break
+        found = continued_from(determined.lower, found, problem, announce, counter, options)
+        determined = determination(problem, found, setups, profiled, search_progress)
     best = found.best
     history = [iteration_of(line, residuals) for line in found.history]
     values = residuals.values(best.x)
     fine = [setup.with_enough_substeps(values) for setup in setups]
     comparisons = comparisons_of(fine, residuals, values, history)
-    analysis = analysed(case, problem, best, fine, comparisons, unseen, history)
+    analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
     minima = minima_of(residuals, found, analysis.uncertainty)
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}

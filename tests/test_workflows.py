@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from exfit.analysis import solution
+from exfit.analysis import determination, solution
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiment, build_experiments
 from exfit.fitting.system import values_of
@@ -201,18 +201,21 @@ def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):
     assert told == [True, False]
 
 
-@pytest.mark.parametrize("step", ["uncertainty_of_solution", "validation_of"])
-def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, step):
+@pytest.mark.parametrize(
+    ("module", "step"), [(determination, "uncertainty_of_solution"), (solution, "validation_of")]
+)
+def test_an_interruption_after_the_search_keeps_what_that_came_to(monkeypatch, module, step):
     def interrupt(*_):
         raise KeyboardInterrupt
 
     whole = fit(case("first_order"))
-    monkeypatch.setattr(solution, step, interrupt)
+    monkeypatch.setattr(module, step, interrupt)
     result = fit(case("first_order"))
     assert result.interrupted
     assert result.success
     assert result.values == whole.values
-    assert result.validation == ()
+    assert (result.knowledge is None) == (module is determination)
+    assert (result.validation == ()) == (module is solution)
     assert solution.INTERRUPTED_AFTERWARDS in result.notes
 
 

@@ -1,7 +1,6 @@
 """The solution of a search, and what follows from it: responses, uncertainty, notes."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.behaviour import behaviour_of
+from exfit.analysis.determination import Determination
 from exfit.analysis.diagnostics import (
     level_notes,
     match_notes,
@@ -26,14 +26,12 @@ from exfit.analysis.phase_ends import phase_ends
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
 from exfit.case.schema import Unknown
-from exfit.errors import SimulationError
-from exfit.fitting.nonlinearity import nonlinear_parameters
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.search import UNIT, names_of_records
+from exfit.fitting.search import UNIT
 from exfit.fitting.setup import ExperimentSetup
-from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
+from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Uncertainty
 from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
@@ -77,6 +75,7 @@ def analysed(
     case: Case,
     problem: FitProblem,
     best: estimate.Result,
+    determined: Determination,
     setups: Sequence[ExperimentSetup],
     fitted: Sequence[Comparison],
     unseen: Sequence[ExperimentSetup],
@@ -88,13 +87,12 @@ def analysed(
     interruption ends it with what was done by then.
     """
     values = problem.residuals.values(best.x)
-    interrupted, unfinished = best.stop is estimate.Stop.INTERRUPTED, False
-    uncertainty, behaviour, validation = None, None, list[Comparison]()
+    unfinished = determined.interrupted
+    interrupted = unfinished or best.stop is estimate.Stop.INTERRUPTED
+    uncertainty, behaviour, validation = determined.uncertainty, None, list[Comparison]()
     ends = list[PhaseEnd]()
     try:
         ends += phase_ends(case, setups, problem.residuals, history)
-        if not interrupted:
-            uncertainty = uncertainty_of_solution(problem, best.x, setups)
         validated = [aligned(case, setup, values) for setup in unseen]
         validation += [validation_of(case, fitted, *pair) for pair in validated]
         behaviour = behaviour_of(setups, values, validated)
@@ -152,22 +150,6 @@ def iteration_of(line: estimate.SolverIteration, residuals: Residuals) -> Iterat
     figures = {name: value for name, value in vars(line).items() if name != "x"}
     free = {parameter.name: values[parameter.name] for parameter in residuals.free}
     return Iteration(**figures, values=free)
-
-
-def uncertainty_of_solution(
-    problem: FitProblem, theta: Array, setups: Iterable[ExperimentSetup]
-) -> UncertaintyAnalysis | None:
-    """Return how well the records determine the solution theta (N,), in scaled parameters.
-
-    None where the derivatives there are not finite.
-    """
-    try:
-        of_records = names_of_records(setups)
-        uncertainty = uncertainty_at(problem, theta, of_records)
-    except SimulationError:
-        return None
-    nonlinear = nonlinear_parameters(problem.compressed, theta, uncertainty, of_records)
-    return replace(uncertainty, nonlinear=nonlinear)
 
 
 def comparisons_of(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from exfit.estimate.gauss_newton import LineSearch
     from exfit.estimate.problem import half_square
     from exfit.estimate.profile_side import ProfileEnd
-    from exfit.estimate.profiling import CostProfile, profile, profiles
+    from exfit.estimate.profiling import CostProfile, LowerMinimum, profile, profiles
     from exfit.estimate.requests import Functions, OneByOne
     from exfit.estimate.search import to_half, to_parabola
     from exfit.estimate.searches import Searches
@@ -43,6 +43,7 @@ __all__ = [
     "Functions",
     "LineSearch",
     "LocalMinimum",
+    "LowerMinimum",
     "MultistartResult",
     "OneByOne",
     "ProfileEnd",
@@ -65,6 +66,7 @@ __all__ = [
 
 _MODULES = {
     "CostProfile": "exfit.estimate.profiling",
+    "LowerMinimum": "exfit.estimate.profiling",
     "Descent": "exfit.estimate.solver",
     "Functions": "exfit.estimate.requests",
     "LineSearch": "exfit.estimate.gauss_newton",

@@ -23,7 +23,7 @@ from exfit.estimate.requests import Functions, Steps
 
 FINE = 2e-3  # of the rise: what a refit may leave, a thousandth of the way to the crossing
 MOST_CORRECTIONS = 15  # of a refit: it starts near its end
-NEXT_TO = 1e-6  # units: a variable no farther from its bound lies on it
+NEXT_TO = 1e-3  # units: a variable no farther from its bound lies on it
 REACH = 1.0  # of a correction, in units of each variable
 FAR = 30.0  # rises that a correction promises: where it fails, take a shorter step instead
 ENOUGH = 0.1  # of what a correction promises: it is not too long
@@ -40,6 +40,9 @@ MOST_REFITS = 12  # to make it so
 CUBICS = 4  # of them, then halves: a jump lets no interpolation come near
 
 
+NOTHING = (inf, -inf)  # an interval that holds no value
+
+
 class ProfileEnd(Enum):
     """Why one side of a profile ends."""
 
@@ -47,6 +50,7 @@ class ProfileEnd(Enum):
     BOUND = "the parameter is at its bound"
     FLAT = "the cost hardly rises"
     FAILED = "no residuals beyond are finite"
+    KNOWN = "the interval about another minimum begins"
     INTERRUPTED = "interrupted"
 
 
@@ -84,16 +88,23 @@ class Valley:
 
 @dataclass(eq=False)
 class Side:
-    """One side of a profile, as far as it has come; ``sign`` is -1 below the minimum."""
+    """One side of a profile, as far as it has come; ``sign`` is -1 below the minimum.
+
+    ``stride`` is how far the last step aimed, ``failed`` where residuals were not finite. It ends
+    where it enters an interval that is ``known``, as from another minimum.
+    """
 
     valley: Valley
     index: int
     sign: int
     rise: float
+    known: tuple[float, float] = NOTHING
     spots: list[Spot] = field(init=False)
     curvature: float = field(init=False)
     end: ProfileEnd = ProfileEnd.INTERRUPTED
     crossing: float | None = None
+    stride: float = 0.0
+    failed: float = inf
 
     def __post_init__(self) -> None:
         """Begin at the minimum."""
@@ -126,15 +137,21 @@ class Side:
         last, points = self.spots[-1], self.valley.points
         if last.place == self.bound:
             return ProfileEnd.BOUND
+        low, high = self.known
+        if low <= last.place <= high and not low <= self.spots[0].place <= high:
+            return ProfileEnd.KNOWN
+        if abs(self.failed - last.place) <= CLOSE * abs(last.place - self.spots[0].place):
+            return ProfileEnd.FAILED
         if len(self.spots) > MOST_POINTS * points:
             return ProfileEnd.FLAT
-        step = min(self.step(), self.way_to_corner())
+        self.stride = self.step()
+        step = min(self.stride, self.way_to_corner())
         for tries in range(MOST_HALVINGS + 1):
             patient = tries == MOST_HALVINGS
             spot = yield from self.refit(self.predicted(step), patient)
             if spot is not None and spot.height - last.height <= LEAPS / points:
                 break
-            step *= 0.5
+            self.stride = step = 0.5 * step
         if spot is None:
             return ProfileEnd.FAILED
         self.spots.append(spot)
@@ -159,16 +176,17 @@ class Side:
         if len(self.spots) == 1:
             return self.first_step(last.height + gain)
         before = self.spots[-2]
-        gone, risen = abs(last.place - before.place), last.height - before.height
-        longest = MOST_GROWTH * max(1.0, gain / share) * gone
-        steepness = last.slope or risen / gone
+        risen = last.height - before.height
+        longest = MOST_GROWTH * max(1.0, gain / share) * self.stride
+        steepness = last.slope or risen / abs(last.place - before.place)
         if not steepness > 0.0:
             return longest
         straight = min(gain / steepness, longest)
         if not min(last.slope, before.slope, risen) > 0.0:
             return straight
         bend = (1.0 / last.slope - 1.0 / before.slope) / risen
-        return min(max(straight + 0.5 * bend * gain**2, 0.5 * straight), longest)
+        bent = straight + 0.5 * bend * (straight * steepness) ** 2
+        return min(max(bent, 0.5 * straight), longest)
 
     def way_to_corner(self) -> float:
         """Return how far the parameter goes until another, which follows it, meets its bound."""
@@ -223,6 +241,7 @@ class Side:
         problem = Problem(valley.functions, None, held, valley.scaled)
         point = yield from problem.evaluate(guess)
         if point.cost == inf:
+            self.failed = float(guess[self.index])
             return None
         linear, before = (yield from linearise(problem, point, valley.bottom)), None
         for _ in range(MOST_CORRECTIONS):

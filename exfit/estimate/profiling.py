@@ -5,6 +5,7 @@ Source: Venzon & Moolgavkar 1988; Bates & Watts 1988, chapter 6; Raue et al. 200
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 
 import numpy as np
@@ -12,17 +13,25 @@ from numpy.typing import ArrayLike
 
 from exfit.estimate.answer import Progress
 from exfit.estimate.arrays import Array
-from exfit.estimate.box import checked
-from exfit.estimate.linear import LinearModel, linearise
+from exfit.estimate.box import Box, checked
+from exfit.estimate.linear import linearise
 from exfit.estimate.lockstep import finish, finish_all
 from exfit.estimate.problem import Problem
-from exfit.estimate.profile_side import ProfileEnd, Side, Valley
+from exfit.estimate.profile_side import NOTHING, ProfileEnd, Side, Spot, Valley
 from exfit.estimate.requests import Function, Functions, OneByOne, Steps
 from exfit.estimate.solver import Descent
 
 POINTS = 5  # from the minimum to the rise: enough for a smooth figure
 LOWER = 1e-3  # of the rise: what is farther below the minimum refutes it
 MOST_MINIMA = 5
+
+
+@dataclass(frozen=True)
+class LowerMinimum:
+    """A minimum whose profiles are known: its cost, and the intervals of parameters there."""
+
+    cost: float
+    intervals: Mapping[int, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -76,7 +85,7 @@ def profiles(
     rises: Mapping[int, float],
     bounds: tuple[ArrayLike, ArrayLike],
     *,
-    lowest: float = inf,
+    beside: LowerMinimum | None = None,
     points: int = POINTS,
     workers: int | None = None,
     x_scale: ArrayLike | None = None,
@@ -88,8 +97,8 @@ def profiles(
     its own of ``rises`` or to its bound, and after each the others are fitted anew. All sides are
     advanced together, in ``workers`` threads (as many as there are processors by default). A rise
     is s^2 q / 2 for an interval at the level of which q is the quantile of chi^2 with one degree
-    of freedom, or that of t squared. It counts from the cost at x, or from ``lowest`` where x is
-    one of several minima and another is lower.
+    of freedom, or that of t squared. It counts from the cost at x or, where x lies ``beside`` a
+    lower minimum, from the cost there; then a side ends where it enters the interval of that one.
 
     Where a cost lower than that turns up, all begin anew from the minimum there. watch gets the
     Progress, in sides; KeyboardInterrupt, raised there or anywhere, ends it with what is done.
@@ -102,27 +111,47 @@ def profiles(
     for rise in rises.values():
         if not rise > 0.0:
             raise ValueError(f"rise: {rise} is not above 0")
-    scaled, restarts = x_scale is not None, 0
-    while True:
-        bottom = finish(linear_at(Problem(functions, None, box, scaled), start))
-        valley = Valley(functions, box, scaled, bottom, min(bottom.point.cost, lowest), points)
-        sides = [Side(valley, index, sign, rises[index]) for index in rises for sign in (-1, 1)]
+    valley_at = partial(valley_about, functions, box, x_scale is not None, points)
+    valley = finish(valley_at(start, inf if beside is None else beside.cost))
+    known = {} if beside is None else beside.intervals
+    for restarts in range(MOST_MINIMA + 1):
+        sides = sides_of(valley, rises, known)
         margin = LOWER * max(rises.values()) if restarts < MOST_MINIMA else inf
         whole = finish_sides(sides, valley.lowest - margin, workers, watch)
-        deepest = min((spot for side in sides for spot in side.spots), key=lambda spot: spot.cost)
+        deepest = deepest_of(sides)
         if not whole or deepest.cost >= valley.lowest - margin:
             break
-        start, lowest, restarts = bottom_near(valley, deepest.x), inf, restarts + 1
+        valley, known = finish(valley_at(bottom_near(valley, deepest.x), inf)), {}
     pairs = zip(sides[::2], sides[1::2], strict=True)
     return tuple(joined(below, above, valley, restarts > 0) for below, above in pairs)
 
 
-def linear_at(problem: Problem, x: Array) -> Steps[LinearModel]:
-    """Return the linear model at the minimum."""
+def valley_about(
+    functions: Functions, box: Box, scaled: bool, points: int, x: Array, lowest: float
+) -> Steps[Valley]:
+    """Return what profiles about a minimum share."""
+    problem = Problem(functions, None, box, scaled)
     point = yield from problem.evaluate(x)
     if point.cost == inf:
         raise ValueError("the residuals at x are not finite")
-    return (yield from linearise(problem, point))
+    bottom = yield from linearise(problem, point)
+    return Valley(functions, box, scaled, bottom, min(point.cost, lowest), points)
+
+
+def sides_of(
+    valley: Valley, rises: Mapping[int, float], known: Mapping[int, tuple[float, float]]
+) -> list[Side]:
+    """Return both sides of each profile, the lower one first."""
+    return [
+        Side(valley, index, sign, rise, known.get(index, NOTHING))
+        for index, rise in rises.items()
+        for sign in (-1, 1)
+    ]
+
+
+def deepest_of(sides: Sequence[Side]) -> Spot:
+    """Return the point of the lowest cost so far."""
+    return min((spot for side in sides for spot in tuple(side.spots)), key=lambda spot: spot.cost)
 
 
 def finish_sides(
@@ -134,16 +163,15 @@ def finish_sides(
     """Walk all sides, until one falls below the limit; return whether none was interrupted."""
     done = 0
 
-    def lowest() -> float:
-        return min(spot.cost for side in sides for spot in tuple(side.spots))
-
     def receive(_: int, side: Side) -> None:
         nonlocal done
         if side.end is not ProfileEnd.INTERRUPTED:
             done += 1
-            watch(Progress("profiling", done, len(sides), lowest()))
+            watch(Progress("profiling", done, len(sides), deepest_of(sides).cost))
 
-    return finish_all([side.walk(lambda: lowest() < limit) for side in sides], workers, receive)
+    return finish_all(
+        [side.walk(lambda: deepest_of(sides).cost < limit) for side in sides], workers, receive
+    )
 
 
 def bottom_near(valley: Valley, x: Array) -> Array:

@@ -5,7 +5,10 @@ from dataclasses import replace
 from math import nan
 from typing import Literal, NamedTuple, Protocol
 
-from exfit.estimate import MultistartResult, Result, SolverIteration, Stop
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
 from exfit.estimate.starts import end_of, same
 from exfit.fitting.descents import (
     Announce,
@@ -23,6 +26,7 @@ from exfit.fitting.descents import (
 )
 from exfit.util.strategies import FROM_FURTHER_STARTS
 
+Array = NDArray[np.float64]
 Way = Literal["strategy", "linear", "direct"]
 
 PERFECT = 1e-16  # of the cost at a start: what a perfect match may leave of it
@@ -143,7 +147,7 @@ def beyond(
     like = count_like(ends[0].cost, minima.end_costs, searches)
     own = own_end(descents, best)
     if own is None:
-        path, last = refined(searches, descents, best, announce)
+        path, last = refined(searches, descents.history, best, announce)
     else:
         path, last = descents._replace(best=own).history, counted(own, descents.ends)
     last = confirmed(last, reason, like)
@@ -152,6 +156,20 @@ def beyond(
     return SearchResult(
         last, minima, path, descents.best, place, ways_of(searches, descents), tuple(notes)
     )
+
+
+def continued(
+    searches: GlobalSearchMethods, found: SearchResult, point: Array, announce: Announce
+) -> SearchResult:
+    """Return a search that goes on from a point (N,) with a lower cost than its best."""
+    path, last = refined(searches, found.history, replace(found.best, x=point), announce)
+    if found.minima is None:
+        return found._replace(best=last, history=path)
+    alike = [local for local in found.minima.minima if is_same(last, local.result)]
+    others = [local for local in found.minima.minima if not is_same(last, local.result)]
+    lowest = LocalMinimum(last.x, last.cost, sum(local.starts for local in alike), last)
+    minima = replace(found.minima, minima=(lowest, *others), best=last)
+    return found._replace(best=last, history=path, minima=minima, place=0)
 
 
 def own_end(descents: Descents, best: Result) -> Result | None:
@@ -171,10 +189,13 @@ def is_same(best: Result, other: Result) -> bool:
 
 
 def refined(
-    searches: GlobalSearchMethods, descents: Descents, end: Result, announce: Announce
+    searches: GlobalSearchMethods,
+    history: Sequence[SolverIteration],
+    end: Result,
+    announce: Announce,
 ) -> tuple[tuple[SolverIteration, ...], Result]:
-    """Return a last descent from an end that further starts led to, behind those of the case."""
-    path = [*descents.history]
+    """Return a last descent from an end that was found elsewhere, behind the path before."""
+    path = [*history]
     last = path[-1]
 
     def join(line: SolverIteration) -> None:

@@ -15,7 +15,13 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
-from exfit.fitting.global_search import SearchResult, Way, global_search, local_search
+from exfit.fitting.global_search import (
+    SearchResult,
+    Way,
+    continued,
+    global_search,
+    local_search,
+)
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.residuals import (
     JACOBIANS,
@@ -89,6 +95,19 @@ def search(
     methods = (method,) if judge is None else STAGES
     search_of = local_search if options.search == "local" else global_search
     return search_of(searches, methods, judge or no_doubt, announce)
+
+
+def continued_from(
+    point: Array,
+    found: SearchResult,
+    problem: FitProblem,
+    announce: Announce,
+    counter: SimulationCounter,
+    options: Estimate,
+) -> SearchResult:
+    """Return a search that goes on from a point (N,) with a lower cost than its best."""
+    searches = CaseSearches(problem, options, lambda _: None, counter)
+    return continued(searches, found, point, announce)
 
 
 @dataclass(frozen=True)

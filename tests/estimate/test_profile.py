@@ -5,7 +5,7 @@ import pytest
 from more_garbow_hillstrom import numbers
 from scipy.stats import t as student
 
-from exfit.estimate import OneByOne, ProfileEnd, least_squares, profile, profiles
+from exfit.estimate import LowerMinimum, OneByOne, ProfileEnd, least_squares, profile, profiles
 
 FREE = (-np.inf, np.inf)
 
@@ -269,11 +269,17 @@ def test_about_a_second_minimum_the_rise_counts_from_the_lowest():
 
     box = ((-3.0,), (3.0,))
     low, high = (least_squares(fun, [start], jac, box) for start in (-1.1, 0.9))
-    one = profiles(OneByOne(fun, jac), high.x, {0: rise}, box, lowest=low.cost, x_scale=1.0)[0]
+    one = profiles(
+        OneByOne(fun, jac), high.x, {0: rise}, box, beside=LowerMinimum(low.cost, {}), x_scale=1.0
+    )[0]
     assert high.cost > low.cost
     for at in (one.low, one.high):
         assert 0.5 * np.sum(fun([at]) ** 2) == pytest.approx(low.cost + rise, abs=0.01 * rise)
     assert 0.0 < one.low < 1.0 < one.high
+    about_lower = LowerMinimum(low.cost, {0: (-2.0, 0.5 * (one.low + high.x[0]))})
+    again = profiles(OneByOne(fun, jac), high.x, {0: rise}, box, beside=about_lower, x_scale=1.0)[0]
+    assert again.ends == (ProfileEnd.KNOWN, ProfileEnd.RISE)
+    assert again.high == one.high
 
 
 def test_threads_change_nothing():
