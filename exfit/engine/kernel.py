@@ -333,37 +333,36 @@ class LinearKernel:
         self._rest = function(engine, "rest", 8)
         self._motion = function(engine, "motion", 9)
         self._at_rest = function(engine, "at_rest", len(AT_REST), first=(ctypes.c_int64,))
-        states = len(system.states)
+        # tangents of parameters, setpoints and states at rest: zero, and written over with zero
+        sizes = (len(system.parameters), len(system.setpoints), len(system.states))
+        self._still = [np.zeros((rows, DIRECTIONS)) for rows in sizes]
+        self._still_input = np.zeros(len(system.inputs))
+        states = sizes[-1]
         whole_blocks = -(-states // DIRECTIONS) * DIRECTIONS
         columns = np.eye(states, whole_blocks).reshape(states, -1, DIRECTIONS)
         self._units = np.ascontiguousarray(columns.transpose(1, 0, 2))
 
-    def _still(self) -> list[Array]:
-        """Return tangents of parameters, setpoints and states at rest: zero, and written over."""
-        sizes = (len(self.system.parameters), len(self.system.setpoints), len(self.system.states))
-        return [np.zeros((rows, DIRECTIONS)) for rows in sizes]
-
     def rest(self, p: Array) -> Start:
         """Return the rest of one parameter set (np,): setpoints (nr,) and states (nx,)."""
         r, x = np.empty(len(self.system.setpoints)), np.empty(len(self.system.states))
-        still = self._still()
-        self._rest(address(p), address(r), address(x), None, *map(address, still), None)
+        still = map(address, self._still)
+        self._rest(address(p), address(r), address(x), None, *still, None)
         return Start(r, x)
 
     def at_rest(self, p: Array) -> AtRest:
         """Return the states at rest of parameter sets p (K, np), and their linearisation there."""
         count, states = len(p), len(self.system.states)
-        r, u = np.empty(len(self.system.setpoints)), np.zeros(len(self.system.inputs))
+        r = np.empty(len(self.system.setpoints))
         x, slopes = np.empty((count, states)), np.empty((count, states))
         columns = np.empty((count, *self._units.shape))
-        arrays = (p, r, x, slopes, columns, *self._still(), self._units, u)
+        arrays = (p, r, x, slopes, columns, *self._still, self._units, self._still_input)
         self._at_rest(count, *map(address, arrays))
         return AtRest(x, slopes, self._joined(columns))
 
     def motion(self, p: Array, r: Array, x: Array, u: Array) -> tuple[Array, Array]:
         """Return the slopes (nx,) at states x and inputs u, and their Jacobian (nx, nx)."""
         slopes, columns = np.empty(len(x)), np.empty(self._units.shape)
-        still = self._still()[:2]
+        still = self._still[:2]
         for unit, column in zip(self._units, columns, strict=True):
             self._motion(*map(address, (p, r, x, slopes, *still, unit, column, u)))
         return slopes, self._joined(columns)

@@ -42,15 +42,19 @@ class FreeParameter:
         given = [bound for bound in (0.0, self.low, self.high) if isfinite(bound)]
         return 2.0 * max(abs(self.start - bound) for bound in given)
 
+    @cached_property
+    def _scaled_bounds(self) -> dict[float, float]:
+        """The bounds by what is scaled of them."""
+        return {self.scaled(bound): bound for bound in (self.high, self.low)}
+
     def scaled(self, value: float) -> float:
         """Return the number that the estimator moves."""
         return float(np.log(value)) if self.logarithmic else value / self.width
 
     def value(self, scaled: float) -> float:
         """Return the parameter's own value; at a bound, exactly that bound."""
-        for bound in (self.low, self.high):
-            if scaled == self.scaled(bound):
-                return bound
+        if scaled in self._scaled_bounds:
+            return self._scaled_bounds[scaled]
         return float(np.exp(scaled)) if self.logarithmic else scaled * self.width
 
     def bound(self, value: float) -> Literal["min", "max"] | None:

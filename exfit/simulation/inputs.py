@@ -47,28 +47,44 @@ class InputStep(NamedTuple):
             return way.clip(0.0, 1.0)
         if not self.smooth:
             return np.full(part.steps + 1, 1.0 if self.at <= part.start else 0.0)
-        begun = _steps_after(self.at, part)
+        seen = np.zeros(part.steps + 1)
+        changing = self._changing(part)
+        seen[changing.stop :] = 1.0
+        begun = _steps_after(self.at, part, changing)
         if not self.ramp:
-            return _mean_of_step(begun)
-        done = _steps_after(self.end, part)
+            seen[changing] = _mean_of_step(begun)
+            return seen
+        done = _steps_after(self.end, part, changing)
         rising = (_mean_of_line(begun) - _mean_of_line(done)) * (part.step / self.ramp)
-        rising[done >= 1.0] = 1.0
-        return rising
+        # the difference of two areas is rounded; over a short ramp that is much of its height
+        seen[changing] = np.where(done >= 1.0, 1.0, rising.clip(0.0, 1.0))
+        return seen
 
     def share_slope(self, part: GridSegment) -> Array:
         """Return the derivative of ``share`` to the instant, 1/s; only a smooth step has it."""
         if not self.smooth:
             raise ValueError(f"the step of {self.signal} at {self.at:g} s is not smooth: it stays")
-        begun = _steps_after(self.at, part)
+        slope = np.zeros(part.steps + 1)
+        changing = self._changing(part)
+        begun = _steps_after(self.at, part, changing)
         if not self.ramp:
-            return np.where(np.abs(begun) < 1.0, (np.abs(begun) - 1.0) / part.step, 0.0)
-        done = _steps_after(self.end, part)
-        return (_mean_of_step(done) - _mean_of_step(begun)) / self.ramp
+            near = np.abs(begun)
+            slope[changing] = np.where(near < 1.0, (near - 1.0) / part.step, 0.0)
+        else:
+            done = _steps_after(self.end, part, changing)
+            slope[changing] = (_mean_of_step(done) - _mean_of_step(begun)) / self.ramp
+        return slope
+
+    def _changing(self, part: GridSegment) -> slice:
+        """Return the grid points of a segment whose B-splines see a smooth step change."""
+        first = math.floor((self.at - part.start) / part.step)
+        last = math.ceil((self.end - part.start) / part.step)
+        return slice(*(min(max(row, 0), part.steps + 1) for row in (first - 1, last + 2)))
 
 
-def _steps_after(at: float, part: GridSegment) -> Array:
-    """Return by how many steps the grid points (n + 1,) of a segment lie after an instant."""
-    return np.arange(part.steps + 1.0) - (at - part.start) / part.step
+def _steps_after(at: float, part: GridSegment, rows: slice) -> Array:
+    """Return by how many steps some grid points of a segment lie after an instant."""
+    return np.arange(rows.start, rows.stop) - (at - part.start) / part.step
 
 
 def _mean_of_step(x: Array) -> Array:

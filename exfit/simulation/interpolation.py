@@ -1,10 +1,9 @@
 """A run read at given times: polynomials that never reach across a step."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache, cached_property
 from math import prod
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,8 @@ from exfit.engine.sampling import SampleRows, whole
 from exfit.simulation.grid import ON_GRID, GridSegment
 
 Array = NDArray[np.float64]
-Number = TypeVar("Number", np.int64, np.float64)
 
-BLOCK = 1 << 16  # samples whose interpolation is kept
+BLOCK = 1 << 16  # samples that are read at a time
 NEIGHBOURS = 6  # grid points of an interpolation, whose slope then jumps by less than 1e-9
 
 
@@ -71,10 +69,6 @@ class Interpolation:
         nearest = np.clip(np.rint(position), 0.0, last)
         self._on_grid = self._still | (np.abs(position - nearest) < near)
         self._nearest = (before[owner] + nearest).astype(np.int64)
-        self._exact: list[NDArray[np.int64]] | None = None
-        if np.all(self._on_grid):
-            within = nearest.astype(np.int64)
-            self._exact = [within[owner == k] for k in range(len(grid))]
 
     @property
     def blocks(self) -> list[slice]:
@@ -84,82 +78,61 @@ class Interpolation:
 
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return samples (M, ...) of a run given as one array (n + 1, ...) per segment."""
-        if self._exact is None:
-            return self._read(run, self.weights)
-        # each segment by itself: a copy of the whole run costs more than a simulation's tenth
-        return np.concatenate([part[k] for part, k in zip(run, self._exact, strict=True)])
+        rows, weights, _ = self.reading()
+        whole = joined(run)
+        samples = np.empty((len(rows), *whole.shape[1:]))
+        for block in self.blocks:
+            points = whole[rows[block]]
+            np.einsum("mk,mk...->m...", weights[block], points, out=samples[block])
+        return samples
 
     def reading(self, changing: bool = False) -> SampleRows:
         """Return what machine code reads; where it is ``changing``, its time derivatives too."""
-        return self._changing if changing else self._reading
+        return self._changing if changing else self._plain
 
     @cached_property
-    def _reading(self) -> SampleRows:
-        if np.all(self._on_grid):
+    def _plain(self) -> SampleRows:
+        if self._on_grid.all():
             return SampleRows(self._nearest[:, None], np.ones((len(self.first), 1)))
-        return SampleRows(_sample_by_sample(self._all_rows), _sample_by_sample(self._all_weights))
+        return SampleRows(self._rows, self.weights(slice(None)))
 
     @cached_property
     def _changing(self) -> SampleRows:
-        weights = (self._all_weights, self._slopes(slice(0, len(self.first))))
-        return SampleRows(_sample_by_sample(self._all_rows), *map(_sample_by_sample, weights))
+        slopes = self._polynomials(slice(None), slice(NEIGHBOURS, 2 * NEIGHBOURS))
+        slopes /= self._step[:, None]
+        slopes[self._still] = 0.0
+        return SampleRows(self._rows, self.weights(slice(None)), slopes)
 
-    def rows(self, block: slice) -> NDArray[np.int64]:
-        """Return which points of a run each sample of a block is read from, (NEIGHBOURS, block)."""
-        if block == slice(0, len(self.first)):
-            return self._all_rows
-        return self._rows_of(block)
+    @property
+    def _rows(self) -> NDArray[np.int64]:
+        """Which points of a run each sample is read from, (M, NEIGHBOURS)."""
+        return np.asarray(np.minimum(self.first[:, None] + np.arange(NEIGHBOURS), self.last))
 
     def weights(self, block: slice) -> Array:
-        """Return how much each of these points counts, (NEIGHBOURS, block)."""
-        if block == slice(0, len(self.first)):
-            return self._all_weights
-        return self._weights_of(block)
+        """Return how much each of the points counts that a block's samples are read from.
 
-    @cached_property
-    def _all_rows(self) -> NDArray[np.int64]:
-        return self._rows_of(slice(0, len(self.first)))
-
-    @cached_property
-    def _all_weights(self) -> Array:
-        return self._weights_of(slice(0, len(self.first)))
-
-    def _rows_of(self, block: slice) -> NDArray[np.int64]:
-        return np.asarray(np.minimum(self.first[block] + np.arange(NEIGHBOURS)[:, None], self.last))
-
-    def _weights_of(self, block: slice) -> Array:
+        They are NEIGHBOURS, from ``first`` on, but none is behind ``last``; (block, NEIGHBOURS).
+        """
         weights = self._polynomials(block, slice(0, NEIGHBOURS))
         on_grid = self._on_grid[block]
-        if np.any(on_grid):
+        if on_grid.any():
             # by their own places: behind the end, one row stands for all
-            exact = self.first[block] + np.arange(NEIGHBOURS)[:, None] == self._nearest[block]
-            weights[:, on_grid] = exact[:, on_grid]
+            places = self.first[block][on_grid, None] + np.arange(NEIGHBOURS)
+            weights[on_grid] = places == self._nearest[block][on_grid, None]
         return weights
-
-    def _slopes(self, block: slice) -> Array:
-        slopes = self._polynomials(block, slice(NEIGHBOURS, 2 * NEIGHBOURS)) / self._step[block]
-        slopes[:, self._still[block]] = 0.0
-        return np.asarray(slopes)
 
     def _polynomials(self, block: slice, rows: slice) -> Array:
-        """Return rows of ``lagrange`` at the samples of a block, (NEIGHBOURS, block)."""
+        """Return rows of ``lagrange`` at the samples of a block, a column each."""
         away, points = self._from_middle[block], self._points[block]
-        powers = np.ones((NEIGHBOURS, len(away)))
+        powers = np.ones((len(away), NEIGHBOURS))
         for k in range(1, NEIGHBOURS):
-            powers[k] = powers[k - 1] * away
+            np.multiply(powers[:, k - 1], away, out=powers[:, k])
         if len(self._kinds) == 1:
-            return np.asarray(lagrange(*self._kinds)[rows] @ powers)
-        weights = np.zeros((NEIGHBOURS, len(away)))
+            return np.asarray(powers @ lagrange(*self._kinds)[rows].T)
+        weights = np.zeros((len(away), NEIGHBOURS))
         for n in self._kinds:
-            weights += lagrange(n)[rows] @ (powers * (points == n))
+            weights += (powers * (points == n)[:, None]) @ lagrange(n)[rows].T
         return weights
-
-    def _read(self, run: Sequence[Array], weights: Callable[[slice], Array]) -> Array:
-        whole = joined(run)
-        samples = np.empty((len(self.first), *whole.shape[1:]))
-        for block in self.blocks:
-            np.einsum("km,km...->m...", weights(block), whole[self.rows(block)], out=samples[block])
-        return samples
 
 
 class WholeRun:
@@ -177,11 +150,6 @@ class WholeRun:
     def __call__(self, run: Sequence[Array]) -> Array:
         """Return all points (G, ...) of a run."""
         return joined(run)
-
-
-def _sample_by_sample(of_points: NDArray[Number]) -> NDArray[Number]:
-    """Return rows (points, M) as those of samples (M, points)."""
-    return np.ascontiguousarray(of_points.T)
 
 
 def joined(run: Sequence[Array]) -> Array:

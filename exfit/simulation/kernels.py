@@ -46,3 +46,9 @@ def time_constants(system: System) -> tuple[str, ...]:
     """Return the parameters in seconds that matter to the response."""
     used = parameters_used(system)
     return tuple(name for name in system.time_constants if name in used)
+
+
+@cache
+def places_of_time_constants(system: System) -> tuple[int, ...]:
+    """Return which of the parameters these are."""
+    return tuple(system.parameters.index(name) for name in time_constants(system))

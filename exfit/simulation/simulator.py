@@ -282,11 +282,9 @@ class Simulator:
         p = self._vectors(sets)
         parts = self._substeps_of_many(p)
         reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()
-        count = len(directions[0])
-        samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
-        slopes = np.full((*samples.shape, count), np.nan)
         if not reached:
-            return samples, slopes, parts
+            samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
+            return samples, np.full((*samples.shape, len(directions[0])), np.nan), parts
         own = [directions[k] for k in reached]
         moves = moves_of(self.system, self.inputs, own)
         delays = np.array([[direction.delay for direction in some] for some in own])
@@ -295,14 +293,16 @@ class Simulator:
         code = self._tangent_code(outputs, moves)
         tangents, rates = moves.tangents(self.system, own), moves.rates(own)
         together = Courses(courses, parts[reached])
-        outs, derived, change = _in_blocks(code, p[reached], together, tangents, rates)
-        samples[reached] = outs
-        derivatives = np.zeros((*outs.shape, count))
-        derivatives[..., moves.columns] = derived
+        samples, slopes, change = _in_blocks(code, p[reached], together, tangents, rates)
+        if len(moves.columns) < delays.shape[1]:
+            driven = slopes
+            slopes = np.zeros((*samples.shape, delays.shape[1]))
+            for column, k in enumerate(moves.columns):
+                slopes[..., k] = driven[..., column]
         if change is not None:
-            derivatives -= change[..., None] * delays[:, None, None, :]
-        slopes[reached] = derivatives
-        return samples, slopes, parts
+            for k in np.flatnonzero(delays.any(axis=0)).tolist():
+                slopes[..., k] -= delays[:, k, None, None] * change
+        return _among_all(samples, parts), _among_all(slopes, parts), parts
 
     def course(self, moves: Moves | None = None, changing: bool = False) -> Course:
         """Return what the machine code runs through, with the tangents of inputs that move.
@@ -361,6 +361,16 @@ def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
             side_by_side = 0
         if side_by_side < len(group):
             yield 1, group[side_by_side:]
+
+
+def _among_all(results: Array, parts: Counts) -> Array:
+    """Return the results of the sets that have sub-steps among all, no numbers for the others."""
+    reached = parts != NO_SUBSTEPS
+    if len(results) == len(parts):
+        return results
+    every = np.full((len(parts), *results.shape[1:]), np.nan)
+    every[reached] = results
+    return every
 
 
 def _in_blocks(

@@ -12,7 +12,7 @@ from exfit.errors import SimulationError
 from exfit.models.blocks import SHORTEST
 from exfit.plants import VT0
 from exfit.simulation.grid import ON_GRID
-from exfit.simulation.kernels import linear_kernel, time_constants
+from exfit.simulation.kernels import linear_kernel, places_of_time_constants, time_constants
 from exfit.simulation.limits import limits_passed
 
 Array = NDArray[np.float64]
@@ -38,11 +38,11 @@ def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]
     """
     rest = linear_kernel(system).at_rest(p)
     lag_rate = _lag_rates(system, p)
-    least = _parts(step, lag_rate)
     with np.errstate(all="ignore"):
-        sure = _surely_still(rest)
-        sure &= _parts(step, np.maximum(lag_rate, _radius_bounds(rest.jacobian))) == least
-    if np.all(sure):
+        least = _parts(step, lag_rate)
+        most = _parts(step, np.maximum(lag_rate, _radius_bounds(rest.jacobian)))
+        sure = _surely_still(rest) & (least == most)
+    if sure.all():
         return least
     unsure = AtRest(*(part[~sure] for part in rest))
     radius = spectral_radii(unsure.jacobian)
@@ -109,8 +109,8 @@ def spectral_radii(jacobians: Array) -> Array:
 
 def _lag_rates(system: System, p: Array) -> Array:
     """Return 1/T of the shortest time constant of each set that is not bypassed."""
-    lags = p[:, [system.parameters.index(name) for name in time_constants(system)]]
-    shortest = np.min(np.where(lags >= SHORTEST, lags, np.inf), axis=1, initial=np.inf)
+    lags = p[:, places_of_time_constants(system)]
+    shortest = np.where(lags >= SHORTEST, lags, np.inf).min(axis=1, initial=np.inf)
     return np.asarray(1.0 / shortest)
 
 
@@ -123,8 +123,9 @@ def _parts(step: float, rates: Array) -> NDArray[np.int64]:
 
 def _surely_still(rest: AtRest) -> Mask:
     """Return which systems are at rest whatever their spectral radius."""
-    finite = np.isfinite(rest.jacobian).all(axis=(1, 2)) & np.isfinite(rest.x).all(axis=1)
-    return np.asarray(finite & (np.abs(rest.slopes) <= REST_TOLERANCE).all(axis=1))
+    # a sum is finite where all numbers are, or at most too large: then eigenvalues decide
+    finite = np.isfinite(rest.jacobian.sum(axis=(1, 2)) + rest.x.sum(axis=1))
+    return np.asarray(finite & (np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE))
 
 
 def _moving(rest: AtRest, radius: Array) -> Mask:

@@ -131,7 +131,7 @@ def form_of(sampling: Interpolation, measured: Array, kept: NDArray[np.bool_]) -
         here = kept[block]
         if not here.any():
             continue
-        weights = sampling.weights(block)[:, here]
+        weights = sampling.weights(block)[here].T
         own, y = group[place[block][here]], deviations[place[block][here]]
         low = own[0]
         size = own[-1] - low + 1
