@@ -4,7 +4,7 @@ from math import inf
 
 import numpy as np
 
-from exfit.estimate.arrays import EPS, UNSEEN, Array, Mask
+from exfit.estimate.arrays import EPS, UNSEEN, Array, Mask, norm
 
 
 def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float = UNSEEN) -> Array:
@@ -20,6 +20,7 @@ def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float =
     """
     y, slope = np.zeros_like(low), A.T @ b
     fixed = (low == high) | ((low == 0.0) & (slope > 0.0)) | ((high == 0.0) & (slope < 0.0))
+    tolerance = 10.0 * EPS * norm(A.ravel()) * norm(b)
     for _ in range(10 * len(y)):
         goal = free_minimum(A, b, y, fixed, unseen)
         blocked = (goal < low) | (goal > high)
@@ -30,7 +31,7 @@ def bounded_minimum(A: Array, b: Array, low: Array, high: Array, unseen: float =
         y, slope = goal, A.T @ (A @ goal + b)
         pull = np.where(fixed & (low < high), np.where(y == low, -slope, slope), 0.0)
         strongest = int(np.argmax(pull))
-        if pull[strongest] <= 10.0 * EPS * np.linalg.norm(A) * np.linalg.norm(b):
+        if pull[strongest] <= tolerance:
             break
         fixed[strongest] = False
     return y

@@ -6,7 +6,7 @@ from math import inf, nan, sqrt
 
 import numpy as np
 
-from exfit.estimate.arrays import TINY, Array
+from exfit.estimate.arrays import TINY, Array, norm
 from exfit.estimate.bounded import bounded_minimum
 from exfit.estimate.box import Box
 from exfit.estimate.problem import Point, Problem
@@ -72,11 +72,11 @@ class LinearModel:
     @cached_property
     def gradient_norm(self) -> float:
         """The Euclidean norm of the projected gradient."""
-        return float(np.linalg.norm(self.projected))
+        return norm(self.projected)
 
     def scaled_length(self, x: Array) -> float:
         """Return how far x is from here in scaled variables."""
-        return float(np.linalg.norm(self.scale * (x - self.point.x)))
+        return norm(self.scale * (x - self.point.x))
 
 
 def linearise(

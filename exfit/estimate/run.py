@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.estimate.answer import STATUS, Result, SolverIteration, Stop
-from exfit.estimate.arrays import Array
+from exfit.estimate.arrays import Array, norm
 from exfit.estimate.box import Box
 from exfit.estimate.linear import LinearModel, blind, linearise
 from exfit.estimate.problem import Point, Problem
@@ -112,7 +112,7 @@ class SearchRun:
             x=x.copy(),
             cost=linear.point.cost,
             gradient_norm=linear.gradient_norm,
-            step_norm=float(np.linalg.norm(x - before.point.x)) if before else 0.0,
+            step_norm=norm(x - before.point.x) if before else 0.0,
             damping=move.damping,
             inner=move.inner,
             nfev=self.problem.nfev,

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from exfit.estimate.answer import Stop
-from exfit.estimate.arrays import EPS, TINY, Array
+from exfit.estimate.arrays import EPS, TINY, Array, norm
 from exfit.estimate.linear import DampedStep, LinearModel, solve
 from exfit.estimate.problem import Point, Problem
 from exfit.estimate.requests import Steps
@@ -139,7 +139,7 @@ def bent(problem: Problem, linear: LinearModel, step: DampedStep, nu: float) -> 
 def first_radius(problem: Problem, linear: LinearModel, first: float) -> float:
     """Return the radius to begin with, no longer than the full step."""
     full = linear.scaled_length(linear.full.target)
-    size = float(np.linalg.norm(linear.scale * linear.box.unit))
+    size = norm(linear.scale * linear.box.unit)
     return min(first * (1.0 if problem.scaled else size), max(full, TINY))
 
 
@@ -149,12 +149,12 @@ def damping(linear: LinearModel, radius: float) -> float:
     Source: Moré 1978, section 5 (Newton's iteration on 1/|y|, safeguarded).
     """
     s, b = free_part(linear)
-    if float(np.linalg.norm(b / s)) <= (1.0 + SLACK) * radius:
+    if norm(b / s) <= (1.0 + SLACK) * radius:
         return 0.0
-    low, high = 0.0, float(np.linalg.norm(s * b)) / radius
+    low, high = 0.0, norm(s * b) / radius
     nu = 1e-3 * high
     for _ in range(NEWTON_STEPS):
-        length = float(np.linalg.norm(s * b / (s**2 + nu)))
+        length = norm(s * b / (s**2 + nu))
         if abs(length - radius) <= SLACK * radius:
             break
         low, high = (nu, high) if length > radius else (low, nu)
