@@ -214,6 +214,7 @@ def test_the_package_offers_what_its_users_name():
         "Functions",
         "LineSearch",
         "LocalMinimum",
+        "LowerMinimum",
         "MultistartResult",
         "OneByOne",
         "ProfileEnd",
