@@ -27,12 +27,13 @@ SEXS = {
     "plant": {"type": "open-circuit", "machine": "GENROU"},
     "test": {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.02}]},
     "parameters": {"free": {"K": {"start": 100.0, "min": 10.0, "max": 1000.0}}},
+    "estimate": {"search": "local"},
 }
 
 
 @pytest.fixture(scope="module")
 def result():
-    return exfit.fit(CASE)
+    return exfit.fit(CASE, search="local")
 
 
 def test_importing_exfit_loads_nothing_heavy():
@@ -63,7 +64,7 @@ def test_another_name_is_no_attribute():
 
 @pytest.mark.parametrize("given", [str, Path, exfit.load_case])
 def test_a_case_may_be_given_as_such_or_by_its_path(given, result):
-    assert exfit.fit(given(CASE)).values == result.values
+    assert exfit.fit(given(CASE), search="local").values == result.values
 
 
 def test_input_that_cannot_be_used_raises_an_exfit_error(tmp_path):
@@ -74,7 +75,7 @@ def test_input_that_cannot_be_used_raises_an_exfit_error(tmp_path):
 
 def test_the_callback_of_a_fit_is_called_with_every_iteration():
     iterations = []
-    result = exfit.fit(CASE, progress=iterations.append)
+    result = exfit.fit(CASE, search="local", progress=iterations.append)
     assert tuple(iterations) == result.history
     assert [iteration.number for iteration in iterations] == list(range(len(iterations)))
 
@@ -84,7 +85,7 @@ def test_an_interruption_in_the_callback_keeps_the_best_point():
         if iteration.number == 3:
             raise KeyboardInterrupt
 
-    result = exfit.fit(CASE, progress=interrupt)
+    result = exfit.fit(CASE, search="local", progress=interrupt)
     assert result.interrupted
     assert not result.success
     assert result.cost == min(iteration.cost for iteration in result.history) < result.start_cost
@@ -132,7 +133,7 @@ def arrays():
 
 def test_a_case_of_a_dict_is_fitted_to_a_record_of_arrays(arrays):
     case = exfit.Case.from_dict({**SEXS, "record": {"channels": {"vt": {"noise": NOISE}}}}, arrays)
-    result = exfit.fit(case)
+    result = exfit.fit(case, search="local")
     fitted = result.parameters["K"].value
     error = result.knowledge.confidence.parameters["K"].std_error
     assert result.success
@@ -181,13 +182,13 @@ def test_a_record_that_is_given_is_fitted_like_its_file(result):
     case = exfit.load_case(CASE)
     read = record_of(case, case.recordings[0])
     copy = exfit.Record.from_arrays(read.time, read.signals)
-    assert exfit.fit(case.with_record(copy)).values == result.values
+    assert exfit.fit(case.with_record(copy), search="local").values == result.values
 
 
 def test_several_records_are_given_by_name(arrays):
     test = SEXS["test"]
     content = {
-        **{key: SEXS[key] for key in ("model", "plant", "parameters")},
+        **{key: SEXS[key] for key in ("model", "plant", "parameters", "estimate")},
         "records": [{"name": "up", "test": test}, {"name": "again", "test": test}],
         "validate": [{"name": "later", "test": test}],
     }

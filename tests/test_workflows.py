@@ -5,6 +5,7 @@ from hashlib import sha256
 
 import numpy as np
 import pytest
+from cases import local_case
 from places import ROOT
 
 from exfit.analysis import determination, solution
@@ -23,8 +24,7 @@ MINPACK_MOST = (77, 55)  # residuals and Jacobians, over the four AC1A starts
 NOISE = 1e-4  # pu, of the records
 
 
-def case(name):
-    return load_case(ROOT / "configs" / f"{name}.yaml")
+case = local_case
 
 
 def true_cost(name):
@@ -119,7 +119,7 @@ def test_differences_lead_to_the_same_minimum_as_the_exact_derivative(fits, tmp_
     changed = changed.replace("../sample_data", (ROOT / "sample_data").as_posix())
     path = tmp_path / "case.yaml"
     path.write_text(changed)
-    found, exact = fit(load_case(path)), fits("ac1a_good", None)
+    found, exact = fit(path, search="local"), fits("ac1a_good", None)
     assert found.comparison.cost == pytest.approx(exact.comparison.cost, rel=1e-6)
 
 
@@ -197,7 +197,7 @@ def test_a_step_too_coarse_for_the_record_is_noted(tmp_path):
     told = []
     for step in (0.1, 0.001):
         path.write_text(f"{text}simulation: {{step: {step}}}\n")
-        told.append(any("halving the step" in note for note in fit(load_case(path)).notes))
+        told.append(any("halving the step" in note for note in fit(path, search="local").notes))
     assert told == [True, False]
 
 
@@ -242,7 +242,7 @@ def test_a_case_that_is_changed_during_its_fit_leaves_the_fit_as_it_was(tmp_path
         else:
             path.unlink(missing_ok=True)
 
-    result = fit(path, progress=change)
+    result = fit(path, progress=change, search="local")
     assert result.success
     assert result.case_text == before
     assert result.inputs["case"] == sha256(before.encode()).hexdigest()

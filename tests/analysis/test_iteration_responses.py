@@ -5,23 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from places import ROOT
+from cases import local_case
 from records import case_of, config, recording, several
 
 from exfit import workflows
 from exfit.analysis import iteration_responses, solution
-from exfit.case.load import load_case
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.output import plots, run_folder
 from exfit.results.tables import DIGITS
 
-CASE = ROOT / "configs" / "first_order.yaml"
-
 
 @pytest.fixture(scope="module")
 def fitted():
-    return workflows.fit(load_case(CASE))
+    return workflows.fit(local_case("first_order"))
 
 
 @pytest.fixture(autouse=True)
@@ -110,7 +107,7 @@ def test_an_iteration_without_a_response_is_left_out(fitted, monkeypatch, tmp_pa
         return result_of(*given)
 
     monkeypatch.setattr(solution, "with_iteration_responses", failing)
-    result = workflows.fit(load_case(CASE))
+    result = workflows.fit(local_case("first_order"))
     assert 1 not in result.comparison.iteration_responses.numbers
     assert len(result.comparison.iteration_responses.numbers) == len(result.history) - 1
     run_folder.write_fit(result, tmp_path / "run").draw()
@@ -122,7 +119,7 @@ def test_an_interruption_keeps_the_iterations_until_then():
         if line.number == 2:
             raise KeyboardInterrupt
 
-    result = workflows.fit(load_case(CASE), progress=stop)
+    result = workflows.fit(local_case("first_order"), progress=stop)
     assert result.interrupted
     assert result.comparison.iteration_responses.numbers == (0, 1, 2)
 
@@ -131,7 +128,7 @@ def test_an_interruption_keeps_the_iterations_until_then():
 def test_a_large_record_leaves_no_responses_and_says_so(fitted, monkeypatch, tmp_path):
     run_folder.write_fit(fitted, tmp_path / "run").draw()
     monkeypatch.setattr(iteration_responses, "MOST_SAMPLES", 100)
-    result = workflows.fit(load_case(CASE))
+    result = workflows.fit(local_case("first_order"))
     assert result.comparison.iteration_responses is None
     assert any("up to 100" in note for note in result.notes)
     run_folder.write_fit(result, tmp_path / "run").draw()  # over the former ones

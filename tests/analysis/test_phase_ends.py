@@ -16,7 +16,7 @@ CASE = ROOT / "configs" / "ac1a_low.yaml"
 
 @pytest.fixture(scope="module")
 def fit():
-    return exfit.fit(CASE)
+    return exfit.fit(CASE, search="local")
 
 
 def test_the_end_of_lm_is_its_last_iteration_with_the_response_there(fit):
@@ -38,7 +38,7 @@ def test_its_files_start_a_fit_where_lm_ended(fit, tmp_path):
     assert (tmp_path / "overlay_lm.png").is_file()
     values = read_parameters(load_case(CASE), tmp_path / "parameters_lm.yaml")
     assert values == end.values
-    again = exfit.fit(CASE, "dgn", values=values)
+    again = exfit.fit(CASE, "dgn", values=values, search="local")
     assert again.history[0].cost == pytest.approx(end.cost, rel=1e-9)
     assert again.phase_ends == ()
     run_folder.write_fit(again, tmp_path)

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from places import CONFIGS
+from cases import local_case
 
 import exfit.analysis.profiles as module
 from exfit.analysis.profiles import profile
-from exfit.case.load import load_case
 from exfit.errors import CaseError
 from exfit.estimate import Stop, least_squares
 from exfit.fitting.build import build_experiments
@@ -23,8 +22,7 @@ TRUTH = {"KA": 364.1523, "KF": 0.0413, "TE": 1.6724, "TF": 1.458, "TA": 0.0542, 
 BESIDE = 1e-6  # of a, about two standard errors of first_order
 
 
-def case_of(name):
-    return load_case(CONFIGS / f"{name}.yaml")
+case_of = local_case
 
 
 @pytest.fixture(scope="module")

@@ -139,7 +139,7 @@ def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fitted")
     record_of(load_case(written(folder)), folder / "record.csv")
     case = load_case(written(folder, *FITTED))
-    return case, fit(case)
+    return case, fit(case, search="local")
 
 
 def test_data_of_exciter_machine_and_stabiliser_are_found_together(found):
@@ -225,7 +225,7 @@ def test_the_cases_of_the_other_plants_find_what_their_records_were_made_with(na
         "machine_playback": {"machine.Tpd0": 6.0, "machine.S10": 0.12, "machine.S12": 0.4},
         "exciter_playback": {"KA": 364.15, "TA": 0.0542, "TE": 1.6724, "KF": 0.0413, "TF": 1.458},
     }[name]
-    found = fit(load_case(ROOT / "configs" / f"{name}.yaml"))
+    found = fit(ROOT / "configs" / f"{name}.yaml", search="local")
     assert found.success
     for symbol, value in truth.items():
         # KIR of a record of 9 s behind noise is the least sure

@@ -16,7 +16,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
-from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH
+from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH, with_local_search
 from commands import Ran
 from places import ROOT
 from rich.console import Console
@@ -90,7 +90,8 @@ def csv_text(time, samples):
 def case_file(content=CASE, path="case.yaml"):
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    text = yaml.safe_dump(with_local_search(content), sort_keys=False)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

@@ -226,7 +226,7 @@ def results(tmp_path_factory):
     for name in ("ac1a_typical", "ac8b_unit1"):
         case = yaml.safe_load((ROOT / "configs" / f"{name}.yaml").read_text())
         case["record"]["file"] = str(ROOT / "sample_data" / Path(case["record"]["file"]).name)
-        case |= {"validate": [], "estimate": {"iterations": 2}}
+        case |= {"validate": [], "estimate": {"search": "local", "iterations": 2}}
         path = place / f"{name}.yaml"
         path.write_text(yaml.safe_dump(case, sort_keys=False))
         with pytest.raises(SystemExit):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from cases import FIRST_ORDER, TIME, TRUTH
+from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 from matplotlib.figure import Figure
 from rich.console import Console
 
@@ -37,7 +37,8 @@ def case_file(name, **changes):
     record = {"file": str(Path("up.csv").absolute()), "time": "t", "channels": {"vt": "v"}}
     path = Path(name)
     path.parent.mkdir(exist_ok=True)
-    path.write_text(yaml.safe_dump({**FIRST_ORDER, "record": record, **changes}, sort_keys=False))
+    content = with_local_search({**FIRST_ORDER, "record": record, **changes})
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
     return path
 
 

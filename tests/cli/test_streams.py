@@ -20,8 +20,11 @@ CASE = ROOT / "configs" / "first_order.yaml"
 TABLES = {name for name in FILES_OF_A_FIT if not name.endswith(".png")}
 # every command with what makes it print, and a file that it leaves
 COMMANDS = {
-    "fit": ([CASE, "--no-plots"], "runs/first_order-fit/result.json"),
-    "fit --json": ([CASE, "--no-plots", "--json"], "runs/first_order-fit/result.json"),
+    "fit": ([CASE, "--search", "local", "--no-plots"], "runs/first_order-fit/result.json"),
+    "fit --json": (
+        [CASE, "--search", "local", "--no-plots", "--json"],
+        "runs/first_order-fit/result.json",
+    ),
     "simulate": ([CASE, "--no-plots"], "runs/first_order-simulate/response.csv"),
     "validate": (
         [CASE, "--no-plots", "--parameters", "values.yaml"],
@@ -114,7 +117,11 @@ def test_nobody_may_be_listening_at_all(run, name):
 
 
 def test_the_code_of_a_fit_that_did_not_converge_stays_where_its_output_is_lost(run):
-    hurried = {**yaml.safe_load(CASE.read_text()), "validate": [], "estimate": {"iterations": 1}}
+    hurried = {
+        **yaml.safe_load(CASE.read_text()),
+        "validate": [],
+        "estimate": {"search": "local", "iterations": 1},
+    }
     hurried["record"]["file"] = str(ROOT / "sample_data" / "first_order.csv")
     Path("hurried.yaml").write_text(yaml.safe_dump(hurried))
     code, _ = run(failing(errno.ENOSPC), ["fit", "hurried.yaml", "--no-plots"])
@@ -176,7 +183,7 @@ def test_a_real_pipe_that_is_closed_costs_no_file_and_shows_no_traceback():
     os.close(reader)
     program = [sys.executable, "-c", "from exfit.cli import main; main()"]
     ran = subprocess.run(
-        [*program, "fit", str(CASE), "--no-plots", "-o", "run"],
+        [*program, "fit", str(CASE), "--search", "local", "--no-plots", "-o", "run"],
         stdout=writer,
         stderr=subprocess.PIPE,
         text=True,

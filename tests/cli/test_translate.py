@@ -19,7 +19,7 @@ FILES = {"ac1a_good-EXAC1.yaml", "ac1a_good-EXAC1.dyr", "translation.csv", "tran
 def fitted(tmp_path_factory):
     """Return the folder of a fit of AC1A."""
     folder = tmp_path_factory.mktemp("fit")
-    write_fit(workflows.fit(ROOT / "configs" / "ac1a_good.yaml"), folder)
+    write_fit(workflows.fit(ROOT / "configs" / "ac1a_good.yaml", search="local"), folder)
     return folder
 
 

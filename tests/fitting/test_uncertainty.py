@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from cases import local_case
 from linearised import autoregressive
 from places import CONFIGS
 from scipy.optimize import curve_fit
@@ -27,8 +28,7 @@ NEAR = 0.15  # within it a standard error means the same
 PHI = 0.6  # of each error in the next one
 
 
-def case_of(name):
-    return load_case(CONFIGS / f"{name}.yaml")
+case_of = local_case
 
 
 @pytest.fixture
@@ -43,6 +43,7 @@ def changed(tmp_path):
         kept = {key: value for key, value in old["free"].items() if key not in fixed}
         still = {key: value for key, value in old.get("fixed", {}).items() if key not in free}
         content["parameters"] = {"fixed": {**still, **fixed}, "free": {**kept, **free}}
+        content["estimate"] = {"search": "local"}
         path = tmp_path / "case.yaml"
         path.write_text(yaml.safe_dump(content, sort_keys=False))
         return load_case(path)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from cases import FIRST_ORDER, TIME, TRUTH
+from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 
 import exfit
 from exfit.errors import CaseError
@@ -33,7 +33,8 @@ def case_file(name, **changes):
     record = {"file": str(Path("record.csv").absolute()), "time": "t", "channels": {"vt": "v"}}
     path = Path(name)
     path.parent.mkdir(exist_ok=True)
-    path.write_text(yaml.safe_dump({**FIRST_ORDER, "record": record, **changes}, sort_keys=False))
+    content = with_local_search({**FIRST_ORDER, "record": record, **changes})
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
     return path
 
 

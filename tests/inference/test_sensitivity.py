@@ -104,7 +104,7 @@ def test_a_compressed_record_shows_the_effects_of_all_its_samples(tmp_path):
 
 
 def test_a_fit_stores_them_in_its_result_and_as_a_table():
-    result = fit(CONFIGS / "ac1a_good.yaml")
+    result = fit(CONFIGS / "ac1a_good.yaml", search="local")
     stored = json.loads(result_text(result))["knowledge"]["sensitivities"]
     table = [*csv.DictReader(io.StringIO(effects_table(result.knowledge.effects)))]
     assert [row["parameter"] for row in table] == [entry["parameter"] for entry in stored]

@@ -27,7 +27,7 @@ CASE = ROOT / "configs" / "first_order.yaml"
 
 @pytest.fixture(scope="module")
 def fitted():
-    return workflows.fit(load_case(CASE))
+    return workflows.fit(CASE, search="local")
 
 
 @pytest.fixture

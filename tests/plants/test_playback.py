@@ -29,6 +29,7 @@ plant:
     S12: {start: 0.25, min: 0.02, max: 2.0}
 test: {steady_until: 1.0}
 record: {file: RECORD, time: t, channels: {efd: efd, vt: vt, ifd: {column: ifd, weight: 0.01}}}
+estimate: {search: local}
 """
 EXCITER = """\
 model: AC1A
@@ -38,6 +39,7 @@ record: {file: RECORD, time: t, channels: {vt: vt, ifd: ifd, efd: efd}}
 parameters:
   fixed: {VALUES}
 simulation: {step: 0.001}
+estimate: {search: local}
 """
 
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from places import ROOT
 
 from exfit import workflows
-from exfit.case.load import load_case
 from exfit.results.comparisons import Overlay
 from exfit.results.model import FitResult
 from exfit.results.tables import table
@@ -23,7 +22,7 @@ laws = settings(deadline=None, derandomize=True, max_examples=25)
 
 @pytest.fixture(scope="module")
 def fitted():
-    return workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))
+    return workflows.fit(ROOT / "configs" / "first_order.yaml", search="local")
 
 
 @laws

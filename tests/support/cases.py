@@ -1,6 +1,14 @@
-"""A small case that several tests start from, and what a fit of it leaves behind."""
+"""Cases that several tests start from, and what a fit of the small one leaves behind.
+
+Their search is local: what a global one does is tested by itself.
+"""
+
+from dataclasses import replace
 
 import numpy as np
+from places import CONFIGS
+
+from exfit.case.load import load_case
 
 # k/(s + a) with k = 4 and a = 2, a unit step at 0.5 s from rest
 TIME = np.linspace(0.0, 3.0, 61)
@@ -16,6 +24,7 @@ FIRST_ORDER = {
         }
     },
     "simulation": {"step": 0.01},
+    "estimate": {"search": "local"},
 }
 FILES_OF_A_FIT = {
     "result.json",
@@ -35,3 +44,14 @@ FILES_OF_A_FIT = {
     "down-step.csv",
     "down-step.png",
 }
+
+
+def with_local_search(content):
+    """Return the content of a case with a local search, unless it says otherwise."""
+    return content | {"estimate": {"search": "local", **content.get("estimate", {})}}
+
+
+def local_case(name):
+    """Return a case of the collection that is fitted from its own start alone."""
+    case = load_case(CONFIGS / f"{name}.yaml")
+    return replace(case, estimate=case.estimate.model_copy(update={"search": "local"}))

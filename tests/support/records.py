@@ -2,6 +2,7 @@
 
 import numpy as np
 import yaml
+from cases import with_local_search
 from places import ROOT
 
 from exfit.case.load import load_case
@@ -55,9 +56,9 @@ def several(*records, free=None, **sections):
 
 
 def case_of(content, folder):
-    """Write a case into a folder and load it."""
+    """Write a case into a folder and load it; its search is local, unless it says otherwise."""
     path = folder / "case.yaml"
-    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    path.write_text(yaml.safe_dump(with_local_search(content), sort_keys=False))
     return load_case(path)
 
 

@@ -102,7 +102,9 @@ def fits_of(name: str) -> Fits:
     results: dict[str, exfit.FitResult] = {}
     for method in methods:
         start = STARTS[name] if method != LM_DGN else values_of(results[LM], STARTS[name])
-        results[method] = exfit.fit(thesis_case(name, start, strategy_of(name, method)))
+        results[method] = exfit.fit(
+            thesis_case(name, start, strategy_of(name, method)), search="local"
+        )
     own = CONFIGS / f"{name}.yaml"
     at_truth = exfit.simulate(own, TRUTH[unit_of(name)]).comparison
     assert at_truth is not None
@@ -249,7 +251,9 @@ def jacobians_at(k: float, a: float) -> Jacobians:
 
 def first_order_fit() -> exfit.FitResult:
     """Return the fit of k/(s + a) from the start of 3.3."""
-    return exfit.fit(thesis_case("first_order", {"k": FIRST_K, "a": FIRST_A}, "dgn"))
+    return exfit.fit(
+        thesis_case("first_order", {"k": FIRST_K, "a": FIRST_A}, "dgn"), search="local"
+    )
 
 
 # ---- other simulators, other steps
