@@ -13,9 +13,10 @@ from exfit.analysis.judgement import doubt_of
 from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
+from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals, SideBySide
-from exfit.fitting.search import UNIT, fitted, names_of_records, search
+from exfit.fitting.search import fitted, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import LEVEL, Interval

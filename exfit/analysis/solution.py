@@ -26,10 +26,9 @@ from exfit.analysis.phase_ends import phase_ends
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
 from exfit.case.schema import Unknown
-from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.search import UNIT
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Uncertainty

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import nan
-from typing import Literal, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,10 @@ from exfit.fitting.descents import (
     notes_of,
     stopped,
 )
+from exfit.fitting.further_starts import Way
 from exfit.util.strategies import FROM_FURTHER_STARTS
 
 Array = NDArray[np.float64]
-Way = Literal["strategy", "linear", "direct"]
 
 PERFECT = 1e-16  # of the cost at a start: what a perfect match may leave of it
 AT_TOLERANCE = (Stop.MATCH, Stop.FLAT)
@@ -62,6 +62,18 @@ class SearchResult(NamedTuple):
         return any(line.phase == FROM_FURTHER_STARTS for line in self.history)
 
 
+class FurtherDescents(NamedTuple):
+    """The minima from further starts and of earlier descents.
+
+    ``ways`` says what the descent from each further start began with; ``why_direct`` is the reason
+    where there was no linear phase.
+    """
+
+    minima: MultistartResult
+    ways: tuple[Way, ...]
+    why_direct: str
+
+
 class GlobalSearchMethods(SearchMethods, Protocol):
     """The searches of a case, those from further starts among them."""
 
@@ -69,11 +81,7 @@ class GlobalSearchMethods(SearchMethods, Protocol):
     def unbounded(self) -> tuple[str, ...]:
         """The parameters without finite bounds: there no starts can be distributed."""
 
-    @property
-    def ways(self) -> tuple[Way, ...]:
-        """What the descent from each further start begins with."""
-
-    def further(self, earlier: Sequence[Result]) -> MultistartResult:
+    def further(self, earlier: Sequence[Result]) -> FurtherDescents:
         """Return the minima from further starts and of earlier descents."""
 
     def refined(self, end: Result, announce: Announce) -> Result:
@@ -131,11 +139,12 @@ def best_of(searches: SearchMethods, descents: Descents) -> SearchResult:
 def beyond(
     searches: GlobalSearchMethods,
     descents: Descents,
-    minima: MultistartResult,
+    further: FurtherDescents,
     doubt: Doubt,
     announce: Announce,
 ) -> SearchResult:
     """Return the best of the descents from the start of a case and of the minima found with it."""
+    minima, ways = further.minima, ways_of(further, descents)
     ends = [minimum.result for minimum in minima.minima]
     try:
         if minima.interrupted:
@@ -143,7 +152,7 @@ def beyond(
         best, reason = chosen(searches, doubt, ends)
     except KeyboardInterrupt:
         best = min([*descents.ends, *filter(None, [minima.best])], key=lambda end: end.cost)
-        return interrupted(searches, descents, minima, best, announce)
+        return interrupted(descents, minima, ways, best, announce)
     like = count_like(ends[0].cost, minima.end_costs, searches)
     own = own_end(descents, best)
     if own is None:
@@ -151,11 +160,11 @@ def beyond(
     else:
         path, last = descents._replace(best=own).history, counted(own, descents.ends)
     last = confirmed(last, reason, like)
-    notes = notes_of((*descents.doubts, reason), last, like, minima.end_costs)
+    notes = [*notes_of((*descents.doubts, reason), last, like, minima.end_costs)]
+    if further.why_direct:
+        notes.append(f"the search goes without its linear phase: {further.why_direct}")
     place = next(k for k, end in enumerate(ends) if end is best)
-    return SearchResult(
-        last, minima, path, descents.best, place, ways_of(searches, descents), tuple(notes)
-    )
+    return SearchResult(last, minima, path, descents.best, place, ways, tuple(notes))
 
 
 def continued(
@@ -214,22 +223,21 @@ def after_search(last: SolverIteration, point: SolverIteration) -> SolverIterati
     )
 
 
-def ways_of(searches: GlobalSearchMethods, descents: Descents) -> tuple[Way, ...]:
+def ways_of(further: FurtherDescents, descents: Descents) -> tuple[Way, ...]:
     """Return what each descent began with, those from the start of the case first."""
     own: tuple[Way, ...] = ("strategy",)
-    return own * len(descents.ends) + searches.ways
+    return own * len(descents.ends) + further.ways
 
 
 def interrupted(
-    searches: GlobalSearchMethods,
     descents: Descents,
     minima: MultistartResult,
+    ways: tuple[Way, ...],
     best: Result,
     announce: Announce,
 ) -> SearchResult:
     """Return the best point of a search that an interruption ended."""
     minima, own = replace(minima, interrupted=True), own_end(descents, best)
-    ways = ways_of(searches, descents)
     if own is not None:
         path = descents._replace(best=own).history
         ends = enumerate(minima.minima)

@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
+
 
 @dataclass(frozen=True)
 class Prior:

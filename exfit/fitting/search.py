@@ -15,19 +15,20 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
+from exfit.fitting.further_starts import further_starts
 from exfit.fitting.global_search import (
+    FurtherDescents,
     SearchResult,
-    Way,
     continued,
     global_search,
     local_search,
 )
+from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.residuals import (
     JACOBIANS,
     LEAST_NOISE,
     Residuals,
-    SideBySide,
     jacobian_error,
 )
 from exfit.fitting.setup import ExperimentSetup
@@ -39,8 +40,6 @@ Array = NDArray[np.float64]
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
-TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
-UNIT = 0.5  # of a scaled parameter, a reasonable step: a factor of 1.6, or half of the interval
 
 
 def fitted(case: Case) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
@@ -132,38 +131,54 @@ class CaseSearches:
 
     def one(self, method: str, announce: Announce) -> estimate.Result:
         """Return the end of a descent from the start of the case."""
-        return self._descent(self.residuals.start, method, self.options.jacobian, announce)
+        options, jacobian = self.options, JACOBIANS[self.options.jacobian](self.residuals)
+        descent = estimate.Descent(
+            functions=estimate.OneByOne(self.residuals, jacobian),
+            method=method,
+            max_iterations=options.most_iterations,
+            jacobian_error=jacobian_error(options.jacobian, options.difference_step),
+            good_enough=_good_enough(options, self.residuals),
+            searches=searches_of(options),
+            **self._limits,
+        )
+        return descent.run(self.residuals.start, announce)
 
     def refined(self, end: estimate.Result, announce: Announce) -> estimate.Result:
         """Return the descent from an end with the full tolerances of the case."""
-        return self._descent(end.x, DEFAULT_STRATEGY, "exact", announce)
-
-    def _descent(self, x: Array, method: str, jacobian: str, announce: Announce) -> estimate.Result:
         descent = estimate.Descent(
-            functions=estimate.OneByOne(self.residuals, JACOBIANS[jacobian](self.residuals)),
-            bounds=self.residuals.bounds,
-            method=method,
-            **_settings(self.options, self.residuals, jacobian),
+            functions=estimate.OneByOne(self.residuals, self.residuals.exact),
+            method=DEFAULT_STRATEGY,
+            **self._limits,
         )
-        return descent.run(x, announce)
+        return descent.run(end.x, announce)
 
     @property
-    def ways(self) -> tuple[Way, ...]:
-        """What the descent from each further start begins with."""
-        direct: tuple[Way, ...] = ("direct",)
-        return direct * self.options.starts
+    def _limits(self) -> dict[str, Any]:
+        """Where a descent may go and where it ends, by the names that `exfit.estimate` has."""
+        stop, tolerance = self.options.stop, self.options.tolerance
+        return {
+            "bounds": self.residuals.bounds,
+            "x_scale": UNIT,
+            "gtol": tolerance.gradient,
+            "gtol_absolute": tolerance.gradient_absolute,
+            "xtol": tolerance.step,
+            "matches": None if stop is None else partial(self.residuals.match, rmse=stop.rmse),
+        }
 
-    def further(self, earlier: Sequence[estimate.Result]) -> estimate.MultistartResult:
+    def further(self, earlier: Sequence[estimate.Result]) -> FurtherDescents:
         """Return the minima from further starts and of earlier descents."""
-        points = estimate.spread(self.residuals.bounds, self.options.starts)
-        descent = estimate.Descent(
-            functions=SideBySide(self.residuals, "exact"),
-            bounds=self.residuals.bounds,
-            method=DEFAULT_STRATEGY,
-            ftol=TO_DISTINGUISH,
-            **_settings(self.options, self.residuals, "exact"),
+        counter = SimulationCounter()  # the sub-steps are those of a coarse grid
+        starts = further_starts(self.problem, self.options.starts, counter)
+        minima = estimate.multistart(
+            starts.points,
+            starts.legs,
+            first_legs=starts.first_legs,
+            watch=self.progress,
+            earlier=earlier,
         )
-        return estimate.multistart(points, [descent], watch=self.progress, earlier=earlier)
+        if self.counter is not None:
+            self.counter.add(counter.simulations)
+        return FurtherDescents(minima, starts.ways, starts.why_direct)
 
     def margin(self, cost: float) -> float:
         """Return by how much a cost may exceed this one and the records do not tell them apart.
@@ -174,22 +189,6 @@ class CaseSearches:
         freedom = max(1, residuals.count - len(residuals.free))
         weights = [channel.weight**2 * channel.samples for channel in residuals.channels]
         return LIKELIHOOD_RATIO * cost / freedom + 0.5 * LEAST_NOISE**2 * sum(weights)
-
-
-def _settings(options: Estimate, residuals: Residuals, jacobian: str) -> dict[str, Any]:
-    """Return the settings of a search, by the names that `exfit.estimate` has for them."""
-    stop = options.stop
-    return {
-        "max_iterations": options.most_iterations,
-        "gtol": options.tolerance.gradient,
-        "gtol_absolute": options.tolerance.gradient_absolute,
-        "xtol": options.tolerance.step,
-        "x_scale": UNIT,
-        "jacobian_error": jacobian_error(jacobian, options.difference_step),
-        "good_enough": _good_enough(options, residuals),
-        "matches": None if stop is None else partial(residuals.match, rmse=stop.rmse),
-        "searches": searches_of(options),
-    }
 
 
 def _good_enough(options: Estimate, residuals: Residuals) -> float | None:

@@ -27,6 +27,6 @@ SEARCHES: Mapping[str, str] = {
     "points distributed over the bounds; the lowest minimum is the result",
     "local": "the descent from the start of the case alone",
 }
-DEFAULT_SEARCH = "local"
+DEFAULT_SEARCH = "global"
 EXPLAINED = "; ".join(f"{name}: {words}" for name, words in STRATEGIES.items())
 SEARCHES_EXPLAINED = "; ".join(f"{name}: {words}" for name, words in SEARCHES.items())

@@ -12,9 +12,9 @@ from exfit.analysis.profiles import profile
 from exfit.errors import CaseError
 from exfit.estimate import Stop, least_squares
 from exfit.fitting.build import build_experiments
+from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import residuals_of
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.search import UNIT
 from exfit.workflows import fit
 
 # what the record of AC1A was made with: sample_data/README.md

@@ -26,9 +26,8 @@ from oracle import system_of, typical_values
 
 from exfit.estimate import least_squares
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.search import UNIT
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 

@@ -18,8 +18,8 @@ from rich.table import Table
 from exfit.case.load import load_case
 from exfit.estimate import multistart
 from exfit.fitting.build import build_experiments
+from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import residuals_of
-from exfit.fitting.search import UNIT
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
 COUNT = 1000

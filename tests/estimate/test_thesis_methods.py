@@ -13,7 +13,8 @@ from scipy.optimize import lsq_linear
 from exfit.case.load import load_case
 from exfit.case.schema import Estimate
 from exfit.estimate import RatioDamping, Searches, least_squares
-from exfit.fitting.search import UNIT, fitted, searches_of
+from exfit.fitting.parameters import UNIT
+from exfit.fitting.search import fitted, searches_of
 
 LITERAL = {"dgn": {"step": "full", "cut": "half"}, "lm": {"update": "ratio"}}
 # Both solve the same linear problems, by other factorisations: an iterate differs by the rounding

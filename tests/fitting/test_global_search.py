@@ -7,10 +7,10 @@ import pytest
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
 from exfit.fitting.descents import STAGES, no_doubt
-from exfit.fitting.global_search import global_search, local_search
+from exfit.fitting.global_search import FurtherDescents, global_search, local_search
 
 MARGIN = 0.01  # of a cost
-FURTHER = 4  # starts
+WAYS = ("linear", "direct")
 
 
 def end(cost, stop=Stop.GRADIENT, phases=("dgn",)):
@@ -34,11 +34,10 @@ def end(cost, stop=Stop.GRADIENT, phases=("dgn",)):
 class Scripted:
     """Searches whose ends are given: of the methods in turn, then of the further starts."""
 
-    ways = ("direct",) * FURTHER
-
-    def __init__(self, *own, more=(), interrupted=False, unbounded=()):
+    def __init__(self, *own, more=(), interrupted=False, unbounded=(), why_direct=""):
         self.own, self.more = list(own), more
         self.is_interrupted, self.unbounded = interrupted, unbounded
+        self.why_direct = why_direct
         self.calls = []
 
     def one(self, method, announce):
@@ -61,7 +60,8 @@ class Scripted:
             LocalMinimum(group[0].x, cost, len(group), group[0]) for cost, group in groups.items()
         )
         best = min(every, key=lambda each: each.cost)
-        return MultistartResult(minima, best, costs, costs, 0, 0, self.is_interrupted)
+        found = MultistartResult(minima, best, costs, costs, 0, 0, self.is_interrupted)
+        return FurtherDescents(found, WAYS, self.why_direct)
 
     def refined(self, result, announce):
         self.calls.append("refined")
@@ -108,7 +108,7 @@ def test_where_the_own_descent_came_to_the_lowest_minimum_its_path_is_the_result
     assert found.best.history is own.history
     assert list(found.history) == lines == [*own.history]
     assert found.minima.minima[found.place].cost == near.cost
-    assert found.ways == ("strategy", *Scripted.ways)
+    assert found.ways == ("strategy", *WAYS)
 
 
 def test_a_lower_minimum_of_another_start_is_refined_behind_the_own_path():
@@ -153,6 +153,11 @@ def test_without_bounds_there_are_no_further_starts_and_a_note_says_so():
     assert found.minima is None
     assert found.notes[0].startswith("no search from further starts")
     assert "KA, TE" in found.notes[0]
+
+
+def test_a_search_without_its_linear_phase_says_why():
+    found, _ = searched(Scripted(end(1.0), more=[end(4.0)], why_direct="the network is switched"))
+    assert found.notes == ("the search goes without its linear phase: the network is switched",)
 
 
 def test_an_interruption_of_the_own_descent_is_the_end():

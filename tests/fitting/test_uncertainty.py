@@ -15,9 +15,9 @@ from scipy.stats import t as student
 from exfit.case.load import load_case
 from exfit.estimate import least_squares
 from exfit.fitting.build import build_experiments
+from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import problem_of, residuals_of
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.search import UNIT
 from exfit.fitting.uncertainty import uncertainty_at
 from exfit.inference import LEVEL
 from exfit.workflows import fit

@@ -21,7 +21,6 @@ from rich.table import Table
 
 import exfit
 from exfit.case.load import load_case
-from exfit.fitting.descents import MORE_STARTS
 from exfit.fitting.search import fitted
 from exfit.results.side_by_side import CONVERGED, outcome_of
 
@@ -60,7 +59,7 @@ def fit_from(case, start):
     """Return how auto ends from a start."""
     result = exfit.fit(case, "auto", values=start)
     phases = {line.phase for line in result.history}
-    stage = "starts" if result.minima else "lm-then-dgn" if "lm" in phases else "dgn"
+    stage = "search" if "search" in phases else "lm-then-dgn" if "lm" in phases else "dgn"
     return Fit(
         cost=result.cost,
         trusted=outcome_of(result) == CONVERGED,
@@ -94,7 +93,7 @@ def study(name, count):
             len(trusted),
             max((fit.cost / lowest for fit in trusted), default=np.nan),
             max((fit.validation for fit in trusted), default=np.nan),
-            *(stages[stage] for stage in ("dgn", "lm-then-dgn", "starts")),
+            *(stages[stage] for stage in ("dgn", "lm-then-dgn", "search")),
             float(np.median(simulations)),
             max(simulations),
         )
@@ -104,7 +103,7 @@ def main(count, names):
     """Print the table; exit code 1 where an end that is trusted is not good."""
     heads = (
         "case", "starts", "exit 0", "worst cost", "worst validation", "dgn", "lm-then-dgn",
-        f"{MORE_STARTS} more", "median simulations", "most",
+        "further starts", "median simulations", "most",
     )  # fmt: skip
     table, bad = Table(*heads), False
     for name in names:

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.analysis.translation.start import StartValue
 from exfit.analysis.translation.steps import TranslationTask
-from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.residuals import Residuals, SideBySide
-from exfit.fitting.search import UNIT
 from exfit.models.blocks import SHORTEST
 from exfit.models.sheet import Model, Parameter
 

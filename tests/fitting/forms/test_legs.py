@@ -7,8 +7,9 @@ from exfit.case.load import load_case
 from exfit.estimate import Descent
 from exfit.estimate.starts import multistart, spread
 from exfit.fitting.forms.legs import legs_of
+from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import SideBySide
-from exfit.fitting.search import UNIT, fitted
+from exfit.fitting.search import fitted
 
 STARTS = 4
 LOWEST = {"ac1a_typical": (5.057e-6,), "ac8b_unit2": (5.074e-6, 5.090e-6)}

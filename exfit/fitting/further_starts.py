@@ -1,0 +1,66 @@
+"""The further starts of a global search: where they lie, and by which legs their descents go."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.estimate import Descent, spread
+from exfit.fitting.forms.legs import legs_of
+from exfit.fitting.parameters import UNIT
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.residuals import SideBySide
+from exfit.fitting.simulation_counter import SimulationCounter
+
+Array = NDArray[np.float64]
+Way = Literal["strategy", "linear", "direct"]
+
+DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
+TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
+
+
+@dataclass(frozen=True)
+class FurtherStarts:
+    """The points (S, N) from which a search goes, and the legs that the descents from them take.
+
+    ``ways`` says what each descent begins with: "linear" the linear phase, "direct" the model
+    itself. ``why_direct`` is the reason where the linear phase has no meaning.
+    """
+
+    points: Array
+    legs: tuple[Descent, ...]
+    ways: tuple[Way, ...]
+    why_direct: str
+
+    @property
+    def first_legs(self) -> tuple[int, ...]:
+        """The leg that each descent begins with."""
+        linear = not self.why_direct
+        return tuple(int(linear and way == "direct") for way in self.ways)
+
+
+def further_starts(
+    problem: FitProblem, count: int, counter: SimulationCounter | None
+) -> FurtherStarts:
+    """Return ``count`` starts: that of the case by way of the linear phase, others over the bounds.
+
+    ``counter`` counts the simulations of their descents.
+    """
+    residuals = problem.residuals.counted_by(counter)
+    own = Descent(
+        functions=SideBySide(problem.compressed.counted_by(counter)),
+        bounds=residuals.bounds,
+        method="dgn",
+        ftol=TO_DISTINGUISH,
+        x_scale=UNIT,
+    )
+    legs = legs_of(residuals, own)
+    direct: tuple[Way, ...] = ("direct",)
+    if legs.no_linear_phase:
+        points = spread(residuals.bounds, count)
+        return FurtherStarts(points, legs.direct, direct * count, legs.no_linear_phase)
+    by_linear: tuple[Way, ...] = ("linear",)
+    ways = (by_linear * (DIRECT - 1) + direct) * count
+    points = spread(residuals.bounds, count, residuals.start)
+    return FurtherStarts(points, legs.linear, ways[:count], "")
