@@ -13,10 +13,10 @@ from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.fitting.global_search import AT_TOLERANCE, SearchResult
 from exfit.fitting.nonlinearity import nonlinear_parameters, not_served_by_linear_theory
-from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals, SideBySide
-from exfit.fitting.search import UNIT, names_of_records
+from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import Uncertainty

@@ -19,8 +19,8 @@ from exfit.analysis.solution import INTERRUPTED_AFTERWARDS
 from exfit.case.load import load_case
 from exfit.estimate import CostProfile, ProfileEnd, least_squares
 from exfit.fitting.nonlinearity import not_served_by_linear_theory
-from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.search import UNIT, fitted, names_of_records
+from exfit.fitting.parameters import UNIT, FreeParameter
+from exfit.fitting.search import fitted, names_of_records
 from exfit.inference import Uncertainty
 
 RISE, BOUND, FLAT = ProfileEnd.RISE, ProfileEnd.BOUND, ProfileEnd.FLAT
