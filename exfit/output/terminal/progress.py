@@ -26,6 +26,11 @@ PLOT_HEIGHTS = (20, 14)  # lines of a plot beside the history and below it
 PLOT_WIDTH = 100  # characters at most
 SHARE_OF_TIME = 0.03  # of the time of a fit: so much may be spent on showing it
 FORMATS = ("{:>4}", "{:5}", "{:>10}", "{:>9}", "{:>9}", "{:>9}", "{:>6}", "{:>5}", "{:>5}")
+STAGES = {
+    "screening": ("screening", "points"),
+    "refining": ("search", "further starts"),
+    "profiling": ("profiles", "sides"),
+}  # in words, and what is counted
 HISTORY = ("it", "phase", "f", "|g|", "step", "damping", "capped", "inner", "nfev")
 
 
@@ -81,12 +86,12 @@ class LiveIterations:
             self._draw(self._live)
 
     def starts(self, progress: Progress) -> None:
-        """Show how far a search from more starts is."""
+        """Show how far the search from further starts is, or the profiles."""
         self._starts = progress
         if self._live is not None:
             self._draw(self._live)
         elif progress.done == progress.total:
-            self.console.print(_of_starts(progress), soft_wrap=True)
+            self.console.print(_of_search(progress), soft_wrap=True)
 
     def _draw(self, live: Live) -> None:
         """Draw, unless that was done so lately that it would slow down the fit."""
@@ -138,7 +143,7 @@ class LiveIterations:
         share = last.cost / first.cost if first.cost > 0.0 else 1.0
         cost = f"cost {last.cost:.4e}, {100.0 * share:.3g} % of the start's"
         text = f"iteration {last.number}{limit}: {cost}"
-        return Text(text if self._starts is None else _of_starts(self._starts), style="dim")
+        return Text(text if self._starts is None else _of_search(self._starts), style="dim")
 
 
 def _most(iterations: int | Mapping[str, int]) -> str:
@@ -148,9 +153,10 @@ def _most(iterations: int | Mapping[str, int]) -> str:
     return ", ".join(f"{count} {phase}" for phase, count in iterations.items())
 
 
-def _of_starts(progress: Progress) -> str:
-    stage = f"{progress.stage} {progress.done} of {progress.total} more starts"
-    return f"{stage}: lowest cost {progress.best:.4e}"
+def _of_search(progress: Progress) -> str:
+    stage, counted = STAGES[progress.stage]
+    done = f"{stage}: {progress.done} of {progress.total} {counted}"
+    return f"{done}, lowest cost {progress.best:.4e}"
 
 
 def _joined(lines: Iterable[Text]) -> Text:
