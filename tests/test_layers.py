@@ -53,6 +53,17 @@ ONLY_IN = {  # where a library may be imported, inside functions too
 }
 AT_ONCE = {"numpy", "matplotlib", "scipy", "pydantic", "rich", "llvmlite", "yaml"}
 
+# what costs a short fit much of its time: NumPy's own parts among them
+SLOW_TO_IMPORT = {
+    "scipy", "matplotlib", "rich", "jinja2", "bokeh", "pandas", "numpy.ma", "numpy.random",
+    "numpy.testing",
+}  # fmt: skip
+NOT_OF_A_FIT = {
+    "exfit.analysis.profiles", "exfit.analysis.comparison", "exfit.analysis.translation",
+    "exfit.analysis.experiment_design", "exfit.exchange.psse",
+    "exfit.fleet.fits", "exfit.output.plots", "exfit.output.terminal", "exfit.records.inspection",
+}  # fmt: skip
+
 
 def module_name(path):
     parts = path.relative_to(ROOT.parent).with_suffix("").parts
@@ -204,6 +215,25 @@ def test_the_command_starts_without_the_heavy_packages():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
     )
     assert not AT_ONCE & set(done.stdout.split())
+
+
+def test_a_fit_without_figures_imports_only_what_it_uses(tmp_path):
+    case = ROOT.parent / "configs" / "ac1a_typical.yaml"
+    arguments = ["fit", str(case), "-o", str(tmp_path), "--quiet", "--no-plots", "--search=local"]
+    code = (
+        "import sys, atexit; from exfit.cli import main; "
+        "atexit.register(lambda: print(*sys.modules)); main()"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT.parent)}
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+    )
+    loaded = set(done.stdout.split())
+    assert sorted({*SLOW_TO_IMPORT, *NOT_OF_A_FIT} & loaded) == []
 
 
 @pytest.mark.parametrize("room", ["estimate", "inference"])

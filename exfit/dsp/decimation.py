@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.util.sorting import distinct
+
 Array = NDArray[np.float64]
 
 PIXELS = 2000  # a figure has no more dots across
@@ -35,4 +37,4 @@ def kept_rows(signals: Sequence[Array], bins: int) -> NDArray[np.intp]:
             filled = np.full(len(starts) * size, beyond)
             filled[:count] = np.where(np.isnan(signal), beyond, signal)
             rows.append(starts + pick(filled.reshape(-1, size), axis=1))
-    return np.unique(np.concatenate(rows))
+    return distinct(np.concatenate(rows))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise, spread
 from exfit.dsp.sampling import even_step
-from exfit.util.median import median
+from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

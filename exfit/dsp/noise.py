@@ -7,7 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from exfit.util.median import median
+from exfit.util.sorting import distinct, median
 
 Array = NDArray[np.float64]
 
@@ -46,5 +46,5 @@ def spread(values: Array, axis: int = -1) -> Array:
 def _quantum(samples: Array) -> float:
     """Return the smallest step between two values that last longer than a spike, or 0."""
     lasting = median(sliding_window_view(samples, NEIGHBOURS), axis=-1)
-    steps = np.diff(np.unique(lasting))
+    steps = np.diff(distinct(lasting))
     return float(np.min(steps)) if len(steps) else 0.0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from exfit.dsp.filtering import OUTLIER_WINDOW, outliers
 from exfit.dsp.noise import noise
 from exfit.dsp.three_phase import MAINS_FREQUENCIES
-from exfit.util.median import median
+from exfit.util.sorting import distinct, median
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -46,7 +46,7 @@ def spikes(time: Array, samples: Array, scatter: float, limit: float) -> Places:
 
 def quantum(samples: Array) -> float | None:
     """Return the step of which the numbers of a channel are multiples, None where there is none."""
-    values = np.unique(_excerpt(samples))
+    values = distinct(_excerpt(samples))
     if len(values) < 3:
         return None
     steps = np.diff(values)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import SECOND_DIFFERENCE, spread
-from exfit.util.median import median
+from exfit.util.sorting import distinct, median
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def settled(samples: Array, first: int, after: NDArray[np.intp]) -> Array:
     result[:first] = np.mean(samples[:first])
     if noise == 0.0:
         return result
-    ends = np.unique([first, *(after[after >= first] + 1), len(samples)])
+    ends = distinct(np.array([first, *(after[after >= first] + 1), len(samples)]))
     for begin, end in pairwise(ends):
         for start, stop in _rests(samples[begin:end], noise):
             result[begin + start : begin + stop] = np.mean(samples[begin + start : begin + stop])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.sampling import GAP_STEPS
-from exfit.util.median import median
+from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
 

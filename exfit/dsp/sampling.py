@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.util.median import median
+from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,7 +7,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import noise
-from exfit.util.median import median
+from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
 

@@ -15,6 +15,7 @@ from exfit.estimate.requests import Functions, Steps
 from exfit.estimate.run import NotFinite
 from exfit.estimate.sobol import sobol
 from exfit.estimate.solver import Descent
+from exfit.util.sorting import median
 
 SEED = 1  # any: what matters is that a run can be repeated
 INDISTINGUISHABLE = 0.5  # standard errors: a difference that no record shows
@@ -151,7 +152,7 @@ def summary(
 ) -> MultistartResult:
     """Return what some starts came to, each of which counts by its weight."""
     ends = [(s.end, s.first_cost, w) for s, w in zip(starts, weights, strict=True) if s.end]
-    nothing = leg.gtol**2 * float(np.median([first_cost for _, first_cost, _ in ends] or [0.0]))
+    nothing = leg.gtol**2 * float(median([first_cost for _, first_cost, _ in ends] or [0.0]))
     outcomes = [end_of(end, nothing, weight) for end, _, weight in ends]
     minima = minima_of(outcomes, leg.functions)
     cut_short = [start.cut_short for start in starts if start.cut_short is not None]

@@ -13,6 +13,7 @@ from exfit.results.description import Behaviour, SmallSignalView
 from exfit.results.model import FitResult
 from exfit.results.tables import DIGITS, clock_digits
 from exfit.simulation.small_signal import Bode, SmallSignal
+from exfit.util.sorting import distinct
 
 Array = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def drawn_responses(responses: IterationResponses, iterations: int) -> Iteration
     wanted = np.geomspace(1, max(iterations, 1), MOST_RESPONSES).round() - 1
     numbers = np.array(responses.numbers)
     nearest = np.argmin(np.abs(numbers[:, None] - wanted), axis=0)
-    rows = np.unique(nearest)
+    rows = distinct(nearest)
     return replace(
         responses,
         numbers=tuple(int(number) for number in numbers[rows]),

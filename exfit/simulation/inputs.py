@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.simulation.grid import ON_GRID, GridSegment
-from exfit.util.median import median
+from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
 

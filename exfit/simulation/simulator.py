@@ -21,6 +21,7 @@ from exfit.simulation.substeps import (
     substeps_for,
     why_unreachable,
 )
+from exfit.util.sorting import distinct
 from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -188,7 +189,7 @@ class Simulator:
 
         At the points of the grid: a record with many more samples shows no more.
         """
-        times = np.unique(np.concatenate([segment.times for segment in self._grid]))
+        times = distinct(np.concatenate([segment.times for segment in self._grid]))
         coarse = Simulator(self.system, self.inputs, times, self.step, self.least)
         samples, parts = coarse.samples(values, outputs)
         finer = Simulator(self.system, self.inputs, times, self.step / 2.0, parts)
@@ -351,7 +352,7 @@ class Simulator:
 
 def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """Yield which sets run together, and in how many lanes: sets with equal sub-steps in many."""
-    for count in np.unique(parts[parts != NO_SUBSTEPS]):
+    for count in distinct(parts[parts != NO_SUBSTEPS]):
         group = np.flatnonzero(parts == count)
         rest = len(group) % lanes
         side_by_side = len(group) - rest if rest < WORTH_A_BLOCK else len(group)

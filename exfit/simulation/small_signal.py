@@ -19,6 +19,7 @@ from exfit.errors import SimulationError
 from exfit.plants import MEASURED
 from exfit.simulation.limits import at_rest, limits_passed
 from exfit.simulation.substeps import REST_TOLERANCE, STATE_ROUNDING, spectral_radii
+from exfit.util.sorting import distinct
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -281,7 +282,7 @@ def spanning(rates: Sequence[complex], points: int = POINTS) -> Array:
         if rate.imag > 0.0 and abs(rate.real) < LIGHTLY * abs(rate)
     ]
     every = np.concatenate([np.geomspace(low / DECADE, high * DECADE, points), *peaks])
-    return np.asarray(np.unique(every[every >= low / DECADE]) / (2.0 * pi))
+    return np.asarray(distinct(every[every >= low / DECADE]) / (2.0 * pi))
 
 
 def _bode(of: StateSpace, frequency: Array) -> Bode:

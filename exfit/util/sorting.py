@@ -1,9 +1,9 @@
-"""The median of samples, without the masked arrays that NumPy's own imports for it."""
+"""Medians and distinct values, without the masked arrays that NumPy's own import for them."""
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 
 def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
@@ -18,3 +18,11 @@ def median(values: ArrayLike, axis: int = -1, keepdims: bool = False) -> Any:
     middle = 0.5 * (parted[..., low] + parted[..., high])
     middle = np.where(np.isnan(parted[..., -1]), np.nan, middle)
     return np.expand_dims(middle, axis) if keepdims else middle[()]
+
+
+def distinct(values: NDArray[Any]) -> NDArray[Any]:
+    """Return the distinct values of an array in ascending order, as `np.unique` does."""
+    ordered = np.sort(values, axis=None)
+    first = np.ones(len(ordered), dtype=np.bool_)
+    first[1:] = ordered[1:] != ordered[:-1]
+    return ordered[first]

@@ -1,9 +1,9 @@
-"""The median against NumPy's own."""
+"""The median and the distinct values against NumPy's own."""
 
 import numpy as np
 import pytest
 
-from exfit.util.median import median
+from exfit.util.sorting import distinct, median
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 10, 101])
@@ -22,3 +22,10 @@ def test_the_median_of_a_list_is_a_number_and_nan_where_a_sample_is():
     assert np.array_equal(
         median([[1.0, np.nan], [2.0, 4.0]], axis=1), [np.nan, 3.0], equal_nan=True
     )
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 50])
+def test_the_distinct_values_are_numpys(count):
+    values = np.random.default_rng(count).integers(0, 10, count)
+    assert np.array_equal(distinct(values), np.unique(values))
+    assert np.array_equal(distinct(values / 3.0), np.unique(values / 3.0))
