@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from exfit.engine.trace import TRUTHS, Node, in_order
 
+PARTIAL = ("/", "sqrt", "log", "exp")  # what makes infinity or no number of a number
+
 
 class Slope(NamedTuple):
     """A derivative that is not zero."""
@@ -24,7 +26,8 @@ class Slope(NamedTuple):
 
     def times(self, factor: Node) -> "Slope":
         """Return a multiple of the derivative."""
-        return self._replace(factor=self.factor.graph.multiply(factor, self.factor))
+        multiple = self.factor.graph.multiply(factor, _needed(self.factor, factor))
+        return Slope(multiple, _needed(self.tangent, factor))
 
 
 def tangents(targets: Iterable[Node], seeds: Mapping[Node, Node]) -> list[Node]:
@@ -139,6 +142,34 @@ def _switched(condition: Node, a: Slope | None, b: Slope | None) -> Slope | None
     taken = slope.factor if symbol else slope.product
     chosen = condition.graph.select(condition, *(taken if s else 0.0 for s in (a, b)))
     return slope._replace(factor=chosen) if symbol else _whole(chosen)
+
+
+def _needed(value: Node, factor: Node) -> Node:
+    """Return a value without the choice of zero that a factor makes as well."""
+    if value.op != "select" or not value.operands[0].varies:
+        return value
+    condition, *branches = value.operands
+    for position, zero in enumerate(branches):
+        other = branches[1 - position]
+        if zero.constant == 0.0 and _switched_off(factor, condition, position) and _finite(other):
+            return other
+    return value
+
+
+def _switched_off(node: Node, condition: Node, position: int) -> bool:
+    """Return whether a value is a product with zero where a condition chooses one branch."""
+    if node.op == "*":
+        return any(_switched_off(factor, condition, position) for factor in node.operands)
+    return (
+        node.op == "select"
+        and node.operands[0] is condition
+        and node.operands[1 + position].constant == 0.0
+    )
+
+
+def _finite(node: Node) -> bool:
+    """Return whether a value is a number whenever the states are."""
+    return not any(part.op in PARTIAL and part.varies for part in in_order([node]))
 
 
 def _whole(tangent: Node) -> Slope:

@@ -7,7 +7,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from exfit.engine.tangents import tangents
-from exfit.engine.trace import Graph, clip, cos, evaluate, exp, in_order, log, sin, sqrt, where
+from exfit.engine.trace import (
+    Graph,
+    clip,
+    cos,
+    evaluate,
+    exp,
+    in_order,
+    larger,
+    log,
+    sin,
+    sqrt,
+    where,
+)
+
+
+def squared(x):
+    return x * x
 
 
 def differentiated(function, count):
@@ -73,6 +89,13 @@ def test_what_lies_on_a_limit_moves_with_it(value, moves_with):
 def test_what_is_not_chosen_moves_nothing_even_where_it_is_no_number(function):
     assert derivatives(function, -1.0, 2.0) == [0.0, 0.0]
     assert all(math.isfinite(slope) for slope in derivatives(function, 1.0, 2.0))
+
+
+def test_a_factor_that_is_zero_needs_no_choice_of_a_zero_tangent():
+    slope, _, _ = differentiated(lambda x, y: squared(larger(x - y, 0.0)), 2)
+    assert [node.op for node in in_order([slope]) if node.wide] == ["symbol", "symbol", "-", "*"]
+    assert derivatives(lambda x, y: squared(larger(x - y, 0.0)), 1.0, 2.0) == [0.0, 0.0]
+    assert derivatives(lambda x, y: squared(larger(x - y, 0.0)), 3.0, 2.0) == [2.0, -2.0]
 
 
 def test_a_chain_on_one_value_multiplies_its_factors_and_one_tangent():
