@@ -1,18 +1,17 @@
 """Axes whose ticks are drawn together: an object for each takes half the time of a figure."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis, YAxis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.font_manager import FontProperties
 from matplotlib.path import Path
 from matplotlib.text import Text
-from matplotlib.ticker import Formatter, LogFormatter, NullLocator
+from matplotlib.ticker import FixedFormatter, FixedLocator, Formatter, LogFormatter, NullLocator
 from matplotlib.transforms import Bbox, IdentityTransform
 from numpy.typing import NDArray
 
@@ -146,6 +145,10 @@ class TicksTogether(Axis):
     _minor_tick_kw: Style
     _translate_tick_params: Callable[[Style], Style]
 
+    def set(self, **properties: Any) -> Any:
+        """Set properties; without this Matplotlib writes a docstring for each class at import."""
+        return self.update(properties)
+
     def set_tick_params(self, which: str = "major", reset: bool = False, **style: Any) -> None:
         """Set how marks, labels and grid are drawn."""
         own = self._translate_tick_params(style)
@@ -156,19 +159,23 @@ class TicksTogether(Axis):
         self.stale = True
 
     def set_clip_path(self, path: Any, transform: Any = None) -> None:
-        """Set where the axis is cut off; its ticks are no objects that would have to know."""
-        Artist.set_clip_path(self, path, transform)
+        """Cut nothing off: the axis lies outside."""
+
+    def reset_ticks(self) -> None:
+        """Leave the ticks: they are no objects."""
 
     def get_majorticklabels(self) -> list[Text]:
         """Return the numbers as objects, which are made for this."""
         return [Text(text=label) for group in self._update_ticks()[:1] for label in group.labels]
 
-    def numbers(self, renderer: RendererBase) -> list[Bbox]:
+    @property
+    def ticks(self) -> list[Ticks]:
+        """The ticks that are drawn."""
+        return self._update_ticks() if self.get_visible() and self.axes.axison else []
+
+    def boxes(self, renderer: RendererBase) -> list[Bbox]:
         """Return the boxes of the numbers, and of the axis with its marks, in dots."""
-        frame = self.axes.bbox.frozen()
-        if not (self.get_visible() and self.axes.axison):
-            return [frame]
-        ticks = self._update_ticks()
+        frame, ticks = self.axes.bbox.frozen(), self.ticks
         mark = dots_of(renderer, max((group.length for group in ticks), default=0.0))
         marks = (mark, 0.0) if self.axis_name == "y" else (0.0, mark)
         marked = Bbox.from_extents(frame.x0 - marks[0], frame.y0 - marks[1], frame.x1, frame.y1)
@@ -239,6 +246,10 @@ class QuickAxes(Axes):
     xaxis: "QuickXAxis"
     yaxis: "QuickYAxis"
 
+    def set(self, **properties: Any) -> Any:
+        """Set properties; see TicksTogether."""
+        return self.update(properties)
+
     def _init_axis(self) -> None:
         self.xaxis, self.yaxis = QuickXAxis(self, clear=False), QuickYAxis(self, clear=False)
         for name, axis in (
@@ -259,6 +270,11 @@ class QuickAxes(Axes):
         """Leave the titles where they are: no ticks are above the axes."""
 
     @property
+    def numbers(self) -> list[list[str]]:
+        """What the ticks of both axes say."""
+        return [group.labels for axis in (self.xaxis, self.yaxis) for group in axis.ticks]
+
+    @property
     def titles(self) -> list[Text]:
         """The titles that are set."""
         texts = {self.get_title(loc=place) for place in ("left", "center", "right")} - {""}
@@ -276,7 +292,7 @@ class QuickAxes(Axes):
     def outside(self, renderer: RendererBase) -> Outside:
         """Return the room that what is beside the axes needs."""
         frame = self.bbox
-        boxes = [*self.xaxis.numbers(renderer), *self.yaxis.numbers(renderer)]
+        boxes = [*self.xaxis.boxes(renderer), *self.yaxis.boxes(renderer)]
         titles = self.titles
         boxes += [
             text.get_window_extent(renderer)
@@ -292,6 +308,12 @@ class QuickAxes(Axes):
             right=max(box.x1 for box in boxes) - frame.x1,
             above=max(max(tops) - frame.y1, self.offset_height(renderer)),
         )
+
+
+def named(axis: Axis, places: Sequence[float], names: Sequence[str]) -> None:
+    """Give an axis names at places, in the same order."""
+    axis.set_major_locator(FixedLocator(places))
+    axis.set_major_formatter(FixedFormatter(names))
 
 
 def logarithmic(axes: Axes) -> None:

@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
-from exfit.output.plots.axes import QuickAxes
+from exfit.output.plots.axes import QuickAxes, named
 from exfit.output.plots.style import MEASURED, MILLI, SIMULATED, START, new_figure, tidy
 from exfit.results.comparisons import IterationResponses
 from exfit.results.model import FitResult
@@ -96,7 +97,7 @@ def _colour_bar(axes: Axes, numbers: Sequence[int]) -> None:
     # the fit is always named: what would be right beside it gives way
     ticks = [k for k in range(0, count - 1, every) if 2 * (count - 1 - k) >= every]
     ticks.append(count - 1)
-    axes.set_xticks([])
-    axes.set_yticks(ticks, [str(numbers[k]) for k in ticks])
+    axes.xaxis.set_major_locator(NullLocator())
+    named(axes.yaxis, ticks, [str(numbers[k]) for k in ticks])
     axes.tick_params(length=0)
     axes.set_ylabel("iteration")

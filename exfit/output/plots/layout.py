@@ -17,7 +17,7 @@ from exfit.output.plots.page import PageRenderer
 Array = NDArray[np.float64]
 
 PAD = 5.0  # points: around the figure, and between what is beside each other
-PASSES = 2  # the numbers of an axis depend on its length
+MOST_PASSES = 3  # the numbers of an axis depend on its length
 SMALLEST = 6.0  # points: letters of a title that is made to fit
 
 
@@ -52,8 +52,11 @@ class Layout(LayoutEngine):
         _place_titles(fig, room, renderer)
         self._place_legend(fig, room, renderer)
         panels = [axes for axes in fig.axes if isinstance(axes, QuickAxes)]
-        for _ in range(PASSES if panels else 0):
+        for _ in range(MOST_PASSES if panels else 0):
+            numbers = [axes.numbers for axes in panels]
             _place(fig, panels, room, renderer)
+            if [axes.numbers for axes in panels] == numbers:
+                break
 
     def _place_legend(self, fig: Figure, room: Room, renderer: PageRenderer) -> None:
         pad = dots_of(renderer, PAD)

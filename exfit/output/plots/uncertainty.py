@@ -2,13 +2,13 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from exfit.analysis.profiles import Profiles
 from exfit.dsp.decimation import envelope
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.output.plots.axes import QuickAxes
+from exfit.output.plots.axes import QuickAxes, named
 from exfit.output.plots.style import (
     COLORS,
     LIMIT,
@@ -60,8 +60,8 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     figure = new_figure(side, side + 0.8)
     axes, bar = panels(figure, 1, 2, width_ratios=[1.0, BAR])[0]
     axes.imshow(values, cmap=COLOUR_MAP, vmin=-1.0, vmax=1.0, aspect="auto")
-    axes.set_xticks([])
-    axes.set_yticks(range(len(names)), names)
+    axes.xaxis.set_major_locator(NullLocator())
+    named(axes.yaxis, range(len(names)), names)
     for row, line in enumerate(values):
         for column, value in enumerate(line):
             if np.isfinite(value):
@@ -85,7 +85,7 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     axes.tick_params(length=0)
     shades = np.linspace(-1.0, 1.0, SHADES)[:, np.newaxis]
     bar.imshow(shades, cmap=COLOUR_MAP, aspect="auto", extent=(0.0, 1.0, -1.0, 1.0), origin="lower")
-    bar.set_xticks([])
+    bar.xaxis.set_major_locator(NullLocator())
     bar.set_ylabel("correlation of the estimates")
     figure.suptitle(f"{title}: which parameters move together", fontsize=11)
     return figure
