@@ -173,9 +173,9 @@ class TicksTogether(Axis):
         """The ticks that are drawn."""
         return self._update_ticks() if self.get_visible() and self.axes.axison else []
 
-    def boxes(self, renderer: RendererBase) -> list[Bbox]:
+    def boxes(self, ticks: Sequence[Ticks], renderer: RendererBase) -> list[Bbox]:
         """Return the boxes of the numbers, and of the axis with its marks, in dots."""
-        frame, ticks = self.axes.bbox.frozen(), self.ticks
+        frame = self.axes.bbox.frozen()
         mark = dots_of(renderer, max((group.length for group in ticks), default=0.0))
         marks = (mark, 0.0) if self.axis_name == "y" else (0.0, mark)
         marked = Bbox.from_extents(frame.x0 - marks[0], frame.y0 - marks[1], frame.x1, frame.y1)
@@ -270,9 +270,9 @@ class QuickAxes(Axes):
         """Leave the titles where they are: no ticks are above the axes."""
 
     @property
-    def numbers(self) -> list[list[str]]:
-        """What the ticks of both axes say."""
-        return [group.labels for axis in (self.xaxis, self.yaxis) for group in axis.ticks]
+    def ticks(self) -> tuple[list[Ticks], list[Ticks]]:
+        """The ticks that are drawn, of the horizontal and of the vertical axis."""
+        return self.xaxis.ticks, self.yaxis.ticks
 
     @property
     def titles(self) -> list[Text]:
@@ -289,10 +289,11 @@ class QuickAxes(Axes):
         written = self.yaxis.get_major_formatter().get_offset() and self.yaxis.get_visible()
         return dots_of(renderer, OFFSET) if written else 0.0
 
-    def outside(self, renderer: RendererBase) -> Outside:
-        """Return the room that what is beside the axes needs."""
+    def outside(self, ticks: tuple[list[Ticks], list[Ticks]], renderer: RendererBase) -> Outside:
+        """Return the room that what is beside the axes needs, with these ticks."""
         frame = self.bbox
-        boxes = [*self.xaxis.boxes(renderer), *self.yaxis.boxes(renderer)]
+        across, upright = ticks
+        boxes = [*self.xaxis.boxes(across, renderer), *self.yaxis.boxes(upright, renderer)]
         titles = self.titles
         boxes += [
             text.get_window_extent(renderer)

@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import ArrayLike, NDArray
 
-from exfit.output.plots.axes import LABEL_GAP, QuickAxes, dots_of
+from exfit.output.plots.axes import LABEL_GAP, Outside, QuickAxes, Ticks, dots_of
 from exfit.output.plots.page import PageRenderer
 
 Array = NDArray[np.float64]
@@ -52,10 +52,14 @@ class Layout(LayoutEngine):
         _place_titles(fig, room, renderer)
         self._place_legend(fig, room, renderer)
         panels = [axes for axes in fig.axes if isinstance(axes, QuickAxes)]
+        ticks = [axes.ticks for axes in panels]
         for _ in range(MOST_PASSES if panels else 0):
-            numbers = [axes.numbers for axes in panels]
-            _place(fig, panels, room, renderer)
-            if [axes.numbers for axes in panels] == numbers:
+            outsides = [
+                axes.outside(own, renderer) for axes, own in zip(panels, ticks, strict=True)
+            ]
+            _place(fig, panels, outsides, room, renderer)
+            former, ticks = ticks, [axes.ticks for axes in panels]
+            if _numbers(ticks) == _numbers(former):
                 break
 
     def _place_legend(self, fig: Figure, room: Room, renderer: PageRenderer) -> None:
@@ -90,17 +94,28 @@ def _place_titles(fig: Figure, room: Room, renderer: PageRenderer) -> None:
             room.bottom += box.height + pad
 
 
-def _place(fig: Figure, panels: Sequence[QuickAxes], room: Room, renderer: PageRenderer) -> None:
+def _numbers(ticks: Sequence[tuple[list[Ticks], list[Ticks]]]) -> list[list[str]]:
+    """Return what the ticks of axes say."""
+    return [group.labels for both in ticks for groups in both for group in groups]
+
+
+def _place(
+    fig: Figure,
+    panels: Sequence[QuickAxes],
+    outsides: Sequence[Outside],
+    room: Room,
+    renderer: PageRenderer,
+) -> None:
     """Place the axes of a grid by what is beside them, the labels of a column or row in line."""
-    outsides = [
-        (axes, spec, axes.outside(renderer))
-        for axes in panels
+    placed = [
+        (axes, spec, outside)
+        for axes, outside in zip(panels, outsides, strict=True)
         if (spec := axes.get_subplotspec()) is not None
     ]
-    grid = outsides[0][1].get_gridspec()
+    grid = placed[0][1].get_gridspec()
     left, left_label, right = np.zeros((3, grid.ncols))
     above, below, below_label = np.zeros((3, grid.nrows))
-    for _, spec, outside in outsides:
+    for _, spec, outside in placed:
         first, last = spec.colspan[0], spec.colspan[-1]
         upper, lower = spec.rowspan[0], spec.rowspan[-1]
         for most, place, needed in (
@@ -119,7 +134,7 @@ def _place(fig: Figure, panels: Sequence[QuickAxes], room: Room, renderer: PageR
     )
     x0, x1, y0, y1 = room.left + x0, room.left + x1, room.top - y0, room.top - y1
     gap = dots_of(renderer, LABEL_GAP)
-    for axes, spec, _ in outsides:
+    for axes, spec, _ in placed:
         first, last = spec.colspan[0], spec.colspan[-1]
         upper, lower = spec.rowspan[0], spec.rowspan[-1]
         box = Bbox([[x0[first], y0[lower]], [x1[last], y1[upper]]])
