@@ -6,7 +6,9 @@ comes, from one start, what one would write with SciPy alone.
 
 import csv
 import os
+import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from math import sqrt
@@ -50,6 +52,9 @@ GOOD_ENOUGH = 2e-4  # pu
 RANDOM_STARTS, SEED, MARGIN = 24, 7, 0.15  # of the width of the bounds, kept free on either side
 PATIENCE = 100  # evaluations by LSODA, most with a Jacobian of seven more
 RAMP = 0.01  # pu
+CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
+PROGRAM = ("-c", "from exfit.cli import main; main()")
+TURNS = 12
 
 
 def record():
@@ -205,6 +210,24 @@ def from_random_starts():
     return {way: sum(cost < least * (1.0 + 1e-4) for cost in found) for way, found in costs.items()}
 
 
+def what_figures_add():
+    """Return the time that all figures of a fit take, in times of a process that imports NumPy.
+
+    Processes take turns; of each the fastest counts.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        fit = [*PROGRAM, "fit", str(CASE), "--search", "local", "-q", "-o", folder]
+        commands = {"numpy": ["-c", "import numpy"], "fit": [*fit, "--no-plots"], "figures": fit}
+        seconds = {name: [] for name in commands}
+        for _ in range(TURNS):
+            for name, command in commands.items():
+                begin = time.perf_counter()
+                subprocess.run([sys.executable, *command], check=True)
+                seconds[name].append(time.perf_counter() - begin)
+    numpy, without, figures = (min(seconds[name]) for name in ("numpy", "fit", "figures"))
+    return (figures - without) / numpy
+
+
 def main():
     table = Table(title="AC1A, 7 free parameters, ac1a_up.csv")
     for heading in ("start", "way"):
@@ -247,6 +270,10 @@ def main():
         f"LSODA 1e-6 and difference quotients, start typical: {seconds:.1f} s, "
         f"{done.nfev} residuals and {done.njev} Jacobians, cost {done.cost / floor:.6f} of the "
         f"truth's: {seconds / ours:.0f} times the time of exfit"
+    )
+    console.print(
+        f"All figures of {CASE.stem} add {what_figures_add():.1f} times the time of a process that "
+        "imports NumPy"
     )
 
 
