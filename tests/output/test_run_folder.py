@@ -17,7 +17,7 @@ from exfit import workflows
 from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.overrides import read_parameters
-from exfit.output import plots, run_folder
+from exfit.output import figure_files, plots, run_folder
 from exfit.results.tables import DIGITS, parameter_file, table
 from exfit.util.files import write
 from exfit.util.text import to_json
@@ -280,7 +280,7 @@ def test_a_disk_that_fills_up_while_drawing_costs_figures_alone(twice, monkeypat
         if path.suffix == ".png":
             raise ExfitError(f"{path}: cannot be written: No space left on device")
 
-    monkeypatch.setattr(run_folder, "write", full)
+    monkeypatch.setattr(figure_files, "write", full)
     missing = run_folder.write_fit(result, folder).draw()
     assert len(missing) == sum(name.endswith(".png") for name in FILES_OF_A_FIT)
     assert all("No space left" in text for text in missing)
