@@ -1,21 +1,30 @@
 """How well a fit is determined: by linear theory and, where that does not serve, by profiles."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from math import inf, isinf
+from math import isinf
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
+from exfit.analysis.profile_hull import (
+    FoundMinimum,
+    allowed,
+    complete,
+    limits_of,
+    other_minima,
+    profiles_about,
+    reasons,
+)
 from exfit.errors import SimulationError
 from exfit.estimate import Stop
 from exfit.fitting.global_search import AT_TOLERANCE, SearchResult
 from exfit.fitting.nonlinearity import nonlinear_parameters, not_served_by_linear_theory
-from exfit.fitting.parameters import UNIT, FreeParameter
+from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import Residuals, SideBySide
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
@@ -37,13 +46,6 @@ class Determination(NamedTuple):
     uncertainty: UncertaintyAnalysis | None
     lower: Array | None = None
     interrupted: bool = False
-
-
-class FoundMinimum(NamedTuple):
-    """A minimum of the cost: its point (N,), in scaled parameters, and its cost."""
-
-    x: Array
-    cost: float
 
 
 def determination(
@@ -68,10 +70,7 @@ def determination(
     own_end = best.success and best.stop not in AT_TOLERANCE
     if uncertainty is None or search.interrupted or not (profiled and own_end):
         return Determination(uncertainty)
-    minima = () if search.minima is None else search.minima.minima
-    others = [
-        FoundMinimum(local.x, local.cost) for k, local in enumerate(minima) if k != search.place
-    ]
+    others = other_minima(search)
     solution = FoundMinimum(best.x, best.cost)
     return with_profile_intervals(
         problem.compressed, solution, others, uncertainty, of_record, progress
@@ -107,18 +106,13 @@ def with_profile_intervals(
     the hulls of profiles about each. An interruption keeps those that are complete.
     """
     rises, near = what_to_profile(residuals, solution, others, uncertainty, of_record)
-    profiles: dict[int, list[estimate.CostProfile]] = {}
-    for minimum in (solution, *near) if rises else ():
-        within = {k: rise for k, rise in rises.items() if allowed(solution, minimum, rise)}
-        lower = None if minimum is solution else beside(solution, profiles)
-        about_minimum = about(residuals, minimum, within, lower, progress)
-        if about_minimum[0].moved:
-            return Determination(uncertainty, lower=about_minimum[0].x)
-        for profile in about_minimum:
-            profiles.setdefault(profile.index, []).append(profile)
-        if not all(map(complete, about_minimum)):
-            return Determination(with_intervals(uncertainty, residuals.free, profiles), None, True)
-    return Determination(with_intervals(uncertainty, residuals.free, profiles))
+    if not rises:
+        return Determination(uncertainty)
+    profiles = profiles_about(residuals, solution, near, rises, POINTS, progress)
+    if profiles.lower is not None:
+        return Determination(uncertainty, lower=profiles.lower)
+    with_profiles = with_intervals(uncertainty, residuals.free, profiles.by_index)
+    return Determination(with_profiles, interrupted=profiles.interrupted)
 
 
 def what_to_profile(
@@ -139,55 +133,6 @@ def what_to_profile(
         return own, near
     names = not_served_by_linear_theory(residuals, solution.x, uncertainty, of_record)
     return {index_of[name]: uncertainty.rises[name] for name in names}, near
-
-
-def allowed(solution: FoundMinimum, other: FoundMinimum, rise: float) -> bool:
-    """Return whether another minimum lies below the rise at which a parameter's interval ends."""
-    return other.cost - solution.cost < rise
-
-
-def beside(
-    solution: FoundMinimum, profiles: Mapping[int, Sequence[estimate.CostProfile]]
-) -> estimate.LowerMinimum:
-    """Return what a profile about another minimum need not find again."""
-    return estimate.LowerMinimum(
-        solution.cost, {index: limits_of(each) for index, each in profiles.items()}
-    )
-
-
-def about(
-    residuals: Residuals,
-    minimum: FoundMinimum,
-    rises: Mapping[int, float],
-    lower: estimate.LowerMinimum | None,
-    progress: Watch,
-) -> tuple[estimate.CostProfile, ...]:
-    """Return the profiles of some parameters about a minimum."""
-    return estimate.profiles(
-        SideBySide(residuals),
-        minimum.x,
-        rises,
-        residuals.bounds,
-        beside=lower,
-        points=POINTS,
-        x_scale=UNIT,
-        watch=progress,
-    )
-
-
-def complete(profile: estimate.CostProfile) -> bool:
-    """Return whether both sides of a profile came to their ends."""
-    return estimate.ProfileEnd.INTERRUPTED not in profile.ends
-
-
-def limits_of(profiles: Iterable[estimate.CostProfile]) -> tuple[float, float]:
-    """Return the interval that all profiles of a parameter lie in, infinite where one is open."""
-    low, high = inf, -inf
-    for profile in profiles:
-        below, above = (end is estimate.ProfileEnd.KNOWN for end in profile.ends)
-        low = low if below else min(low, -inf if profile.low is None else profile.low)
-        high = high if above else max(high, inf if profile.high is None else profile.high)
-    return low, high
 
 
 def with_intervals(
@@ -214,29 +159,15 @@ def of_profiles(
     """Return what is known of a parameter by the hull of its profiles."""
     hull = limits_of(profiles)
     low, high = (None if isinf(limit) else parameter.value(limit) for limit in hull)
+    below, above = reasons(parameter, profiles)
+    open_sides = [
+        f"has no {side} limit: {reason}"
+        for side, reason in (("lower", below), ("upper", above))
+        if reason
+    ]
     return replace(
         own,
         interval=None if low is None and high is None else (low, high),
-        why=" and ".join(open_sides(parameter, profiles)) or None,
+        why=" and ".join(open_sides) or None,
         method="profile" if hull == limits_of(profiles[:1]) else "hull",
     )
-
-
-def open_sides(parameter: FreeParameter, profiles: Sequence[estimate.CostProfile]) -> Iterator[str]:
-    """Yield which limits profiles leave open, and why."""
-    closed = (estimate.ProfileEnd.RISE, estimate.ProfileEnd.KNOWN)
-    bounds = (("lower", "min", parameter.low), ("upper", "max", parameter.high))
-    for side, (adjective, bound, limit) in enumerate(bounds):
-        ends = [profile.ends[side] for profile in profiles]
-        end = next((end for end in ends if end not in closed), None)
-        if end is not None:
-            yield f"has no {adjective} limit: {reason(end, f'its {bound} {limit:.4g}')}"
-
-
-def reason(end: estimate.ProfileEnd, bound: str) -> str:
-    """Return in words why a side of a profile has no limit."""
-    if end is estimate.ProfileEnd.BOUND:
-        return f"the record does not exclude {bound}"
-    if end is estimate.ProfileEnd.FAILED:
-        return "there is no response beyond"
-    return "the cost hardly rises"

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from math import isinf
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,19 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.analysis.diagnostics import search_range_notes
 from exfit.analysis.judgement import doubt_of
+from exfit.analysis.profile_hull import (
+    FoundMinimum,
+    limits_of,
+    other_minima,
+    profiles_about,
+    reasons,
+)
 from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.parameters import UNIT
+from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
-from exfit.fitting.residuals import Residuals, SideBySide
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.search import fitted, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
@@ -25,15 +33,17 @@ from exfit.util.text import near
 Array = NDArray[np.float64]
 
 LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
+ENCLOSED = "the intervals enclose another minimum, which the record does not refute"
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
-ENDS = {
-    estimate.ProfileEnd.RISE: "",
-    estimate.ProfileEnd.BOUND: "the record does not exclude the bound",
-    estimate.ProfileEnd.FLAT: "the cost hardly rises",
-    estimate.ProfileEnd.FAILED: "no response beyond",
-    estimate.ProfileEnd.INTERRUPTED: "interrupted",
-}
+POINTS = 5  # of a side: enough for a smooth figure
+
+
+class Branch(NamedTuple):
+    """The profile about another minimum: values (K,) of the parameter, and the least costs (K,)."""
+
+    at: Array
+    costs: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +52,8 @@ class Profile:
 
     ``low`` and ``high`` end the interval, None where the cost does not rise as far before what
     ``ends`` says: at the ends of the interval the cost is ``rise`` above the minimum.
-    ``linear`` is the interval of the linear theory, if it has one.
+    ``linear`` is the interval of the linear theory, if it has one. ``others`` are profiles about
+    other minima that the record does not refute: the interval encloses theirs.
     """
 
     name: str
@@ -55,6 +66,7 @@ class Profile:
     ends: tuple[str, str]
     rise: float
     linear: Interval | None
+    others: tuple[Branch, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +96,10 @@ class Profiles:
                     "linear": profile.linear,
                     "at": profile.at.tolist(),
                     "costs": profile.costs.tolist(),
+                    "others": [
+                        {"at": branch.at.tolist(), "costs": branch.costs.tolist()}
+                        for branch in profile.others
+                    ],
                 }
                 for profile in self.profiles
             },
@@ -104,27 +120,30 @@ def profile(
     """
     setups, problem = fitted(case)
     wanted = _indices(case, problem.residuals, names)
-    best = _minimum(case, setups, problem, progress)
-    x, records = best.x, names_of_records(setups)
+    found = _found(case, setups, problem, progress)
+    residuals, records, others = problem.compressed, names_of_records(setups), other_minima(found)
+    x = found.best.x
     for _ in range(MOST_MINIMA):
         uncertainty = uncertainty_at(problem, x, records)
         rises = {index: uncertainty.rises[name] for name, index in wanted.items()}
-        residuals = problem.compressed
-        about_x = estimate.profiles(
-            SideBySide(residuals), x, rises, residuals.bounds, x_scale=UNIT, watch=progress
-        )
-        interrupted = any(_interrupted(cost_profile) for cost_profile in about_x)
-        if interrupted or not about_x[0].moved:
+        solution = FoundMinimum(x, estimate.half_square(residuals(x)))
+        profiles = profiles_about(residuals, solution, others, rises, POINTS, progress)
+        if profiles.lower is None or profiles.interrupted:
             break
-        x = about_x[0].x  # its residuals, and so the rise, are others
+        x = profiles.lower  # its residuals, and so the rise, are others
+    first = next(iter(profiles.by_index.values()))[0]
     return Profiles(
         name=case.path.stem,
-        cost=about_x[0].cost,
+        cost=first.cost,
         profiles=tuple(
-            _profile(case, problem.residuals, uncertainty, cost_profile) for cost_profile in about_x
+            _profile(case, residuals, uncertainty, each) for each in profiles.by_index.values()
         ),
-        notes=(*search_range_notes(case), *_notes(best, about_x[0].x)),
-        interrupted=interrupted,
+        notes=(
+            *search_range_notes(case),
+            *_notes(found.best, first.x),
+            *([ENCLOSED] if any(others for _, *others in profiles.by_index.values()) else []),
+        ),
+        interrupted=profiles.interrupted,
     )
 
 
@@ -141,23 +160,23 @@ def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str
     return {name: free[name] for name in wanted}
 
 
-def _minimum(
+def _found(
     case: Case,
     setups: Sequence[ExperimentSetup],
     problem: FitProblem,
     progress: Callable[[estimate.Progress], None],
-) -> estimate.Result:
-    """Return the fit of a case; raises KeyboardInterrupt where it was interrupted."""
+) -> SearchResult:
+    """Return the search of a case; raises KeyboardInterrupt where it was interrupted."""
     options = case.estimate.to_the_minimum()
     start, judged = case.values(), case.validations if options.strategy == "auto" else ()
     unseen = [build_experiment(case, recording, start) for recording in judged]
     doubt = doubt_of(case, problem, setups, unseen)
-    best, minima, *_ = search(
+    found = search(
         case, problem, options.strategy, lambda _: None, progress, options=options, doubt=doubt
     )
-    if best.stop is estimate.Stop.INTERRUPTED or (minima is not None and minima.interrupted):
+    if found.best.stop is estimate.Stop.INTERRUPTED or found.interrupted:
         raise KeyboardInterrupt
-    return best
+    return found
 
 
 def _notes(best: estimate.Result, x: Array) -> Iterator[str]:
@@ -168,34 +187,35 @@ def _notes(best: estimate.Result, x: Array) -> Iterator[str]:
         yield LOWER
 
 
-def _interrupted(cost_profile: estimate.CostProfile) -> bool:
-    return estimate.ProfileEnd.INTERRUPTED in cost_profile.ends
-
-
 def _profile(
     case: Case,
     residuals: Residuals,
     uncertainty: UncertaintyAnalysis,
-    cost_profile: estimate.CostProfile,
+    profiles: Sequence[estimate.CostProfile],
 ) -> Profile:
-    """Return a profile in the parameter's own values."""
-    parameter = residuals.free[cost_profile.index]
-    low, high = cost_profile.low, cost_profile.high
-    below, above = cost_profile.ends
+    """Return the profiles of a parameter about several minima in its own values."""
+    first, *others = profiles
+    parameter = residuals.free[first.index]
+    low, high = (None if isinf(limit) else parameter.value(limit) for limit in limits_of(profiles))
     units = {
         nuisance.name: nuisance.unit
         for experiment in residuals.experiments
         for nuisance in experiment.nuisances
     }
+
+    def branch(profile: estimate.CostProfile) -> Branch:
+        return Branch(np.array([parameter.value(float(x)) for x in profile.at]), profile.costs)
+
     return Profile(
         name=parameter.name,
         unit={**units, **case.units()}.get(parameter.name, ""),
-        value=parameter.value(float(cost_profile.x[cost_profile.index])),
-        at=np.array([parameter.value(float(x)) for x in cost_profile.at]),
-        costs=cost_profile.costs,
-        low=None if low is None else parameter.value(low),
-        high=None if high is None else parameter.value(high),
-        ends=(ENDS[below], ENDS[above]),
+        value=parameter.value(float(first.x[first.index])),
+        at=branch(first).at,
+        costs=first.costs,
+        low=low,
+        high=high,
+        ends=reasons(parameter, profiles),
         rise=uncertainty.rises[parameter.name],
         linear=uncertainty.confidence.parameters[parameter.name].interval,
+        others=tuple(map(branch, others)),
     )

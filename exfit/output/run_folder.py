@@ -227,7 +227,8 @@ def write_profiles(profiles: "Profiles", folder: Path) -> FigureFiles:
     rows = [
         f"{profile.name},{value:.{DIGITS}g},{cost:.{DIGITS}g}\n"
         for profile in profiles.profiles
-        for value, cost in zip(profile.at, profile.costs, strict=True)
+        for at, costs in ((profile.at, profile.costs), *profile.others)
+        for value, cost in zip(at, costs, strict=True)
     ]
     numbers = {
         "profile.csv": "".join(["parameter,value,cost\n", *rows]),

@@ -83,7 +83,7 @@ def test_kd_of_ac1a_is_open_down_to_its_bound(kd):
     (one,) = kd.profiles
     assert one.linear is None
     assert one.low is None
-    assert one.ends == ("the record does not exclude the bound", "")
+    assert one.ends == ("the record does not exclude its min 0.03556", "")
     assert one.at[0] == 0.03556
     assert one.costs[0] < kd.cost + one.rise
     # what the record was made with lies inside

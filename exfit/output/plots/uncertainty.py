@@ -23,6 +23,8 @@ from exfit.output.plots.style import (
 
 Array = NDArray[np.float64]
 PERCENT = 1e-2
+OTHER_MINIMA = COLORS[4]
+SUBDIVIDED = 8  # parts of a profile between two points
 COLOUR_MAP, SHADES = "RdBu_r", 256  # of correlations
 BAR = 0.05  # width of the colour bar, of that of the map
 
@@ -91,6 +93,14 @@ def correlation(analysis: UncertaintyAnalysis, title: str) -> Figure:
     return figure
 
 
+def smooth(at: Array, rise: Array) -> tuple[Array, Array]:
+    """Return a profile with points in between: the root of the rise is nearly linear."""
+    places = np.arange(len(at), dtype=np.float64)
+    between = np.linspace(0.0, places[-1], SUBDIVIDED * (len(at) - 1) + 1)
+    roots = np.sqrt(rise) if len(at) > 1 else np.zeros(len(at))
+    return np.interp(between, places, at), np.interp(between, places, roots) ** 2
+
+
 def profiles(profiled: Profiles) -> Figure:
     """Return the profile of each parameter: the rise of the cost in units of that at the limit."""
     columns = min(3, len(profiled.profiles))
@@ -101,8 +111,12 @@ def profiles(profiled: Profiles) -> Figure:
     for k, profile in enumerate(profiled.profiles):
         axes = figure.add_subplot(grid[divmod(k, columns)], sharey=axes, axes_class=QuickAxes)
         axes.tick_params(labelleft=k % columns == 0)
-        rise = (profile.costs - profiled.cost) / profile.rise
-        axes.plot(profile.at, rise, "o-", color=SIMULATED, linewidth=1.3, markersize=3)
+        branches = [(profile.at, profile.costs, SIMULATED)]
+        branches += [(*branch, OTHER_MINIMA) for branch in profile.others]
+        for at, costs, color in branches:
+            rise = np.maximum(costs - profiled.cost, 0.0) / profile.rise
+            axes.plot(at, rise, "o", color=color, markersize=3)
+            axes.plot(*smooth(at, rise), color=color, linewidth=1.3)
         axes.axhline(1.0, color=LIMIT, linewidth=1.0, linestyle=":")
         for limit in (profile.low, profile.high):
             if limit is not None:
