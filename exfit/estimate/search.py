@@ -15,6 +15,7 @@ from exfit.estimate.requests import Steps
 
 ARMIJO = 1e-4  # share of the promised decrease that makes a trial good enough
 MOST_TRIALS = 60
+LEAST_AGAIN = 1e-10  # of the cost: where the full step promises less, one trial shows it or none
 SAME = 1e-9  # units: a step that differs by less is the same
 
 Cut = Callable[[float, float], float]
@@ -49,6 +50,14 @@ class Search(Protocol):
 def gain_ratio(decrease: float, promise: float) -> float:
     """Return the decrease in units of what was promised, nan if that was nothing."""
     return decrease / promise if promise > 0.0 else nan
+
+
+def worth_trying(linear: LinearModel, promise: float, rejections: int) -> bool:
+    """Return whether a trial may show what it promises, or one more after some rejections."""
+    cost = linear.point.cost
+    if rejections and linear.full.promise <= LEAST_AGAIN * cost:
+        return False
+    return promise > EPS * cost
 
 
 def held_back(linear: LinearModel, step: DampedStep) -> bool:
@@ -87,7 +96,7 @@ def shorten(
     """
     cost, length, reductions = linear.point.cost, 1.0, 0
     capped = held_back(linear, step)
-    while reductions < trials and -length * step.slope > EPS * cost:
+    while reductions < trials and worth_trying(linear, -length * step.slope, reductions):
         trial = yield from problem.evaluate(step.at(length))
         if trial.cost < cost and trial.cost <= cost + armijo * length * step.slope:
             quality = gain_ratio(cost - trial.cost, step.promised(length))

@@ -7,11 +7,19 @@ from typing import Self
 import numpy as np
 
 from exfit.estimate.answer import Stop
-from exfit.estimate.arrays import EPS, TINY, Array, norm
+from exfit.estimate.arrays import TINY, Array, norm
 from exfit.estimate.linear import DampedStep, LinearModel, solve
 from exfit.estimate.problem import Point, Problem
 from exfit.estimate.requests import Steps
-from exfit.estimate.search import ARMIJO, MOST_TRIALS, Move, gain_ratio, shorten, to_parabola
+from exfit.estimate.search import (
+    ARMIJO,
+    MOST_TRIALS,
+    Move,
+    gain_ratio,
+    shorten,
+    to_parabola,
+    worth_trying,
+)
 
 BAD, PROVED, GOOD = 0.25, 0.5, 0.75  # gain ratios that shrink, hand over, enlarge
 TIMID = 0.1  # share of what the full step promises: an iteration that gains less gained little
@@ -79,7 +87,7 @@ class TrustRegion:
             if rejections == spent:
                 capped = nu > 0.0
             step = solve(linear, nu)
-            if not step.promise > EPS * cost:
+            if not worth_trying(linear, step.promise, rejections):
                 break
             trial = yield from self.trial(problem, linear, step, nu)
             decrease = cost - trial.cost

@@ -88,6 +88,17 @@ def test_a_start_far_out_does_not_make_a_small_cost_of_a_large_one():
     assert result.x == pytest.approx(np.ones(4), abs=1e-9)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_coarse_residuals_waste_no_trials_at_the_floor(method):
+    # rounded to 1e-7 of their size, so that f is known to 1e-13 or so, and ftol asks for more
+    case = CERTIFIED["Misra1a"]
+    step = 1e-7 * np.sqrt(case.squares)
+    fun = lambda x: step * np.round(case.fun(x) / step)  # noqa: E731
+    result = least_squares(fun, case.starts[1], case.jac, method=method)
+    assert result.success
+    assert [line.inner for line in result.history if line.capped is not None][-1] <= 1
+
+
 CALLS = {
     "differences": {},
     "central differences": {"jac": "3-point"},
