@@ -64,21 +64,16 @@ class Target(NamedTuple):
     features: str
 
 
-def target(long_vectors: bool) -> Target:
+def target() -> Target:
     """Return the processor that code is made for: this one, or the one that EXFIT_CPU names.
 
     ``EXFIT_CPU=x86-64`` gives the code that every processor of 64 bits runs, as a check that no
-    result depends on the machine; any name that LLVM knows will do. Without long vectors this
-    processor's AVX-512 is left out: single numbers that are chosen by comparison, as limits do,
-    take a tenth less time where the choice need not pass through a mask register.
+    result depends on the machine; any name that LLVM knows will do.
     """
     chosen = os.environ.get("EXFIT_CPU")
     if chosen:
         return Target(chosen, "")
-    features: str = llvm.get_host_cpu_features().flatten()
-    if not long_vectors:
-        features = features.replace("+avx512", "-avx512")
-    return Target(llvm.get_host_cpu_name(), features)
+    return Target(llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
 
 
 @cache
@@ -160,13 +155,13 @@ def _code(traced: str, write_ir: Callable[[], str], machine: Any, name: str) -> 
     return code
 
 
-def compiled(traced: str, write_ir: Callable[[], str], *, long_vectors: bool) -> Any:
+def compiled(traced: str, write_ir: Callable[[], str]) -> Any:
     """Return LLVM's engine holding the functions of an IR.
 
     ``traced`` is a text that the IR follows from, with these modules.
     """
     with _lock:
-        machine, name = _machine(target(long_vectors))
+        machine, name = _machine(target())
         code = _code(traced, write_ir, machine, name)
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
@@ -187,7 +182,6 @@ class Kernel:
         engine = compiled(
             f"simulation {lanes} {traced.text}",
             lambda: simulation(traced, lanes),
-            long_vectors=lanes > 1,
         )
         self._rest = function(engine, "rest", 4)
         self._run = function(engine, "run", 4, RUN_ARGUMENTS)
@@ -269,7 +263,7 @@ class TangentKernel:
             return simulation_with_tangents(traced, derived, directions)
 
         text = f"tangents {self.free} {self.moving} {directions} {traced.text}"
-        engine = compiled(text, ir, long_vectors=True)
+        engine = compiled(text, ir)
         counts = (len(system.setpoints), len(system.states), len(self.outputs))
         sizes = Sizes(*counts, directions=directions, moving=len(self.moving))
         self._sampled = Sampler(engine, sizes)
@@ -329,7 +323,7 @@ class LinearKernel:
         def ir() -> str:
             return linearisation(traced, differentiate(traced, system, ()), DIRECTIONS)
 
-        engine = compiled(f"linearisation {DIRECTIONS} {traced.text}", ir, long_vectors=False)
+        engine = compiled(f"linearisation {DIRECTIONS} {traced.text}", ir)
         self._rest = function(engine, "rest", 8)
         self._motion = function(engine, "motion", 9)
         self._at_rest = function(engine, "at_rest", len(AT_REST), first=(ctypes.c_int64,))

@@ -42,11 +42,8 @@ def faults(environment: Mapping[str, str]) -> Iterator[str]:
     if cpu := environment.get(EXFIT):
         from exfit.engine.kernel import target
 
-        yield from (
-            f"machine code is made for {target(long_vectors).cpu}, not for {cpu}"
-            for long_vectors in (False, True)
-            if target(long_vectors) != (cpu, "")
-        )
+        if target() != (cpu, ""):
+            yield f"machine code is made for {target().cpu}, not for {cpu}"
 
 
 def openblas_cores() -> set[str]:
