@@ -1,6 +1,6 @@
 """How a fit came about: the response after each of its iterations."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ from exfit.fitting.residuals import UNREACHABLE, Residuals
 from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.results.comparisons import Comparison, IterationResponses, judged_of
 from exfit.results.model import Iteration
-from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -76,14 +75,8 @@ def with_iteration_responses(
         return comparison
     signal = comparison.judged_by
     lines = [history[k] for k in chosen(len(history))]
-    responses = list(
-        in_threads(lambda line: iteration_response(setup, residuals, signal, line.values), lines)
-    )
-    numbered = [
-        (line.number, response)
-        for line, response in zip(lines, responses, strict=True)
-        if response is not None
-    ]
+    responses = iteration_responses(setup, residuals, signal, [line.values for line in lines])
+    numbered = [(lines[k].number, response) for k, response in responses]
     if not numbered:
         return comparison
     responses_kept = IterationResponses(
@@ -96,18 +89,27 @@ def with_iteration_responses(
     return replace(comparison, iteration_responses=responses_kept)
 
 
-def iteration_response(
-    setup: ExperimentSetup, residuals: Residuals, signal: str, values: Values
-) -> Array | None:
-    """Return the response (M,) to the values of an iteration, None where there is none."""
+def iteration_responses(
+    setup: ExperimentSetup, residuals: Residuals, signal: str, iterations: Sequence[Values]
+) -> Iterator[tuple[int, Array]]:
+    """Yield the place of each iteration that has a finite response to its values, and it (M,)."""
     place = setup.experiment.signals.index(signal)
     channel = setup.channels[place]
+    complete = {k: completed(residuals, values) for k, values in enumerate(iterations)}
+    sets = {k: values for k, values in complete.items() if values is not None}
+    samples, _ = setup.experiment.samples_of_many([*sets.values()])
+    for k, own in zip(sets, samples, strict=True):
+        response = compared(channel, channel.as_recorded(own[:, place]))
+        if np.isfinite(response[channel.kept]).all():
+            yield k, response
+
+
+def completed(residuals: Residuals, values: Values) -> Values | None:
+    """Return every value by name, given those of an iteration; None where a tie has none."""
     try:
-        samples, _ = setup.experiment.samples(residuals.completed(values))
+        return residuals.completed(values)
     except UNREACHABLE:
         return None
-    response = compared(channel, channel.as_recorded(samples[:, place]))
-    return response if np.isfinite(response[channel.kept]).all() else None
 
 
 def skipped_response_notes(comparisons: Sequence[Comparison]) -> list[str]:

@@ -208,9 +208,16 @@ class Experiment:
 
         Of a set without a start at rest they are no numbers; see ``Simulator.samples_of_many``.
         """
-        systems = [self.parameters(values) for values in sets]
-        samples, parts = self.simulator.samples_of_many(systems, self.signals, self._tests(sets))
+        samples, parts = self.samples_of_many(sets)
         return self._compared_many(samples, sets), parts
+
+    def samples_of_many(self, sets: Sequence[Values]) -> tuple[Array, Counts]:
+        """Return the signals (K, M, channels) of several sets of values, and their sub-steps.
+
+        Of a set without a start at rest they are no numbers; see ``Simulator.samples_of_many``.
+        """
+        systems = [self.parameters(values) for values in sets]
+        return self.simulator.samples_of_many(systems, self.signals, self._tests(sets))
 
     def compared(self, samples: Array, values: Values) -> Array:
         """Return the weighted errors of simulated signals (M, channels)."""
