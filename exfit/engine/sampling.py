@@ -104,25 +104,28 @@ class Courses:
     """
 
     def __init__(self, courses: Sequence[Course], parts: NDArray[np.int64]) -> None:
-        shared = len(courses) == 1
-        of_set: Any = np.zeros(len(parts), np.intp) if shared else slice(None)
         self.parts, self.sets = parts, len(parts)
-        lengths = [len(segment.u) for segment in courses[0].segments]
+        segments = courses[0].segments
+        lengths = [len(segment.u) for segment in segments]
         self.rows, self.longest, self.segments = sum(lengths), max(lengths), len(lengths)
         self.points = max(course.reading.weights.shape[1] for course in courses)
         readings = [course.reading.padded(self.points) for course in courses]
         self.samples = len(readings[0].weights)
         self.arrays = courses, readings  # what the addresses below point into
-        shapes = courses[0].segments[0].shapes
+        shapes = segments[0].shapes
         self.columns = 0 if shapes is None else shapes.shape[-1]
-        self.readings = np.array([_places(reading) for reading in readings])[of_set]
-        tables = np.array([_table(course.segments) for course in courses])[of_set]
-        parts = parts.reshape(self.sets, -1)
-        tables[:, :, SPAN.index("parts")] = parts
-        steps = [[segment.step for segment in course.segments] for course in courses]
-        h = np.array(steps)[of_set] / parts
-        tables[:, :, SPAN.index("h")] = h.view(np.int64)
-        self.spans = np.ascontiguousarray(tables)
+        self.readings = _of_each([_places(reading) for reading in readings], self.sets)
+        self.spans = _of_each([_table(course.segments) for course in courses], self.sets)
+        self.spans[:, :, SPAN.index("parts")] = parts.reshape(self.sets, -1)
+        steps = np.array([segment.step for segment in segments])
+        h = steps / self.spans[:, :, SPAN.index("parts")]
+        self.spans[:, :, SPAN.index("h")] = h.view(np.int64)
+
+
+def _of_each(tables: Sequence[Any], sets: int) -> Table:
+    """Return a table of each set, where there is one for all as well."""
+    table = np.array(tables, dtype=np.int64)
+    return table if len(tables) == sets else np.repeat(table, sets, axis=0)
 
 
 def _places(reading: SampleRows) -> tuple[int, int, int]:
@@ -203,15 +206,18 @@ class Sampler:
         """Return where a job works, and the buffer that holds it."""
         setpoints, states, outputs, sets, directions, moving = self.sizes
         wide = sets * directions
-        lengths = [
+        lengths = (
             *(setpoints * sets, states * sets, courses.rows * outputs * sets),
             *(setpoints * wide, states * wide, courses.rows * outputs * wide),
             courses.longest * moving * directions,
-        ]
-        ends = np.cumsum([-(-length // CACHE_LINE) * CACHE_LINE for length in lengths])
-        scratch = _scratch_of(int(ends[-1]) + CACHE_LINE)
+        )
+        offsets, end = [], 0
+        for length in lengths:
+            offsets.append(end)
+            end += -(-length // CACHE_LINE) * CACHE_LINE
+        scratch = _scratch_of(end + CACHE_LINE)
         begin = -(-address(scratch) // (8 * CACHE_LINE)) * (8 * CACHE_LINE)
-        return begin + 8 * np.concatenate([[0], ends[:-1]]), scratch
+        return np.array([begin + 8 * offset for offset in offsets]), scratch
 
 
 def _places_in(array: NDArray[Any], count: int) -> Table:

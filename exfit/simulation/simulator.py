@@ -351,17 +351,22 @@ class Simulator:
 
 
 def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    """Yield which sets run together, and in how many lanes: sets with equal sub-steps in many."""
-    for count in distinct(parts[parts != NO_SUBSTEPS]):
-        group = np.flatnonzero(parts == count)
-        rest = len(group) % lanes
-        side_by_side = len(group) - rest if rest < WORTH_A_BLOCK else len(group)
-        if lanes > 1 and side_by_side:
-            yield lanes, group[:side_by_side]
-        else:
-            side_by_side = 0
-        if side_by_side < len(group):
-            yield 1, group[side_by_side:]
+    """Yield how many lanes which sets run in: blocks with equal sub-steps in many, others in one."""
+    alone = np.flatnonzero(parts != NO_SUBSTEPS)
+    if lanes > 1 and len(alone) >= WORTH_A_BLOCK:
+        order = alone[np.argsort(parts[alone], kind="stable")]
+        equal = np.split(order, np.flatnonzero(np.diff(parts[order])) + 1)
+        filling = [len(group) - len(group) % lanes for group in equal]
+        ends = [
+            end if len(group) - end < WORTH_A_BLOCK else len(group)
+            for group, end in zip(equal, filling, strict=True)
+        ]
+        together = [group[:end] for group, end in zip(equal, ends, strict=True) if end]
+        if together:
+            yield lanes, np.concatenate(together)
+        alone = np.concatenate([group[end:] for group, end in zip(equal, ends, strict=True)])
+    if len(alone):
+        yield 1, alone
 
 
 def _among_all(results: Array, parts: Counts) -> Array:
