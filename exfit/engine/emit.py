@@ -80,6 +80,10 @@ def _module(parts: Sequence[TracePart], functions: Mapping[str, Writer], around:
         for shape in shapes
         for name in INTRINSICS
     ]
+    declarations += [
+        f"declare {t} @llvm.fmuladd.{suffix}({t}, {t}, {t})\n"
+        for t, suffix in dict.fromkeys((shape.type, shape.suffix) for shape in (Shape(1), *shapes))
+    ]
     bodies = "".join(_function(name, body, parts) for name, body in functions.items())
     called = [
         text for shape in shapes for name, text in inlined(shape).items() if f"{name}(" in bodies

@@ -15,8 +15,15 @@ LOGIC = {"&": "and", "|": "or"}
 COMPARISON = {"<": "olt", "<=": "ole"}
 INTRINSICS = ("sqrt", "log")
 TRANSCENDENTAL = ("exp", "sin", "cos")
+SUMS = ("+", "-")
 COSTLY = ("/", *INTRINSICS, *TRANSCENDENTAL)
 UNLIKELY, WEIGHTS = ", !prof !0", '!0 = !{!"branch_weights", i32 1, i32 100}\n'
+
+
+def _goes_into(product: Node, total: Node) -> bool:
+    """Return whether a node is a product that is computed in one operation with a sum of it."""
+    alike = product.varies == total.varies and product.wide == total.wide
+    return product.op == "*" and alike
 
 
 @dataclass(frozen=True)
@@ -77,12 +84,17 @@ class Writer:
         return self.wide if node.wide else self.narrow
 
     def arithmetic(self, op: str, shape: Shape, a: str, b: str) -> str:
-        """Write a floating-point operation; products may contract into a following sum."""
-        return self.let(f"{op} nsz contract {shape.type} {a}, {b}")
+        """Write a floating-point operation."""
+        return self.let(f"{op} nsz {shape.type} {a}, {b}")
 
     def add_product(self, shape: Shape, x: str, a: str, b: str) -> str:
-        """Write x + a b."""
-        return self.arithmetic("fadd", shape, x, self.arithmetic("fmul", shape, a, b))
+        """Write x + a b, rounded once where the processor does that."""
+        factors = f"{shape.type} {a}, {shape.type} {b}, {shape.type} {x}"
+        return self.let(f"call nsz {shape.type} @llvm.fmuladd.{shape.suffix}({factors})")
+
+    def negative(self, shape: Shape, x: str) -> str:
+        """Write -x."""
+        return self.let(f"fneg nsz {shape.type} {x}")
 
     def spread(self, scalar: str, shape: Shape) -> str:
         """Write a scalar into every lane."""
@@ -220,6 +232,8 @@ class Writer:
             )
         if node.op == "clip":
             return self._clip(node, shape, values)
+        if node.op in SUMS and any(_goes_into(operand, node) for operand in node.operands):
+            return self._sum_with_product(node, shape, values)
         args = [self._operand(operand, shape, values) for operand in node.operands]
         if node.op in BINARY:
             return self.arithmetic(BINARY[node.op], shape, *args)
@@ -230,6 +244,21 @@ class Writer:
         if node.op in TRANSCENDENTAL:
             return self.let(f"call {shape.type} @{node.op}_{shape.suffix}({shape.type} {args[0]})")
         raise KeyError(f"{node.op} {node.args}")
+
+    def _sum_with_product(self, node: Node, shape: Shape, values: Values) -> str:
+        """Write a sum or difference and a product in it as one operation.
+
+        Which product, the graph alone decides: code for one set and for many rounds alike.
+        """
+        first, second = node.operands
+        product, other = (first, second) if _goes_into(first, node) else (second, first)
+        a, b = (self._operand(factor, shape, values) for factor in product.operands)
+        x = self._operand(other, shape, values)
+        if node.op == "-" and product is first:
+            x = self.negative(shape, x)
+        elif node.op == "-":
+            a = self.negative(shape, a)
+        return self.add_product(shape, x, a, b)
 
     def _truth(self, node: Node, shape: Shape, values: Values) -> str:
         if node.op in LOGIC:

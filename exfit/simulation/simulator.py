@@ -351,7 +351,7 @@ class Simulator:
 
 
 def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    """Yield how many lanes which sets run in: blocks with equal sub-steps in many, others in one."""
+    """Yield lanes and the sets that run in so many: blocks with equal sub-steps, then others."""
     alone = np.flatnonzero(parts != NO_SUBSTEPS)
     if lanes > 1 and len(alone) >= WORTH_A_BLOCK:
         order = alone[np.argsort(parts[alone], kind="stable")]
