@@ -1,6 +1,6 @@
 """From parameter values to a response: the start at rest, the sub-steps, the samples."""
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -16,6 +16,8 @@ from exfit.simulation.interpolation import Interpolation, WholeRun, joined
 from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel, time_constants
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
+    among_all,
+    groups,
     spectral_radii,
     substeps_at_rest,
     substeps_for,
@@ -30,7 +32,6 @@ Values = Mapping[str, float]
 
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
-WORTH_A_BLOCK = 3  # sets that take longer one by one than SIDE_BY_SIDE of them together
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,7 +304,7 @@ class Simulator:
         if change is not None:
             for k in np.flatnonzero(delays.any(axis=0)).tolist():
                 slopes[..., k] -= delays[:, k, None, None] * change
-        return _among_all(samples, parts), _among_all(slopes, parts), parts
+        return among_all(samples, parts), among_all(slopes, parts), parts
 
     def course(self, moves: Moves | None = None, changing: bool = False) -> Course:
         """Return what the machine code runs through, with the tangents of inputs that move.
@@ -348,35 +349,6 @@ class Simulator:
         """Return the parameters of sets as the machine code takes them, (K, np)."""
         names = self.system.parameters
         return np.array([[values[name] for name in names] for values in sets], dtype=np.float64)
-
-
-def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    """Yield lanes and the sets that run in so many: blocks with equal sub-steps, then others."""
-    alone = np.flatnonzero(parts != NO_SUBSTEPS)
-    if lanes > 1 and len(alone) >= WORTH_A_BLOCK:
-        order = alone[np.argsort(parts[alone], kind="stable")]
-        equal = np.split(order, np.flatnonzero(np.diff(parts[order])) + 1)
-        filling = [len(group) - len(group) % lanes for group in equal]
-        ends = [
-            end if len(group) - end < WORTH_A_BLOCK else len(group)
-            for group, end in zip(equal, filling, strict=True)
-        ]
-        together = [group[:end] for group, end in zip(equal, ends, strict=True) if end]
-        if together:
-            yield lanes, np.concatenate(together)
-        alone = np.concatenate([group[end:] for group, end in zip(equal, ends, strict=True)])
-    if len(alone):
-        yield 1, alone
-
-
-def _among_all(results: Array, parts: Counts) -> Array:
-    """Return the results of the sets that have sub-steps among all, no numbers for the others."""
-    reached = parts != NO_SUBSTEPS
-    if len(results) == len(parts):
-        return results
-    every = np.full((len(parts), *results.shape[1:]), np.nan)
-    every[reached] = results
-    return every
 
 
 def _in_blocks(

@@ -1,7 +1,7 @@
 """Into how many parts a step of a simulation is divided: a rule of the start at rest."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from exfit.simulation.limits import limits_passed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
 MOST_SUBSTEPS = 1000  # per step: beyond it the step or a time constant is a mistake
@@ -24,6 +25,7 @@ REST_TOLERANCE = 1e-6  # pu/s: below any real motion
 STATE_ROUNDING = 1e-13  # of a state, relative
 SQUARINGS = 5  # of a Jacobian, to bound its spectral radius
 UNDERFLOW = 1e-200  # a smaller norm of a power may have lost all digits
+WORTH_A_BLOCK = 3  # sets that take longer one by one than a block of them together
 NO_SUBSTEPS = 0  # sub-steps of a set of values that has no response
 
 
@@ -49,6 +51,35 @@ def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]
     parts = _parts(step, np.maximum(lag_rate[~sure], radius))
     least[~sure] = np.where(np.any(_moving(unsure, radius), axis=1), NO_SUBSTEPS, parts)
     return least
+
+
+def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Yield lanes and the sets that run in so many: blocks with equal sub-steps, then others."""
+    alone = np.flatnonzero(parts != NO_SUBSTEPS)
+    if lanes > 1 and len(alone) >= WORTH_A_BLOCK:
+        order = alone[np.argsort(parts[alone], kind="stable")]
+        equal = np.split(order, np.flatnonzero(np.diff(parts[order])) + 1)
+        filling = [len(group) - len(group) % lanes for group in equal]
+        ends = [
+            end if len(group) - end < WORTH_A_BLOCK else len(group)
+            for group, end in zip(equal, filling, strict=True)
+        ]
+        together = [group[:end] for group, end in zip(equal, ends, strict=True) if end]
+        if together:
+            yield lanes, np.concatenate(together)
+        alone = np.concatenate([group[end:] for group, end in zip(equal, ends, strict=True)])
+    if len(alone):
+        yield 1, alone
+
+
+def among_all(results: Array, parts: Counts) -> Array:
+    """Return the results of the sets that have sub-steps among all, no numbers for the others."""
+    reached = parts != NO_SUBSTEPS
+    if len(results) == len(parts):
+        return results
+    every = np.full((len(parts), *results.shape[1:]), np.nan)
+    every[reached] = results
+    return every
 
 
 def why_unreachable(system: System, step: float, values: Values, p: Array) -> SimulationError:
