@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 PERCENT = 1e-2
 OTHER_MINIMA = COLORS[4]
 SUBDIVIDED = 8  # parts of a profile between two points
-COLOUR_MAP, SHADES = "RdBu_r", 256  # of correlations
+COLOUR_MAP, SHADES = "RdBu_r", 40  # of correlations
 BAR = 0.05  # width of the colour bar, of that of the map
 
 
