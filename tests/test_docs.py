@@ -319,11 +319,12 @@ def test_the_notebook_runs(monkeypatch):
     assert low < 200.0 < high
 
 
-def test_the_python_of_the_page_gives_the_values_that_it_says(monkeypatch):
+@pytest.mark.parametrize("page", ["python_api.md", "estimator.md"])
+def test_the_python_of_the_page_gives_the_values_that_it_says(page, monkeypatch):
     monkeypatch.chdir(ROOT)
     names: dict[str, object] = {}
-    exec(block("python_api.md", "python"), names)
-    for expression, value in re.findall(r"^(\S+) +# ([\d.]+)$", block("python_api.md", "python")):
+    exec(block(page, "python"), names)
+    for expression, value in re.findall(r"^(\S+) +# ([\d.]+)$", block(page, "python")):
         assert eval(expression, names) == pytest.approx(float(value), rel=1e-4)
 
 
