@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from fit import ByHand
+from estimators import ByHand
 from oracle import system_of, typical_values, vector
 
 from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
