@@ -38,7 +38,7 @@ def legs_of(residuals: Residuals, own: Descent) -> Legs:
     """
     coarse = coarse_form(residuals)
     linear = linear_form(coarse)
-    direct = (_leg(coarse, own, "dgn", COARSE_ITERATIONS), own)
+    direct = (_leg(coarse, own, "lm-then-dgn", COARSE_ITERATIONS), own)
     if isinstance(linear, str):
         return Legs(direct, direct, linear)
     return Legs(direct, (_leg(linear, own, "lm", LINEAR_ITERATIONS), *direct))
