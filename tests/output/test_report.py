@@ -160,7 +160,11 @@ def test_every_fitted_parameter_is_reported_with_its_interval_or_the_reason_why_
         if one["interval"] is None:
             assert row[3] == one["why"].replace("`", "")
         else:
-            assert row[3] == " … ".join(f"{limit:.5g}" for limit in one["interval"])
+            low, high = (None if x is None else f"{x:.5g}" for x in one["interval"])
+            limits = f"below {high}" if low is None else f"above {low}"
+            limits = f"{low} … {high}" if low and high else limits
+            method = "" if one["interval_method"] == "linear" else one["interval_method"]
+            assert row[3] == " ".join(filter(None, [limits, method, one["why"]]))
         assert row[5] == f"{one['min']:.5g} … {one['max']:.5g}"
 
 
