@@ -109,10 +109,10 @@ def least_squares(
 ) -> Result:
     """Minimise f(x) = 1/2 sum(fun(x)^2) within bounds, from x0 (N,).
 
-    fun(x, *args, **kwargs) gives the residuals (M,), jac of the same arguments their derivatives
-    (M, N); "2-point" and "3-point" take differences, inside the bounds, and count them in nfev. A
-    trial that is not finite, or whose fun raises ArithmeticError, is rejected. fun is never called
-    outside the bounds.
+    ``fun(x, *args, **kwargs)`` gives the residuals (M,), jac of the same arguments their
+    derivatives (M, N); "2-point" and "3-point" take differences, inside the bounds, and count them
+    in nfev. A trial that is not finite, or whose fun raises ArithmeticError, is rejected. fun is
+    never called outside the bounds.
 
     ``method`` is a name of `exfit.util.strategies.STRATEGIES`, where each is explained.
 
