@@ -168,7 +168,7 @@ def fit(
         seconds=clock.perf_counter() - began,
         notes=(
             *found.notes,
-            *minima_notes(residuals, found, minima),
+            *minima_notes(residuals, found, minima, analysis.uncertainty),
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
         ),
         validation=analysis.validation,

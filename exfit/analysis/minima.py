@@ -11,11 +11,13 @@ from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.search import LIKELIHOOD_RATIO as REFUTED
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.model import Minima, Minimum
+from exfit.results.search_summary import multiple
 
 Values = Mapping[str, float]
 
 TINY = float(np.finfo(float).tiny)
 REMARKABLE = 0.1  # difference between values of a parameter, as a share, that is worth a word
+WITHIN = 2.0  # standard errors: an interval says it already
 MOST_VALUES = 6  # of a minimum, in a sentence
 
 
@@ -61,9 +63,15 @@ def own_values(residuals: Residuals, x: NDArray[np.float64]) -> dict[str, float]
 
 
 def minima_notes(
-    residuals: Residuals, search: SearchResult, minima: Minima | None
+    residuals: Residuals,
+    search: SearchResult,
+    minima: Minima | None,
+    uncertainty: UncertaintyAnalysis | None,
 ) -> Iterator[str]:
-    """Yield what must be known of the other minima beside the result of a search."""
+    """Yield what must be known of the other minima beside the result of a search.
+
+    Those within the intervals of the ``uncertainty`` are no news.
+    """
     if search.minima is None:
         return
     if search.minima.interrupted:
@@ -80,7 +88,9 @@ def minima_notes(
             f"cost: {own.message}"
         )
     if minima is not None:
-        yield from _of_others(residuals, search, search.minima.minima, minima.minima)
+        errors = {} if uncertainty is None else uncertainty.confidence.parameters
+        std_errors = {name: each.std_error or 0.0 for name, each in errors.items()}
+        yield from _of_others(residuals, search, search.minima.minima, minima.minima, std_errors)
 
 
 def _of_others(
@@ -88,12 +98,17 @@ def _of_others(
     search: SearchResult,
     ends: Sequence[LocalMinimum],
     minima: Sequence[Minimum],
+    std_errors: Values,
 ) -> Iterator[str]:
     """Yield where the start of the case led, if elsewhere, and what the records do not refute."""
     here = own_values(residuals, search.best.x)
     for k, (end, minimum) in enumerate(zip(ends, minima, strict=True)):
         from_start = search.goes_on and search.own.success and is_same(end.result, search.own)
-        if k != search.place and (from_start or not minimum.refuted):
+        apart = any(
+            abs(value - here[name]) > WITHIN * std_errors.get(name, 0.0)
+            for name, value in minimum.values.items()
+        )
+        if k != search.place and (from_start or (apart and not minimum.refuted)):
             subject = (
                 "the descent from the start of the case ended at" if from_start else "there is"
             )
@@ -114,7 +129,7 @@ def minimum_in_words(minimum: Minimum, cost: float, here: Values) -> str:
 
 def times(cost: float, other: float) -> str:
     """Return a cost in words, as a multiple of another one."""
-    return f"{cost / other:.4g} times" if other > 0.0 else f"{cost:.3g} pu² above"
+    return multiple(cost / other) if other > 0.0 else f"{cost:.3g} pu² above"
 
 
 def differences(there: Values, here: Values) -> str:

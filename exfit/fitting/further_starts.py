@@ -12,11 +12,13 @@ from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import SideBySide
 from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.util.strategies import DEFAULT_STRATEGY
 
 Array = NDArray[np.float64]
 Way = Literal["strategy", "linear", "direct"]
 
 DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
+MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
 TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
 
 
@@ -51,7 +53,8 @@ def further_starts(
     own = Descent(
         functions=SideBySide(problem.compressed.counted_by(counter)),
         bounds=residuals.bounds,
-        method="dgn",
+        method=DEFAULT_STRATEGY,
+        max_iterations=MOST_ITERATIONS,
         ftol=TO_DISTINGUISH,
         x_scale=UNIT,
     )

@@ -6,6 +6,8 @@ import numpy as np
 
 from exfit.results.model import Minima, Minimum
 
+NEAR = 2.0  # times a cost: below it another one is given to a thousandth
+
 
 def search_summary(minima: Minima, cost: float) -> str:
     """Return from where a search went, and where its descents led; ``cost`` is of the result."""
@@ -47,4 +49,10 @@ def _refuted(minima: Sequence[Minimum], cost: float) -> Iterator[str]:
 
 def _height(minimum: Minimum, cost: float) -> str:
     """Return how high a minimum lies."""
-    return f"{minimum.cost / cost:.4g} times as high" if cost > 0.0 else f"at {minimum.cost:.3g}"
+    return f"{multiple(minimum.cost / cost)} as high" if cost > 0.0 else f"at {minimum.cost:.3g}"
+
+
+def multiple(ratio: float) -> str:
+    """Return how many times as high a cost is, in as many digits as tell it from another one."""
+    digits = max(0, 3 - len(f"{ratio:.0f}")) if ratio >= NEAR else 3
+    return f"{ratio:.{digits}f} times"
