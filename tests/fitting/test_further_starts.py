@@ -85,7 +85,7 @@ def test_a_search_leaves_a_false_minimum_by_a_path_that_is_whole(both):
 def test_what_the_own_start_led_to_is_noted_with_what_the_record_says_of_it(both):
     local, whole = both
     (note,) = [text for text in whole.notes if "start of the case ended" in text]
-    assert f"{local.cost / whole.cost:.4g} times this cost, which the record refutes" in note
+    assert f"{local.cost / whole.cost:.2f} times this cost, which the record refutes" in note
     assert f"KF {local.values['KF']:.4g} (here {whole.values['KF']:.4g})" in note
 
 
