@@ -1,7 +1,7 @@
 """The search for the parameters of a case."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import isfinite
 from typing import Any
@@ -176,6 +176,9 @@ class CaseSearches:
             watch=self.progress,
             earlier=earlier,
         )
+        own = [end.history[0].cost for end in earlier]
+        start_costs = np.append(own, self.problem.compressed.costs([*starts.points]))
+        minima = replace(minima, start_costs=start_costs)
         if self.counter is not None:
             self.counter.add(counter.simulations)
         return FurtherDescents(minima, starts.ways, starts.why_direct)

@@ -145,8 +145,8 @@ class Minima:
 
     @property
     def failed(self) -> int:
-        """How many starts have no response."""
-        return int(np.count_nonzero(np.isinf(self.start_costs)))
+        """How many starts have no response, and led nowhere."""
+        return int(np.count_nonzero(np.isinf(self.start_costs) & np.isnan(self.end_costs)))
 
 
 @dataclass(frozen=True, eq=False)
