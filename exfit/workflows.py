@@ -42,7 +42,7 @@ from exfit.case import load
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
-from exfit.fitting.search import checked_search, checked_strategy, continued_from, fitted
+from exfit.fitting.search import checked_strategy, continued_from, fitted, search_options
 from exfit.fitting.search import search as search_case
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.simulation_counter import SimulationCounter
@@ -90,6 +90,8 @@ def fit(
         live: called before ``progress`` with the response of that iteration.
         values: in place of those of the case, by name, or those of an earlier fit: of a free
             parameter its start. The result says which.
+        search: "global", or "local" for the descent from the start of the case alone, with the
+            intervals of linear theory; None: the case's own.
 
     Raises ExfitError for input that cannot be used.
 
@@ -100,9 +102,7 @@ def fit(
     began = clock.perf_counter()
     case = with_values(loaded(case, values), values)
     method = checked_strategy(strategy or case.estimate.strategy)
-    options = case.estimate
-    if search is not None:
-        options = options.model_copy(update={"search": checked_search(search)})
+    options = search_options(case, search)
     start = case.values()
     setups, problem = fitted(case)
     residuals, counter = problem.residuals, SimulationCounter()

@@ -73,6 +73,16 @@ def checked_search(search: str) -> str:
     return search
 
 
+def search_options(case: Case, search: str | None) -> Estimate:
+    """Return the settings of a case, with another kind of search where one is given.
+
+    Raises CaseError where there is no search of this name.
+    """
+    if search is None:
+        return case.estimate
+    return case.estimate.model_copy(update={"search": checked_search(search)})
+
+
 def search(
     case: Case,
     problem: FitProblem,
