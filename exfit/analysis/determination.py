@@ -71,7 +71,10 @@ def determination(
     if uncertainty is None or search.interrupted or not (profiled and own_end):
         return Determination(uncertainty)
     others = other_minima(search)
-    solution = FoundMinimum(best.x, best.cost)
+    # strategy auto may prefer a minimum that is not the lowest: their hull is about both
+    solution, *others = sorted(
+        [FoundMinimum(best.x, best.cost), *others], key=lambda minimum: minimum.cost
+    )
     return with_profile_intervals(
         problem.compressed, solution, others, uncertainty, of_record, progress
     )
