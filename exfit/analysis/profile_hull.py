@@ -51,11 +51,16 @@ def profiles_about(
 ) -> ProfilesAboutMinima:
     """Return the profiles about a solution, and about others as far as these are not refuted.
 
-    An interruption keeps what is done by then.
+    What lies within the interval of a parameter already needs no further profile. An interruption
+    keeps what is done by then.
     """
     profiles: dict[int, list[estimate.CostProfile]] = {}
     for minimum in (solution, *others):
-        within = {k: rise for k, rise in rises.items() if allowed(solution, minimum, rise)}
+        within = {
+            k: rise
+            for k, rise in rises.items()
+            if allowed(solution, minimum, rise) and beyond(minimum.x[k], profiles.get(k, ()))
+        }
         if not within:
             continue
         about_minimum = estimate.profiles(
@@ -82,6 +87,12 @@ def profiles_about(
 def allowed(solution: FoundMinimum, other: FoundMinimum, rise: float) -> bool:
     """Return whether another minimum lies below the rise at which a parameter's interval ends."""
     return other.cost - solution.cost < rise
+
+
+def beyond(value: float, profiles: Iterable[estimate.CostProfile]) -> bool:
+    """Return whether a value lies in the interval of no profile so far."""
+    low, high = limits_of(profiles)
+    return not low <= value <= high
 
 
 def beside(
