@@ -218,7 +218,7 @@ def test_the_command_starts_without_the_heavy_packages():
 
 
 def test_a_fit_without_figures_imports_only_what_it_uses(tmp_path):
-    case = ROOT.parent / "configs" / "ac1a_typical.yaml"
+    case = Path(__file__).parents[1] / "configs" / "ac1a_typical.yaml"
     arguments = ["fit", str(case), "-o", str(tmp_path), "--quiet", "--no-plots", "--search=local"]
     code = (
         "import sys, atexit; from exfit.cli import main; "

@@ -1,6 +1,7 @@
 """Gauss-Newton, in full steps (gn) or damped by capping and shortening them (dgn)."""
 
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Self
 
 import numpy as np
@@ -58,7 +59,8 @@ class LineSearch:
     def advance(self, problem: Problem, linear: LinearModel) -> Steps[tuple[Move, Self]]:
         """Try lambda = 1, then less."""
         step = solve(linear, reach=self.reach) if self.capped else linear.full
-        move = yield from shorten(problem, linear, step, armijo=self.armijo, cut=self.cut)
+        reach = self.reach if self.capped else inf
+        move = yield from shorten(problem, linear, step, reach, armijo=self.armijo, cut=self.cut)
         if move.point is None:
             return move, self
         farthest = float(np.max(abs(move.point.x - linear.point.x) / linear.box.unit))

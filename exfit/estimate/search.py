@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import Protocol, Self
 
 import numpy as np
@@ -60,8 +60,11 @@ def worth_trying(linear: LinearModel, promise: float, rejections: int) -> bool:
     return promise > EPS * cost
 
 
-def held_back(linear: LinearModel, step: DampedStep) -> bool:
-    """Return whether a step is another than the full Gauss-Newton step."""
+def held_back(linear: LinearModel, step: DampedStep, reach: float) -> bool:
+    """Return whether a step, the best within reach, is another than the full Gauss-Newton step."""
+    farthest = np.max(abs(step.target - linear.point.x) / linear.box.unit)
+    if linear.rank == len(linear.scale) and farthest < reach * (1.0 - SAME):
+        return False
     apart = abs(step.target - linear.full.target)
     return bool(np.any(apart > SAME * linear.box.unit))
 
@@ -86,16 +89,17 @@ def shorten(
     problem: Problem,
     linear: LinearModel,
     step: DampedStep,
+    reach: float = inf,
     trials: int = MOST_TRIALS,
     armijo: float = ARMIJO,
     cut: Cut = to_parabola,
 ) -> Steps[Move]:
-    """Shorten the step until Armijo's rule holds or its promise can no longer be seen.
+    """Shorten the best step within reach until Armijo's rule holds or its promise is rounding.
 
     Source: Armijo 1966.
     """
     cost, length, reductions = linear.point.cost, 1.0, 0
-    capped = held_back(linear, step)
+    capped = held_back(linear, step, reach)
     while reductions < trials and worth_trying(linear, -length * step.slope, reductions):
         trial = yield from problem.evaluate(step.at(length))
         if trial.cost < cost and trial.cost <= cost + armijo * length * step.slope:

@@ -60,12 +60,15 @@ class Rules:
         """Return why there is nothing to gain from a point, if so."""
         if not linear.finite:
             return Stop.JACOBIAN
-        full, cost = linear.full, linear.point.cost
+        cost = linear.point.cost
+        nothing = cost <= self.gtol**2 * self.first_cost
         flat = linear.gradient_norm <= self.gtol * self.first_gradient + TINY
-        if flat and (full.promise <= self.ftol * cost or cost <= self.gtol**2 * self.first_cost):
+        if flat and (nothing or linear.full.promise <= self.ftol * cost):
             return Stop.GRADIENT
-        if self.tiny(full.target, full.origin, linear.box):
-            return Stop.STEP
+        if not linear.surely_longer(self.xtol):
+            full = linear.full
+            if self.tiny(full.target, full.origin, linear.box):
+                return Stop.STEP
         return self.good_enough(linear)
 
     def good_enough(self, linear: LinearModel) -> Stop | None:
@@ -84,7 +87,8 @@ class Rules:
             return Stop.JACOBIAN
         if move.point is None:
             return self.stuck(before, move.stop)
-        if max(before.full.promise, cost - linear.point.cost) <= self.ftol * cost:
+        gained = cost - linear.point.cost > self.ftol * cost
+        if not gained and before.full.promise <= self.ftol * cost:
             return Stop.FLOOR
         if move.stop is None and self.tiny(linear.point.x, before.point.x, linear.box):
             return self.at_rest(linear) or self.stuck(linear, Stop.STALLED)

@@ -65,7 +65,7 @@ class TrustRegion:
         if self.timid < self.patience:
             return (yield from self.within(problem, linear))
         move = yield from shorten(
-            problem, linear, solve(linear, reach=1.0), BOLD_TRIALS, self.armijo
+            problem, linear, solve(linear, reach=1.0), 1.0, BOLD_TRIALS, self.armijo
         )
         if move.point is None:
             wary = replace(self, timid=0, patience=2 * self.patience)
@@ -110,8 +110,11 @@ class TrustRegion:
 
     def after(self, linear: LinearModel, nu: float, decrease: float) -> Self:
         """Return the search after an accepted trial: how many were timid, or damped, in a row."""
-        timid = self.timid + 1 if decrease < TIMID * linear.full.promise else 0
-        return replace(self, timid=timid, damped=self.damped + 1 if nu > 0.0 else 0)
+        bold = decrease >= TIMID * linear.highest_promise
+        timid = not bold and decrease < TIMID * linear.full.promise
+        return replace(
+            self, timid=self.timid + 1 if timid else 0, damped=self.damped + 1 if nu > 0.0 else 0
+        )
 
     def resized(self, linear: LinearModel, step: DampedStep, nu: float, decrease: float) -> Self:
         """Return the search with the radius that the trial suggests."""

@@ -253,7 +253,7 @@ def fitted_ac8b(results):
 def of_value(value):
     """Return an entry of a fitted parameter."""
     others = {"at_bound": None, "of_record": False, "std_error": None, "interval": None}
-    texts = {"why": None, "unit": "", "meaning": "", "physical": True}
+    texts = {"interval_method": None, "why": None, "unit": "", "meaning": "", "physical": True}
     return {"value": value, "start": 1.0, "min": 0.0, "max": 1e9, **others, **texts}
 
 
