@@ -31,7 +31,7 @@ from exfit.estimate.requests import (
 
 Done = TypeVar("Done")
 
-ABREAST = 32  # searches of a thread: two blocks of sets side by side
+ABREAST = 128  # searches of a thread, so that most blocks of sets side by side are full
 LISTENING = 0.1  # s: on Windows an interruption reaches only what returns from waiting
 
 

@@ -1,6 +1,6 @@
 """Many starts, each refined to a minimum, and the distinct minima they lead to."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, nan
 
@@ -61,7 +61,7 @@ def multistart(
     legs: Sequence[Descent],
     *,
     first_legs: Sequence[int] | None = None,
-    counts: Sequence[int] | None = None,
+    merged: float | None = None,
     workers: int | None = None,
     watch: Watch = lambda _: None,
     earlier: Sequence[Result] = (),
@@ -75,7 +75,8 @@ def multistart(
     functions of the legs must bear being called from several threads at a time.
 
     first_legs  which leg each start begins with (by default with the first one)
-    counts  of how many starts each of these is the end already (by default of itself alone)
+    merged  standard errors by which the ends of the first leg may differ whose starts go on as one,
+            from the best of them; by default each goes on by itself
     watch   gets every Progress; KeyboardInterrupt, raised there or anywhere, ends the search
             with what is done
     earlier results of the last leg from other starts: their starts and ends count as the first
@@ -88,24 +89,49 @@ def multistart(
     Raises ValueError for bounds that cross or starts outside them.
     """
     points = np.array(starts, dtype=np.float64, ndmin=2)
-    ends = dict[int, RefinedStart]()
+    firsts = [0] * len(points) if first_legs is None else first_legs
+    joining = [merged is not None and first == 0 for first in firsts]
+    near, ends = dict[int, RefinedStart](), dict[int, RefinedStart]()
 
     def receive(place: int, end: RefinedStart) -> None:
-        ends[place] = end
-        if end.cut_short is not None:
-            raise KeyboardInterrupt
+        if joining[place]:
+            near[place] = end
+            refuse_interrupted(end)
+        else:
+            take([place], end)
+
+    def take(places: Sequence[int], end: RefinedStart) -> None:
+        ends.update(dict.fromkeys(places, end))
+        refuse_interrupted(end)
         lowest = min((end.cost for end in ends.values() if end.end is not None), default=inf)
         watch(Progress("refining", len(ends), len(points), lowest))
 
-    firsts = [0] * len(points) if first_legs is None else first_legs
-    ways = [refined(x, legs[first:]) for x, first in zip(points, firsts, strict=True)]
-    whole = finish_all(ways, workers, receive)
+    ways = zip(points, firsts, joining, strict=True)
+    begun = [refined(x, legs[:1] if joins else legs[first:]) for x, first, joins in ways]
+    whole = finish_all(begun, workers, receive)
+    if whole and near:
+        groups = together(near, merged or 0.0)
+        going_on = [refined(near[group[0]].at(points[group[0]]), legs[1:]) for group in groups]
+        whole = finish_all(going_on, workers, lambda k, end: take(groups[k], end))
     every = [
         *(RefinedStart(result.history[0].cost, result) for result in earlier),
         *(ends.get(k, RefinedStart(nan)) for k in range(len(points))),
     ]
-    weights = [*([1] * len(earlier)), *([1] * len(points) if counts is None else counts)]
-    return summary(every, weights, legs[-1], interrupted=not whole)
+    return summary(every, legs[-1], interrupted=not whole)
+
+
+def refuse_interrupted(end: "RefinedStart") -> None:
+    """Raise KeyboardInterrupt where an interruption ended a refinement."""
+    if end.cut_short is not None:
+        raise KeyboardInterrupt
+
+
+def together(ends: Mapping[int, "RefinedStart"], errors: float) -> list[list[int]]:
+    """Return which starts go on as one: those whose ends lie within so many standard errors."""
+    begun = [(k, start.end) for k, start in sorted(ends.items()) if start.end is not None]
+    groups = distinct([outcome_of(end, 0.0, errors) for _, end in begun])
+    alone = [[k] for k, start in sorted(ends.items()) if start.end is None]
+    return [*([begun[k][0] for k in group] for group in groups), *alone]
 
 
 @dataclass(frozen=True)
@@ -118,6 +144,10 @@ class RefinedStart:
     first_cost: float
     end: Result | None = None
     cut_short: Result | None = None
+
+    def at(self, start: Array) -> Array:
+        """Return the point (N,) where it ended, that of the start where it could not begin."""
+        return start if self.end is None else self.end.x
 
     @property
     def cost(self) -> float:
@@ -147,13 +177,11 @@ def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
     return RefinedStart(first_cost, result)
 
 
-def summary(
-    starts: Sequence[RefinedStart], weights: Sequence[int], leg: Descent, interrupted: bool
-) -> MultistartResult:
-    """Return what some starts came to, each of which counts by its weight."""
-    ends = [(s.end, s.first_cost, w) for s, w in zip(starts, weights, strict=True) if s.end]
-    nothing = leg.gtol**2 * float(median([first_cost for _, first_cost, _ in ends] or [0.0]))
-    outcomes = [end_of(end, nothing, weight) for end, _, weight in ends]
+def summary(starts: Sequence[RefinedStart], leg: Descent, interrupted: bool) -> MultistartResult:
+    """Return what some starts came to."""
+    ends = [(start.end, start.first_cost) for start in starts if start.end is not None]
+    nothing = leg.gtol**2 * float(median([first_cost for _, first_cost in ends] or [0.0]))
+    outcomes = [outcome_of(end, nothing) for end, _ in ends]
     minima = minima_of(outcomes, leg.functions)
     cut_short = [start.cut_short for start in starts if start.cut_short is not None]
     candidates = [*(local.result for local in minima[:1]), *cut_short]
@@ -161,8 +189,8 @@ def summary(
     return MultistartResult(
         minima=minima,
         best=min(candidates, key=lambda result: result.cost, default=None),
-        start_costs=np.repeat([start.first_cost for start in starts], weights),
-        end_costs=np.repeat([start.cost for start in starts], weights),
+        start_costs=np.array([start.first_cost for start in starts]),
+        end_costs=np.array([start.cost for start in starts]),
         failed=failed,
         unrefined=len(starts) - failed - len(outcomes),
         interrupted=interrupted,
@@ -194,35 +222,34 @@ def spread(
 class StartOutcome:
     """Where a refinement ended, without residuals and J: thousands would not fit into the memory.
 
-    ``triangle`` (N, N) has the lengths of J; ``step`` is what half a standard error costs;
-    ``starts`` is how many led there.
+    ``triangle`` (N, N) has the lengths of J; ``step`` is what the standard errors cost by which
+    another end may differ.
     """
 
     result: Result
     triangle: Array
     step: float
-    starts: int
 
 
-def end_of(result: Result, nothing: float, starts: int) -> StartOutcome:
-    """Return the end that a refinement came to; ``nothing`` is what a perfect match may cost."""
+def outcome_of(result: Result, nothing: float, errors: float = INDISTINGUISHABLE) -> StartOutcome:
+    """Return where a refinement ended; ``nothing`` is what a perfect match may cost."""
     freedom = max(1, len(result.fun) - len(result.x))
-    step = INDISTINGUISHABLE**2 * result.cost / freedom + nothing
+    step = errors**2 * result.cost / freedom + nothing
     triangle = np.asarray(np.linalg.qr(result.jac, mode="r"), dtype=np.float64)
     small = replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x))))
-    return StartOutcome(small, triangle, step, starts)
+    return StartOutcome(small, triangle, step)
 
 
-def distinct(ends: Iterable[StartOutcome]) -> list[list[StartOutcome]]:
-    """Return the ends of each minimum, the best first."""
-    groups: list[list[StartOutcome]] = []
-    for end in sorted(ends, key=lambda end: end.result.cost):
+def distinct(ends: Sequence[StartOutcome]) -> list[list[int]]:
+    """Return which ends belong to each minimum, the best first."""
+    groups: list[list[int]] = []
+    for k in sorted(range(len(ends)), key=lambda k: ends[k].result.cost):
         for group in groups:
-            if same(group[0], end):
-                group.append(end)
+            if same(ends[group[0]], ends[k]):
+                group.append(k)
                 break
         else:
-            groups.append([end])
+            groups.append([k])
     return groups
 
 
@@ -233,14 +260,13 @@ def same(best: StartOutcome, other: StartOutcome) -> bool:
     return max(rise, 0.5 * float(way @ way)) <= best.step
 
 
-def minima_of(ends: Iterable[StartOutcome], functions: Functions) -> tuple[LocalMinimum, ...]:
+def minima_of(ends: Sequence[StartOutcome], functions: Functions) -> tuple[LocalMinimum, ...]:
     """Return the distinct minima that ends are, the lowest first."""
-    return tuple(minimum(group, functions) for group in distinct(ends))
+    return tuple(minimum(ends[group[0]].result, len(group), functions) for group in distinct(ends))
 
 
-def minimum(group: Sequence[StartOutcome], functions: Functions) -> LocalMinimum:
-    """Return the minimum that some ends are, with its residuals and Jacobian again."""
-    best = group[0].result
+def minimum(best: Result, starts: int, functions: Functions) -> LocalMinimum:
+    """Return the minimum with the best of some ends, with its residuals and Jacobian again."""
     (residuals,), (jacobian,) = functions.residuals([best.x]), functions.jacobians([best.x])
     result = replace(best, fun=residuals, jac=jacobian)
-    return LocalMinimum(best.x, best.cost, sum(end.starts for end in group), result)
+    return LocalMinimum(best.x, best.cost, starts, result)

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Way = Literal["strategy", "linear", "direct"]
 
 DIRECT = 3  # every third start goes without the linear phase, which misleads where limits are met
+MERGED = 3.0  # standard errors: linear phases that end so near lead to one minimum, 480 of 480 did
 MOST_ITERATIONS = 50  # of a phase of the last leg: what takes more creeps along a valley
 TO_DISTINGUISH = 1e-8  # of the cost: what a search may leave where minima are compared
 
@@ -34,6 +35,11 @@ class FurtherStarts:
     legs: tuple[Descent, ...]
     ways: tuple[Way, ...]
     why_direct: str
+
+    @property
+    def merged(self) -> float | None:
+        """Within how many standard errors the ends of linear phases go on as one."""
+        return None if self.why_direct else MERGED
 
     @property
     def first_legs(self) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.estimate import LocalMinimum, MultistartResult, Result, SolverIteration, Stop
-from exfit.estimate.starts import end_of, same
+from exfit.estimate.starts import outcome_of, same
 from exfit.fitting.descents import (
     Announce,
     Descents,
@@ -193,7 +193,7 @@ def own_end(descents: Descents, best: Result) -> Result | None:
 def is_same(best: Result, other: Result) -> bool:
     """Return whether an end of a descent is in the minimum that has this best one."""
     nothing = PERFECT * other.history[0].cost
-    lowest, higher = (end_of(end, nothing, 1) for end in (best, other))
+    lowest, higher = (outcome_of(end, nothing) for end in (best, other))
     return other.cost >= best.cost and same(lowest, higher)
 
 

@@ -183,6 +183,7 @@ class CaseSearches:
             starts.points,
             starts.legs,
             first_legs=starts.first_legs,
+            merged=starts.merged,
             watch=self.progress,
             earlier=earlier,
         )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.estimate.lockstep import finish, finish_all
+from exfit.estimate.lockstep import ABREAST, finish, finish_all
 from exfit.estimate.requests import (
     OneByOne,
     jacobian_at,
@@ -63,8 +63,8 @@ def test_a_search_that_ends_leaves_its_place_to_the_next():
             yield from residuals_at(counted, [np.ones(1)])
 
     counted = Counted(lambda x: x)
-    finish_all([asking(1) for _ in range(64)] + [asking(2)], 1, lambda place, end: None)
-    assert sizes == [32, 32, 1, 1]
+    finish_all([asking(1) for _ in range(2 * ABREAST)] + [asking(2)], 1, lambda place, end: None)
+    assert sizes == [ABREAST, ABREAST, 1, 1]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -83,10 +83,10 @@ def test_an_interruption_reaches_all_under_way_and_drops_the_others(workers):
         yield from residuals_at(LINE, [np.zeros(1)])
         raise KeyboardInterrupt
 
-    searches = [interrupting(), *(endless(place) for place in range(1, 200))]
+    searches = [interrupting(), *(endless(place) for place in range(1, 300))]
     assert not finish_all(searches, workers, ends.__setitem__)
     assert ends == dict.fromkeys(begun, "cut short")
-    assert 1 <= len(begun) < 199
+    assert 1 <= len(begun) < 299
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -31,7 +31,7 @@ HIMMELBLAU = (himmelblau, himmelblau_slopes, BOX)
 
 def search(fun, jac, bounds, count=COUNT, *, x0=None, seed=1, **more):
     """Search from starts over the bounds, with the tolerances that tell minima apart."""
-    running = {key: more.pop(key) for key in ("workers", "watch", "counts") if key in more}
+    running = {key: more.pop(key) for key in ("workers", "watch") if key in more}
     leg = Descent(functions=OneByOne(fun, jac), bounds=bounds, **{"ftol": 1e-8, **more})
     return multistart(spread(bounds, count, x0, seed), [leg], **running)
 
@@ -151,10 +151,27 @@ def test_a_leg_that_cannot_begin_is_left_out():
     assert found.end_costs.tolist() == plain.end_costs.tolist()
 
 
-def test_a_start_counts_as_often_as_it_stands_for():
-    found = search(*HIMMELBLAU, 4, counts=[1, 2, 3, 4])
-    assert sum(minimum.starts for minimum in found.minima) == 10
-    assert len(found.end_costs) == len(found.start_costs) == 10
+def test_starts_whose_first_leg_ends_alike_go_on_as_one():
+    """The ends of one minimum of the first leg are merged, those of two minima are not."""
+    counted = []
+
+    def fun(x):
+        counted.append(x)
+        return himmelblau(x)
+
+    hills = OneByOne(
+        lambda x: np.append(x**2 - 9.0, 1.0), lambda x: np.vstack([np.diag(2.0 * x), np.zeros(2)])
+    )
+    legs = [
+        Descent(functions=hills, bounds=BOX),
+        Descent(functions=OneByOne(fun, himmelblau_slopes), bounds=BOX),
+    ]
+    each, calls = multistart(spread(BOX, COUNT), legs, workers=1), len(counted)
+    merged = multistart(spread(BOX, COUNT), legs, merged=3.0, workers=1)
+    assert len(counted) - calls < 0.25 * calls
+    assert len(merged.minima) == len(each.minima) == 4
+    assert [local.starts for local in merged.minima] == [local.starts for local in each.minima]
+    assert np.sort(merged.end_costs) == pytest.approx(np.sort(each.end_costs), abs=1e-12)
 
 
 @pytest.mark.parametrize("workers", [1, 3])

@@ -34,7 +34,7 @@ else:
 
 MOST_ITERATIONS = 100  # of a phase, by default
 MOST_DIFFERENCE = 0.1  # a tenth of a parameter: beyond it no difference is a derivative
-FURTHER_STARTS = 12  # of these two thirds by way of the linear phase
+FURTHER_STARTS = 8  # of these two thirds by way of the linear phase
 MOST_STARTS = 1_000_000  # a day of simulations; their points alone fill 100 MB
 
 
