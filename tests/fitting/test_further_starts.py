@@ -97,7 +97,7 @@ def test_the_minima_of_a_search_are_counted_and_judged(both):
     assert lowest.values == {name: whole.values[name] for name in whole.parameters}
     assert (lowest.chi_square, lowest.refuted) == (0.0, False)
     assert all(minimum.refuted for minimum in others)
-    assert sum(minimum.starts for minimum in whole.minima.minima) == whole.minima.starts == 13
+    assert sum(minimum.starts for minimum in whole.minima.minima) == whole.minima.starts == 9
     assert whole.minima.ways[0] == "strategy"
     # twice the difference of the costs in variances of white residuals
     freedom = len(whole.comparison.time) - len(whole.parameters)
