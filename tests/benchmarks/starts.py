@@ -2,8 +2,8 @@
 
 Run it as ``python tests/benchmarks/starts.py [COUNT]``. Starts lie anywhere within a tenth and ten
 times the typical values; each is refined to convergence by way of the linear phase and the coarse
-grid, as further starts of a fit are. The fastest of some runs counts; one thread and two take
-turns.
+grid, and linear phases that end alike go on as one, as in the search of a fit. The fastest of some
+runs counts; one thread and two take turns.
 """
 
 import os
@@ -21,6 +21,7 @@ from exfit.case.load import load_case
 from exfit.estimate import Descent
 from exfit.estimate.starts import multistart, spread
 from exfit.fitting.forms.legs import legs_of
+from exfit.fitting.further_starts import MERGED
 from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import SideBySide
 from exfit.fitting.search import fitted
@@ -37,7 +38,7 @@ def legs():
     own = Descent(
         functions=SideBySide(problem.compressed),
         bounds=problem.residuals.bounds,
-        method="dgn",
+        method="lm-then-dgn",
         ftol=1e-8,
         x_scale=UNIT,
     )
@@ -47,7 +48,7 @@ def legs():
 def timed(points, of_case, workers):
     """Return what a search finds, the seconds and the processor's seconds that it takes."""
     begin, busy = time.perf_counter(), time.process_time()
-    found = multistart(points, of_case, workers=workers)
+    found = multistart(points, of_case, workers=workers, merged=MERGED)
     return found, time.perf_counter() - begin, time.process_time() - busy
 
 
@@ -56,7 +57,7 @@ def main():
     count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
     residuals, of_case = legs()
     points = spread(residuals.bounds, count)
-    multistart(points[:32], of_case)  # compiles
+    multistart(points[:32], of_case, merged=MERGED)  # compiles
     runs = [
         (workers, timed(points, of_case, workers)) for _ in range(REPEATS) for workers in WORKERS
     ]
