@@ -147,16 +147,20 @@ class Group(Generic[Done]):
         self.requests: dict[int, Request] = {}
 
     def advance(self, stop: Event) -> bool:
-        """Advance until all have ended; return whether they did so without interruption."""
-        try:
-            while self.begin():
-                for place, answer in answers(self.requests).items():
-                    self.send(place, answer)
-                if stop.is_set():
-                    raise KeyboardInterrupt
-        except KeyboardInterrupt:
-            self.interrupt()
-            return False
+        """Advance until all have ended; return whether they did so without interruption.
+
+        What overflows on the way is not finite, and rejected: NumPy need not warn.
+        """
+        with np.errstate(all="ignore"):
+            try:
+                while self.begin():
+                    for place, answer in answers(self.requests).items():
+                        self.send(place, answer)
+                    if stop.is_set():
+                        raise KeyboardInterrupt
+            except KeyboardInterrupt:
+                self.interrupt()
+                return False
         return True
 
     def begin(self) -> bool:

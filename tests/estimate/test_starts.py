@@ -315,7 +315,7 @@ def test_a_signal_ends_the_threads_at_once(place):
             # another thread may have counted on in between: the first to come sends it
             if once.acquire(blocking=False):
                 signal.raise_signal(signal.SIGINT)
-            released.wait(0.05)
+            released.wait(0.002)
         return himmelblau(x)
 
     found = search(fun, himmelblau_slopes, BOX, 500, workers=3)
