@@ -29,7 +29,7 @@ from exfit.fitting.search import fitted
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
 COUNT = 1000
 WORKERS = (1, 2)
-REPEATS = 3
+REPEATS = 2
 
 
 def legs():
