@@ -114,7 +114,7 @@ def multistart(
         going_on = [refined(near[group[0]].at(points[group[0]]), legs[1:]) for group in groups]
         whole = finish_all(going_on, workers, lambda k, end: take(groups[k], end))
     every = [
-        *(RefinedStart(result.history[0].cost, result) for result in earlier),
+        *(RefinedStart(result.history[0].cost, outcome_of(result)) for result in earlier),
         *(ends.get(k, RefinedStart(nan)) for k in range(len(points))),
     ]
     return summary(every, legs[-1], interrupted=not whole)
@@ -129,7 +129,7 @@ def refuse_interrupted(end: "RefinedStart") -> None:
 def together(ends: Mapping[int, "RefinedStart"], errors: float) -> list[list[int]]:
     """Return which starts go on as one: those whose ends lie within so many standard errors."""
     begun = [(k, start.end) for k, start in sorted(ends.items()) if start.end is not None]
-    groups = distinct([outcome_of(end, 0.0, errors) for _, end in begun])
+    groups = distinct([end for _, end in begun], errors)
     alone = [[k] for k, start in sorted(ends.items()) if start.end is None]
     return [*([begun[k][0] for k in group] for group in groups), *alone]
 
@@ -142,17 +142,17 @@ class RefinedStart:
     """
 
     first_cost: float
-    end: Result | None = None
+    end: "StartOutcome | None" = None
     cut_short: Result | None = None
 
     def at(self, start: Array) -> Array:
         """Return the point (N,) where it ended, that of the start where it could not begin."""
-        return start if self.end is None else self.end.x
+        return start if self.end is None else self.end.result.x
 
     @property
     def cost(self) -> float:
         """The cost where it ended, nan where it did not come to an end of its own."""
-        return nan if self.end is None else self.end.cost
+        return nan if self.end is None else self.end.result.cost
 
 
 def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
@@ -174,15 +174,14 @@ def refined(x: Array, legs: Sequence[Descent]) -> Steps[RefinedStart]:
             raise KeyboardInterrupt
     if result is not None and result.stop is Stop.INTERRUPTED:
         return RefinedStart(first_cost, cut_short=result)
-    return RefinedStart(first_cost, result)
+    return RefinedStart(first_cost, None if result is None else outcome_of(result))
 
 
 def summary(starts: Sequence[RefinedStart], leg: Descent, interrupted: bool) -> MultistartResult:
     """Return what some starts came to."""
     ends = [(start.end, start.first_cost) for start in starts if start.end is not None]
     nothing = leg.gtol**2 * float(median([first_cost for _, first_cost in ends] or [0.0]))
-    outcomes = [outcome_of(end, nothing) for end, _ in ends]
-    minima = minima_of(outcomes, leg.functions)
+    minima = minima_of([end for end, _ in ends], nothing, leg.functions)
     cut_short = [start.cut_short for start in starts if start.cut_short is not None]
     candidates = [*(local.result for local in minima[:1]), *cut_short]
     failed = sum(start.first_cost == inf for start in starts)
@@ -192,7 +191,7 @@ def summary(starts: Sequence[RefinedStart], leg: Descent, interrupted: bool) -> 
         start_costs=np.array([start.first_cost for start in starts]),
         end_costs=np.array([start.cost for start in starts]),
         failed=failed,
-        unrefined=len(starts) - failed - len(outcomes),
+        unrefined=len(starts) - failed - len(ends),
         interrupted=interrupted,
     )
 
@@ -222,30 +221,30 @@ def spread(
 class StartOutcome:
     """Where a refinement ended, without residuals and J: thousands would not fit into the memory.
 
-    ``triangle`` (N, N) has the lengths of J; ``step`` is what the standard errors cost by which
-    another end may differ.
+    ``triangle`` (N, N) has the lengths of J; ``variance`` is half that of the residuals.
     """
 
     result: Result
     triangle: Array
-    step: float
+    variance: float
 
 
-def outcome_of(result: Result, nothing: float, errors: float = INDISTINGUISHABLE) -> StartOutcome:
-    """Return where a refinement ended; ``nothing`` is what a perfect match may cost."""
+def outcome_of(result: Result) -> StartOutcome:
+    """Return where a refinement ended."""
     freedom = max(1, len(result.fun) - len(result.x))
-    step = errors**2 * result.cost / freedom + nothing
     triangle = np.asarray(np.linalg.qr(result.jac, mode="r"), dtype=np.float64)
     small = replace(result, fun=np.zeros(0), jac=np.zeros((0, len(result.x))))
-    return StartOutcome(small, triangle, step)
+    return StartOutcome(small, triangle, result.cost / freedom)
 
 
-def distinct(ends: Sequence[StartOutcome]) -> list[list[int]]:
+def distinct(
+    ends: Sequence[StartOutcome], errors: float = INDISTINGUISHABLE, nothing: float = 0.0
+) -> list[list[int]]:
     """Return which ends belong to each minimum, the best first."""
     groups: list[list[int]] = []
     for k in sorted(range(len(ends)), key=lambda k: ends[k].result.cost):
         for group in groups:
-            if same(ends[group[0]], ends[k]):
+            if same(ends[group[0]], ends[k], errors, nothing):
                 group.append(k)
                 break
         else:
@@ -253,16 +252,29 @@ def distinct(ends: Sequence[StartOutcome]) -> list[list[int]]:
     return groups
 
 
-def same(best: StartOutcome, other: StartOutcome) -> bool:
-    """Return whether two ends are one minimum, by the rule that `multistart` states."""
+def same(
+    best: StartOutcome,
+    other: StartOutcome,
+    errors: float = INDISTINGUISHABLE,
+    nothing: float = 0.0,
+) -> bool:
+    """Return whether two ends are within so many standard errors, as `multistart` measures them.
+
+    ``nothing`` is what a perfect match may cost.
+    """
     way = best.triangle @ (other.result.x - best.result.x)
     rise = other.result.cost - best.result.cost
-    return max(rise, 0.5 * float(way @ way)) <= best.step
+    return max(rise, 0.5 * float(way @ way)) <= errors**2 * best.variance + nothing
 
 
-def minima_of(ends: Sequence[StartOutcome], functions: Functions) -> tuple[LocalMinimum, ...]:
+def minima_of(
+    ends: Sequence[StartOutcome], nothing: float, functions: Functions
+) -> tuple[LocalMinimum, ...]:
     """Return the distinct minima that ends are, the lowest first."""
-    return tuple(minimum(ends[group[0]].result, len(group), functions) for group in distinct(ends))
+    return tuple(
+        minimum(ends[group[0]].result, len(group), functions)
+        for group in distinct(ends, nothing=nothing)
+    )
 
 
 def minimum(best: Result, starts: int, functions: Functions) -> LocalMinimum:

@@ -193,8 +193,8 @@ def own_end(descents: Descents, best: Result) -> Result | None:
 def is_same(best: Result, other: Result) -> bool:
     """Return whether an end of a descent is in the minimum that has this best one."""
     nothing = PERFECT * other.history[0].cost
-    lowest, higher = (outcome_of(end, nothing) for end in (best, other))
-    return other.cost >= best.cost and same(lowest, higher)
+    lowest, higher = outcome_of(best), outcome_of(other)
+    return other.cost >= best.cost and same(lowest, higher, nothing=nothing)
 
 
 def refined(
