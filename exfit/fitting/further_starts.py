@@ -56,15 +56,7 @@ def further_starts(
     ``counter`` counts the simulations of their descents.
     """
     residuals = problem.residuals.counted_by(counter)
-    own = Descent(
-        functions=SideBySide(problem.compressed.counted_by(counter)),
-        bounds=residuals.bounds,
-        method=DEFAULT_STRATEGY,
-        max_iterations=MOST_ITERATIONS,
-        ftol=TO_DISTINGUISH,
-        x_scale=UNIT,
-    )
-    legs = legs_of(residuals, own)
+    legs = legs_of(residuals, last_leg(problem, counter))
     direct: tuple[Way, ...] = ("direct",)
     if legs.no_linear_phase:
         points = spread(residuals.bounds, count)
@@ -73,3 +65,15 @@ def further_starts(
     ways = (by_linear * (DIRECT - 1) + direct) * count
     points = spread(residuals.bounds, count, residuals.start)
     return FurtherStarts(points, legs.linear, ways[:count], "")
+
+
+def last_leg(problem: FitProblem, counter: SimulationCounter | None = None) -> Descent:
+    """Return the descent of a further start on the case's own grid."""
+    return Descent(
+        functions=SideBySide(problem.compressed.counted_by(counter)),
+        bounds=problem.residuals.bounds,
+        method=DEFAULT_STRATEGY,
+        max_iterations=MOST_ITERATIONS,
+        ftol=TO_DISTINGUISH,
+        x_scale=UNIT,
+    )

@@ -18,12 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 from exfit.case.load import load_case
-from exfit.estimate import Descent
 from exfit.estimate.starts import multistart, spread
 from exfit.fitting.forms.legs import legs_of
-from exfit.fitting.further_starts import MERGED
-from exfit.fitting.parameters import UNIT
-from exfit.fitting.residuals import SideBySide
+from exfit.fitting.further_starts import MERGED, last_leg
 from exfit.fitting.search import fitted
 
 CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
@@ -35,14 +32,7 @@ REPEATS = 2
 def legs():
     """Return the residuals of the case and the legs of its further starts."""
     _, problem = fitted(load_case(CASE))
-    own = Descent(
-        functions=SideBySide(problem.compressed),
-        bounds=problem.residuals.bounds,
-        method="lm-then-dgn",
-        ftol=1e-8,
-        x_scale=UNIT,
-    )
-    return problem.residuals, legs_of(problem.residuals, own).linear
+    return problem.residuals, legs_of(problem.residuals, last_leg(problem)).linear
 
 
 def timed(points, of_case, workers):

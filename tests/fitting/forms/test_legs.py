@@ -4,11 +4,9 @@ import pytest
 from places import ROOT
 
 from exfit.case.load import load_case
-from exfit.estimate import Descent
 from exfit.estimate.starts import multistart, spread
 from exfit.fitting.forms.legs import legs_of
-from exfit.fitting.parameters import UNIT
-from exfit.fitting.residuals import SideBySide
+from exfit.fitting.further_starts import last_leg
 from exfit.fitting.search import fitted
 
 STARTS = 4
@@ -18,13 +16,7 @@ LOWEST = {"ac1a_typical": (5.057e-6,), "ac8b_unit2": (5.074e-6, 5.090e-6)}
 def legs(name):
     """Return the legs of a case, and its bounds."""
     _, problem = fitted(load_case(ROOT / "configs" / f"{name}.yaml"))
-    own = Descent(
-        functions=SideBySide(problem.compressed),
-        bounds=problem.residuals.bounds,
-        method="dgn",
-        ftol=1e-8,
-        x_scale=UNIT,
-    )
+    own = last_leg(problem)
     return legs_of(problem.residuals, own), own
 
 
