@@ -7,8 +7,7 @@
 Everything here is imported when it is first used: ``import exfit`` alone loads nothing heavy.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from exfit.errors import (
     CaseError,
@@ -19,6 +18,7 @@ from exfit.errors import (
     RecordError,
     SimulationError,
 )
+from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
     from exfit.analysis.translation.translate import translate
@@ -83,11 +83,7 @@ _MODULES = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    """Return a public name from the module that defines it."""
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULES[name]), name)
+__getattr__ = names_of(__name__, _MODULES)
 
 
 def __dir__() -> list[str]:

@@ -19,8 +19,9 @@ algorithm: implementation and theory); Dennis & Schnabel 1983, chapters 6 and 10
 Iterative methods for optimization, chapters 2 and 3.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
     from exfit.estimate.answer import STATUS, Progress, Result, SolverIteration, Stop
@@ -93,8 +94,4 @@ _MODULES = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    """Return a public name from the module that defines it, imported when it is first used."""
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULES[name]), name)
+__getattr__ = names_of(__name__, _MODULES)
