@@ -44,13 +44,15 @@ ROWS = (
         words=(
             "vt", "ut", "ug", "vg", "ugen", "vgen", "uterm", "vterm", "ugenerator",
             "terminal voltage", "generator voltage", "stator voltage", "generatorspannung",
-            "klemmenspannung", "ustator", "vstator", "voltage", "volt", "spannung", "u", "v",
+            "klemmenspannung", "ustator", "vstator", "eterm", "ugrel", "gen kv", "gen volts",
+            "voltage", "volt", "spannung", "kv", "u", "v", "vab", "uab", "u12", "u1",
         ),
     ),
     SignalRow(
         "vref", "reference", quantity="voltage", turn=1, base=RATED_VOLTAGE,
         words=(
-            "vref", "uref", "usoll", "vset", "uset", "reference", "setpoint", "sollwert", "ref",
+            "vref", "uref", "usoll", "ugsoll", "vset", "uset", "reference", "setpoint", "sollwert",
+            "ref",
         ),
     ),
     SignalRow(
@@ -58,21 +60,27 @@ ROWS = (
         base=AIR_GAP_LINE,
         words=(
             "efd", "vfd", "ufd", "vf", "uf", "field voltage", "ufield", "vfield",
-            "erregerspannung", "feldspannung",
+            "erregerspannung", "feldspannung", "field v", "field volts", "fld volts",
         ),
     ),
     SignalRow(
         "ifd", "field current", noise=5e-3, quantity="current", turn=3, base=AIR_GAP_LINE,
-        words=("ifd", "if", "field current", "ifield", "erregerstrom", "feldstrom", "lad ifd"),
+        words=(
+            "ifd", "if", "field current", "ifield", "erregerstrom", "feldstrom", "lad ifd",
+            "field i", "field amps", "fld amps",
+        ),
     ),
     SignalRow(
         "p", "active power", noise=1e-3, quantity="power", turn=5, base=RATED_POWER,
-        words=("p", "pe", "pg", "pgen", "active power", "real power", "wirkleistung", "power"),
+        words=(
+            "p", "pe", "pg", "pgen", "active power", "real power", "wirkleistung", "power",
+            "mw",
+        ),
         unit_suffices=True,
     ),
     SignalRow(
         "q", "reactive power", noise=1e-3, quantity="reactive", turn=4, base=RATED_POWER,
-        words=("q", "qe", "qg", "qgen", "reactive power", "reactive", "blindleistung"),
+        words=("q", "qe", "qg", "qgen", "reactive power", "reactive", "blindleistung", "mvar"),
         unit_suffices=True,
     ),
     SignalRow(

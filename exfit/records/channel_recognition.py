@@ -15,6 +15,7 @@ TRIPLES = (
     ("a", "b", "c"), ("r", "s", "t"), ("1", "2", "3"),
 )  # fmt: skip
 LINE_TO_LINE = TRIPLES[1:4]
+CAPITAL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])")  # where a word of a name begins
 OF_VOLTAGE = re.compile(r"^(u|v|.*volt|.*spannung)")
 
 
@@ -84,15 +85,25 @@ def _triples(name: str, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 
 def _rank(name: str, unit: str | None, row: SignalRow) -> int | None:
-    """Return how surely a column is a signal, the surest 0; None where it is not."""
+    """Return how surely a column is a signal, the surest 0; None where it is not.
+
+    A word is the whole name, with or without its unit, or a part that is set apart: by a mark, or,
+    if it has two letters or more, by its capital as in rUgRel.
+    """
     if unit not in (None, "pu", "%") and quantity_of(unit) != row.quantity:
         return None
-    tokens = [token for token in re.split(r"[^a-zäöüß0-9]+", bare(name).lower()) if token]
+    tokens = _tokens(bare(name))
     if OF_EXCITER & {*tokens}:
         return None
-    text = " ".join(tokens)
-    joined = "".join(tokens)
+    whole = {" ".join(tokens), "".join(tokens), " ".join(_tokens(name))}
+    text, split_at_capitals = " ".join(tokens), " ".join(_tokens(CAPITAL.sub(" ", bare(name))))
     for rank, word in enumerate(row.words):
-        if word in (text, joined) or re.search(rf"(^| ){re.escape(word)}( |$)", text):
+        part = re.compile(rf"(^| ){re.escape(word)}( |$)")
+        if word in whole or part.search(text) or (len(word) > 1 and part.search(split_at_capitals)):
             return rank
     return None
+
+
+def _tokens(name: str) -> list[str]:
+    """Return the words and numbers of a name, in small letters."""
+    return [token for token in re.split(r"[^a-zäöüß0-9]+", name.lower()) if token]

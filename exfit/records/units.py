@@ -32,6 +32,7 @@ _PREFIXED = re.compile(
     r"|(?P<small>[mk])(?P<ampere>a)|(?P<milli>M)(?P<second>S)"
 )
 _MEGA = re.compile(r"mw|mva|m(?i:var)")  # no generator makes milliwatts in small letters, or mvar
+_ALONE = re.compile(r"[kKMG](?:V|A|W|(?i:var))|mvar|mw")  # a unit in place of a name
 _PREFIXES: Mapping[str, str] = {"K": "k", "µ": "u", "μ": "u"}
 _BARE = re.compile(r"[\[({<]\s*(.*?)\s*[\])}>]")
 _TIME = re.compile(r"t|time|zeit|tiempo|temps|tempo", re.IGNORECASE)
@@ -79,8 +80,8 @@ def needs_base(unit: str) -> bool:
 def unit_in(name: str) -> str | None:
     """Return the unit at the end of a column's name, None without one.
 
-    Ugen [kV], If (A), t/ms, U in V, Time, s and U_kV have one; U (L1), Phase, A, P_min and U (A),
-    where letters are phases and limits, have none.
+    Ugen [kV], If (A), t/ms, U in V, Time, s and U_kV have one, MW is one; U (L1), Phase, A, P_min
+    and U (A), where letters are phases and limits, have none.
     """
     return _split(name)[1]
 
@@ -93,6 +94,8 @@ def bare(name: str) -> str:
 def _split(name: str) -> tuple[str, str | None]:
     """Return a name without its unit, and the unit."""
     name = name.strip()
+    if _ALONE.fullmatch(name):
+        return name, name
     for form, holds in FORMS:
         parts = form.fullmatch(name)
         if parts and holds(parts["name"], parts["unit"]) and name not in OTHER_UNITS:

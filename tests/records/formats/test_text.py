@@ -165,7 +165,7 @@ FILES = {
         ("Fecha", "Hora"),
         [0.0, 0.75],
         {"kV": [13.8, 13.9]},
-        {},
+        {"kV": "kV"},
     ),
     "day first, told by midnight": Seen(
         form("Time,U", "04/09/2020 23:59:59,1", "05/09/2020 00:00:00,2"),
