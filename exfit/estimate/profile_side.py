@@ -7,7 +7,6 @@ few are enough to find where the cost has risen as far as asked.
 Source: Bates & Watts 1988, sections 6.1 (profile t, profile traces) and A3.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import inf, isfinite, sqrt
@@ -116,14 +115,14 @@ class Side:
         slope = 0.0 if height > 0.0 else self.curvature
         self.spots = [Spot(x, cost, float(x[self.index]), height, slope, x, tangent)]
 
-    def walk(self, given_up: Callable[[], bool]) -> Steps["Side"]:
+    def walk(self, limit: float) -> Steps["Side"]:
         """Go to where the cost has risen as far as asked, or as far as there is a way.
 
-        An interruption ends it, and so does ``given_up``, which is asked at every point.
+        An interruption ends it, and so does a point with a cost below the limit.
         """
         try:
             end = None
-            while end is None and not given_up():
+            while end is None and self.spots[-1].cost >= limit:
                 end = yield from self.go_on()
             if end is ProfileEnd.RISE:
                 self.crossing = yield from self.crossed()

@@ -160,7 +160,11 @@ def finish_sides(
     workers: int | None,
     watch: Callable[[Progress], object],
 ) -> bool:
-    """Walk all sides, until one falls below the limit; return whether none was interrupted."""
+    """Walk all sides; return whether none was interrupted.
+
+    A side that falls below the limit ends there. The others go on: where they end must not depend
+    on when that was, as threads advance them.
+    """
     done = 0
 
     def receive(_: int, side: Side) -> None:
@@ -169,9 +173,7 @@ def finish_sides(
             done += 1
             watch(Progress("profiling", done, len(sides), deepest_of(sides).cost))
 
-    return finish_all(
-        [side.walk(lambda: deepest_of(sides).cost < limit) for side in sides], workers, receive
-    )
+    return finish_all([side.walk(limit) for side in sides], workers, receive)
 
 
 def bottom_near(valley: Valley, x: Array) -> Array:

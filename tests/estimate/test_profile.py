@@ -1,11 +1,16 @@
 """Profile likelihood against linear theory and the published intervals of Bates & Watts 1988."""
 
+from math import inf
+
 import numpy as np
 import pytest
 from more_garbow_hillstrom import numbers
 from scipy.stats import t as student
 
 from exfit.estimate import LowerMinimum, OneByOne, ProfileEnd, least_squares, profile, profiles
+from exfit.estimate.box import checked
+from exfit.estimate.lockstep import finish
+from exfit.estimate.profiling import finish_sides, sides_of, valley_about
 
 FREE = (-np.inf, np.inf)
 
@@ -291,6 +296,22 @@ def test_threads_change_nothing():
     for one, other in zip(alone, together, strict=True):
         assert one.xs.tolist() == other.xs.tolist()
         assert (one.low, one.high) == (other.low, other.high)
+
+
+def test_a_side_that_meets_a_lower_minimum_ends_no_other():
+    """Else where the others end would depend on the threads that advance them."""
+    found = enzyme_minimum()
+    rises, box = rises_of(found), checked(found.x, BOUNDS, None)[1]
+    aside = found.x * [1.0, 1.1]
+    valley = finish(valley_about(OneByOne(*ENZYME), box, False, 5, aside, inf))
+    limit = valley.lowest - 1e-3 * max(rises.values())
+    together, alone = sides_of(valley, rises, {}), sides_of(valley, rises, {})
+    finish_sides(together, limit, 1, lambda _: None)
+    for side in alone:
+        finish_sides([side], limit, 1, lambda _: None)
+    assert len({side.spots[-1].cost < limit for side in alone}) == 2  # some meet it, some do not
+    for side, own in zip(together, alone, strict=True):
+        assert [spot.x.tolist() for spot in side.spots] == [spot.x.tolist() for spot in own.spots]
 
 
 @pytest.mark.parametrize("calls", [3, 6, 9])
