@@ -2,7 +2,7 @@
 
 import sys
 import time as clock
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from os import PathLike
@@ -22,7 +22,7 @@ from exfit.analysis.case_description import (
     values_by_part,
 )
 from exfit.analysis.determination import determination
-from exfit.analysis.diagnostics import typical_notes, unphysical_notes
+from exfit.analysis.diagnostics import rest_notes, simulation_notes
 from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
 from exfit.analysis.iteration_responses import (
     LiveResponse,
@@ -33,11 +33,12 @@ from exfit.analysis.minima import minima_notes, minima_of
 from exfit.analysis.solution import (
     analysed,
     comparisons_of,
+    evidence_of,
     fit_notes,
     fitted_parameters,
     iteration_of,
-    record_notes,
 )
+from exfit.analysis.verdict import verdict_of
 from exfit.case import load
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiment, plain_simulator
@@ -133,6 +134,7 @@ def fit(
     comparisons = comparisons_of(fine, residuals, values, history)
     analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
     minima = minima_of(residuals, found, analysis.uncertainty)
+    verdict = verdict_of(evidence_of(case, residuals, best, fine, comparisons, analysis))
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
     return FitResult(
@@ -170,10 +172,12 @@ def fit(
             *found.notes,
             *minima_notes(residuals, found, minima, analysis.uncertainty),
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
+            *(cause.sentence for cause in verdict.causes),
         ),
         validation=analysis.validation,
         versions=versions(),
         inputs=hashes,
+        verdict=verdict,
         given_values=given_values(case),
         strategy_given=method != case.estimate.strategy,
         parts=tuple(parts_of(case)),
@@ -285,7 +289,7 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
         response = setup.response(values)
         comparison = compare_with_record(setup, "record", values) if setup.channels else None
-        notes = [] if comparison is None else record_notes(setup, comparison)
+        notes = [] if comparison is None else rest_notes(setup, comparison)
         return SimulationResult(
             response, comparison, (*simulation_notes(case, values, response), *notes)
         )
@@ -293,16 +297,6 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
     at = {**values, **levels}
     response = with_enough_substeps(simulator, at, case.path).response(at)
     return SimulationResult(response, None, tuple(simulation_notes(case, values, response)))
-
-
-def simulation_notes(case: Case, values: Mapping[str, float], response: Response) -> Iterator[str]:
-    """Yield which values are typical or not physical, and whether the machine falls out of step."""
-    yield from typical_notes(case)
-    yield from unphysical_notes(case, values)
-    delta = response.signals.get("delta")
-    if delta is not None and np.max(np.abs(delta)) > np.pi:
-        at = float(response.time[np.argmax(np.abs(delta) > np.pi)])
-        yield f"the machine falls out of step at {at:.3g} s: delta passes half a turn"
 
 
 def validate(

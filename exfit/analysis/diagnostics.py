@@ -6,33 +6,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
+from exfit.analysis.causes.rest import INVISIBLE, other_levels, unsteady_signals
 from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ReferenceTable
 from exfit.dsp.reference_moves import scatter
 from exfit.fitting.experiment import Channel
 from exfit.fitting.references import is_table
-from exfit.fitting.residuals import Residuals, noise_of
+from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import system_of
-from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
 from exfit.plants import REFERENCES
-from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
 from exfit.simulation.kernels import parameters_used
+from exfit.simulation.simulator import Response
 
 Array = NDArray[np.float64]
 
 COARSE = 0.2  # of the error of the fit: what halving the step may move
-INVISIBLE = 1e-7  # pu: no recorder shows it
-FAR_FROM_START = 0.01  # of vt0: beyond the noise of a record
-FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
-FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
-UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 NEAR_MINIMUM = 0.1  # standard errors: what errors and intervals in two digits do not show
-MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 
 
 def notes(
@@ -83,37 +77,6 @@ def tolerance_notes(residuals: Residuals, solution: estimate.Result) -> Iterator
         )
 
 
-def match_notes(fitted: Comparison, vt0: float | None) -> Iterator[str]:
-    """Yield where the response does not describe the record."""
-    if not fitted.fit_percent > 0.0:
-        yield (
-            "the response matches the record no better than a constant would: "
-            "check the step's sign, size and instant, and the units of the record"
-        )
-    measured, simulated = fitted.features.measured, fitted.features.simulated
-    if measured is not None and simulated is not None:
-        way = measured.final_value - measured.initial_value
-        if way * (simulated.final_value - simulated.initial_value) < 0.0:
-            yield f"the record moves by {way:+.3g} pu, the response the other way"
-        if vt0 is not None and abs(measured.initial_value - vt0) > FAR_FROM_START * abs(vt0):
-            yield f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu"
-
-
-def misfit_notes(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> Iterator[str]:
-    """Yield the channels that the fit misses by more than their noise, which none gave.
-
-    A given noise is compared with the residuals where the intervals are made.
-    """
-    for channel, noise in zip(residuals.channels, uncertainty.confidence.noise, strict=True):
-        times = noise.estimated / (channel.weight * noise_of(channel))
-        if channel.noise is None and times > MISFIT:
-            yield (
-                f"the error of {noise.label} is {times:.2g} times the scatter of its record from "
-                "sample to sample: the step, the model or the record differs from the case, and "
-                "the intervals do not include that error"
-            )
-
-
 def reference_notes(test: BumpTest, setup: ExperimentSetup) -> Iterator[str]:
     """Yield how well a recorded reference is known: the size of the test is as uncertain."""
     for signal in REFERENCES:
@@ -144,56 +107,6 @@ def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:
             yield (
                 f"{beyond} of {samples} samples of {channel.signal} of {name} {verb} left out as "
                 "outliers"
-            )
-
-
-def voltage_notes(fitted: Comparison) -> Iterator[str]:
-    """Yield a voltage that no machine is tested at, yet some might rest with."""
-    measured = fitted.features.measured
-    if measured is not None and abs(measured.initial_value - 1.0) > FAR_FROM_RATED:
-        yield (
-            f"vt starts from {measured.initial_value:.4g} pu: check its unit, its base and, of "
-            "phases, their connection"
-        )
-
-
-def level_notes(fitted: Comparison, steady: float) -> Iterator[str]:
-    """Yield the signals that start elsewhere than their record."""
-    for signal, overlay in fitted.overlays.items():
-        before = (fitted.time < steady) & np.isfinite(overlay.error)
-        if signal == "vt" or not before.any():
-            continue
-        measured = float(np.mean(overlay.measured[before]))
-        simulated = float(np.mean(overlay.simulated[before]))
-        if abs(measured - simulated) > FAR_FROM_BASE * max(abs(simulated), 0.1):
-            yield (
-                f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu: "
-                "check its base, and the data and the power that the case gives the machine"
-            )
-
-
-def unsteady_notes(
-    record: Record, steady: float, channels: Sequence[Channel] = ()
-) -> Iterator[str]:
-    """Yield the signals that drift while the case calls the unit steady."""
-    smooth = {
-        channel.signal: channel.filtering.smooth_over for channel in channels if channel.filtering
-    }
-    before = record.time < steady
-    for signal, samples in record.signals.items():
-        at_rest = samples[before & np.isfinite(samples)]
-        # averages over a window scatter little from each to the next: one of each window counts
-        at_rest = at_rest[:: smooth.get(signal, 1)]
-        half = len(at_rest) // 2
-        if half < 4:
-            continue
-        # noise from neighbours: a drift does not pass for it
-        noise = float(np.std(np.diff(at_rest))) / np.sqrt(2.0)
-        drift = abs(float(at_rest[:half].mean() - at_rest[half:].mean()))
-        if drift > max(UNSTEADY * noise * np.sqrt(2.0 / half), INVISIBLE):
-            yield (
-                f"{signal} moves by {drift:.2g} pu before {steady:g} s, where the record should be "
-                "at rest: the values that the fit starts from are uncertain"
             )
 
 
@@ -244,3 +157,22 @@ def _typical_values(case: Case) -> dict[str, float]:
     used = {name for view in views for name in parameters_used(system_of(view))}
     values = case.values()
     return {name: values[name] for name in case.typical() if name in used}
+
+
+def simulation_notes(case: Case, values: Mapping[str, float], response: Response) -> Iterator[str]:
+    """Yield which values are typical or not physical, and whether the machine falls out of step."""
+    yield from typical_notes(case)
+    yield from unphysical_notes(case, values)
+    delta = response.signals.get("delta")
+    if delta is not None and np.max(np.abs(delta)) > np.pi:
+        at = float(response.time[np.argmax(np.abs(delta) > np.pi)])
+        yield f"the machine falls out of step at {at:.3g} s: delta passes half a turn"
+
+
+def rest_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
+    """Yield where the steady part of a record contradicts the case."""
+    test = setup.test
+    if test.steady is not None and test.begin is None:
+        causes = unsteady_signals(setup.record, test.steady, setup.channels)
+        yield from (cause.sentence for cause in causes)
+        yield from (cause.sentence for cause in other_levels(comparison, test.steady))

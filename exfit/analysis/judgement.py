@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from exfit.analysis.diagnostics import MISFIT
+from exfit.analysis.causes.match import MISFIT
 from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.errors import SimulationError

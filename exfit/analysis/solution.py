@@ -8,24 +8,19 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.behaviour import behaviour_of
+from exfit.analysis.causes import Evidence, FittedRecord
 from exfit.analysis.determination import Determination
 from exfit.analysis.diagnostics import (
-    level_notes,
-    match_notes,
-    misfit_notes,
     notes,
     outlier_notes,
     reference_notes,
     tolerance_notes,
-    unsteady_notes,
-    voltage_notes,
 )
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.analysis.phase_ends import phase_ends
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
-from exfit.case.schema import Unknown
 from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
@@ -187,17 +182,9 @@ def fit_notes(
     yield from given_value_notes(case)
     yield from tolerance_notes(residuals, best)
     yield from notes(case, residuals, best, comparisons)
-    for recording, setup, comparison in zip(case.recordings, setups, comparisons, strict=True):
-        vt0 = setup.test.vt0 if setup.test.begin is None else None
-        # a fitted vt0 lies where the record begins, or on a bound, which is reported
-        yield from match_notes(comparison, None if isinstance(vt0, Unknown) else vt0)
-        if case.kind.per_unit:
-            yield from voltage_notes(comparison)
-        yield from record_notes(setup, comparison)
+    for recording, setup in zip(case.recordings, setups, strict=True):
         yield from outlier_notes(setup.record.source.name, setup.channels)
         yield from reference_notes(recording.test, setup)
-    if analysis.uncertainty is not None:
-        yield from misfit_notes(residuals, analysis.uncertainty)
     yield from skipped_response_notes(comparisons)
     if analysis.unfinished:
         yield INTERRUPTED_AFTERWARDS
@@ -237,9 +224,25 @@ def validation_of(
     return judged(comparison, fitted, setup.channels, accept)
 
 
-def record_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
-    """Yield where the steady part of a record contradicts the case."""
-    test = setup.test
-    if test.steady is not None and test.begin is None:
-        yield from unsteady_notes(setup.record, test.steady, setup.channels)
-        yield from level_notes(comparison, test.steady)
+def evidence_of(
+    case: Case,
+    residuals: Residuals,
+    best: estimate.Result,
+    setups: Sequence[ExperimentSetup],
+    comparisons: Sequence[Comparison],
+    analysis: Analysis,
+) -> Evidence:
+    """Return what the verdict on a fit and the causes of a poor one are worked out from."""
+    return Evidence(
+        case=case,
+        residuals=residuals,
+        solution=best,
+        records=tuple(
+            FittedRecord(recording.test, setup, comparison)
+            for recording, setup, comparison in zip(
+                case.recordings, setups, comparisons, strict=True
+            )
+        ),
+        uncertainty=analysis.uncertainty,
+        validation=analysis.validation,
+    )

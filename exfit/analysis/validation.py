@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from exfit.analysis.diagnostics import unsteady_notes
+from exfit.analysis.causes.rest import unsteady_signals
 from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.case.schema import Recording
@@ -118,7 +118,8 @@ def _notes(
     yield from _spike_notes(test.setup)
     yield from test.notes
     if not test.notes and steady is not None:
-        yield from unsteady_notes(record, steady, test.setup.channels)
+        causes = unsteady_signals(record, steady, test.setup.channels)
+        yield from (cause.sentence for cause in causes)
     for parameter in test.setup.free:
         side = parameter.bound(values[parameter.name])
         if side is not None and parameter.name.endswith(".at"):

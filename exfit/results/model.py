@@ -16,6 +16,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
+from exfit.results.verdict import Verdict
 from exfit.util.typed import IN_FILE, KEY, plain
 
 if TYPE_CHECKING:
@@ -177,8 +178,8 @@ class FitResult:
     ``cost`` is what the fit made small, ``comparisons`` are with each record,
     ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
     what identifies the unit and the test. ``inputs`` is the SHA-256 of every file by its label,
-    ``files`` its name. ``given_values`` are those in place of the case's. ``behaviour`` is None in
-    results of an earlier version.
+    ``files`` its name. ``given_values`` are those in place of the case's. ``verdict`` and
+    ``behaviour`` are None in results of an earlier version.
     """
 
     DERIVED: ClassVar = {
@@ -220,6 +221,7 @@ class FitResult:
     validation: tuple[Comparison, ...]
     versions: Mapping[str, str]
     inputs: Mapping[str, str]
+    verdict: Verdict | None = None
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
     phase_ends: tuple[PhaseEnd, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)

@@ -9,7 +9,7 @@ from exfit.results.model import FitResult
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Headline:
     """What the fit comes to: a word, a sentence, and whether it is good; None where none judges."""
 
     word: str
@@ -17,14 +17,14 @@ class Verdict:
     good: bool | None
 
 
-def verdict(result: FitResult) -> Verdict:
+def verdict(result: FitResult) -> Headline:
     """Return what a fit comes to."""
     word, text, good = _judged(result)
     rmse = ", ".join(
         f"{match.rmse:.2e} pu ({match.name})" for match in (*result.comparisons, *result.validation)
     )
     sentence = f"{text[:1].upper()}{text[1:]}{_missed(result)}; rmse {rmse}; {_determined(result)}."
-    return Verdict(word, sentence, good)
+    return Headline(word, sentence, good)
 
 
 def _determined(result: FitResult) -> str:

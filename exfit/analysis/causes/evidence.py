@@ -1,0 +1,83 @@
+"""What is known of a fit when its causes are looked for."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from exfit import estimate
+from exfit.case.case import Case
+from exfit.case.schema import BumpTest, Unknown
+from exfit.fitting.residuals import Residuals
+from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.results.comparisons import Comparison
+from exfit.results.verdict import Cause
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRecord:
+    """A record of a fit: its test as the case has it and as simulated, and the match with it."""
+
+    test: BumpTest
+    setup: ExperimentSetup
+    comparison: Comparison
+
+    @property
+    def begins_at_rest(self) -> bool:
+        """Whether the simulation starts where the record does, from rest."""
+        return self.setup.test.begin is None
+
+    @property
+    def steady_until(self) -> float | None:
+        """The instant (s) until which the record should be at rest; None where it never is."""
+        return self.setup.test.steady if self.begins_at_rest else None
+
+    @property
+    def given_vt0(self) -> float | None:
+        """The voltage (pu) before the first step that the case gives; None where it is fitted."""
+        vt0 = self.setup.test.vt0 if self.begins_at_rest else None
+        return None if isinstance(vt0, Unknown) else vt0
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What a fit came to, as the recognisers of causes get it.
+
+    ``solution`` is where the search ended, in scaled parameters; ``records`` are those of the fit,
+    ``validation`` the comparisons with those of none. ``uncertainty`` is None where it is not
+    known.
+    """
+
+    case: Case
+    residuals: Residuals
+    solution: estimate.Result
+    records: Sequence[FittedRecord]
+    uncertainty: UncertaintyAnalysis | None
+    validation: Sequence[Comparison] = ()
+
+    @cached_property
+    def values(self) -> Mapping[str, float]:
+        """Every value by name, the fitted ones as they ended."""
+        return self.residuals.values(self.solution.x)
+
+    @property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        """The matches with the records of the fit."""
+        return tuple(record.comparison for record in self.records)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """The parameters of the unit that the records do not limit on both sides."""
+        of_records = {
+            nuisance.name
+            for experiment in self.residuals.experiments
+            for nuisance in experiment.nuisances
+        }
+        own = [free.name for free in self.residuals.free if free.name not in of_records]
+        if self.uncertainty is None:
+            return tuple(own)
+        parameters = self.uncertainty.confidence.parameters
+        return tuple(name for name in own if not parameters[name].determined)
+
+
+Recogniser = Callable[[Evidence], Iterator[Cause]]  # yields the causes of one kind that it sees

@@ -1,0 +1,101 @@
+"""Records that are not at rest before their step, or rest elsewhere than the model."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from exfit.analysis.causes.evidence import Evidence
+from exfit.fitting.experiment import Channel
+from exfit.records.record import Record
+from exfit.results.comparisons import Comparison
+from exfit.results.verdict import Cause
+
+FAR_FROM_START = 0.01  # of vt0: beyond the noise of a record
+FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
+FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
+LEAST_LEVEL = 0.1  # pu: below it a deviation is not relative to the level
+FEWEST_IN_HALF = 4  # samples at rest, of each half
+UNSTEADY = 6.0  # standard errors between both halves of what is called steady
+INVISIBLE = 1e-7  # pu: no recorder shows it
+
+
+def wrong_start(evidence: Evidence) -> Iterator[Cause]:
+    """Yield a voltage before the first step that is not that of the record."""
+    for record in evidence.records:
+        measured, vt0 = record.comparison.features.measured, record.given_vt0
+        if measured is None or record.comparison.features.simulated is None or vt0 is None:
+            continue
+        if abs(measured.initial_value - vt0) > FAR_FROM_START * abs(vt0):
+            yield Cause(
+                f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu",
+                "correct vt0, or the base of vt",
+            )
+
+
+def wrong_voltage(evidence: Evidence) -> Iterator[Cause]:
+    """Yield a voltage that no machine is tested at, yet some might rest with."""
+    if not evidence.case.kind.per_unit:
+        return
+    for record in evidence.records:
+        measured = record.comparison.features.measured
+        if measured is not None and abs(measured.initial_value - 1.0) > FAR_FROM_RATED:
+            yield Cause(
+                f"vt starts from {measured.initial_value:.4g} pu",
+                "check its unit, its base and, of phases, their connection",
+            )
+
+
+def unsteady_record(evidence: Evidence) -> Iterator[Cause]:
+    """Yield the signals that drift while the case calls the unit steady."""
+    for record in evidence.records:
+        if record.steady_until is not None:
+            setup = record.setup
+            yield from unsteady_signals(setup.record, record.steady_until, setup.channels)
+
+
+def wrong_levels(evidence: Evidence) -> Iterator[Cause]:
+    """Yield the signals that start elsewhere than their record."""
+    for record in evidence.records:
+        if record.steady_until is not None:
+            yield from other_levels(record.comparison, record.steady_until)
+
+
+def other_levels(comparison: Comparison, steady: float) -> Iterator[Cause]:
+    """Yield the signals of a comparison that start elsewhere than their record."""
+    for signal, overlay in comparison.overlays.items():
+        before = (comparison.time < steady) & np.isfinite(overlay.error)
+        if signal == "vt" or not before.any():
+            continue
+        measured = float(np.mean(overlay.measured[before]))
+        simulated = float(np.mean(overlay.simulated[before]))
+        if abs(measured - simulated) > FAR_FROM_BASE * max(abs(simulated), LEAST_LEVEL):
+            yield Cause(
+                f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu",
+                "check its base, and the data and the power that the case gives the machine",
+            )
+
+
+def unsteady_signals(
+    record: Record, steady: float, channels: Sequence[Channel] = ()
+) -> Iterator[Cause]:
+    """Yield the signals of a record that drift before the instant ``steady`` (s)."""
+    smooth = {
+        channel.signal: channel.filtering.smooth_over for channel in channels if channel.filtering
+    }
+    before = record.time < steady
+    for signal, samples in record.signals.items():
+        at_rest = samples[before & np.isfinite(samples)]
+        # averages over a window scatter little from each to the next: one of each window counts
+        at_rest = at_rest[:: smooth.get(signal, 1)]
+        half = len(at_rest) // 2
+        if half < FEWEST_IN_HALF:
+            continue
+        # noise from neighbours: a drift does not pass for it
+        noise = float(np.std(np.diff(at_rest))) / np.sqrt(2.0)
+        drift = abs(float(at_rest[:half].mean() - at_rest[half:].mean()))
+        if drift > max(UNSTEADY * noise * np.sqrt(2.0 / half), INVISIBLE):
+            yield Cause(
+                f"{signal} moves by {drift:.2g} pu before {steady:g} s, where the record should be "
+                "at rest",
+                "the values that the fit starts from are uncertain",
+            )
