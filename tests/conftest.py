@@ -19,9 +19,10 @@ hypothesis.settings.register_profile("all", max_examples=200, deadline=None, der
 def pytest_addoption(parser):
     parser.addoption(
         "--models",
-        choices=("few", "all"),
+        choices=("few", "others", "all"),
         default="few",
-        help="run over a few models of each family, or over all models, with what else takes long",
+        help="run over a few models of each family, or over all models, with what else takes long; "
+        "others: what the few leave out",
     )
 
 
@@ -31,20 +32,31 @@ def pytest_configure(config):
     Its names are hashes of what the code is made from. A worker has one thread of OpenBLAS, as the
     command line has: there are as many workers as processors.
     """
-    config.addinivalue_line("markers", "long: runs with --models=all only")
-    hypothesis.settings.load_profile(config.getoption("models"))
+    config.addinivalue_line("markers", "long: does not run over the few models")
+    few = config.getoption("models") == "few"
+    hypothesis.settings.load_profile("few" if few else "all")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "EXFIT_CACHE" not in os.environ:
         os.environ["EXFIT_CACHE"] = str(config.cache.mkdir("machine_code"))
 
 
 def pytest_collection_modifyitems(config, items):
-    if config.getoption("models") == "all":
+    models = config.getoption("models")
+    if models == "all":
         return
-    left_out = [item for item in items if _is_left_out(item)]
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not _is_left_out(item)]
+    selected = [item for item in items if _is_selected(item, models)]
+    config.hook.pytest_deselected(items=[item for item in items if not _is_selected(item, models)])
+    items[:] = selected
+
+
+def _is_selected(item, models):
+    """Return whether a test runs over the few models, or adds to what runs over them.
+
+    Drawn inputs are more in number over the other models: such a test adds to both.
+    """
+    if models == "few":
+        return not _is_left_out(item)
+    return _is_left_out(item) or hypothesis.is_hypothesis_test(getattr(item, "obj", None))
 
 
 def _is_left_out(item):

@@ -12,6 +12,7 @@ from solver_ends import WANTED_DIGITS, certified_ends, published_ends
 from exfit.estimate import Stop, least_squares
 
 METHODS = ["dgn", "lm", "lm-then-dgn"]
+CERTIFIED_METHODS = ["dgn", "lm", pytest.param("lm-then-dgn", marks=pytest.mark.long)]
 
 
 def by_method(method):
@@ -23,7 +24,7 @@ def on_certified_sets(method):
     return certified_ends(by_method(method))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", CERTIFIED_METHODS)
 def test_finds_six_certified_digits_from_nearly_every_start(method):
     enough = [end.digits >= WANTED_DIGITS for end in on_certified_sets(method).values()]
     # the four that dgn does not reach are far starts, from which it has no radius to shrink
@@ -31,11 +32,12 @@ def test_finds_six_certified_digits_from_nearly_every_start(method):
     assert sum(enough) >= 50
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", CERTIFIED_METHODS)
 def test_claims_no_success_where_nist_has_no_minimum(method):
     assert [start for start, end in on_certified_sets(method).items() if end.wrong] == []
 
 
+@pytest.mark.long
 def test_scipy_needs_no_fewer_evaluations_for_as_many_digits():
     # tolerances of SciPy that bring it to within two of the starts that lm solves
     tight = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15, "x_scale": "jac"}
