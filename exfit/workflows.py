@@ -21,14 +21,13 @@ from exfit.analysis.case_description import (
     tests_of,
     values_by_part,
 )
-from exfit.analysis.determination import determination
+from exfit.analysis.case_search import SearchTask, search_outcome
 from exfit.analysis.diagnostics import rest_notes, simulation_notes
 from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
 from exfit.analysis.iteration_responses import (
     LiveResponse,
     live_response,
 )
-from exfit.analysis.judgement import doubt_of
 from exfit.analysis.minima import minima_notes, minima_of
 from exfit.analysis.solution import (
     analysed,
@@ -43,8 +42,7 @@ from exfit.case import load
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.recordings import read_section
-from exfit.fitting.search import checked_strategy, continued_from, fitted, search_options
-from exfit.fitting.search import search as search_case
+from exfit.fitting.search import checked_strategy, fitted, search_options
 from exfit.fitting.setup import with_enough_substeps
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.system import values_of
@@ -62,7 +60,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 CaseOrPath = Case | str | PathLike[str]
 
-MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
 LIBRARIES = ("numpy", "llvmlite", "pydantic")
 
 
@@ -118,15 +115,10 @@ def fit(
             live(response)
         progress(iteration_of(line, residuals))
 
-    doubt = doubt_of(case, problem, setups, unseen)
-    found = search_case(case, problem, method, announce, search_progress, counter, options, doubt)
-    profiled = options.search != "local"
-    determined = determination(problem, found, setups, profiled, search_progress)
-    for _ in range(MOST_MINIMA):
-        if determined.lower is None:
-            break
-        found = continued_from(determined.lower, found, problem, announce, counter, options)
-        determined = determination(problem, found, setups, profiled, search_progress)
+    task = SearchTask(case, setups, unseen, method, options, counter)
+    outcome = search_outcome(task, problem, announce, search_progress)
+    problem, setups, unseen, found, determined = outcome
+    residuals = problem.residuals
     best = found.best
     history = [iteration_of(line, residuals) for line in found.history]
     values = residuals.values(best.x)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
+from exfit.analysis.case_search import SearchTask, weighted_search
 from exfit.analysis.diagnostics import search_range_notes
-from exfit.analysis.judgement import doubt_of
 from exfit.analysis.profile_hull import (
     FoundMinimum,
     limits_of,
@@ -24,8 +24,9 @@ from exfit.fitting.build import build_experiment
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.search import fitted, names_of_records, search
+from exfit.fitting.search import fitted, names_of_records
 from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import LEVEL, Interval
 from exfit.util.text import near
@@ -120,7 +121,7 @@ def profile(
     """
     setups, problem = fitted(case)
     wanted = _indices(case, problem.residuals, names)
-    found = _found(case, setups, problem, progress)
+    problem, found = _found(case, setups, problem, progress)
     residuals, records, others = problem.compressed, names_of_records(setups), other_minima(found)
     x = found.best.x
     for _ in range(MOST_MINIMA):
@@ -162,21 +163,22 @@ def _indices(case: Case, residuals: Residuals, names: Iterable[str]) -> dict[str
 
 def _found(
     case: Case,
-    setups: Sequence[ExperimentSetup],
+    setups: tuple[ExperimentSetup, ...],
     problem: FitProblem,
     progress: Callable[[estimate.Progress], None],
-) -> SearchResult:
-    """Return the search of a case; raises KeyboardInterrupt where it was interrupted."""
+) -> tuple[FitProblem, SearchResult]:
+    """Return the problem of a case as it was searched, and that search.
+
+    Raises KeyboardInterrupt where it was interrupted.
+    """
     options = case.estimate.to_the_minimum()
     start, judged = case.values(), case.validations if options.strategy == "auto" else ()
-    unseen = [build_experiment(case, recording, start) for recording in judged]
-    doubt = doubt_of(case, problem, setups, unseen)
-    found = search(
-        case, problem, options.strategy, lambda _: None, progress, options=options, doubt=doubt
-    )
+    unseen = tuple(build_experiment(case, recording, start) for recording in judged)
+    task = SearchTask(case, setups, unseen, options.strategy, options, SimulationCounter())
+    problem, found = weighted_search(task, problem, lambda _: None, progress)
     if found.best.stop is estimate.Stop.INTERRUPTED or found.interrupted:
         raise KeyboardInterrupt
-    return found
+    return problem, found
 
 
 def _notes(best: estimate.Result, x: Array) -> Iterator[str]:

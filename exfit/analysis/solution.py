@@ -21,6 +21,7 @@ from exfit.analysis.iteration_responses import skipped_response_notes, with_iter
 from exfit.analysis.phase_ends import phase_ends
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
+from exfit.fitting.channel_weights import balanced, weight_notes
 from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
@@ -181,6 +182,7 @@ def fit_notes(
         yield "the search did not end at a minimum: the errors and intervals assume that it did"
     yield from given_value_notes(case)
     yield from tolerance_notes(residuals, best)
+    yield from weight_notes(residuals)
     yield from notes(case, residuals, best, comparisons)
     for recording, setup in zip(case.recordings, setups, strict=True):
         yield from outlier_notes(setup.record.source.name, setup.channels)
@@ -201,6 +203,8 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[Experim
     if setup.free:
         robust = robust_of(case)
         residuals = Residuals([fine.experiment], setup.free, values, robust=robust)
+        if case.estimate.weights == "balanced":
+            residuals = balanced(FitProblem(residuals, residuals), residuals.start).residuals
         descent = estimate.Descent(
             functions=estimate.OneByOne(residuals, residuals.exact),
             bounds=residuals.bounds,

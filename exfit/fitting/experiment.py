@@ -61,7 +61,8 @@ class Channel:
     """A measured signal (M,) per unit, and the weight of its errors.
 
     ``noise`` is the standard deviation of its noise, per unit, where that is given; ``scale`` and
-    ``offset`` are those that made it per unit.
+    ``offset`` are those that made it per unit. ``residual_deviation`` is the standard deviation of
+    its residuals, per unit, where the channels are weighted by it.
     """
 
     signal: str
@@ -71,6 +72,7 @@ class Channel:
     noise: float | None = None
     scale: float = 1.0
     offset: float = 0.0
+    residual_deviation: float | None = None
 
     def filtered(self, samples: Array) -> Array:
         """Return samples (M,) as they are compared: filtered, without those left out."""

@@ -88,8 +88,14 @@ class Residuals:
 
     @cached_property
     def noise(self) -> float:
-        """The standard deviation of a weighted error, by the noise of the records."""
-        deviations = [channel.weight * noise_of(channel) for channel in self.channels]
+        """The standard deviation of a weighted error, by the noise of the records.
+
+        Where the channels are weighted by their residuals, it is that of these.
+        """
+        deviations = [
+            channel.weight * (channel.residual_deviation or noise_of(channel))
+            for channel in self.channels
+        ]
         return float(np.sqrt(np.mean(np.square(deviations))))
 
     def match(self, residuals: Array, rmse: float) -> bool:

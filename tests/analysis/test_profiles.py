@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cases import local_case
 
-import exfit.analysis.profiles as module
+from exfit.analysis import case_search
 from exfit.analysis.profiles import profile
 from exfit.errors import CaseError
 from exfit.estimate import Stop, least_squares
@@ -156,14 +156,14 @@ def test_the_progress_is_reported_in_sides():
 @pytest.fixture
 def search_ends(monkeypatch):
     """Return a function that makes the search of a fit end with other results."""
-    search = module.search
+    search = case_search.search
 
     def replaced(change):
         def other(case, problem, *rest, **settings):
             found = search(case, problem, *rest, **settings)
             return found._replace(best=change(problem.residuals, found.best))
 
-        monkeypatch.setattr(module, "search", other)
+        monkeypatch.setattr(case_search, "search", other)
 
     return replaced
 

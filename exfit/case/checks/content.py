@@ -8,7 +8,13 @@ from exfit.case.checks.model import parameter_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
 from exfit.case.checks.plant import model_faults, plants_of_records_faults, stabiliser_faults
-from exfit.case.checks.record import channels_faults, noise_faults, record_faults, repeated_names
+from exfit.case.checks.record import (
+    channels_faults,
+    noise_faults,
+    record_faults,
+    repeated_names,
+    weight_faults,
+)
 from exfit.case.checks.recorded_reference import recorded_reference_faults
 from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
@@ -43,6 +49,8 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     for recording in several:
         yield from _recording_faults(recording, content, kind)
     yield from noise_faults([content, *several], kind)
+    if content.at("estimate").content.get("weights") == "balanced":
+        yield from weight_faults([content, *content.at("records").entries])
     yield from repeated_names(several)
     yield from _estimate_faults(content)
     yield from _starts_faults(content, parts)

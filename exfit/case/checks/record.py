@@ -160,6 +160,15 @@ def noise_faults(recordings: Sequence[ContentNode], kind: PlantKind) -> Iterator
     yield from _missing_noise([node for node in channels if node.place[0] != "validate"])
 
 
+def weight_faults(recordings: Sequence[ContentNode]) -> Iterator[Fault]:
+    """Yield the weights of channels that the fit is to weight by their residuals."""
+    for recording in recordings:
+        for _, channel in recording.at("record", "channels").sections:
+            for key in ("weight", "noise"):
+                if key in channel:
+                    yield channel.at(key).fault("not allowed with estimate.weights: balanced")
+
+
 def _missing_noise(channels: Sequence[ContentNode]) -> Iterator[Fault]:
     if any("noise" in channel for channel in channels):
         for channel in channels:

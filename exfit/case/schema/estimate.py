@@ -185,6 +185,11 @@ class Estimate(Section):
         description="Size of a residual, in standard deviations of the noise, from which huber and "
         "soft-l1 count it less than its square.",
     )
+    weights: Literal["given", "balanced"] = Field(
+        default="given",
+        description="Weights of the channels: those given with them; or balanced, one over the "
+        "scatter of each channel's residuals, found by weighting, fitting and weighting anew.",
+    )
     search: SearchKind = Field(
         default=DEFAULT_SEARCH, description=f"How far the search goes. {SEARCHES_EXPLAINED}."
     )

@@ -1,0 +1,78 @@
+"""The search for the parameters of a case: weighted, judged, and continued where profiles lead."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from exfit import estimate
+from exfit.analysis.determination import Determination, determination
+from exfit.analysis.judgement import doubt_of
+from exfit.case.case import Case
+from exfit.case.schema import Estimate
+from exfit.fitting.channel_weights import as_fitted, searched, weighted_alike
+from exfit.fitting.descents import Announce
+from exfit.fitting.global_search import SearchResult
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.search import continued_from, search
+from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.simulation_counter import SimulationCounter
+
+Watch = Callable[[estimate.Progress], None]
+
+MOST_MINIMA = 3  # that profiles lead to, each below the other: two are rare
+
+
+class SearchTask(NamedTuple):
+    """What a case is searched with: the tests of the fit, ``unseen`` ones, the settings."""
+
+    case: Case
+    setups: tuple[ExperimentSetup, ...]
+    unseen: tuple[ExperimentSetup, ...]
+    method: str
+    options: Estimate
+    counter: SimulationCounter
+
+
+class SearchOutcome(NamedTuple):
+    """The problem and the tests with the weights of the fit, the search, what it determines."""
+
+    problem: FitProblem
+    setups: tuple[ExperimentSetup, ...]
+    unseen: tuple[ExperimentSetup, ...]
+    found: SearchResult
+    determined: Determination
+
+
+def search_outcome(
+    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
+) -> SearchOutcome:
+    """Return the best point of a case and how well it is determined.
+
+    Where profiles lead to a lower minimum the search goes on from there.
+    """
+    options, counter = task.options, task.counter
+    problem, found = weighted_search(task, problem, announce, progress)
+    setups, unseen = as_fitted(task.setups, problem), task.unseen
+    if options.weights == "balanced":
+        unseen = weighted_alike(unseen, problem.residuals)
+    profiled = options.search != "local"
+    determined = determination(problem, found, setups, profiled, progress)
+    for _ in range(MOST_MINIMA):
+        if determined.lower is None:
+            break
+        found = continued_from(determined.lower, found, problem, announce, counter, options)
+        determined = determination(problem, found, setups, profiled, progress)
+    return SearchOutcome(problem, setups, unseen, found, determined)
+
+
+def weighted_search(
+    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
+) -> tuple[FitProblem, SearchResult]:
+    """Return the problem with the weights that the case asks for, and its search."""
+
+    def search_of(problem: FitProblem) -> SearchResult:
+        doubt = doubt_of(task.case, problem, task.setups, task.unseen)
+        return search(
+            task.case, problem, task.method, announce, progress, task.counter, task.options, doubt
+        )
+
+    return searched(problem, task.options, search_of, task.counter)

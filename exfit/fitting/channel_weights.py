@@ -1,0 +1,205 @@
+"""Weights of channels by what the model can match: one over the scatter of their own residuals.
+
+Where the variance of each channel's errors is not known, the parameters of greatest likelihood
+make the sum of M_k ln(s_k) small, M_k samples and s_k the root mean square of the residuals of
+channel k. They are found by weighting with 1 / s_k, fitting, and weighting anew until the s_k stay:
+iterated feasible generalised least squares.
+
+Source: Seber & Wild 1989, section 11.2 (its several responses are uncorrelated here); Beal &
+Sheiner 1988.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import accumulate, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit import estimate
+from exfit.case.schema import Estimate
+from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.global_search import SearchResult
+from exfit.fitting.parameters import UNIT
+from exfit.fitting.problem import FitProblem
+from exfit.fitting.residuals import LEAST_NOISE, Residuals
+from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.simulation_counter import SimulationCounter
+
+Array = NDArray[np.float64]
+
+MOST_REWEIGHTINGS = 20  # a handful is enough, unless two channels contradict each other
+MOST_SEARCHES = 3  # with weights of another minimum each: two are rare
+WEIGHT_TOLERANCE = 0.02  # of a weight: so small a change moves no parameter by a share of its error
+OTHER_MINIMUM = 0.1  # of a weight: a larger change shows that another minimum was found
+
+
+def searched(
+    problem: FitProblem,
+    options: Estimate,
+    search: Callable[[FitProblem], SearchResult],
+    counter: SimulationCounter | None = None,
+) -> tuple[FitProblem, SearchResult]:
+    """Return the problem with the weights that the options ask for, and its search."""
+    if options.weights == "balanced":
+        return balanced_search(problem, search, counter)
+    return problem, search(problem)
+
+
+def balanced_search(
+    problem: FitProblem,
+    search: Callable[[FitProblem], SearchResult],
+    counter: SimulationCounter | None = None,
+) -> tuple[FitProblem, SearchResult]:
+    """Return the problem with the weights that balance its channels, and its search.
+
+    The weights come from descents from the start of the case; where the search ends in a minimum
+    with other ones, from there. Raises KeyboardInterrupt where an interruption ends the descents.
+    """
+    problem = balanced(problem, problem.residuals.start, counter)
+    found = search(problem)
+    for _ in range(MOST_SEARCHES - 1):
+        if found.interrupted or found.best.stop is estimate.Stop.INTERRUPTED:
+            break
+        deviations = residual_deviations(problem.compressed, found.best.x)
+        if _agree(deviations, _deviations_used(problem.residuals), OTHER_MINIMUM):
+            break
+        problem = balanced(problem, found.best.x, counter, deviations)
+        found = search(problem)
+    return problem, found
+
+
+def balanced(
+    problem: FitProblem,
+    theta: Array,
+    counter: SimulationCounter | None = None,
+    deviations: Array | None = None,
+) -> FitProblem:
+    """Return the problem with the weights that balance its channels in the minimum near theta (N,).
+
+    ``deviations`` (channels,) are those to begin with; by default those of the records themselves:
+    of all signals the same share is matched then.
+    """
+    before = _movements(problem.residuals) if deviations is None else deviations
+    problem = with_deviations(problem, before, of_residuals=deviations is not None)
+    for _ in range(MOST_REWEIGHTINGS):
+        theta = _minimum_near(problem.compressed.counted_by(counter), theta)
+        after = residual_deviations(problem.compressed, theta)
+        problem = with_deviations(problem, after)
+        if _agree(before, after, WEIGHT_TOLERANCE):
+            break
+        before = after
+    return problem
+
+
+def residual_deviations(residuals: Residuals, theta: Array) -> Array:
+    """Return the standard deviation (channels,) of the residuals of each channel, per unit.
+
+    It is the one by which the noise is reported: the root mean square or, with a robust loss,
+    that of the influence over the mean of its derivative (Huber 1981, section 7.6).
+    """
+    errors, _ = residuals.errors(theta)
+    influence, curvature = residuals.influence(errors)
+    ends = [0, *accumulate(residuals.sizes)]
+    pairs = zip(residuals.channels, pairwise(ends), strict=True)
+    return np.array([_deviation(c, influence[a:b], curvature[a:b]) for c, (a, b) in pairs])
+
+
+def _deviation(channel: Channel, influence: Array, curvature: Array) -> float:
+    scale = channel.weight * max(float(np.mean(curvature)), np.finfo(float).eps)
+    return max(float(np.sqrt(influence @ influence / channel.samples)) / scale, LEAST_NOISE)
+
+
+def with_deviations(
+    problem: FitProblem, deviations: Array, of_residuals: bool = True
+) -> FitProblem:
+    """Return the problem with the weights 1 / deviations (channels,), the largest of them 1."""
+    whole = _weighted(problem.residuals, deviations, of_residuals)
+    if problem.compressed is problem.residuals:
+        return FitProblem(whole, whole)
+    return FitProblem(whole, _weighted(problem.compressed, deviations, of_residuals))
+
+
+def _weighted(residuals: Residuals, deviations: Array, of_residuals: bool) -> Residuals:
+    finest, own = float(np.min(deviations)), iter(deviations.tolist())
+
+    def weighted(channel: Channel) -> Channel:
+        deviation = next(own)
+        matched = deviation if of_residuals else None
+        return replace(channel, weight=finest / deviation, residual_deviation=matched)
+
+    experiments = [_with_channels(experiment, weighted) for experiment in residuals.experiments]
+    return replace(residuals, experiments=experiments)
+
+
+def _movements(residuals: Residuals) -> Array:
+    """Return the standard deviation (channels,) of what each channel shows, per unit."""
+    movements = [float(np.std(channel.measured[channel.kept])) for channel in residuals.channels]
+    return np.maximum(movements, LEAST_NOISE)
+
+
+def _deviations_used(residuals: Residuals) -> Array:
+    return np.array([channel.residual_deviation or np.nan for channel in residuals.channels])
+
+
+def _agree(before: Array, after: Array, tolerance: float) -> bool:
+    """Return whether two sets of deviations give the same weights."""
+    changes = np.log(after / before)
+    return float(np.ptp(changes)) <= tolerance
+
+
+def _minimum_near(residuals: Residuals, theta: Array) -> Array:
+    """Return the end (N,) of a descent from theta (N,)."""
+    descent = estimate.Descent(
+        functions=estimate.OneByOne(residuals, residuals.exact),
+        bounds=residuals.bounds,
+        x_scale=UNIT,
+    )
+    end = descent.run(theta)
+    if end.stop is estimate.Stop.INTERRUPTED:
+        raise KeyboardInterrupt
+    return end.x
+
+
+def as_fitted(
+    setups: Sequence[ExperimentSetup], problem: FitProblem
+) -> tuple[ExperimentSetup, ...]:
+    """Return the setups of a problem with the weights of its channels."""
+    pairs = zip(setups, problem.residuals.experiments, strict=True)
+    return tuple(replace(setup, experiment=experiment) for setup, experiment in pairs)
+
+
+def weighted_alike(
+    setups: Iterable[ExperimentSetup], residuals: Residuals
+) -> tuple[ExperimentSetup, ...]:
+    """Return setups of other records whose channels weigh what those of these residuals weigh."""
+    weights = defaultdict(list)
+    for channel in residuals.channels:
+        weights[channel.signal].append(channel.weight)
+
+    def weighted(channel: Channel) -> Channel:
+        own = weights.get(channel.signal, [channel.weight])
+        return replace(channel, weight=float(np.mean(own)))
+
+    return tuple(
+        replace(setup, experiment=_with_channels(setup.experiment, weighted)) for setup in setups
+    )
+
+
+def _with_channels(experiment: Experiment, changed: Callable[[Channel], Channel]) -> Experiment:
+    return replace(experiment, channels=tuple(map(changed, experiment.channels)))
+
+
+def weight_notes(residuals: Residuals) -> Iterator[str]:
+    """Yield how the channels are weighted, where their residuals decide it."""
+    several = len(residuals.experiments) > 1
+    deviations = [
+        f"{experiment.name + ' ' if several else ''}{channel.signal} {deviation:.2g}"
+        for experiment in residuals.experiments
+        for channel in experiment.channels
+        if (deviation := channel.residual_deviation) is not None
+    ]
+    if len(deviations) > 1:
+        listed = ", ".join(deviations)
+        yield f"weights balanced: one over the scatter of each channel's residuals (pu), {listed}"
