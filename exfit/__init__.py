@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
     from exfit.fleet.fits import fit_all
+    from exfit.fleet.ranking import rank
     from exfit.records.record import Record
     from exfit.results.io import load_result
     from exfit.results.model import FitResult
@@ -59,6 +60,7 @@ __all__ = [
     "load_case",
     "load_result",
     "profile",
+    "rank",
     "read_record",
     "simulate",
     "translate",
@@ -76,6 +78,7 @@ _MODULES = {
     "load_case": "exfit.workflows",
     "load_result": "exfit.results.io",
     "profile": "exfit.workflows",
+    "rank": "exfit.fleet.ranking",
     "read_record": "exfit.workflows",
     "simulate": "exfit.workflows",
     "translate": "exfit.analysis.translation.translate",

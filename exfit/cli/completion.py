@@ -23,6 +23,16 @@ def exciters(_: click.Context, __: click.Parameter, incomplete: str) -> list[str
     return _beginning(MODELS, incomplete.upper())
 
 
+def several_exciters(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    """Return names of exciters behind those that are given already, separated by commas."""
+    from exfit.models import MODELS
+
+    given, comma, last = incomplete.rpartition(",")
+    taken = given.upper().split(",")
+    names = _beginning((name for name in MODELS if name not in taken), last.upper())
+    return [f"{given}{comma}{name}" for name in names]
+
+
 def machines(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
     """Return the names of machines, in upper or lower case."""
     from exfit.models import MACHINE_NAMES

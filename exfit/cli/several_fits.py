@@ -41,11 +41,9 @@ def fit_several(
 
     folder = output.folder(SERIES)
     plan = planned(cases, strategies, given.load, search)
-    _refuse_own_files(plan, folder)
+    refuse_files_of_cases(plan, folder, SERIES)
     figures: dict[str, FigureFiles] = {}
-    series = _shown(plan, folder, figures) if output.shown else _quiet(plan, folder, figures)
-    if not series.runs and series.interrupted:
-        raise Interruption("no fit is done")
+    series = run_planned(plan, folder, figures, output)
     try:
         of_all = run_folder.write_series(series, folder)
     finally:  # whatever becomes of the files
@@ -59,11 +57,24 @@ def fit_several(
         terminal.written(terminal.console(), folder)
     output.draw(of_all)
     if output.figures:
-        _draw(figures, output)
+        draw_each(figures, output)
     if series.failed:
         raise ExfitError("\n".join(f"{name}: {fault}" for name, fault in series.failed.items()))
     if not series.all_converged:
         raise SystemExit(NOT_CONVERGED)
+
+
+def run_planned(
+    plan: "Sequence[PlannedFit]", folder: Path, figures: "dict[str, FigureFiles]", output: Output
+) -> "FitSeries":
+    """Run the fits, write their numbers and collect their figures; show how far they are.
+
+    Raises Interruption where none is done.
+    """
+    series = _shown(plan, folder, figures) if output.shown else _quiet(plan, folder, figures)
+    if not series.runs and series.interrupted:
+        raise Interruption("no fit is done")
+    return series
 
 
 def _quiet(
@@ -101,7 +112,7 @@ def _show(series: "FitSeries") -> None:
     terminal.fit_series(terminal.console(), series)
 
 
-def _draw(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
+def draw_each(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
     """Draw the figures of each fit, with a line for each fit where results are shown."""
     left = [*figures]
     try:
@@ -117,8 +128,11 @@ def _draw(figures: "Mapping[str, FigureFiles]", output: Output) -> None:
         raise KeyboardInterrupt(f"{interruption}{others}") from None
 
 
-def _refuse_own_files(plan: "Sequence[PlannedFit]", folder: Path) -> None:
-    """Raise CaseError where results would replace files of a case, or cannot be written."""
+def refuse_files_of_cases(plan: "Sequence[PlannedFit]", folder: Path, command: str) -> None:
+    """Raise CaseError where results would replace files of a case, or cannot be written.
+
+    ``command`` names those that are written beside the folders of the fits.
+    """
     from exfit.output import run_folder
 
     faults: dict[str, None] = {}
@@ -126,7 +140,7 @@ def _refuse_own_files(plan: "Sequence[PlannedFit]", folder: Path) -> None:
         try:
             run_folder.refuse_unwritable(folder / fit.name)
             refuse_own_files(fit.case, folder / fit.name, "fit")
-            refuse_own_files(fit.case, folder, SERIES)
+            refuse_own_files(fit.case, folder, command)
         except ExfitError as fault:
             faults[str(fault)] = None
     if faults:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from exfit.analysis.profiles import Profiles
     from exfit.fitting.uncertainty import UncertaintyAnalysis
     from exfit.fleet.fits import FitSeries
+    from exfit.fleet.ranking import Ranking
     from exfit.records.inspection import Inspection
     from exfit.results.comparisons import Comparison
     from exfit.results.model import FitResult
@@ -95,6 +96,16 @@ def of_series(series: "FitSeries") -> PlannedFigures:
         return {}
     shows = "responses, errors and costs of all fits"
     return {"fits.png": PlannedFigure(shows, partial(plots.fit_series, series))}
+
+
+def of_ranking(ranking: "Ranking") -> PlannedFigures:
+    """Return the figure of the best models of a ranking."""
+    from exfit.output import plots
+
+    if not ranking.models:
+        return {}
+    shows = "responses and errors of the best models"
+    return {"rank.png": PlannedFigure(shows, partial(plots.ranking, ranking))}
 
 
 def of_uncertainty(uncertainty: "UncertaintyAnalysis", name: str) -> PlannedFigures:

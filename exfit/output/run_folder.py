@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from exfit.analysis.experiment_design import Design
     from exfit.analysis.profiles import Profiles
     from exfit.fleet.fits import FitSeries
+    from exfit.fleet.ranking import Ranking
     from exfit.models.sheet import Model
     from exfit.records.inspection import Inspection
     from exfit.results.translation import Translation
@@ -53,7 +54,7 @@ ITERATIONS, SENSITIVITIES = "iterations.csv", "sensitivities.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
 INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
 SERIES, AT_RECORD = "fits.json", "compare-record.csv"
-TRANSLATION = "translation.json"
+TRANSLATION, RANKING = "translation.json", "rank.json"
 MAIN_FILES = (
     WHOLE_FIT,
     VALIDATION,
@@ -64,6 +65,7 @@ MAIN_FILES = (
     AGREEMENT,
     SERIES,
     TRANSLATION,
+    RANKING,
 )
 # what a command may write that could be an input too, beside files that are named after records
 PHASE_PARAMETERS = tuple(f"parameters_{phase}.yaml" for phase in PHASES)
@@ -83,6 +85,7 @@ NUMBERS = {
     "identify": (DESIGN, SENSITIVITIES),
     "compare": ("compare.csv", AT_RECORD, AGREEMENT),
     "fits": ("fits.csv", SERIES),
+    "rank": ("rank.csv", RANKING),
     "translate": ("translation.csv", TRANSLATION),
 }
 # what a fit may write, beside the files that are named after records
@@ -163,6 +166,15 @@ def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
             with suppress(ExfitError):
                 write(_last_parameters(lowest.case), parameter_file(lowest))
     return FigureFiles.beside(folder / SERIES, partial(run_figures.of_series, series))
+
+
+def write_ranking(ranking: "Ranking", folder: Path) -> FigureFiles:
+    """Write the table of a ranking as CSV and JSON; return the figure of its best models."""
+    from exfit.output.ranking_table import ranking_table
+
+    numbers = {"rank.csv": ranking_table(ranking.models), RANKING: to_json(ranking.to_dict())}
+    write_together(folder, numbers, ["rank.png"])
+    return FigureFiles.beside(folder / RANKING, partial(run_figures.of_ranking, ranking))
 
 
 def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:

@@ -4,6 +4,7 @@ from exfit.output.plots.agreement import agreement
 from exfit.output.plots.fit_series import fit_series
 from exfit.output.plots.iterations import iterations
 from exfit.output.plots.overlays import overlay
+from exfit.output.plots.ranking import ranking
 from exfit.output.plots.records import inspection
 from exfit.output.plots.responses import overview, response
 from exfit.output.plots.search import convergence, trajectories, waterfall
@@ -22,6 +23,7 @@ __all__ = [
     "overview",
     "png",
     "profiles",
+    "ranking",
     "response",
     "sensitivity",
     "trajectories",

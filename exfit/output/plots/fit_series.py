@@ -1,6 +1,6 @@
 """Fits of several cases with several strategies: overlays, errors and costs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -11,6 +11,7 @@ from exfit.dsp.decimation import envelope
 from exfit.fleet.fits import FitRun, FitSeries
 from exfit.output.plots.axes import QuickAxes, logarithmic
 from exfit.output.plots.style import COLORS, MEASURED, MILLI, STYLES, new_figure, tidy
+from exfit.results.comparisons import Comparison
 from exfit.results.side_by_side import CONVERGED, outcome_of
 from exfit.signals import label_of
 
@@ -37,7 +38,8 @@ def fit_series(series: FitSeries) -> Figure:
         costs = figure.add_subplot(grid[2 * k : 2 * k + 2, 1], axes_class=QuickAxes)
         overlay.tick_params(labelbottom=False)
         overlay.set_title(f"{name}: {runs[0].result.model}", fontsize=10, loc="left")
-        _responses(overlay, errors, runs)
+        of_strategies = {run.result.strategy: run.result.comparison for run in runs}
+        responses_beside(overlay, errors, of_strategies)
         _costs(costs, runs)
     left_out = [*cases][MOST_CASES:]
     if left_out:
@@ -45,20 +47,19 @@ def fit_series(series: FitSeries) -> Figure:
     return figure
 
 
-def _responses(overlay: Axes, errors: Axes, runs: Sequence[FitRun]) -> None:
-    """Draw the judged signal of the first record, and what each fit leaves of it."""
-    first = runs[0].result.comparison
+def responses_beside(overlay: Axes, errors: Axes, comparisons: Mapping[str, Comparison]) -> None:
+    """Draw the judged signal of a record, and what each response leaves of it, by its name."""
+    first = next(iter(comparisons.values()))
     signal = first.judged_by
     measured = first.overlays[signal].measured
     overlay.plot(
         *envelope(first.time, measured), ".", color=MEASURED, markersize=4, label="measured"
     )
     errors.axhline(0.0, color="black", linewidth=0.6)
-    for k, run in enumerate(runs):
-        match = run.result.comparison
+    for k, (name, match) in enumerate(comparisons.items()):
         line = match.overlays[signal]
-        look = _look(k, len(runs))
-        label = f"{run.result.strategy}, rmse {match.rmse:.2e} pu"
+        look = _look(k, len(comparisons))
+        label = f"{name}, rmse {match.rmse:.2e} pu"
         overlay.plot(*envelope(match.time, line.simulated), label=label, **look)
         errors.plot(*envelope(match.time, MILLI * line.error), **{**look, "linewidth": 0.8})
     overlay.set_ylabel(label_of(signal))

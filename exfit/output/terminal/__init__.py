@@ -7,6 +7,7 @@ from exfit.output.terminal.comparisons import comparisons, validation
 from exfit.output.terminal.fit_series import SeriesProgress, fit_series
 from exfit.output.terminal.fits import fit
 from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
+from exfit.output.terminal.ranking import ranking
 from exfit.output.terminal.records import inspection
 from exfit.output.terminal.terminal import (
     again,
@@ -40,6 +41,7 @@ __all__ = [
     "model",
     "notes",
     "profiles",
+    "ranking",
     "task",
     "translation",
     "validation",

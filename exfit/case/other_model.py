@@ -1,0 +1,52 @@
+"""A case with another exciter in place of its own, from the typical data of that exciter."""
+
+from dataclasses import replace
+
+from exfit.case.case import Case
+from exfit.case.parts import exciter_part
+from exfit.case.schema import FreeSection, Parameters
+from exfit.case.starting_case import bounds_of, free_of
+from exfit.case.ties import Ties
+from exfit.errors import CaseError
+from exfit.models.sheet import Model
+
+
+def with_exciter(case: Case, name: str, model: Model) -> Case:
+    """Return a case with another exciter, by the ``name`` that a case gives it.
+
+    Its free parameters and their bounds are those that ``exfit new`` writes, all others typical.
+    Plant, tests, records and what is found about them stay. The case is no longer that of a file.
+    Raises CaseError where it has no exciter, or where another part follows that.
+    """
+    if case.parts.exciter is None:
+        raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to replace"])
+    section = case.parameters
+    own = {*(row.symbol for row in case.parts.exciter.sheet), *section.free, *section.fixed}
+    ties = {tied: tie for tied, tie in case.ties.by_name.items() if tied not in own}
+    faults = [
+        f"{case.path}: {tied} {tie.text}: {used} belongs to {case.parts.exciter.name}; a case for "
+        "other models needs a number here"
+        for tied, tie in ties.items()
+        for used in tie.names
+        if used in own
+    ]
+    if faults:
+        raise CaseError(faults)
+    others = (part for part in case.parts.all if part.kind != "exciter")
+    exciter = exciter_part(model, exponential=False)
+    free = {
+        row.symbol: FreeSection(start=row.typical, min=low, max=high)
+        for row in free_of(model)
+        for low, high in [bounds_of(row)]
+    }
+    return replace(
+        case,
+        path=case.folder / f"{case.path.stem}-{model.name}",
+        from_file=False,
+        model=name,
+        saturation="quadratic",
+        parts=replace(case.parts, exciter=model, all=(exciter, *others)),
+        ties=Ties(ties),
+        parameters=Parameters(free=free),
+        given_values={key: given for key, given in case.given_values.items() if key not in own},
+    )
