@@ -21,10 +21,11 @@ from exfit.inference.noise import SURPRISING, effective_samples, whiteness
 from exfit.inference.wording import listed
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
-from exfit.results.side_by_side import CONVERGED, NOT_ACCEPTED, outcome_of
+from exfit.results.side_by_side import CONVERGED, INTERRUPTED, NOT_ACCEPTED, outcome_of
+from exfit.results.verdict import GOOD, MATCHES
 
 Array = NDArray[np.float64]
-Evidence = Literal["fit", "validation"]
+Records = Literal["fit", "validation"]
 
 # difference of the criterion from which on a model is refuted: a rival with as many parameters
 # fits so much more of the noise by chance in one record of thirty, even with seven of them
@@ -36,6 +37,7 @@ JUDGED = (CONVERGED, NOT_ACCEPTED)  # a search that has not ended well says noth
 class RankedModel:
     """A model among others: how well it matches, and what the records determine of it.
 
+    outcome          the verdict on its fit, or that a validation is not accepted
     rmse             root mean square error of the fitted records, of the judged signals, per unit
     validation_rmse  of the records that no fit saw; None where there are none
     bic              Bayesian information criterion, above the lowest of all
@@ -56,12 +58,12 @@ class RankedModel:
     determined: int
     at_bound: tuple[str, ...]
     typical: Mapping[str, float]
-    refuted_by: tuple[Evidence, ...] | None
+    refuted_by: tuple[Records, ...] | None
 
     @property
     def matches(self) -> bool:
         """Whether its fit can be used."""
-        return self.outcome == CONVERGED
+        return self.outcome in (GOOD, MATCHES)
 
     @property
     def possible(self) -> bool:
@@ -113,7 +115,7 @@ def ranked(results: Mapping[str, FitResult]) -> tuple[RankedModel, ...]:
     unseen = [Likelihood.of(result.validation) for result in fits]
     counts = [len(result.parameters) for result in fits]
     judged = [outcome_of(result) in JUDGED for result in fits]
-    refuted: dict[Evidence, list[bool]] = {
+    refuted: dict[Records, list[bool]] = {
         "fit": _refuted(fitted, counts, judged),
         "validation": _refuted(unseen, [0] * len(fits), judged),
     }
@@ -136,13 +138,13 @@ def _order(model: RankedModel) -> tuple[bool, float, float]:
 
 
 def _ranked(
-    name: str, result: FitResult, bic: float, refuted_by: tuple[Evidence, ...] | None
+    name: str, result: FitResult, bic: float, refuted_by: tuple[Records, ...] | None
 ) -> RankedModel:
     own = {key: each for key, each in result.parameters.items() if not each.of_record}
     return RankedModel(
         name=name,
         model=result.model,
-        outcome=outcome_of(result),
+        outcome=_outcome(result),
         rmse=_rmse(result.comparisons),
         validation_rmse=_rmse(result.validation) if result.validation else None,
         bic=bic,
@@ -152,6 +154,14 @@ def _ranked(
         typical={key: result.fixed[key] for key in result.typical if key in result.fixed},
         refuted_by=refuted_by,
     )
+
+
+def _outcome(result: FitResult) -> str:
+    """Return the verdict on a fit, or what speaks against one that matches its records."""
+    outcome, verdict = outcome_of(result), result.verdict
+    if verdict is None or outcome == INTERRUPTED or (verdict.matches and outcome != CONVERGED):
+        return outcome
+    return verdict.verdict
 
 
 def _rmse(comparisons: Sequence[Comparison]) -> float:

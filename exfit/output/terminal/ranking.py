@@ -9,7 +9,7 @@ from exfit.output.terminal.terminal import number, plain_table, remarks
 
 NOT_REFUTED = "*"  # behind the name of a model
 LEGEND = "rmse in pu; BIC above the lowest; * not refuted by the records"
-COLUMNS = ("model", "unseen", "rmse", "BIC", "determined", "outcome")
+COLUMNS = ("model", "unseen", "rmse", "BIC", "determined", "verdict")
 NUMBERS = ("unseen", "rmse", "BIC", "determined")
 
 
