@@ -213,29 +213,27 @@ def _effective(errors: Array) -> float:
 def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
     """Yield what the records say of the models, and of which they say nothing."""
     judged = [model for model in models if model.refuted_by is not None]
-    possible = [model.name for model in judged if model.possible]
-    if len(possible) > 1:
-        yield (
-            f"the records cannot tell {listed(possible)} apart: none of them is better by "
-            f"{STRONG:g} of the criterion, apart from what more parameters gain"
-        )
-    elif possible and len(judged) > 1:
-        yield f"the records refute all of these models but {possible[0]}"
-    elif judged and not possible:
-        yield _contradiction(judged)
-    others = [model for model in models if model.refuted_by is None]
-    for model in others:
-        yield f"{model.name} is not judged: its search ended {model.outcome}"
-    if judged and all(model.validation_rmse is None for model in judged) and len(judged) > 1:
+    if len(judged) > 1:
+        yield _judgement(judged)
+    for model in models:
+        if model.refuted_by is None:
+            yield f"{model.name} is not judged: its search ended {model.outcome}"
+    if len(judged) > 1 and judged[0].validation_rmse is None:
         yield "a record that no fit saw, under `validate`, tells models apart that this one cannot"
 
 
-def _contradiction(judged: Sequence[RankedModel]) -> str:
-    """Return that each model is refuted by the records that it was fitted to or by others."""
+def _judgement(judged: Sequence[RankedModel]) -> str:
+    """Return which of several models the records do not refute."""
+    possible = [model.name for model in judged if model.possible]
+    if len(possible) > 1:
+        return (
+            f"the records cannot tell {listed(possible)} apart: none of them is better by "
+            f"{STRONG:g} of the criterion, apart from what more parameters gain"
+        )
+    if possible:
+        return f"the records refute all of these models but {possible[0]}"
     fitted = min(judged, key=lambda model: model.bic).name
-    unseen = listed(
-        [model.name for model in judged if "validation" not in (model.refuted_by or ())]
-    )
+    unseen = listed([model.name for model in judged if model.refuted_by == ("fit",)])
     return (
         f"no model describes all records: {fitted} is the best on those fitted, {unseen} on those "
         "that no fit saw. What the fitted step does not show, such as a limit that is typical "

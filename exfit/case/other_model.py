@@ -1,14 +1,15 @@
 """A case with another exciter in place of its own, from the typical data of that exciter."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from exfit.case.case import Case
 from exfit.case.parts import exciter_part
 from exfit.case.schema import FreeSection, Parameters
 from exfit.case.starting_case import bounds_of, free_of
-from exfit.case.ties import Ties
+from exfit.case.ties import Tie, Ties
 from exfit.errors import CaseError
-from exfit.models.sheet import Model
+from exfit.models.sheet import Model, Parameter
 
 
 def with_exciter(case: Case, name: str, model: Model) -> Case:
@@ -20,25 +21,11 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
     """
     if case.parts.exciter is None:
         raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to replace"])
-    section = case.parameters
-    own = {*(row.symbol for row in case.parts.exciter.sheet), *section.free, *section.fixed}
+    own = _names_of_exciter(case)
     ties = {tied: tie for tied, tie in case.ties.by_name.items() if tied not in own}
-    faults = [
-        f"{case.path}: {tied} {tie.text}: {used} belongs to {case.parts.exciter.name}; a case for "
-        "other models needs a number here"
-        for tied, tie in ties.items()
-        for used in tie.names
-        if used in own
-    ]
-    if faults:
-        raise CaseError(faults)
+    _refuse_ties(case, ties, own)
     others = (part for part in case.parts.all if part.kind != "exciter")
     exciter = exciter_part(model, exponential=False)
-    free = {
-        row.symbol: FreeSection(start=row.typical, min=low, max=high)
-        for row in free_of(model)
-        for low, high in [bounds_of(row)]
-    }
     return replace(
         case,
         path=case.folder / f"{case.path.stem}-{model.name}",
@@ -47,6 +34,31 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
         saturation="quadratic",
         parts=replace(case.parts, exciter=model, all=(exciter, *others)),
         ties=Ties(ties),
-        parameters=Parameters(free=free),
+        parameters=Parameters(free={row.symbol: _section(row) for row in free_of(model)}),
         given_values={key: given for key, given in case.given_values.items() if key not in own},
     )
+
+
+def _section(row: Parameter) -> FreeSection:
+    low, high = bounds_of(row)
+    return FreeSection(start=row.typical, min=low, max=high)
+
+
+def _names_of_exciter(case: Case) -> set[str]:
+    """Return the parameters of the exciter of a case, and the helpers of its ties."""
+    exciter, section = case.parts.exciter, case.parameters
+    rows = () if exciter is None else exciter.sheet
+    return {*(row.symbol for row in rows), *section.free, *section.fixed}
+
+
+def _refuse_ties(case: Case, ties: Mapping[str, Tie], own: set[str]) -> None:
+    """Raise CaseError for each tie that uses one of the exciter's ``own`` parameters."""
+    faults = [
+        f"{case.path}: {name} {tie.text}: {used} belongs to {case.subject}; a case for other "
+        "models needs a number here"
+        for name, tie in ties.items()
+        for used in tie.names
+        if used in own
+    ]
+    if faults:
+        raise CaseError(faults)
