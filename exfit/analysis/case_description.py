@@ -122,10 +122,12 @@ def tests_of(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[Recorded
 
 
 def _network(view: Case) -> dict[str, NetworkParameter]:
-    values = view.values()
+    values, sources = view.values(), view.sources()
     networks: Iterator[Part] = (part for part in view.parts.all if part.kind == "network")
     return {
-        row.symbol: NetworkParameter(values[NETWORK + row.symbol], row.unit, row.meaning)
+        row.symbol: NetworkParameter(
+            values[NETWORK + row.symbol], row.unit, row.meaning, sources[NETWORK + row.symbol]
+        )
         for part in networks
         for row in part.sheet
     }

@@ -22,7 +22,7 @@ def with_values(case: Case, values: ValuesOrResult | None) -> Case:
     if values.model != case.subject:
         raise CaseError([f"values: model: {values.model}, but {case.path} has {case.subject}"])
     taken = taken_over(case, values.own_values, values.of_records, "values")
-    return with_given_values(case, taken, "values")
+    return with_given_values(case, taken, "values", values.sources)
 
 
 def changes_of(case: Case, values: ValuesOrResult | None) -> Values:

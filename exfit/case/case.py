@@ -1,8 +1,9 @@
 """Case: a checked case file, with the models it names. It is data: nothing of it ever changes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from exfit.case.assembly import CheckedContent, check_content, plain_content
@@ -32,6 +33,7 @@ from exfit.errors import CaseError
 from exfit.models.sheet import Parameter
 from exfit.plants import KINDS, NETWORK, PlantKind
 from exfit.records.record import Record
+from exfit.util.sources import FITTED, NOT_STATED, TYPICAL, least_certain
 from exfit.util.text import Place, dotted, near
 
 
@@ -54,7 +56,8 @@ class Case:
     The sections are those of the case file. ``path`` is that file. For a case made in Python
     (``from_file`` is false) ``path`` is the folder of its files and the name that messages use.
     ``given_records`` holds, by name, the records that were given as arrays instead of files,
-    ``given_values`` the values of parameters that were given in place of those of the sections.
+    ``given_values`` the values of parameters that were given in place of those of the sections,
+    ``given_sources`` where values that were given beside the case come from.
     """
 
     path: Path
@@ -76,6 +79,7 @@ class Case:
     ties: Ties
     given_records: Mapping[str, Record] = field(default_factory=dict)
     given_values: Mapping[str, GivenValue] = field(default_factory=dict)
+    given_sources: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the name, what is studied, and the free parameters, in one line."""
@@ -147,11 +151,16 @@ class Case:
             )
         return replace(self, given_records={**self.given_records, name: record})
 
-    def with_values(self, values: Mapping[str, float], source: Path | str) -> "Case":
+    def with_values(
+        self,
+        values: Mapping[str, float],
+        source: Path | str,
+        sources: Mapping[str, str] = MappingProxyType({}),
+    ) -> "Case":
         """Return the case with other values: fixed ones, and starts of those that are free.
 
-        A value that followed others no longer does. ``source`` says who gave the values. Names
-        and values are not checked.
+        A value that followed others no longer does. ``source`` says who gave the values,
+        ``sources`` where each of them comes from. Names and values are not checked.
         """
         own = self.values()
         earlier = self.given_values
@@ -163,7 +172,15 @@ class Case:
             if value != own.get(name)
         }
         ties = {name: tie for name, tie in self.ties.by_name.items() if name not in given}
-        return replace(self, ties=Ties(ties), given_values={**earlier, **given})
+        given_sources = {
+            name: sources.get(name, NOT_STATED) for name in values if name in (*sources, *given)
+        }
+        return replace(
+            self,
+            ties=Ties(ties),
+            given_values={**earlier, **given},
+            given_sources={**self.given_sources, **given_sources},
+        )
 
     @property
     def folder(self) -> Path:
@@ -217,9 +234,10 @@ class Case:
         own = {key: getattr(self.plant, key) for key in ("machine", "parameters", "free")}
         on_load = KINDS[plant.type].on_load
         section = InfiniteBus if on_load else OpenCircuit
+        sources = {**_at(self.plant, ("sources",)), **dict(plant).get("sources", {})}
         return replace(
             self,
-            plant=section(**own, **dict(plant)),
+            plant=section(**{**own, **dict(plant), "sources": sources}),
             parts=with_network(self.parts, plant.given if on_load else None),
             given_values={
                 name: given
@@ -279,15 +297,28 @@ class Case:
             for name, section in sections.items()
         }
 
+    def sources(self, fitted: Iterable[str] = ()) -> dict[str, str]:
+        """Return where every value comes from, as the system names them: typical, nameplate ...
+
+        What the case does not give is typical. The source of a free parameter is that of its start,
+        unless it is among those ``fitted``. What follows others is as certain as the least certain
+        of these.
+        """
+        sources = dict.fromkeys(self.values(), NOT_STATED)
+        for part in self.parts.all:
+            sources |= self._sources_of(part)
+        sources |= {name: word for name, word in self.given_sources.items() if name in sources}
+        sources |= dict.fromkeys(fitted, FITTED)
+        for name in self.ties.order:
+            sources[name] = least_certain(sources[used] for used in self.ties.by_name[name].names)
+        return sources
+
     def typical(self) -> tuple[str, ...]:
-        """Return the parameters that the file does not give, as the system names them."""
-        in_file = {
-            part.prefix + symbol
-            for part in self.parts.all
-            for symbol in (*self._fixed(part), *self._free(part))
-        }
-        given = {*in_file, *self.given_values, *self.ties.by_name}
-        return tuple(name for name in self.rows() if name not in given)
+        """Return the parameters that keep a typical value, as the system names them."""
+        sources, others = self.sources(), {*self.ties.by_name, *self.free()}
+        return tuple(
+            name for name in self.rows() if sources[name] == TYPICAL and name not in others
+        )
 
     def units(self) -> dict[str, str]:
         """Return the unit of every parameter."""
@@ -297,6 +328,17 @@ class Case:
         given: Mapping[str, float | str] = _at(self, part.fixed)
         own = part.symbols
         return {symbol: given[symbol] for symbol in given if symbol in own}
+
+    def _sources_of(self, part: Part) -> dict[str, str]:
+        """Return where the values of a part come from, and those of the exciter's helpers."""
+        stated: Mapping[str, str] = _at(self, part.sources)
+        given, own = {*self._fixed(part), *self._free(part)}, part.symbols
+        sources = {
+            part.prefix + symbol: stated.get(symbol, NOT_STATED) if symbol in given else TYPICAL
+            for symbol in own
+        }
+        helpers = stated if part.kind == "exciter" else ()
+        return sources | {name: stated[name] for name in helpers if name not in own}
 
     def _free(self, part: Part) -> Mapping[str, FreeSection]:
         given: Mapping[str, FreeSection] = {} if part.free is None else _at(self, part.free)

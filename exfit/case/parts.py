@@ -40,8 +40,9 @@ OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names wit
 class Part:
     """A part of a case: its kind, the model it names, where the file gives its parameters.
 
-    Its parameters are those of its sheet, in the system under ``prefix``. ``check(values)`` yields
-    (symbol, text) for values that contradict each other.
+    ``sources`` is where the file says where their values come from. Its parameters are those of its
+    sheet, in the system under ``prefix``. ``check(values)`` yields (symbol, text) for values that
+    contradict each other.
     """
 
     kind: str
@@ -50,6 +51,7 @@ class Part:
     sheet: Sheet
     fixed: Place
     free: Place | None
+    sources: Place
     check: Callable[[Mapping[str, float]], Contradictions] = field(compare=False)
 
     @property
@@ -202,7 +204,7 @@ def exciter_part(model: Model, exponential: bool) -> Part:
         if exponential:
             yield from exponential_faults(values)
 
-    places: tuple[Place, Place] = ("parameters", "fixed"), ("parameters", "free")
+    places = _places("parameters", "fixed")
     return Part("exciter", model.name, "", model.sheet, *places, check)
 
 
@@ -215,13 +217,13 @@ def machine_part(machine: Machine, on_load: bool) -> Part:
         if on_load and values.get("Tppd0", inf) < SHORTEST:
             yield "Tppd0", f"{values['Tppd0']:g} is for open circuit; on load it must be positive"
 
-    places: tuple[Place, Place] = ("plant", "parameters"), ("plant", "free")
+    places = _places("plant", "parameters")
     return Part("machine", machine.name, MACHINE, machine.sheet, *places, check)
 
 
 def stabiliser_part(model: Model) -> Part:
     """Return the part of a stabiliser."""
-    places: tuple[Place, Place] = ("stabiliser", "parameters"), ("stabiliser", "free")
+    places = _places("stabiliser", "parameters")
     return Part(
         "stabiliser",
         model.name,
@@ -249,7 +251,13 @@ def network_part(given: Data, place: Place = ("plant", "network")) -> Part:
     sheet = flow_sheet("E" if "E" in given else "Q")
     if "Q" in given and "E" in given:
         sheet = (*sheet, *(row for row in flow_sheet("Q") if row.symbol == "Q"))
-    return Part("network", "the network", NETWORK, sheet, place, None, check)
+    sources = (*place[:-1], "sources")
+    return Part("network", "the network", NETWORK, sheet, place, None, sources, check)
+
+
+def _places(section: str, fixed: str) -> tuple[Place, Place, Place]:
+    """Return where a section of the file gives what is fixed, what is free, and their sources."""
+    return (section, fixed), (section, "free"), (section, "sources")
 
 
 def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Model | None:

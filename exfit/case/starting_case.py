@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from exfit.case.suggestion import FILL_IN, bump_section, record_section, relative
-from exfit.case.templates import commented, parameter_line
+from exfit.case.templates import commented, parameter_line, source_lines
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Parameter
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
+from exfit.util.sources import TYPICAL
 from exfit.util.text import yaml_number
 
 ALONE = "FIRST_ORDER"  # the model whose output is vt itself
@@ -48,8 +49,9 @@ def starting_case(
     """
     lines = [
         f"# {model.name} on the record {_plain(inspection.path.name)}: a case to start from.",
-        "# Values are typical: replace them by those of the unit. `exfit check` tries",
-        "# the case, `exfit identify` shows what its test resolves, `exfit fit` fits.",
+        "# Values are typical: replace them by those of the unit, and the words under",
+        "# `sources`. `exfit check` tries the case, `exfit identify` shows what its test",
+        "# resolves, `exfit fit` fits.",
         *(f"# note: {_plain(text)}." for text in inspection.findings),
         "# about: {Plant: ..., Unit: ..., Rated: ..., Tested by: ...}  # for reports",
         f"model: {name}",
@@ -80,6 +82,7 @@ def _plant(model: Model, machine: Machine, inspection: Inspection) -> Iterator[s
     yield "  parameters:"
     for row in machine.sheet:
         yield parameter_line(row, yaml_number(row.typical), "    ")
+    yield from source_lines({row.symbol: TYPICAL for row in machine.sheet}, "  ")
 
 
 def _on_load(power: InspectedChannel) -> bool:
@@ -122,6 +125,7 @@ def _parameters(model: Model) -> Iterator[str]:
         yield f"    # {row.unit}, {row.meaning}"
         start, low, high = map(_short, (row.typical, *bounds_of(row)))
         yield f"    {row.symbol}: {{start: {start}, min: {low}, max: {high}}}"
+    yield from source_lines({row.symbol: TYPICAL for row in model.sheet if row not in free}, "  ")
 
 
 def _short(value: float) -> str:

@@ -1,8 +1,14 @@
 """The lines of a case file that is made for a user to edit: values with their meanings."""
 
+import textwrap
+from collections.abc import Iterator, Mapping
+
 from exfit.models.sheet import Parameter
+from exfit.util.sources import SOURCES
 
 MEANING_AT = 24  # column of the comments
+WIDTH = 80  # columns of a case
+NO_BREAK = "\N{NO-BREAK SPACE}"  # within a pair of a name and a word
 
 
 def parameter_line(row: Parameter, value: str, indent: str, remark: str = "") -> str:
@@ -13,3 +19,19 @@ def parameter_line(row: Parameter, value: str, indent: str, remark: str = "") ->
 def commented(text: str, comment: str) -> str:
     """Return a line of a case with a comment, at one place where the line is short."""
     return f"{text:{MEANING_AT}}# {comment}" if len(text) < MEANING_AT else f"{text}  # {comment}"
+
+
+def source_lines(sources: Mapping[str, str], indent: str) -> Iterator[str]:
+    """Yield the lines that say where values come from, as far as that is stated."""
+    stated = [f"{name}: {word}" for name, word in sources.items() if word in SOURCES]
+    if not stated:
+        return
+    yield f"{indent}# each is from: {', '.join(SOURCES)}"
+    yield f"{indent}sources:"
+    pairs = textwrap.wrap(
+        "{" + ", ".join(pair.replace(" ", NO_BREAK) for pair in stated) + "}",
+        WIDTH,
+        initial_indent=f"{indent}  ",
+        subsequent_indent=f"{indent}   ",
+    )
+    yield from (line.replace(NO_BREAK, " ") for line in pairs)

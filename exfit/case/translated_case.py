@@ -8,9 +8,10 @@ import yaml
 
 from exfit.case.starting_case import BOUNDS, bounds_of, free_of
 from exfit.case.suggestion import relative
-from exfit.case.templates import commented
+from exfit.case.templates import commented, source_lines
 from exfit.case.yaml import read_yaml
 from exfit.models.sheet import Model, Parameter
+from exfit.util.sources import FITTED
 from exfit.util.text import yaml_number
 
 TEST: Mapping[str, Any] = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 10.0}
@@ -24,6 +25,7 @@ def translated_case(
     model: tuple[str, Model],
     values: Mapping[str, float],
     provenance: Mapping[str, str],
+    sources: Mapping[str, str],
     plant: Mapping[str, Any],
     heading: str,
 ) -> str:
@@ -31,7 +33,8 @@ def translated_case(
 
     ``model`` is behind the name that the case gives it, ``text`` that of the fitted ``case``. Where
     there is no such text, the case is one of ``plant``, without a record. What the fit found for
-    the machine is where its parameters start.
+    the machine is where its parameters start. ``provenance`` says in words where each of the
+    ``values`` comes from, ``sources`` in the words of a case.
     """
     name, sheet = model
     content = read_yaml(text, case)[0].value if text else {"plant": plant, "test": TEST}
@@ -44,6 +47,7 @@ def translated_case(
     lines = [f"# {line}" for line in heading.splitlines()]
     lines += [f"model: {name}", *dumped.splitlines()]
     lines += ["parameters:", *_parameters(sheet, values, provenance)]
+    lines += source_lines(sources, "  ")
     return "\n".join(lines) + "\n"
 
 
@@ -71,10 +75,12 @@ def _with_values(plant: Mapping[str, Any], values: Mapping[str, float]) -> dict[
         symbol: {**section, "start": values.get(symbol, section.get("start"))}
         for symbol, section in plant.get("free", {}).items()
     }
+    sources = {**plant.get("sources", {}), **dict.fromkeys(free, FITTED)}
     return {
         **plant,
         **({"parameters": given} if given else {}),
         **({"free": free} if free else {}),
+        **({"sources": sources} if sources else {}),
     }
 
 

@@ -172,11 +172,17 @@ class Given:
         path = self.parameters
         if path is None and not self.changes:
             return load(case)
-        from exfit.fitting.overrides import fitted_model_hash, read_parameters, with_given_values
+        from exfit.fitting.overrides import (
+            fitted_model_hash,
+            read_parameters,
+            sources_in,
+            with_given_values,
+        )
 
         loaded = load(case, fitted_model_hash(path) if path else "")
         if path:
-            loaded = with_given_values(loaded, read_parameters(loaded, path), path)
+            values = read_parameters(loaded, path)
+            loaded = with_given_values(loaded, values, path, sources_in(path))
         return with_given_values(loaded, assignments(self.changes, "--set"), "--set")
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from math import isclose, isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from exfit.case.bounds import search_bounds
@@ -14,6 +15,7 @@ from exfit.fitting.nuisance import names_of
 from exfit.fitting.references import with_recorded_steps
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
+from exfit.util.sources import SOURCES
 from exfit.util.text import near
 
 
@@ -37,12 +39,18 @@ def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[s
     return dict(given)
 
 
-def with_given_values(case: Case, given: Mapping[str, float], source: Path | str) -> Case:
+def with_given_values(
+    case: Case,
+    given: Mapping[str, float],
+    source: Path | str,
+    sources: Mapping[str, str] = MappingProxyType({}),
+) -> Case:
     """Return the case with other fixed values, and other starts of what is free.
 
-    Raises CaseError, naming ``source``, as `changed_values` does, and for a start out of bounds.
+    ``source`` is who gives them, ``sources`` where each of the values comes from. Raises CaseError,
+    naming ``source``, as `changed_values` does, and for a start out of bounds.
     """
-    changed = case.with_values(changed_values(case, given, str(source)), source)
+    changed = case.with_values(changed_values(case, given, str(source)), source, sources)
     faults, rows = [], case.rows()
     for name, section in changed.free().items():
         low, high = search_bounds(section.min, section.max, rows.get(name))
@@ -118,9 +126,15 @@ def read_parameters(case: Case, path: Path) -> dict[str, float]:
         texts.append(f"model: {content['model']}, but {case.path} has {case.subject}")
     texts += _no_numbers("parameters", parameters)
     texts += _no_numbers("records", about)
+    texts += _wrong_sources(content.get("sources", {}))
     if texts:
         raise CaseError(f"{path}: {text}" for text in texts)
     return taken_over(case, parameters, about, str(path))
+
+
+def sources_in(path: Path) -> dict[str, str]:
+    """Return where the values of a file that `read_parameters` has read come from, by name."""
+    return {str(name): str(word) for name, word in _content(path)[0].get("sources", {}).items()}
 
 
 def taken_over(
@@ -154,6 +168,16 @@ def _no_numbers(key: str, given: Any) -> Iterator[str]:
     for name, value in given.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             yield f"{key}.{name}: {value!r} is not a number"
+
+
+def _wrong_sources(given: Any) -> Iterator[str]:
+    """Yield the words that are no source of a value."""
+    if not isinstance(given, dict):
+        yield "sources: not a mapping (key: value)"
+        return
+    for name, word in given.items():
+        if word not in SOURCES:
+            yield f"sources.{name}: {word!r} is not a source; {near(str(word), SOURCES)}"
 
 
 def _of_records(case: Case) -> list[str]:

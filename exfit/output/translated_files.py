@@ -8,10 +8,11 @@ from exfit.case.translated_case import translated_case
 from exfit.exchange.psse.export import export
 from exfit.exchange.psse.records import alternatives
 from exfit.models.sheet import Model
-from exfit.plants import INFINITE_BUS, OPEN_CIRCUIT
+from exfit.plants import INFINITE_BUS, MACHINE, NETWORK, OPEN_CIRCUIT
 from exfit.results.model import FitResult
 from exfit.results.tables import table
 from exfit.results.translation import Translation
+from exfit.util.sources import SOURCES
 
 
 def files_of_translation(
@@ -51,8 +52,17 @@ def case_of_translation(
     translation: Translation, result: FitResult, target: tuple[str, Model], folder: Path
 ) -> str:
     """Return the case of the fit with the target in place of its exciter."""
-    machine = {"machine": result.machine_model, "parameters": dict(result.machine)}
     network = network_of(result)
+    machine = {
+        "machine": result.machine_model,
+        "parameters": dict(result.machine),
+        "sources": {
+            symbol: word
+            for prefix, symbols in ((MACHINE, result.machine), (NETWORK, network))
+            for symbol in symbols
+            if (word := result.sources.get(prefix + symbol)) in SOURCES
+        },
+    }
     plant = (
         {"type": INFINITE_BUS.name, **machine, "network": network}
         if network
@@ -65,6 +75,7 @@ def case_of_translation(
         target,
         translation.values,
         {symbol: entry.provenance for symbol, entry in translation.parameters.items()},
+        {symbol: entry.value_source for symbol, entry in translation.parameters.items()},
         plant,
         f"{translation.source} of {result.case.name} as {translation.target}.\n"
         f"{translation.verdict}",

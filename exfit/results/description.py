@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 
 from exfit.simulation.limit_hits import LimitHit
 from exfit.simulation.small_signal import SmallSignal
+from exfit.util.sources import NOT_STATED
 
 
 class SheetRow(NamedTuple):
@@ -35,6 +36,7 @@ class NetworkParameter(NamedTuple):
     value: float
     unit: str
     meaning: str
+    source: str = NOT_STATED
 
 
 @dataclass(frozen=True)

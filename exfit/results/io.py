@@ -11,6 +11,7 @@ from exfit.results.consistency import contradictions
 from exfit.results.description import PartDescription
 from exfit.results.model import PARTS, FitResult
 from exfit.results.thinning import thinned
+from exfit.util.sources import FITTED, TYPICAL
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
@@ -39,6 +40,8 @@ def load_result(path: str | PathLike[str]) -> FitResult:
             f"{source}: version {version}: written by a later exfit; this one reads up to {VERSION}"
         )
     whole = {**content, "parts": _parts_of(content)} if version == 1 else content
+    if "sources" not in whole:
+        whole = {**whole, "sources": _sources_of(whole)}
     try:
         result: FitResult = Reader(complete=version == VERSION).read(FitResult, whole)
     except FormError as fault:
@@ -67,6 +70,12 @@ def _content(source: Path) -> dict[str, Any]:
 
 def _refuse_constant(text: str) -> NoReturn:
     raise ValueError(f"{text} is not a number of JSON")
+
+
+def _sources_of(content: Mapping[str, Any]) -> dict[str, str]:
+    """Return where values come from, as far as a file of an earlier version says."""
+    typical, fitted = content.get("typical", ()), content["parameters"]
+    return {**dict.fromkeys(typical, TYPICAL), **dict.fromkeys(fitted, FITTED)}
 
 
 def _parts_of(content: Mapping[str, Any]) -> list[Any]:

@@ -17,6 +17,7 @@ from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
 from exfit.results.verdict import Verdict
+from exfit.util.sources import NOT_STATED, TYPICAL
 from exfit.util.typed import IN_FILE, KEY, plain
 
 if TYPE_CHECKING:
@@ -174,6 +175,7 @@ class FitResult:
     ``fixed`` are the exciter's others, and helpers; ``machine``, ``network`` and ``stabiliser`` are
     all values of these parts by symbol, the fitted ones among them; their models are None where
     the case has no such part. Values that follow others by ``ties`` are among all of these.
+    ``sources`` says where every value comes from: typical, nameplate ..., not stated.
 
     ``cost`` is what the fit made small, ``comparisons`` are with each record,
     ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
@@ -187,6 +189,7 @@ class FitResult:
         "rmse": "rmse",
         "nit": "nit",
         "fit": "comparison",
+        "typical": "typical",
     }
 
     case: Path
@@ -197,7 +200,6 @@ class FitResult:
     parameters: Mapping[str, FittedParameter]
     fixed: Mapping[str, float]
     ties: Mapping[str, str]
-    typical: tuple[str, ...]
     machine: Mapping[str, float]
     machine_model: str | None
     network: Mapping[str, float]
@@ -223,6 +225,7 @@ class FitResult:
     inputs: Mapping[str, str]
     verdict: Verdict | None = None
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
     phase_ends: tuple[PhaseEnd, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)
     strategy_given: bool = field(default=True, metadata=IN_FILE)
@@ -293,13 +296,19 @@ class FitResult:
             if name.startswith(prefix)
         }
 
+    @property
+    def typical(self) -> tuple[str, ...]:
+        """The parameters whose values are typical, by name; not those that follow them."""
+        return tuple(
+            name for name, word in self.sources.items() if word == TYPICAL and name not in self.ties
+        )
+
     def source_of(self, name: str) -> str:
-        """Return where the value of a parameter comes from: fitted, tied, typical or fixed."""
-        if name in self.parameters:
-            return "fitted"
-        if name in self.ties:
-            return f"tied {self.ties[name]}"
-        return "typical" if name in self.typical else "fixed"
+        """Return where the value of a parameter comes from, in words: fitted, typical, tied ..."""
+        word = self.sources.get(name, NOT_STATED)
+        if name not in self.ties:
+            return word
+        return f"tied {self.ties[name]}" + (f", {TYPICAL}" if word == TYPICAL else "")
 
     @property
     def outcome(self) -> str:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import floor, log10
 
 import numpy as np
@@ -12,6 +12,7 @@ from exfit.dsp.decimation import kept_rows
 from exfit.inference import ParameterEffect
 from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.model import FitResult, PhaseEnd
+from exfit.util.sources import NOT_STATED, SOURCES
 from exfit.util.text import yaml_number
 
 Array = NDArray[np.float64]
@@ -133,7 +134,9 @@ def parameter_file(result: FitResult) -> str:
         "parameters:",
     ]
     for name, value in result.own_values.items():
-        lines.append(f"  {name}: {yaml_number(value)}  # {_origin(result, name)}")
+        remark = _remark(result, name)
+        lines.append(f"  {name}: {yaml_number(value)}" + (f"  # {remark}" if remark else ""))
+    lines += _sources(result, result.own_values)
     if result.of_records:
         lines += ["records:  # identified with the parameters"]
         lines += [f"  {name}: {yaml_number(value)}" for name, value in result.of_records.items()]
@@ -151,6 +154,7 @@ def phase_end_file(result: FitResult, end: PhaseEnd) -> str:
         *([f"model_sha256: {result.inputs['model']}"] if "model" in result.inputs else []),
         "parameters:",
         *(f"  {name}: {yaml_number(end.values[name])}" for name in own),
+        *_sources(result, own),
     ]
     if result.of_records:
         lines += ["records:"]
@@ -158,10 +162,19 @@ def phase_end_file(result: FitResult, end: PhaseEnd) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _origin(result: FitResult, name: str) -> str:
-    """Return where a value is from."""
+def _remark(result: FitResult, name: str) -> str:
+    """Return what must be known beside a value and its source."""
     parameter = result.parameters.get(name)
     if parameter is None:
-        return "typical" if name in result.typical else result.ties.get(name, "fixed")
+        return result.ties.get(name, "")
     marks = [f"on its {parameter.at_bound}"] if parameter.at_bound else []
-    return ", ".join(["fitted", *marks, *([] if parameter.physical else ["not physical"])])
+    return ", ".join([*marks, *([] if parameter.physical else ["not physical"])])
+
+
+def _sources(result: FitResult, names: Iterable[str]) -> Iterator[str]:
+    """Yield the lines that say where values come from, as far as that is stated."""
+    stated = {name: result.sources.get(name, NOT_STATED) for name in names}
+    lines = [f"  {name}: {word}" for name, word in stated.items() if word in SOURCES]
+    if lines:
+        yield "sources:"
+        yield from lines

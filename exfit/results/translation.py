@@ -7,12 +7,14 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.util.sources import NOT_STATED, TYPICAL
 from exfit.util.typed import IN_FILE, plain
 
 Array = NDArray[np.float64]
 
 POOR = 5.0  # % of the step: an error beyond it changes what a study shows
 EXACT = 1e-4  # % of the step: what differs by less differs by rounding and sub-steps
+WITHOUT_EFFECT = "without effect"  # origin of what the source does not have
 UNDETERMINED = 0.5  # relative change of a parameter that stays unnoticed
 SAMPLES: Mapping[str, Any] = {**IN_FILE}
 
@@ -22,7 +24,8 @@ class TranslatedParameter:
     """A parameter of the target: its value, and where that comes from.
 
     ``origin`` is copied, computed, fitted, without effect or typical; ``of`` are the parameters of
-    the source that it is from, with what each is there: fitted, fixed, typical. Of a fitted one
+    the source that it is from, with what each is there: fitted, nameplate, typical ...;
+    ``value_source`` is the one word of `util.sources` for it, or its origin. Of a fitted one
     ``unnoticed`` is by what share of its value it can change, the others following, until the
     responses change by a thousandth of the step (rms); it is no confidence interval.
     """
@@ -36,11 +39,12 @@ class TranslatedParameter:
     source: str
     of: Mapping[str, str] = field(default_factory=dict)
     unnoticed: float | None = None
+    value_source: str = NOT_STATED
 
     @property
     def provenance(self) -> str:
         """Where the value is from, in words."""
-        if self.origin in ("typical", "without effect"):
+        if self.origin in (TYPICAL, WITHOUT_EFFECT):
             return f"{self.origin}: {self.source} has no such parameter"
         return f"translated from {self.source}: {self.origin_in_words}"
 

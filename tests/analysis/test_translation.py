@@ -123,7 +123,7 @@ def test_the_search_finds_the_best_there_is():
 def test_a_gain_in_two_factors_is_their_product():
     translation = translated("AC2A", "AC1A", KA=20.0, KB=15.0, KH=0.0, VFEMAX=99.0, **FAR)
     assert translation.values["KA"] == 300.0
-    assert translation.parameters["KA"].of == {"KA": "fixed", "KB": "fixed"}
+    assert translation.parameters["KA"].of == {"KA": "not stated", "KB": "not stated"}
 
 
 def test_a_lead_as_a_share_of_its_lag_is_the_lead():

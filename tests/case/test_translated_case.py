@@ -15,13 +15,15 @@ CASE = ROOT / "configs" / "ac1a_typical.yaml"
 EXAC1 = MODELS["EXAC1"]
 VALUES = typical(EXAC1.sheet) | {"KA": 333.0, "TF": 0.0123}
 PROVENANCE = {row.symbol: f"from {row.symbol}" for row in EXAC1.sheet}
+SOURCES = dict.fromkeys(PROVENANCE, "fitted") | {"KC": "not stated", "KD": "without effect"}
 PLANT = {"type": "open-circuit", "machine": "GENROU", "parameters": {"Tpd0": 6.5, "Xd": 1.7}}
 
 
 def translated(text, case=CASE, folder=ROOT / "configs", **values):
     parts = "EXAC1", EXAC1
     own = VALUES | values
-    return translated_case(text, case, folder, parts, own, PROVENANCE, PLANT, "AC1A\nas EXAC1")
+    sources = PROVENANCE, SOURCES
+    return translated_case(text, case, folder, parts, own, *sources, PLANT, "AC1A\nas EXAC1")
 
 
 def test_it_is_the_case_with_another_exciter():
@@ -35,6 +37,9 @@ def test_it_is_the_case_with_another_exciter():
     assert [*case.free()] == [row.symbol for row in EXAC1.sheet if row.free]
     assert text.startswith("# AC1A\n# as EXAC1\nmodel: EXAC1\n")
     assert "regulator gain; from KA" in text
+    assert {name: case.sources()[name] for name in ("KA", "TR", "KC", "KD")} == {
+        "KA": "fitted", "TR": "fitted", "KC": "not stated", "KD": "not stated"
+    }  # fmt: skip
 
 
 def test_its_records_are_named_from_its_own_folder(tmp_path):
@@ -54,6 +59,7 @@ def test_what_was_found_of_the_machine_is_where_its_fit_starts():
     case = parse_case(translated(yaml.safe_dump(content)), CASE)
     assert case.free()["machine.Tpd0"].start == 6.5
     assert case.values()["machine.Xd"] == 1.7
+    assert case.sources()["machine.Tpd0"] == "fitted"
 
 
 def test_a_gain_of_zero_stays_fixed():

@@ -201,7 +201,8 @@ def test_a_stabiliser_goes_into_the_case_with_its_model_and_parameters(run, pssx
 def test_a_fitted_stabiliser_is_written_behind_its_exciter(run, fitted, pssx):
     parameters = {**result_of(fitted)["parameters"], "stabiliser.k": of_value(7.0)}
     changes = {"stabiliser_model": "PSSX", "stabiliser": {"k": 5.0, "a": 3.0}}
-    named(fitted, parameters=parameters, history=[], **changes)
+    sources = {**result_of(fitted)["sources"], "stabiliser.k": "fitted"}
+    named(fitted, parameters=parameters, history=[], sources=sources, **changes)
     code, out, _ = run("export", fitted)
     assert code == 0
     assert out.splitlines()[-1].split() == ["1", "'PSSX'", "1", "1", "3.0", "7.0", "/"]
@@ -296,18 +297,22 @@ def test_a_result_or_its_folder_gives_the_same_on_the_terminal(run, fitted):
 
 def test_fitted_values_of_the_machine_go_over_those_of_the_case(run, fitted):
     parameters = {**result_of(fitted)["parameters"], "machine.Tpd0": of_value(5.5)}
-    named(fitted, parameters=parameters, history=[])
+    sources = {**result_of(fitted)["sources"], "machine.Tpd0": "fitted"}
+    named(fitted, parameters=parameters, history=[], sources=sources)
     _, out, _ = run("export", fitted)
     assert read_unit(out, "out.dyr").machine.values["Tpd0"] == 5.5
     assert "// GENROU: fitted: Tpd0." in out.splitlines()
 
 
 def test_values_that_no_one_gave_are_named(run, fitted):
-    named(fitted, typical=["TR", "KE", "machine.Tpq0", "machine.H"])
+    sources = dict.fromkeys(["TR", "KE", "machine.Tpq0", "machine.H"], "typical")
+    named(fitted, sources={**sources, "KA": "fitted", "TE": "maker"})
     _, out, err = run("export", fitted)
-    assert "ESAC1A: as in exfit's typical data, check that it is the unit's: TR, KE" in err
-    assert re.search(r"GENROU: as in exfit's typical data, .*: Tpq0, H\n", err)
-    assert "// ESAC1A: as in exfit's typical data" in out
+    assert "ESAC1A: typical, not of this unit, check: TR, KE\n" in err
+    assert "GENROU: typical, not of this unit, check: Tpq0, H\n" in err
+    for line in ("typical, not of this unit, check: TR, KE.", "fitted: KA.", "maker: TE."):
+        assert f"// ESAC1A: {line}" in out.splitlines()
+    assert "// ESAC1A: not stated: TB TC" in out
 
 
 @pytest.mark.parametrize("name", [None, "ONE_AXIS"])

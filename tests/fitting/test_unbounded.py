@@ -131,8 +131,10 @@ def test_terminal_report_and_file_mark_the_value_and_no_other(found):
     for name in ("KD", "TE"):
         (line,) = [line for line in lines if line.startswith(f"{name} ")]
         assert line.rstrip().endswith("not physical") == (name == "KD")
-        (stored,) = [row for row in parameter_file(result).splitlines() if f" {name}:" in row]
-        assert stored.endswith("# fitted, not physical" if name == "KD" else "# fitted")
+        rows = [row for row in parameter_file(result).splitlines() if f" {name}:" in row]
+        stored, source = rows
+        assert source == f"  {name}: fitted"
+        assert stored.endswith("# not physical") == (name == "KD")
     ranked = [effect.parameter for effect in result.knowledge.effects]
     shown = " ".join(line.strip() for line in lines).partition("in units of the noise: ")[2]
     assert re.findall(r"(K[AD]|T[AE]) [\d.]+", shown.partition("note:")[0])[:3] == ranked

@@ -79,7 +79,6 @@ def result(free=2, iterations=4, phases=("lm", "dgn"), at_bound=None):
         },
         fixed={},
         ties={},
-        typical=(),
         machine={},
         machine_model=None,
         network={},

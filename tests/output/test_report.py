@@ -187,7 +187,7 @@ def test_every_parameter_that_was_not_fitted_is_reported_with_its_value_and_sour
                 continue
             row = told[kind][symbol]
             assert row[1] == f"{value:.6g}"
-            assert row[3] == ("typical" if prefix + symbol in saved["typical"] else "fixed")
+            assert row[3] == (saved["sources"][prefix + symbol])
 
 
 @pytest.mark.parametrize("name", EVERY)

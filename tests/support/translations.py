@@ -8,6 +8,7 @@ import exfit
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
+from exfit.util.sources import TYPICAL
 
 MACHINE = {
     "Tpd0": 6.0, "Tppd0": 0.035, "Xd": 1.8, "Xpd": 0.3, "Xppd": 0.25, "Xl": 0.2, "S10": 0.12,
@@ -32,7 +33,7 @@ def fit_of(fit, model, machine="GENROU", network=None, **values):
         model=model,
         parameters={},
         fixed=own,
-        typical=tuple(name for name in own if name not in values),
+        sources={name: TYPICAL for name in own if name not in values},
         machine={**typical(MACHINES[machine].sheet), **MACHINE},
         machine_model=machine,
         network=network or {},

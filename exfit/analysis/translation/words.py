@@ -6,6 +6,7 @@ from exfit.analysis.translation.start import StartValue
 from exfit.analysis.translation.steps import DEFAULT_MACHINE, TranslationTask
 from exfit.results.model import FitResult
 from exfit.results.translation import UNDETERMINED, StepComparison, TranslatedParameter
+from exfit.util.sources import NOT_STATED, least_certain
 
 Values = Mapping[str, float]
 
@@ -23,9 +24,17 @@ def translated_parameters(
             source=task.source.name,
             of={name: _state(task.result, name) for name in values[row.symbol].of},
             unnoticed=unnoticed.get(row.symbol),
+            value_source=_value_source(task.result, values[row.symbol]),
         )
         for row in task.target.sheet
     }
+
+
+def _value_source(result: FitResult, entry: StartValue) -> str:
+    """Return where a value comes from in one word: of several in the source the least certain."""
+    if entry.kind not in ("copied", "computed"):
+        return entry.kind
+    return least_certain(result.sources.get(name, NOT_STATED) for name in entry.of)
 
 
 def _state(result: FitResult, name: str) -> str:

@@ -16,6 +16,7 @@ from exfit.case.checks.record import (
     weight_faults,
 )
 from exfit.case.checks.recorded_reference import recorded_reference_faults
+from exfit.case.checks.sources import source_faults
 from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
@@ -42,6 +43,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from model_faults(content, kind)
     yield from parameter_faults(content, parts, ties)
     yield from stabiliser_faults(content, parts, kind)
+    yield from source_faults(content, parts, kind)
     yield from plants_of_records_faults(content, kind)
     yield from _single_record_faults(content)
     if "records" not in content:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import BaseModel, Discriminator, Field, Tag
 
 from exfit.case.schema.values import (
+    STATED,
     Count,
     FreeSection,
     Frozen,
@@ -14,6 +15,7 @@ from exfit.case.schema.values import (
     Number,
     Positive,
     Section,
+    Sources,
     nothing,
 )
 from exfit.util.strategies import (
@@ -48,6 +50,7 @@ class Parameters(Section):
     free: Frozen[FreeSection] = Field(
         default_factory=nothing, description="Parameters that are fitted."
     )
+    sources: Sources = STATED
 
 
 class Tolerance(Section):

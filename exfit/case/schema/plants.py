@@ -5,7 +5,17 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from exfit.case.schema.values import FreeSection, Frozen, Given, Number, Section, Text, nothing
+from exfit.case.schema.values import (
+    STATED,
+    FreeSection,
+    Frozen,
+    Given,
+    Number,
+    Section,
+    Sources,
+    Text,
+    nothing,
+)
 from exfit.models import MACHINE_NAMES
 from exfit.plants import HEARD
 
@@ -40,6 +50,7 @@ class OpenCircuit(PlantSection):
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
+    sources: Sources = STATED
 
 
 class InfiniteBus(PlantSection):
@@ -53,6 +64,7 @@ class InfiniteBus(PlantSection):
         description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
         "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
     )
+    sources: Sources = STATED
 
     @property
     def given(self) -> Mapping[str, float]:
@@ -82,6 +94,7 @@ class MachinePlayback(PlantSection):
     machine: Text = MACHINE
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
+    sources: Sources = STATED
 
 
 class NoPlant(PlantSection):
@@ -110,6 +123,7 @@ class Stabiliser(Section):
     free: Frozen[FreeSection] = Field(
         default_factory=nothing, description="Parameters that are fitted."
     )
+    sources: Sources = STATED
 
 
 class OffLine(PlantSection):
@@ -125,6 +139,7 @@ class OnLine(PlantSection):
     network: Frozen[Number] = Field(
         description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
     )
+    sources: Sources = STATED
 
     @property
     def given(self) -> Mapping[str, float]:

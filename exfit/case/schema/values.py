@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -17,6 +17,12 @@ from pydantic import (
 
 from exfit.case.messages import PERCENT
 from exfit.case.ties import is_tie
+from exfit.util.sources import NOT_STATED, SOURCES
+
+if TYPE_CHECKING:
+    Source = str
+else:
+    Source = Literal[SOURCES]
 
 Value = TypeVar("Value")
 
@@ -37,6 +43,12 @@ NotNegative = Annotated[Number, Field(ge=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Text = Annotated[str, Strict(), Field(min_length=1)]
 Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSerializer(thawed)]
+
+Sources = Frozen[Source]
+STATED = Field(
+    default_factory=nothing,
+    description=f"Where the value of each parameter comes from; {NOT_STATED} by default.",
+)
 
 
 def _is_tie(value: Any) -> str:

@@ -1,7 +1,7 @@
 """The PSS/E records of a fit, as a dynamics file."""
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
@@ -20,6 +20,7 @@ from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES
 from exfit.results.model import FitResult
 from exfit.results.translation import Translation
+from exfit.util.sources import NOT_STATED, TYPICAL, by_source
 from exfit.util.text import near, show
 
 
@@ -33,12 +34,11 @@ class Exported:
 
 @dataclass(frozen=True)
 class Written:
-    """A record with its values; ``fitted`` and ``typical`` are the names of those."""
+    """A record with its values, and their names by the source of their values."""
 
     definition: Definition
     values: Mapping[str, float]
-    fitted: tuple[str, ...]
-    typical: tuple[str, ...]
+    by_source: Mapping[str, Sequence[str]]
 
 
 def export(
@@ -78,16 +78,14 @@ def export(
 def _translated(result: FitResult, translation: Translation) -> FitResult:
     """Return a result whose exciter is that of a translation."""
     others = {name: entry for name, entry in result.parameters.items() if "." in name}
-    of_others = tuple(name for name in result.typical if "." in name)
-    of_target = tuple(
-        name for name, entry in translation.parameters.items() if entry.origin == "typical"
-    )
+    of_others = {name: word for name, word in result.sources.items() if "." in name}
+    of_target = {name: entry.value_source for name, entry in translation.parameters.items()}
     return replace(
         result,
         model=translation.target,
         parameters=others,
         fixed=translation.values,
-        typical=(*of_target, *of_others),
+        sources={**of_target, **of_others},
         inputs={label: sha for label, sha in result.inputs.items() if label != "model"},
     )
 
@@ -161,12 +159,12 @@ def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
     if missing:
         names = ", ".join(prefix + symbol for symbol in missing)
         raise ExfitError(f"{definition.record.name}: no value of {names} in the result")
-    return Written(
-        definition,
-        values,
-        tuple(name for name in definition.names if prefix + name in result.parameters),
-        tuple(name for name in definition.names if prefix + name in result.typical),
-    )
+    own = {
+        row.symbol: result.sources.get(prefix + row.symbol, NOT_STATED)
+        for row in definition.model.sheet
+    }
+    written = [name for name in definition.names if name in own]
+    return Written(definition, values, by_source(written, own))
 
 
 def _warnings(entry: Written) -> Iterator[str]:
@@ -178,9 +176,9 @@ def _warnings(entry: Written) -> Iterator[str]:
             yield f"{record.name} cannot hold {row.symbol} = {show(value)}: it is lost"
     if record.doubt:
         yield f"{record.name}: {record.doubt}"
-    if entry.typical:
-        names = ", ".join(entry.typical)
-        yield f"{record.name}: as in exfit's typical data, check that it is the unit's: {names}"
+    if TYPICAL in entry.by_source:
+        names = ", ".join(entry.by_source[TYPICAL])
+        yield f"{record.name}: {TYPICAL}, not of this unit, check: {names}"
 
 
 def _matters(symbol: str, value: float) -> bool:
@@ -200,8 +198,9 @@ def _origin(result: FitResult) -> Iterator[str]:
 
 def _comments(entry: Written) -> Iterator[str]:
     record = entry.definition.record
-    if entry.fitted:
-        yield f"{record.name}: fitted: {' '.join(entry.fitted)}."
+    for source, symbols in entry.by_source.items():
+        if source != TYPICAL:
+            yield f"{record.name}: {source}: {' '.join(symbols)}."
     for warning in _warnings(entry):
         yield f"{warning}."
 

@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from exfit.case.templates import commented, parameter_line
+from exfit.case.templates import commented, parameter_line, source_lines
 from exfit.errors import DynamicsError
 from exfit.exchange.psse.fields import text_of
 from exfit.exchange.psse.unit import Unit, UnitPart, read_unit
 from exfit.models.sheet import Sheet
+from exfit.util.sources import TYPICAL
 from exfit.util.text import yaml_number
 
 TEST = """\
@@ -33,10 +34,10 @@ def case_text(unit: Unit, file: str) -> str:
     if unit.stabiliser is not None:
         name = unit.stabiliser.definition.model.name
         lines += ["stabiliser:", commented(f"  model: {name}", _origin(unit.stabiliser))]
-        lines += ["  parameters:", *_values(unit.stabiliser, "    ")]
+        lines += ["  parameters:", *_values(unit.stabiliser, "    "), *_sources(unit.stabiliser)]
     lines += [*TEST.splitlines(), "parameters:"]
     lines += [commented("  fixed:", "what a fit shall find goes under free")]
-    lines += _values(unit.exciter, "    ")
+    lines += [*_values(unit.exciter, "    "), *_sources(unit.exciter)]
     return "\n".join(lines) + "\n"
 
 
@@ -58,6 +59,7 @@ def _plant(machine: UnitPart) -> Iterator[str]:
     yield commented(f"  machine: {machine.definition.model.name}", _origin(machine))
     yield "  parameters:"
     yield from _values(machine, "    ")
+    yield from _sources(machine)
 
 
 def _values(part: UnitPart, indent: str) -> Iterator[str]:
@@ -65,6 +67,13 @@ def _values(part: UnitPart, indent: str) -> Iterator[str]:
     for row in rows:
         remark = "" if row.symbol in part.definition.names else "; typical, not in the file"
         yield parameter_line(row, yaml_number(part.values[row.symbol]), indent, remark)
+
+
+def _sources(part: UnitPart) -> Iterator[str]:
+    """Yield which values are not of the file; it does not say where its own come from."""
+    names = part.definition.names
+    absent = [row.symbol for row in part.definition.model.sheet if row.symbol not in names]
+    yield from source_lines(dict.fromkeys(absent, TYPICAL), "  ")
 
 
 def _origin(part: UnitPart) -> str:

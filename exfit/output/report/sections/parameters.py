@@ -75,7 +75,7 @@ def _helpers(result: FitResult) -> Iterator[FixedGroup]:
 def _networks_of_records(result: FitResult) -> Iterator[FixedGroup]:
     for test in result.tests:
         rows = (
-            _fixed(result, "network.", symbol, row.value, SheetRow(row.unit, row.meaning))
+            FixedParameter(symbol, row.unit, row.meaning, row.value, row.source)
             for symbol, row in test.network.items()
             if f"network.{symbol}" not in result.parameters
         )

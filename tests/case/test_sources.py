@@ -1,0 +1,149 @@
+"""Where values come from: what a case states, what is typical, and what contradicts that."""
+
+import pytest
+import yaml
+from places import ROOT
+
+from exfit.case.case import Case
+from exfit.case.json_schema import json_schema
+from exfit.errors import CaseError
+from exfit.util.sources import LEAST_CERTAIN_FIRST, NOT_STATED, SOURCES, least_certain
+
+NETWORK = {"f0": 60, "X": 0.3, "P": 0.5, "Q": 0.1}
+CONTENT = {
+    "model": "AC1A",
+    "plant": {
+        "type": "infinite-bus",
+        "machine": "GENROU",
+        "parameters": {"Tpd0": 6.0, "Xd": 1.8, "S10": 0.1, "S12": 0.4, "Xq": "=0.95*machine.Xd"},
+        "free": {"H": {"start": 3.0, "min": 1.0, "max": 9.0}},
+        "network": NETWORK,
+        "sources": {"Tpd0": "nameplate", "S10": "measured", "X": "test report", "H": "typical"},
+    },
+    "stabiliser": {
+        "model": "STAB1",
+        "parameters": {"K_T": 10.0, "T3": 0.1},
+        "sources": {"K_T": "maker"},
+    },
+    "test": {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}], "duration": 3.0},
+    "parameters": {
+        "fixed": {
+            "KE": 1.0, "VRMAX": 14.0, "VRMIN": "=-VRMAX", "TE": "=0.9*TE0", "TE0": 1.0,
+            "KF": "=KA/1e4", "TF": "=TE+KC",
+        },
+        "free": {"KA": {"start": 400, "min": 10, "max": 5000}},
+        "sources": {"VRMAX": "typical", "TE0": "fitted", "KE": "measured"},
+    },
+}  # fmt: skip
+
+
+def changed(**sections):
+    return {**CONTENT, **{key: {**CONTENT[key], **value} for key, value in sections.items()}}
+
+
+def test_every_value_has_a_source():
+    case = Case.from_dict(CONTENT)
+    sources = case.sources()
+    assert sources.keys() == case.values().keys()
+    assert {*sources.values()} <= {*SOURCES, NOT_STATED}
+    stated = {
+        "machine.Tpd0": "nameplate", "machine.S10": "measured", "machine.H": "typical",
+        "network.X": "test report", "stabiliser.K_T": "maker", "VRMAX": "typical",
+        "TE0": "fitted", "KE": "measured",
+    }  # fmt: skip
+    assert {name: sources[name] for name in stated} == stated
+    for given in ("machine.Xd", "network.P", "stabiliser.T3", "KA"):
+        assert sources[given] == NOT_STATED
+    for left_out in ("machine.Tppd0", "network.Rc", "stabiliser.T4", "KC", "SE1"):
+        assert sources[left_out] == "typical"
+
+
+def test_what_follows_others_is_as_certain_as_the_least_certain_of_them():
+    sources = Case.from_dict(CONTENT).sources()
+    assert sources["VRMIN"] == sources["VRMAX"] == "typical"
+    assert sources["TE"] == sources["TE0"] == "fitted"
+    assert sources["TF"] == sources["KC"] == "typical"
+    assert sources["machine.Xq"] == NOT_STATED
+    assert {*LEAST_CERTAIN_FIRST} == {*SOURCES, NOT_STATED}
+    for k, word in enumerate(LEAST_CERTAIN_FIRST):
+        assert least_certain(reversed(LEAST_CERTAIN_FIRST[k:])) == word
+    assert least_certain([]) == NOT_STATED
+
+
+def test_a_fitted_value_passes_its_source_on():
+    case = Case.from_dict(CONTENT)
+    assert case.sources()["KF"] == NOT_STATED
+    sources = case.sources(fitted=["KA", "machine.H"])
+    assert sources["KA"] == sources["KF"] == sources["machine.H"] == "fitted"
+
+
+def test_typical_are_the_values_that_neither_a_fit_nor_another_value_gives():
+    typical = Case.from_dict(CONTENT).typical()
+    assert {"VRMAX", "KC", "machine.Tppd0", "network.Rc"} <= {*typical}
+    assert not {"VRMIN", "TF", "machine.H", "KA", "KE", "machine.Xd"} & {*typical}
+
+
+def test_a_record_with_a_network_of_its_own_states_its_sources():
+    of_record = {"type": "infinite-bus", "network": NETWORK, "sources": {"X": "measured"}}
+    content = {key: value for key, value in CONTENT.items() if key != "test"}
+    record = {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}}
+    test = {key: value for key, value in CONTENT["test"].items() if key != "duration"}
+    content["records"] = [{"name": "one", "test": test, "record": record}]
+    content["records"][0]["plant"] = of_record
+    case = Case.from_dict(content)
+    view = case.seen_from(case.records[0]).sources()
+    assert view["network.X"] == "measured"
+    assert view["machine.Tpd0"] == "nameplate"
+    of_record["sources"] = {"Y": "measured", "Rc": "maker"}
+    with pytest.raises(CaseError) as caught:
+        Case.from_dict(content)
+    assert [fault.split(": ")[1] for fault in str(caught.value).splitlines()] == [
+        "records[0].plant.sources.Y", "records[0].plant.sources.Rc"
+    ]  # fmt: skip
+
+
+def test_all_faults_of_sources_are_reported_together():
+    plant = {"Tpd0": "plate", "Xl": "maker", "Xq": "maker", "Xpp": "maker", "Rc": "maker"}
+    exciter = {"VRMIN": "maker", "KC": "maker", "KFF": "maker", "KE": 3}
+    with pytest.raises(CaseError) as caught:
+        Case.from_dict(changed(plant={"sources": plant}, parameters={"sources": exciter}))
+    faults = dict(line.split(": ", 2)[1:] for line in str(caught.value).splitlines())
+    assert faults == {
+        "plant.sources.Tpd0": "'plate' is not possible; did you mean nameplate?",
+        "plant.sources.Xl": "source of a value that the case does not give: it is typical",
+        "plant.sources.Xq": "follows others by =0.95*machine.Xd: no source of its own",
+        "plant.sources.Xpp": "not given; did you mean Xppd?",
+        "plant.sources.Rc": "source of a value that the case does not give: it is typical",
+        "parameters.sources.VRMIN": "follows others by =-VRMAX: no source of its own",
+        "parameters.sources.KC": "source of a value that the case does not give: it is typical",
+        "parameters.sources.KFF": "not given; did you mean KF?",
+        "parameters.sources.KE": f"3 is not possible; known: {', '.join(SOURCES)}",
+    }
+
+
+def test_values_given_beside_the_case_bring_their_sources():
+    case = Case.from_dict(CONTENT)
+    values = {"KE": 1.0, "KC": 0.3, "machine.Tpd0": 6.5, "VRMAX": 14.0}
+    given = case.with_values(values, "file", {"KC": "fitted", "VRMAX": "nameplate"}).sources()
+    assert given["KC"] == given["TF"] == "fitted"
+    assert given["VRMAX"] == given["VRMIN"] == "nameplate"
+    assert given["machine.Tpd0"] == NOT_STATED  # another value than that of the nameplate
+    assert given["KE"] == "measured"  # the value of the case, of which no one says more
+
+
+def test_the_schema_offers_the_words():
+    sections = json_schema()["$defs"]
+    for section in ("Parameters", "OpenCircuit", "InfiniteBus", "MachinePlayback", "Stabiliser"):
+        stated = sections[section]["properties"]["sources"]
+        assert stated["additionalProperties"]["enum"] == list(SOURCES)
+
+
+def test_the_sources_of_a_case_file_are_read(tmp_path):
+    from exfit.case.load import load_case
+
+    content = yaml.safe_load((ROOT / "configs" / "ac1a_typical.yaml").read_text())
+    content["plant"]["sources"] = {"Tpd0": "test report"}
+    content["record"]["file"] = str(ROOT / "sample_data" / "ac1a_up.csv")
+    content.pop("validate", None)
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump(content))
+    assert load_case(tmp_path / "case.yaml").sources()["machine.Tpd0"] == "test report"
