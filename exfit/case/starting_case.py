@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from exfit.case.suggestion import FILL_IN, bump_section, record_section, relative
+from exfit.case.suggestion import FILL_IN, bump_section, record_section, relative, weights_section
 from exfit.case.templates import commented, parameter_line, source_lines
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import Machine
@@ -59,6 +59,7 @@ def starting_case(
         *bump_section(inspection, vt0=model.name == ALONE),
         *record_section(inspection, relative(inspection.path, folder), only=("vt",)),
         *_parameters(model),
+        *weights_section(inspection),
         "# validate:               # a record that the fit does not see, as the step down",
         "#   - name: down",
         "#     test: {vref: [{at: 1.0, step: -0.05}]}",

@@ -59,15 +59,26 @@ def _channel_lines(
 ) -> Iterator[str]:
     """Yield the entry of each channel, with what to check above it.
 
-    A recorded ``reference`` drives the simulation: it is not compared, and has no noise.
+    A recorded ``reference`` drives the simulation: it is not compared.
     """
-    compared = [channel for channel in channels if channel is not reference]
-    noisy = all(in_per_unit(channel) and channel.noise > 0.0 for channel in compared)
     for channel in channels:
         drives = channel is reference
         mark = "" if drives or channel.signal in only else "# "
         yield f"    # {_about(channel)}"
-        yield f"    {mark}{channel.signal}: {_channel(channel, noisy, drives)}"
+        yield f"    {mark}{channel.signal}: {_channel(channel, drives)}"
+
+
+def weights_section(inspection: Inspection) -> list[str]:
+    """Return the lines of an ``estimate:`` section; none where a single channel is compared.
+
+    The noise of each channel from sample to sample is no weight: what a model does not match, as
+    the ripple of a bridge, is more.
+    """
+    signals = {"vt", *(signal for signal in COMPARED if inspection.channel_of(signal))}
+    if len(signals) < 2:
+        return []
+    text = "each channel by how well the model matches it"
+    return ["estimate:", commented("  weights: balanced", text)]
 
 
 def bump_section(inspection: Inspection, vt0: bool = False) -> list[str]:
@@ -170,7 +181,7 @@ def _about(channel: InspectedChannel) -> str:
     return f"{why}; {channel.level:.5g} {channel.unit or '?'} at rest; base: {base}"
 
 
-def _channel(channel: InspectedChannel, noisy: bool, drives: bool) -> str:
+def _channel(channel: InspectedChannel, drives: bool) -> str:
     entries = {"column": _text(channel.name)}
     if channel.unit == "%":
         entries["scale"] = "0.01"
@@ -178,8 +189,6 @@ def _channel(channel: InspectedChannel, noisy: bool, drives: bool) -> str:
         entries |= {"unit": str(channel.unit), "base": FILL_IN}
     elif not in_per_unit(channel):
         entries |= {"unit": FILL_IN, "base": FILL_IN}
-    if noisy and not drives:
-        entries["noise"] = yaml_number(float(f"{channel.noise:.2g}"))
     if channel.spikes and not drives:
         entries["outliers"] = f"{SPIKE_LIMIT:g}"
     if len(entries) == 1:

@@ -50,10 +50,10 @@ def inspect_(
 ) -> None:
     """Show the content of FILE, a record: channels, sampling, gaps, noise, spikes, steps.
 
-    Suggests the record and test sections of a case; guesses are marked. Writes inspect.json
-    and inspect.png to runs/FILE-inspect, or to DIR.
+    Suggests the record, test and estimate sections of a case; guesses are marked. Writes
+    inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
-    from exfit.case.suggestion import bump_section, record_section
+    from exfit.case.suggestion import bump_section, record_section, weights_section
     from exfit.output import run_folder
 
     # files of one record in several formats have one stem
@@ -69,7 +69,11 @@ def inspect_(
         terminal.inspection(
             console,
             inspection,
-            [*record_section(inspection, file.as_posix()), *bump_section(inspection)],
+            [
+                *record_section(inspection, file.as_posix()),
+                *bump_section(inspection),
+                *weights_section(inspection),
+            ],
         )
         terminal.written(console, folder)
     output.draw(figures)

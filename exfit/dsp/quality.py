@@ -1,6 +1,7 @@
 """What a recorder did to a channel: spikes, rounding, intervals in which it was stuck."""
 
 from math import log
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,10 @@ Places = NDArray[np.intp]
 
 EXCERPT, EXCERPT_PARTS = 200_000, 20  # samples that are enough to estimate noise; in parts
 JUMP_SHARE = 0.75  # of a spike's least size: it begins or ends with such a jump
+FEW_SPIKES, SPIKE_SHARE = 3, 0.005  # samples, or of all: more are the signal's own
+LONGEST_SPIKE = 2  # samples
+LEVEL_SAMPLES = 3  # on each side of a spike, whose median is the level: it stays
+NEARLY, MOST_NEARLY = 2.0 / 3.0, 0.5  # of the limit; of the spikes: so many come near it at most
 OFF_GRID = 0.05  # of a step: numbers farther off its grid are not rounded to it
 STUCK_RUN, FEWEST_STUCK = 3.0, 20  # times the longest run by chance, and samples
 WAVE_POWER = 0.9  # of the power of a waveform, near its mains frequency
@@ -31,9 +36,39 @@ def noise_of(samples: Array) -> float:
 def spikes(time: Array, samples: Array, scatter: float, limit: float) -> Places:
     """Return the places of the spikes of a channel (M,), given the ``scatter`` of its noise.
 
-    They are the outliers beyond ``limit`` times the noise that begin or end with a jump of three
-    quarters of this; the others are not looked at, which makes long records quick: at a limit of
-    six, one sample in 700 of white noise jumps like that.
+    They are the outliers beyond ``limit`` times the noise, if these are what a recorder does to a
+    signal: few, each alone between samples of one level, and apart from all others in size. There
+    is none in a signal that scatters widely by itself, as the field voltage of a thyristor bridge,
+    and none where it jumps.
+    """
+    outlying = _outlying(time, samples, scatter, limit)
+    # the first and the last sample return to no level
+    outlying = outlying[(outlying > 0) & (outlying < len(samples) - 1)]
+    few = 0 < len(outlying) <= max(FEW_SPIKES, SPIKE_SHARE * len(samples))
+    if not few or not _are_alone(samples, outlying, limit * scatter):
+        return np.zeros(0, np.intp)
+    nearly = len(_outlying(time, samples, scatter, NEARLY * limit)) - len(outlying)
+    by_chance = 2.0 * NormalDist().cdf(-NEARLY * limit) * len(samples)
+    apart = nearly <= max(FEW_SPIKES - 1, MOST_NEARLY * len(outlying) + 3.0 * by_chance)
+    return outlying if apart else np.zeros(0, np.intp)
+
+
+def _are_alone(samples: Array, outlying: Places, largest_change: float) -> bool:
+    """Return whether each outlier, or pair of them, returns to the level that it left."""
+    for run in np.split(outlying, np.flatnonzero(np.diff(outlying) > 1) + 1):
+        before = samples[max(run[0] - LEVEL_SAMPLES, 0) : run[0]]
+        after = samples[run[-1] + 1 : run[-1] + 1 + LEVEL_SAMPLES]
+        change = abs(float(np.median(after) - np.median(before)))
+        if len(run) > LONGEST_SPIKE or change > largest_change:
+            return False
+    return True
+
+
+def _outlying(time: Array, samples: Array, scatter: float, limit: float) -> Places:
+    """Return the places of the outliers that begin or end with a jump of most of the limit.
+
+    The others are not looked at, which makes long records quick: at a limit of six, one sample in
+    700 of white noise jumps like that.
     """
     jumps = np.flatnonzero(np.abs(np.diff(samples)) > JUMP_SHARE * limit * scatter)
     if len(samples) < OUTLIER_WINDOW or not len(jumps):

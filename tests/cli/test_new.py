@@ -72,7 +72,7 @@ def test_every_model_becomes_a_case_that_loads_as_it_stands(model, record, tmp_p
     (step,) = case.test.vref
     assert step.at.start == pytest.approx(AT, abs=0.05)
     assert step.at.min < AT < step.at.max
-    assert case.record.channels["vt"].noise == pytest.approx(NOISE, rel=0.2)
+    assert case.record.channels["vt"].noise is None  # the residuals show what counts
 
 
 def test_what_is_free_is_a_gain_or_a_time_and_starts_between_its_bounds(model):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.dsp.quality import quantum, spikes, stuck
+from exfit.dsp.quality import noise_of, quantum, spikes, stuck
 
 LIMIT = 6.0  # times the noise
 
@@ -37,3 +37,46 @@ def test_white_noise_has_no_spikes_and_each_spike_is_found_at_its_place():
     places = np.arange(100, 20_000, 400)
     noisy[places] += 25.0  # six times what seven samples of noise may scatter by
     assert set(places) <= set(spikes(time, noisy, 1.0, LIMIT))
+
+
+def bridge(time, seed):
+    """Return what a recorder shows of the field voltage of a six-pulse bridge, of mean 1."""
+    rng = np.random.default_rng(seed)
+    angle = (2.0 * np.pi * 50.0 * time + rng.uniform(0.0, 2.0 * np.pi)) % (np.pi / 3.0)
+    notches = np.where(angle < 0.03, -0.8, 0.0)  # while two valves conduct
+    return np.cos(angle + 0.7) + notches + rng.normal(0.0, 1e-3, time.size)
+
+
+@pytest.mark.parametrize("step", [0.0013, 0.004, 0.01003])
+def test_what_a_bridge_does_is_no_spike(step):
+    for seed in range(10):
+        time = step * np.arange(4000)
+        field = bridge(time, seed)
+        assert len(spikes(time, field, noise_of(field), LIMIT)) == 0
+
+
+def test_noise_with_heavy_tails_has_no_spikes():
+    time = 0.003 * np.arange(3752)
+    none = 0
+    for seed in range(20):
+        noisy = np.random.default_rng(seed).standard_t(3.0, time.size)
+        none += len(spikes(time, noisy, noise_of(noisy), LIMIT)) == 0
+    assert none == 20
+
+
+def test_a_jump_with_its_first_samples_is_no_spike():
+    rng = np.random.default_rng(3)
+    time = 0.01 * np.arange(1000)
+    field = np.where(time < 2.0, 1.0, 1.5 + 4.0 * np.exp(-np.maximum(time - 2.0, 0.0) / 0.015))
+    assert len(spikes(time, field + rng.normal(0.0, 1e-3, time.size), 1e-3, LIMIT)) == 0
+
+
+def test_many_spikes_are_the_signal_and_few_are_found_beside_a_step():
+    rng = np.random.default_rng(4)
+    time = 0.01 * np.arange(1000)
+    noisy = np.where(time < 2.0, 1.0, 1.05) + rng.normal(0.0, 1e-4, time.size)
+    few, many = noisy.copy(), noisy.copy()
+    few[[50, 333, 700]] += 0.01
+    many[20:-20:40] += 0.01
+    assert [*spikes(time, few, 1e-4, LIMIT)] == [50, 333, 700]
+    assert len(spikes(time, many, 1e-4, LIMIT)) == 0

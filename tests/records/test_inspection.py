@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from places import REFERENCE, SAMPLES
 from tables import read_columns
 
-from exfit.case.suggestion import bump_section, record_section
+from exfit.case.suggestion import bump_section, record_section, weights_section
 from exfit.errors import RecordError
 from exfit.output import plots
 from exfit.records.channel_recognition import connection_of, guess_signals, three_phases
@@ -229,8 +229,18 @@ def test_a_suggested_case_holds_no_base_that_nobody_gave():
     assert list(map(float, sizes)) == pytest.approx([0.0495, -0.0471], rel=0.06)
 
 
+def test_several_channels_are_to_be_balanced_and_a_single_one_is_not():
+    section = yaml.safe_load("\n".join(weights_section(INSPECTED)))
+    assert section == {"estimate": {"weights": "balanced"}}
+    assert weights_section(inspect(sample(SAMPLES / "first_order.csv"))) == []
+
+
 def test_every_suggestion_fits_a_terminal_of_80_columns_but_for_names():
-    lines = [*record_section(INSPECTED, "dirty.csv"), *bump_section(INSPECTED)]
+    lines = [
+        *record_section(INSPECTED, "dirty.csv"),
+        *bump_section(INSPECTED),
+        *weights_section(INSPECTED),
+    ]
     assert max(map(len, lines)) <= 80
 
 
