@@ -9,6 +9,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# rows of eight bytes each, addresses and counts, of the tables that the loops of `driver` work on
+JOB = ("p", "dp", "rates", "spans")  # sets side by side, from rest through all segments
+SPAN = ("u", "shapes", "row", "n", "parts", "h")  # a segment of a run
+SAMPLES = ("rows", "weights", "slopes", "out", "dout", "change")  # of one of the sets of a job
+WORK = ("r", "x", "out", "dr", "dx", "dout", "du")  # where a job leaves what is not asked for
+
+# the arrays of the functions that linearise
+AT_REST = ("p", "r", "x", "slopes", "jacobian", "dp", "dr", "dx", "units", "u")
+ALONG = ("p", "r", "x", "u", "slopes", "jacobian", "dp", "dr", "units")
+
 
 def address(array: Array) -> int:
     """Return where an array begins; raises TypeError where machine code could not read it."""

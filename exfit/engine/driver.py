@@ -1,24 +1,19 @@
 """Loops around the machine code of a system: many parameter sets in one call, sampled as they run.
 
 A call releases the interpreter's lock once, however many sets it runs. What it works on stands in
-tables of addresses and counts, a row of eight bytes each, in the order of the tuples below.
+tables of addresses and counts, whose rows `calls` describes.
 """
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+from exfit.engine.calls import ALONG, AT_REST, JOB, SAMPLES, SPAN, WORK
 from exfit.engine.writer import Shape, Writer
 
-JOB = ("p", "dp", "rates", "spans")  # sets side by side, from rest through all segments
-SPAN = ("u", "shapes", "row", "n", "parts", "h")  # a segment of a run
-SAMPLES = ("rows", "weights", "slopes", "out", "dout", "change")  # of one of the sets of a job
-WORK = ("r", "x", "out", "dr", "dx", "dout", "du")  # where a job leaves what is not asked for
 ARGUMENTS = (
     *("i64 %count", "ptr %jobs", "ptr %lanes", "i64 %segments"),
     *("i64 %samples", "i64 %points", "i64 %columns", "ptr %work"),
 )
-
-AT_REST = ("p", "r", "x", "slopes", "jacobian", "dp", "dr", "dx", "units", "u")
 
 ONE = Shape(1)
 
@@ -93,24 +88,45 @@ def _read_set(
 def at_rest(parameters: int, states: int, directions: int) -> str:
     """Return the IR of ``at_rest``: the states, slopes and Jacobian at rest of many sets."""
     w = Writer(ONE, ONE)
-    blocks = -(-states // directions)
     with _loop(w, "set", "%count") as k:
         p, x, slopes = (
-            w.address(array, w.let(f"mul i64 {k}, {size}"))
+            _of_number(w, k, array, size)
             for array, size in (("%p", parameters), ("%x", states), ("%slopes", states))
         )
         starting = _pointers(p, "%r", x, "null", "%dp", "%dr", "%dx", "null")
         w.put(f"call void @rest({starting})")
-        with _loop(w, "block", str(blocks)) as block:
-            size = states * directions
-            units = w.address("%units", w.let(f"mul i64 {block}, {size}"))
-            place = w.let(f"add i64 {w.let(f'mul i64 {k}, {blocks}')}, {block}")
-            columns = w.address("%jacobian", w.let(f"mul i64 {place}, {size}"))
-            arrays = (p, "%r", x, slopes, "%dp", "%dr", units, columns, "%u")
-            w.put(f"call void @motion({_pointers(*arrays)})")
+        _linearise(w, k, (p, x, slopes, "%u"), states, directions)
     w.put("ret void")
     arguments = ("i64 %count", *(f"ptr %{name}" for name in AT_REST))
     return _defined("void @at_rest", arguments, w)
+
+
+def along(states: int, inputs: int, directions: int) -> str:
+    """Return the IR of ``along``: the slopes of one set and their Jacobian at many states."""
+    w = Writer(ONE, ONE)
+    with _loop(w, "point", "%count") as k:
+        x, slopes, u = (
+            _of_number(w, k, array, size)
+            for array, size in (("%x", states), ("%slopes", states), ("%u", inputs))
+        )
+        _linearise(w, k, ("%p", x, slopes, u), states, directions)
+    w.put("ret void")
+    arguments = ("i64 %count", *(f"ptr %{name}" for name in ALONG))
+    return _defined("void @along", arguments, w)
+
+
+def _linearise(
+    w: Writer, k: str, arrays: tuple[str, str, str, str], states: int, directions: int
+) -> None:
+    """Write the calls that give the slopes for p, x and u, and the blocks of their Jacobian."""
+    p, x, slopes, u = arrays
+    blocks, size = -(-states // directions), states * directions
+    with _loop(w, "block", str(blocks)) as block:
+        units = _of_number(w, block, "%units", size)
+        place = w.let(f"add i64 {w.let(f'mul i64 {k}, {blocks}')}, {block}")
+        columns = _of_number(w, place, "%jacobian", size)
+        given = _pointers(p, "%r", x, slopes, "%dp", "%dr", units, columns, u)
+        w.put(f"call void @motion({given})")
 
 
 def _reader(shape: Shape) -> str:
@@ -193,6 +209,11 @@ def _row(w: Writer, table: str, number: str, fields: Sequence[str]) -> dict[str,
         field: w.let(f"load ptr, ptr {w.address(first, column)}, align 8")
         for column, field in enumerate(fields)
     }
+
+
+def _of_number(w: Writer, number: str, array: str, size: int) -> str:
+    """Write where the part of so many numbers begins that belongs to a set, a point or a block."""
+    return w.address(array, w.let(f"mul i64 {number}, {size}"))
 
 
 def _whole(w: Writer, address: str) -> str:

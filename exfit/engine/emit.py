@@ -8,7 +8,7 @@ functions take are rows of such values; ``run`` is the classical Runge-Kutta met
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from exfit.engine.driver import at_rest, sampled
+from exfit.engine.driver import along, at_rest, sampled
 from exfit.engine.functions import functions as inlined
 from exfit.engine.system import Tangents, Trace
 from exfit.engine.trace import Node, in_order
@@ -58,7 +58,8 @@ def simulation_with_tangents(traced: Trace, derived: Tangents, directions: int) 
 def linearisation(traced: Trace, derived: Tangents, directions: int) -> str:
     """Return the IR of ``rest`` and ``motion``, the slopes at given states, with derivatives."""
     parts = _with_tangents(traced, derived, directions)
-    around = at_rest(len(traced.p), len(traced.x), directions)
+    states = len(traced.x)
+    around = at_rest(len(traced.p), states, directions) + along(states, len(traced.u), directions)
     return _module(parts, {"rest": _rest(parts), "motion": _motion(parts)}, around)
 
 

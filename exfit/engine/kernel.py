@@ -8,22 +8,17 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.calls import address, function
-from exfit.engine.driver import AT_REST
-from exfit.engine.emit import linearisation, simulation, simulation_with_tangents
-from exfit.engine.sampling import Course, Courses, Sampler, Segment, Sizes, whole
+from exfit.engine.calls import ALONG, AT_REST, address, function
+from exfit.engine.sampling import Courses, Sampler, Sizes
 from exfit.engine.system import System, differentiate, trace
 from exfit.util.cache import cache_folder
 from exfit.util.files import write_whole
-
-if TYPE_CHECKING:
-    pass
 
 Array = NDArray[np.float64]
 
@@ -47,14 +42,12 @@ class Start(NamedTuple):
 class Span(NamedTuple):
     """A segment of a run: inputs u (n + 1, nu) at its grid points, linear between, and the step.
 
-    ``step`` is in seconds; each of the n steps is taken in ``parts`` equal sub-steps. ``du``
-    (n + 1, moving, N) are the tangents of the inputs that move, linear between as well.
+    ``step`` is in seconds; each of the n steps is taken in ``parts`` equal sub-steps.
     """
 
     u: Array
     step: float
     parts: int
-    du: Array | None = None
 
 
 class Target(NamedTuple):
@@ -170,6 +163,15 @@ def compiled(traced: str, write_ir: Callable[[], str]) -> Any:
         return engine
 
 
+@cache
+def _text(system: System, outputs: tuple[str, ...]) -> str:
+    """Return the trace of a system as text: several of its kernels have the same.
+
+    It is traced anew for the IR, which is seldom written: to differentiate a trace adds to it.
+    """
+    return trace(system, outputs).text
+
+
 RUN_ARGUMENTS = (ctypes.c_void_p, ctypes.c_double, ctypes.c_int64, ctypes.c_int64)
 
 
@@ -178,11 +180,13 @@ class Kernel:
 
     def __init__(self, system: System, outputs: Sequence[str], lanes: int = 1) -> None:
         self.lanes, self.system, self.outputs = lanes, system, tuple(outputs)
-        traced = trace(system, outputs)
-        engine = compiled(
-            f"simulation {lanes} {traced.text}",
-            lambda: simulation(traced, lanes),
-        )
+
+        def ir() -> str:
+            from exfit.engine.emit import simulation
+
+            return simulation(trace(system, self.outputs), lanes)
+
+        engine = compiled(f"simulation {lanes} {_text(system, self.outputs)}", ir)
         self._rest = function(engine, "rest", 4)
         self._run = function(engine, "run", 4, RUN_ARGUMENTS)
         sizes = Sizes(len(system.setpoints), len(system.states), len(self.outputs), lanes)
@@ -231,12 +235,12 @@ def side_by_side(parts: NDArray[np.int64], lanes: int) -> NDArray[np.intp]:
 def _blocks(tangents: Array, width: int) -> Array:
     """Return tangents (K, ..., N) as blocks (K, blocks, ..., width) of directions, none missing."""
     given = tangents.shape[-1]
-    missing = -given % width if given else width
-    if missing:
-        padding = np.zeros((*tangents.shape[:-1], missing))
-        tangents = np.concatenate([tangents, padding], axis=-1)
-    blocks = tangents.reshape(*tangents.shape[:-1], -1, width)
-    return np.ascontiguousarray(np.moveaxis(blocks, -2, 1))
+    count = max(1, -(-given // width))
+    blocks = np.zeros((len(tangents), count, *tangents.shape[1:-1], width))
+    for k in range(count):
+        own = tangents[..., k * width : (k + 1) * width]
+        blocks[:, k, ..., : own.shape[-1]] = own
+    return blocks
 
 
 class TangentKernel:
@@ -256,13 +260,16 @@ class TangentKernel:
     ) -> None:
         self.system, self.outputs = system, tuple(outputs)
         self.free, self.moving, self.directions = tuple(free), tuple(moving), directions
-        traced = trace(system, outputs)
 
         def ir() -> str:
+            from exfit.engine.emit import simulation_with_tangents
+
+            traced = trace(system, self.outputs)
             derived = differentiate(traced, system, free, moving)
             return simulation_with_tangents(traced, derived, directions)
 
-        text = f"tangents {self.free} {self.moving} {directions} {traced.text}"
+        traced = _text(system, self.outputs)
+        text = f"tangents {self.free} {self.moving} {directions} {traced}"
         engine = compiled(text, ir)
         counts = (len(system.setpoints), len(system.states), len(self.outputs))
         sizes = Sizes(*counts, directions=directions, moving=len(self.moving))
@@ -290,20 +297,6 @@ class TangentKernel:
             flat = np.moveaxis(slopes, 1, -2).reshape(*flat.shape[:-1], -1)
         return outputs, flat[..., : dp.shape[-1]], change
 
-    def run(self, p: Array, dp: Array, spans: Sequence[Span]) -> tuple[list[Array], list[Array]]:
-        """Return, for each span, outputs (n + 1, ny) and their derivatives (n + 1, ny, N).
-
-        ``p`` is (np,), ``dp`` (np, N).
-        """
-        count = dp.shape[1]
-        segments = [Segment(span.u, span.step, span.du) for span in spans]
-        ends = np.cumsum([len(span.u) for span in spans])
-        parts = np.array([[span.parts for span in spans]])
-        courses = Courses([Course(segments, whole(int(ends[-1])))], parts)
-        rates = np.tile(np.eye(count), (1, len(self.moving), 1, 1)) if self.moving else None
-        outputs, slopes, _ = self.samples(p[None], dp[None], courses, rates)
-        return np.split(outputs[0], ends[:-1]), np.split(slopes[0], ends[:-1])
-
 
 class AtRest(NamedTuple):
     """K systems at rest: states x (K, nx), their slopes there, the slopes' Jacobian (K, nx, nx)."""
@@ -318,29 +311,35 @@ class LinearKernel:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        traced = trace(system, ())
 
         def ir() -> str:
+            from exfit.engine.emit import linearisation
+
+            traced = trace(system, ())
             return linearisation(traced, differentiate(traced, system, ()), DIRECTIONS)
 
-        engine = compiled(f"linearisation {DIRECTIONS} {traced.text}", ir)
+        engine = compiled(f"linearisation {DIRECTIONS} {_text(system, ())}", ir)
         self._rest = function(engine, "rest", 8)
-        self._motion = function(engine, "motion", 9)
         self._at_rest = function(engine, "at_rest", len(AT_REST), first=(ctypes.c_int64,))
+        self._along = function(engine, "along", len(ALONG), first=(ctypes.c_int64,))
         # tangents of parameters, setpoints and states at rest: zero, and written over with zero
         sizes = (len(system.parameters), len(system.setpoints), len(system.states))
-        self._still = [np.zeros((rows, DIRECTIONS)) for rows in sizes]
-        self._still_input = np.zeros(len(system.inputs))
         states = sizes[-1]
         whole_blocks = -(-states // DIRECTIONS) * DIRECTIONS
         columns = np.eye(states, whole_blocks).reshape(states, -1, DIRECTIONS)
-        self._units = np.ascontiguousarray(columns.transpose(1, 0, 2))
+        units = np.ascontiguousarray(columns.transpose(1, 0, 2))
+        still, no_input = (
+            [np.zeros((rows, DIRECTIONS)) for rows in sizes],
+            np.zeros(len(system.inputs)),
+        )
+        self._blocks, self._kept = units.shape, (still, units, no_input)
+        self._still, self._units = [address(zeros) for zeros in still], address(units)
+        self._no_input = address(no_input)
 
     def rest(self, p: Array) -> Start:
         """Return the rest of one parameter set (np,): setpoints (nr,) and states (nx,)."""
         r, x = np.empty(len(self.system.setpoints)), np.empty(len(self.system.states))
-        still = map(address, self._still)
-        self._rest(address(p), address(r), address(x), None, *still, None)
+        self._rest(address(p), address(r), address(x), None, *self._still, None)
         return Start(r, x)
 
     def at_rest(self, p: Array) -> AtRest:
@@ -348,20 +347,23 @@ class LinearKernel:
         count, states = len(p), len(self.system.states)
         r = np.empty(len(self.system.setpoints))
         x, slopes = np.empty((count, states)), np.empty((count, states))
-        columns = np.empty((count, *self._units.shape))
-        arrays = (p, r, x, slopes, columns, *self._still, self._units, self._still_input)
-        self._at_rest(count, *map(address, arrays))
+        columns = np.empty((count, *self._blocks))
+        arrays = map(address, (p, r, x, slopes, columns))
+        self._at_rest(count, *arrays, *self._still, self._units, self._no_input)
         return AtRest(x, slopes, self._joined(columns))
 
     def motion(self, p: Array, r: Array, x: Array, u: Array) -> tuple[Array, Array]:
-        """Return the slopes (nx,) at states x and inputs u, and their Jacobian (nx, nx)."""
-        slopes, columns = np.empty(len(x)), np.empty(self._units.shape)
-        still = self._still[:2]
-        for unit, column in zip(self._units, columns, strict=True):
-            self._motion(*map(address, (p, r, x, slopes, *still, unit, column, u)))
+        """Return the slopes (..., nx) at states x and inputs u (..., nu), and their Jacobians.
+
+        These are (..., nx, nx); p (np,) and r (nr,) are those of one parameter set.
+        """
+        slopes, columns = np.empty(x.shape), np.empty((*x.shape[:-1], *self._blocks))
+        arrays = map(address, (p, r, x, u, slopes, columns))
+        self._along(x.size // x.shape[-1], *arrays, *self._still[:2], self._units)
         return slopes, self._joined(columns)
 
-    def _joined(self, columns: Array) -> Array:
+    @staticmethod
+    def _joined(columns: Array) -> Array:
         """Return Jacobians (..., nx, nx) of blocks (..., blocks, nx, DIRECTIONS) of columns."""
-        rows = np.moveaxis(columns, -3, -2)
+        rows = columns.swapaxes(-3, -2)
         return rows.reshape(*rows.shape[:-2], -1)[..., : rows.shape[-3]]

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.calls import address, place_of
-from exfit.engine.driver import SAMPLES, SPAN
+from exfit.engine.calls import JOB, SAMPLES, SPAN, address, place_of
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -68,11 +67,6 @@ class Course(NamedTuple):
 
     segments: Sequence[Segment]
     reading: SampleRows
-
-
-def whole(rows: int) -> SampleRows:
-    """Return what reads all rows of a run."""
-    return SampleRows(np.arange(rows)[:, None], np.ones((rows, 1)))
 
 
 class Sizes(NamedTuple):
@@ -174,7 +168,7 @@ class Sampler:
         slopes = None if dp is None else np.empty((count, blocks, *shape, sizes.directions))
         changing = dp is not None and courses.readings[0, 2] != 0
         changes = np.empty((count, *shape)) if changing else None
-        jobs = np.zeros((len(sets), blocks, 4), np.int64)
+        jobs = np.zeros((len(sets), blocks, len(JOB)), np.int64)
         jobs[:, :, 0] = _places_in(p, len(sets))[:, None]
         if dp is not None:
             jobs[:, :, 1] = _places_in(dp, len(sets) * blocks).reshape(-1, blocks)

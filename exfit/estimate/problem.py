@@ -32,8 +32,7 @@ class Point:
 
 def half_square(residuals: Array) -> float:
     """Return half the sum of squares; what is not a number costs infinity."""
-    with np.errstate(all="ignore"):
-        total = 0.5 * float(residuals @ residuals)
+    total = 0.5 * float(residuals @ residuals)
     return total if isfinite(total) else inf
 
 

@@ -102,8 +102,7 @@ class OneByOne:
 
     def _residuals(self, x: Array) -> Array:
         try:
-            with np.errstate(all="ignore"):
-                r = np.array(self.fun(x.copy()), dtype=np.float64, ndmin=1)
+            r = np.array(self.fun(x.copy()), dtype=np.float64, ndmin=1)
         except ArithmeticError:
             return np.full(1, np.nan)
         if r.ndim != 1:
@@ -114,7 +113,6 @@ class OneByOne:
         if self.jac is None:
             raise TypeError("jac: missing")
         try:
-            with np.errstate(all="ignore"):
-                return np.array(self.jac(x.copy()), dtype=np.float64, ndmin=2)
+            return np.array(self.jac(x.copy()), dtype=np.float64, ndmin=2)
         except ArithmeticError:
             return np.full((1, 1), np.nan)

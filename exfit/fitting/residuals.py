@@ -209,7 +209,8 @@ class Residuals:
 
     def costs(self, points: Sequence[Array]) -> Array:
         """Return half the sum of squares at each of points (N,), infinite where there are none."""
-        return np.array([half_square(residuals) for residuals in self.of_many(points)])
+        with np.errstate(over="ignore"):
+            return np.array([half_square(residuals) for residuals in self.of_many(points)])
 
     def exact_of_many(self, points: Sequence[Array]) -> list[Array]:
         """Return the exact Jacobian at each of points (N,), nan where there is none."""

@@ -1,6 +1,6 @@
 """Directions of differentiation as arrays, as the machine code takes them."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -37,11 +37,13 @@ class InputShape(NamedTuple):
 class Moves:
     """What the directions of some sets move, all together.
 
-    ``columns`` are the directions that need a run: that of a delay alone needs none. ``free`` are
-    the parameters that move; ``shapes`` belong to the inputs that do.
+    ``columns`` are the directions that need a run: that of a delay alone needs none; ``delayed``
+    those that have a delay. ``free`` are the parameters that move; ``shapes`` belong to the inputs
+    that do.
     """
 
     columns: tuple[int, ...]
+    delayed: tuple[int, ...]
     free: tuple[str, ...]
     shapes: dict[str, tuple[InputShape, ...]]
 
@@ -88,13 +90,26 @@ class Moves:
 def moves_of(system: System, inputs: Inputs, directions: Sequence[Sequence[Direction]]) -> Moves:
     """Return what the directions of several sets move."""
     every = [(k, move) for own in directions for k, move in enumerate(own)]
-    free = {name for _, move in every for name in move.parameters}
-    shapes = {shape for _, move in every for shape in _shapes_of(move)}
+    shapes = {shape for _, move in every if move.steps for shape in _shapes_of(move)}
     return Moves(
-        columns=tuple(sorted({k for k, move in every if move.parameters or move.steps})),
-        free=tuple(name for name in system.parameters if name in free),
-        shapes=_by_signal(system, inputs, shapes),
+        columns=_places(every, lambda move: bool(move.parameters or move.steps)),
+        delayed=_places(every, lambda move: move.delay != 0.0),
+        free=_moving_parameters(system, [move for _, move in every]),
+        shapes=_by_signal(system, inputs, shapes) if shapes else {},
     )
+
+
+def _places(
+    every: Iterable[tuple[int, Direction]], among: Callable[[Direction], bool]
+) -> tuple[int, ...]:
+    """Return the places of the directions of which something is true, of any set."""
+    return tuple(sorted({k for k, move in every if among(move)}))
+
+
+def _moving_parameters(system: System, moves: Sequence[Direction]) -> tuple[str, ...]:
+    """Return the parameters that move, in the order of the system."""
+    free = {name for move in moves for name in move.parameters}
+    return tuple(name for name in system.parameters if name in free)
 
 
 def _shapes_of(move: Direction) -> Iterator[InputShape]:

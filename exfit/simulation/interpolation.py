@@ -8,7 +8,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.engine.sampling import SampleRows, whole
+from exfit.engine.sampling import SampleRows
 from exfit.simulation.grid import ON_GRID, GridSegment
 
 Array = NDArray[np.float64]
@@ -135,11 +135,12 @@ class Interpolation:
         return weights
 
 
-class WholeRun:
-    """Reads a run at all ``rows`` of its grid, one segment behind the other."""
+class GridPoints:
+    """Reads a run at some ``rows`` (M,) of its grid, one segment behind the other."""
 
-    def __init__(self, rows: int) -> None:
-        self._reading = whole(rows)
+    def __init__(self, rows: NDArray[np.int64]) -> None:
+        self._rows = rows
+        self._reading = SampleRows(rows[:, None], np.ones((len(rows), 1)))
 
     def reading(self, changing: bool = False) -> SampleRows:
         """Return what machine code reads; raises for the derivative to a delay, one of samples."""
@@ -148,8 +149,8 @@ class WholeRun:
         return self._reading
 
     def __call__(self, run: Sequence[Array]) -> Array:
-        """Return all points (G, ...) of a run."""
-        return joined(run)
+        """Return these points (M, ...) of a run."""
+        return joined(run)[self._rows]
 
 
 def joined(run: Sequence[Array]) -> Array:

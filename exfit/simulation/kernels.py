@@ -2,6 +2,9 @@
 
 from functools import cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from exfit.engine.kernel import Kernel, LinearKernel, TangentKernel
 from exfit.engine.system import System, trace
 from exfit.engine.trace import in_order
@@ -49,6 +52,7 @@ def time_constants(system: System) -> tuple[str, ...]:
 
 
 @cache
-def places_of_time_constants(system: System) -> tuple[int, ...]:
+def places_of_time_constants(system: System) -> NDArray[np.intp]:
     """Return which of the parameters these are."""
-    return tuple(system.parameters.index(name) for name in time_constants(system))
+    places = [system.parameters.index(name) for name in time_constants(system)]
+    return np.array(places, dtype=np.intp)

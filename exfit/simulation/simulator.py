@@ -12,7 +12,7 @@ from exfit.engine.sampling import Course, Courses, Segment
 from exfit.engine.system import System
 from exfit.simulation.directions import Moves, moves_of
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
-from exfit.simulation.interpolation import Interpolation, WholeRun, joined
+from exfit.simulation.interpolation import GridPoints, Interpolation, joined
 from exfit.simulation.kernels import kernel, linear_kernel, tangent_kernel, time_constants
 from exfit.simulation.substeps import (
     NO_SUBSTEPS,
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
+POINTS_ALONG = 100  # of a response, where its sub-steps are checked
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 
@@ -82,7 +83,7 @@ class Simulator:
             for segment in self._grid
         ]
         self._segments = self._segments_of()
-        self._sampling: Interpolation | WholeRun = Interpolation(self._grid, times, delay)
+        self._sampling: Interpolation | GridPoints = Interpolation(self._grid, times, delay)
 
     def with_inputs(self, steps: tuple[InputStep, ...], delay: float) -> "Simulator":
         """Return the simulator of the same test with other steps and another delay (s).
@@ -102,16 +103,16 @@ class Simulator:
             result._sampling = Interpolation(self._grid, self.times, delay)
         return result
 
-    def on_grid(self) -> "Simulator":
-        """Return the simulator that gives all points of its grid, whatever the delay.
+    def on_grid(self, points: int | None = None) -> "Simulator":
+        """Return the simulator that gives all points of its grid, or so many, whatever the delay.
 
         An instant of an exact step is there twice: before and after it.
         """
+        times = np.concatenate([segment.times for segment in self._grid])
+        count = len(times)
+        rows = np.arange(count) if points is None else np.linspace(0, count - 1, points).astype(int)
         result = copy(self)
-        result.times, result._sampling = (
-            np.concatenate([segment.times for segment in self._grid]),
-            WholeRun(sum(len(segment.u) for segment in self._segments)),
-        )
+        result.times, result._sampling = times[rows], GridPoints(rows)
         return result
 
     def small_signal(self) -> "Simulator":
@@ -154,17 +155,16 @@ class Simulator:
         parts = substeps_at_rest(self.system, self.step, p)
         return np.where(parts == NO_SUBSTEPS, parts, np.maximum(parts, self.least))
 
-    def substeps_along(self, values: Values, response: Response, points: int = 100) -> int:
-        """Return the sub-steps that the rule requires along a response with all its states."""
-        p = self._vectors([values])[0]
-        rest = linear_kernel(self.system).rest(p)
-        inputs = self._sampling([segment.u for segment in self._segments])
-        rows = np.linspace(0, len(response.time) - 1, points).astype(int)
-        states = np.stack([response.signals[name][rows] for name in self.system.states], axis=1)
-        code, r = linear_kernel(self.system), rest.r
-        pairs = zip(np.ascontiguousarray(states), np.ascontiguousarray(inputs[rows]), strict=True)
-        jacobians = np.stack([code.motion(p, r, x, u)[1] for x, u in pairs])
-        return substeps_for(self.system, self.step, values, float(spectral_radii(jacobians).max()))
+    def substeps_along(self, values: Values, points: int = POINTS_ALONG) -> tuple[int, int]:
+        """Return the sub-steps of a response, and those that the rule requires all along it."""
+        system, some = self.system, self.on_grid(points)
+        signals, parts = some.samples(values, system.outputs)
+        states = signals[:, [system.outputs.index(name) for name in system.states]]
+        inputs = some._sampling([segment.u for segment in self._segments])
+        code, p = linear_kernel(system), self._vectors([values])[0]
+        _, jacobians = code.motion(p, code.rest(p).r, np.ascontiguousarray(states), inputs)
+        radius = float(spectral_radii(jacobians).max())
+        return parts, substeps_for(system, self.step, values, radius)
 
     def with_enough_substeps(self, values: Values) -> "Simulator":
         """Return a simulator whose sub-steps are enough all along the response to these values.
@@ -173,12 +173,10 @@ class Simulator:
         """
         simulator = self
         for _ in range(MOST_REPEATS):
-            whole = simulator.on_grid()
-            response = whole.response(values)
-            wanted = whole.substeps_along(values, response)
-            if wanted <= response.substeps:
+            parts, required = simulator.substeps_along(values)
+            if required <= parts:
                 break
-            simulator = self._with(self.step, wanted)
+            simulator = self._with(self.step, required)
         return simulator
 
     def step_error(self, values: Values, outputs: tuple[str, ...]) -> float:
@@ -289,21 +287,20 @@ class Simulator:
             return samples, np.full((*samples.shape, len(directions[0])), np.nan), parts
         own = [directions[k] for k in reached]
         moves = moves_of(self.system, self.inputs, own)
-        delays = np.array([[direction.delay for direction in some] for some in own])
-        of_set = [self] if tests is None else [tests[k] for k in reached]
-        courses = [test.course(moves, changing=bool(np.any(delays))) for test in of_set]
+        simulators = [self] if tests is None else [tests[k] for k in reached]
+        courses = [test.course(moves, changing=bool(moves.delayed)) for test in simulators]
         code = self._tangent_code(outputs, moves)
         tangents, rates = moves.tangents(self.system, own), moves.rates(own)
+        if len(own) < len(sets):
+            p = p[reached]
         together = Courses(courses, parts[reached])
-        samples, slopes, change = _in_blocks(code, p[reached], together, tangents, rates)
-        if len(moves.columns) < delays.shape[1]:
-            driven = slopes
-            slopes = np.zeros((*samples.shape, delays.shape[1]))
-            for column, k in enumerate(moves.columns):
-                slopes[..., k] = driven[..., column]
-        if change is not None:
-            for k in np.flatnonzero(delays.any(axis=0)).tolist():
-                slopes[..., k] -= delays[:, k, None, None] * change
+        samples, slopes, change = _in_blocks(code, p, together, tangents, rates)
+        if len(moves.columns) < len(own[0]):
+            driven, slopes = slopes, np.zeros((*samples.shape, len(own[0])))
+            slopes[..., list(moves.columns)] = driven
+        for k in moves.delayed if change is not None else ():
+            delays = np.array([of_set[k].delay for of_set in own])
+            slopes[..., k] -= delays[:, None, None] * change
         return among_all(samples, parts), among_all(slopes, parts), parts
 
     def course(self, moves: Moves | None = None, changing: bool = False) -> Course:

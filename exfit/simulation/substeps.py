@@ -41,16 +41,17 @@ def substeps_at_rest(system: System, step: float, p: Array) -> NDArray[np.int64]
     rest = linear_kernel(system).at_rest(p)
     lag_rate = _lag_rates(system, p)
     with np.errstate(all="ignore"):
-        least = _parts(step, lag_rate)
-        most = _parts(step, np.maximum(lag_rate, _radius_bounds(rest.jacobian)))
-        sure = _surely_still(rest) & (least == most)
+        parts = _parts(step, lag_rate)
+        enough = step * _radius_bounds(rest.jacobian) - ON_GRID <= parts
+        sure = enough & _surely_still(rest)
     if sure.all():
-        return least
+        return parts
     unsure = AtRest(*(part[~sure] for part in rest))
     radius = spectral_radii(unsure.jacobian)
-    parts = _parts(step, np.maximum(lag_rate[~sure], radius))
-    least[~sure] = np.where(np.any(_moving(unsure, radius), axis=1), NO_SUBSTEPS, parts)
-    return least
+    moves = np.any(_moving(unsure, radius), axis=1)
+    required = _parts(step, np.maximum(lag_rate[~sure], radius))
+    parts[~sure] = np.where(moves, NO_SUBSTEPS, required)
+    return parts
 
 
 def groups(parts: Counts, lanes: int) -> Iterator[tuple[int, NDArray[np.intp]]]:
@@ -140,7 +141,7 @@ def spectral_radii(jacobians: Array) -> Array:
 
 def _lag_rates(system: System, p: Array) -> Array:
     """Return 1/T of the shortest time constant of each set that is not bypassed."""
-    lags = p[:, places_of_time_constants(system)]
+    lags = p.take(places_of_time_constants(system), axis=1)
     shortest = np.where(lags >= SHORTEST, lags, np.inf).min(axis=1, initial=np.inf)
     return np.asarray(1.0 / shortest)
 
@@ -153,9 +154,9 @@ def _parts(step: float, rates: Array) -> NDArray[np.int64]:
 
 
 def _surely_still(rest: AtRest) -> Mask:
-    """Return which systems are at rest whatever their spectral radius."""
+    """Return which systems are at rest whatever their spectral radius, where that is finite."""
     # a sum is finite where all numbers are, or at most too large: then eigenvalues decide
-    finite = np.isfinite(rest.jacobian.sum(axis=(1, 2)) + rest.x.sum(axis=1))
+    finite = np.isfinite(rest.x.sum(axis=1))
     return np.asarray(finite & (np.abs(rest.slopes).max(axis=1) <= REST_TOLERANCE))
 
 

@@ -23,7 +23,7 @@ from scipy.integrate import solve_ivp
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from estimators import ByHand
-from oracle import system_of, typical_values, vector
+from oracle import system_of, tangent_run, typical_values, vector
 
 from exfit.engine.kernel import SIDE_BY_SIDE, Kernel, Span, TangentKernel
 from exfit.simulation.inputs import Direction, Inputs, InputStep, each
@@ -80,7 +80,7 @@ def tangents():
     """Return the bare machine code of exfit with its exact derivatives."""
     code, p, spans = TangentKernel(SYSTEM, ("vt",), FREE), vector(SYSTEM, VALUES), bump()
     seeds = np.eye(len(p))[:, [SYSTEM.parameters.index(name) for name in FREE]]
-    return lambda: code.run(p, seeds, spans)
+    return lambda: tangent_run(code, p, seeds, spans)
 
 
 def simulator(smooth=False):

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracle import drawn_values, float_run, levels, system_of, vector
+from oracle import drawn_values, float_run, levels, system_of, tangent_run, vector
 
+from exfit.engine import emit
 from exfit.engine import kernel as engine
 from exfit.engine.emit import simulation_with_tangents
 from exfit.engine.kernel import Kernel, LinearKernel, Span, TangentKernel
@@ -85,8 +86,9 @@ def test_sets_side_by_side_give_what_each_gives_alone_to_the_last_bit(model):
     for lane, one in enumerate(sets):
         p = vector(system, one)
         alone = run(system, one, system.outputs, bump(0.05))
-        tangent_run, _ = derived.run(p, seeds(system, system.parameters[-1:]), bump(0.05))
-        for a, b, c in zip(together, alone, tangent_run, strict=True):
+        directions = seeds(system, system.parameters[-1:])
+        with_tangents, _ = tangent_run(derived, p, directions, bump(0.05))
+        for a, b, c in zip(together, alone, with_tangents, strict=True):
             np.testing.assert_array_equal(a[:, :, lane], b)
             np.testing.assert_array_equal(c, b)
 
@@ -277,7 +279,7 @@ def seeds(system, free):
 
 def exact(system, values, outputs, spans, free):
     code = TangentKernel(system, outputs, free)
-    samples, slopes = code.run(vector(system, values), seeds(system, free), spans)
+    samples, slopes = tangent_run(code, vector(system, values), seeds(system, free), spans)
     return np.concatenate(samples), np.concatenate(slopes)
 
 
@@ -415,18 +417,19 @@ def test_tangents_of_moving_inputs_equal_differences_in_every_direction(count):
     rng, h, p = np.random.default_rng(8), 1e-4, np.array([0.7, 1.3])
     code = TangentKernel(DRIVEN, DRIVEN.outputs, ("b",), ("u", "w"))
     dp = seeds(DRIVEN, ("b",)) @ rng.normal(size=(1, count))
-    spans = [
-        Span(rng.normal(size=(n + 1, 3)), 0.05, parts, rng.normal(size=(n + 1, 2, count)))
-        for n, parts in ((30, 1), (45, 3))
-    ]
-    samples, slopes = (np.concatenate(one) for one in code.run(p, dp, spans))
+    sizes = ((30, 1), (45, 3))
+    drawn = [(rng.normal(size=(n + 1, 3)), rng.normal(size=(n + 1, 2, count))) for n, _ in sizes]
+    spans = [Span(u, 0.05, parts) for (u, _), (_, parts) in zip(drawn, sizes, strict=True)]
+    du = [moves for _, moves in drawn]
+    runs = tangent_run(code, p, dp, spans, du)
+    samples, slopes = (np.concatenate(of_spans) for of_spans in runs)
     assert slopes.shape == (*samples.shape, count)
 
     def moved(column, side):
         there = (p + side * h * dp[:, column])[:, None]
-        ends = [span._replace(u=span.u.copy(), du=None) for span in spans]
-        for end, span in zip(ends, spans, strict=True):
-            end.u[:, [0, 2]] += side * h * span.du[:, :, column]
+        ends = [span._replace(u=span.u.copy()) for span in spans]
+        for end, moves in zip(ends, du, strict=True):
+            end.u[:, [0, 2]] += side * h * moves[:, :, column]
         plain = compiled(DRIVEN, DRIVEN.outputs)
         return np.concatenate(plain.run(there, plain.start(there), ends))[:, :, 0]
 
@@ -469,7 +472,7 @@ def test_tangents_in_several_threads_are_the_same_to_the_last_bit(model):
     vectors = [vector(system, drawn_values(model, seed)) for seed in range(8)]
 
     def simulate(p):
-        return np.concatenate(code.run(p, np.eye(len(p)), bump(0.05))[1])
+        return np.concatenate(tangent_run(code, p, np.eye(len(p)), bump(0.05))[1])
 
     expected = [simulate(p) for p in vectors]
     with ThreadPoolExecutor(4) as pool:
@@ -516,7 +519,7 @@ def test_what_was_compiled_once_is_read_the_next_time(cache, builds):
 
 def test_no_ir_is_written_for_code_that_is_kept(cache, monkeypatch):
     nine()
-    monkeypatch.setattr(engine, "simulation", None)
+    monkeypatch.setattr(emit, "simulation", None)
     assert nine() == 9.0
 
 

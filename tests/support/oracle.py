@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from exfit.engine.kernel import LinearKernel, Span
+from exfit.engine.kernel import LinearKernel, Span, TangentKernel
+from exfit.engine.sampling import Course, Courses, SampleRows, Segment
 from exfit.engine.system import System
 from exfit.engine.trace import clip
 from exfit.models import MODELS
@@ -126,6 +127,30 @@ def fastest_rate(system: System, values: Mapping[str, float]) -> float:
     used = parameters_used(system)
     lags = [1.0 / values[T] for T in system.time_constants if T in used and values[T] >= SHORTEST]
     return max(lags + list(np.abs(rates_at_rest(system, values))))
+
+
+def tangent_run(
+    code: TangentKernel,
+    p: np.ndarray,
+    dp: np.ndarray,
+    spans: Sequence[Span],
+    moved: Sequence[np.ndarray] = (),
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return, for each span, outputs (n + 1, ny) and their derivatives (n + 1, ny, N).
+
+    ``p`` is (np,), ``dp`` (np, N); ``moved`` (n + 1, moving, N) are, for each span, the tangents of
+    the inputs that move.
+    """
+    count = dp.shape[1]
+    shapes = moved or [None] * len(spans)
+    segments = [Segment(s.u, s.step, du) for s, du in zip(spans, shapes, strict=True)]
+    ends = np.cumsum([len(span.u) for span in spans])
+    rows = np.arange(ends[-1])[:, None]
+    course = Course(segments, SampleRows(rows, np.ones(rows.shape)))
+    courses = Courses([course], np.array([[span.parts for span in spans]]))
+    rates = np.tile(np.eye(count), (1, len(code.moving), 1, 1)) if code.moving else None
+    outputs, slopes, _ = code.samples(p[None], dp[None], courses, rates)
+    return np.split(outputs[0], ends[:-1]), np.split(slopes[0], ends[:-1])
 
 
 def float_run(
