@@ -12,6 +12,7 @@ from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ReferenceTable
 from exfit.dsp.reference_moves import scatter
 from exfit.fitting.experiment import Channel
+from exfit.fitting.global_search import AT_TOLERANCE
 from exfit.fitting.references import is_table
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -57,17 +58,11 @@ def notes(
 
 
 def tolerance_notes(residuals: Residuals, solution: estimate.Result) -> Iterator[str]:
-    """Yield how far from a minimum a search ended that a tolerance of the case ended.
-
-    No parameter lies farther from the minimum of the linear model than z of its standard errors,
-    where z^2 is twice the decrease that the model promises, in variances of the residuals.
-    """
-    if solution.stop not in (estimate.Stop.MATCH, estimate.Stop.FLAT):
+    """Yield how far from a minimum a search ended that a tolerance of the case ended."""
+    if solution.stop not in AT_TOLERANCE:
         return
     ended = "the search ended at a tolerance of the case, not at a minimum"
-    freedom = max(1, residuals.samples - len(solution.x))
-    variance = max(2.0 * solution.cost / freedom, np.finfo(float).tiny)
-    distance = float(np.sqrt(2.0 * max(solution.promise, 0.0) / variance))
+    distance = distance_from_minimum(residuals, solution)
     if distance <= NEAR_MINIMUM:
         yield f"{ended}, but within {NEAR_MINIMUM:g} standard errors of it"
     else:
@@ -94,6 +89,20 @@ def reference_notes(test: BumpTest, setup: ExperimentSetup) -> Iterator[str]:
                 f"leaves the size of its change uncertain by {share:.1g} %, and the intervals do "
                 "not include that error"
             )
+
+
+def distance_from_minimum(residuals: Residuals, solution: estimate.Result) -> float:
+    """Return how far (standard errors) a search that a tolerance ended may lie from a minimum.
+
+    No parameter lies farther from the minimum of the linear model than z of its standard errors,
+    where z^2 is twice the decrease that the model promises, in variances of the residuals. It is 0
+    for a search that ended by itself.
+    """
+    if solution.stop not in AT_TOLERANCE:
+        return 0.0
+    freedom = max(1, residuals.samples - len(solution.x))
+    variance = max(2.0 * solution.cost / freedom, np.finfo(float).tiny)
+    return float(np.sqrt(2.0 * max(solution.promise, 0.0) / variance))
 
 
 def outlier_notes(name: str, channels: Sequence[Channel]) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from exfit.dsp.filtering import Filtering, LowPass, Median, MovingAverage, outli
 from exfit.errors import RecordError
 from exfit.fitting.experiment import Channel
 from exfit.fitting.recordings import column_of
+from exfit.inference.noise import effective_samples
 from exfit.records.record import Record
 
 Mask = NDArray[np.bool_]
@@ -25,6 +27,18 @@ Section = ChannelSection | PhasesSection
 
 LEAST_WINDOWS = 10  # of a running median in a record: a wider one hides the response
 FEWEST_SAMPLES = 3  # of a channel: fewer do not show its noise
+WHITE_NOISE_SEED = 0
+INDEPENDENT = 2.0  # times the length over which filtered noise is correlated
+
+
+class NoiseShape(NamedTuple):
+    """What becomes of white noise in a channel: its ``gain``, and how it is correlated.
+
+    Of samples that are ``apart`` by so many, each is independent of the one before.
+    """
+
+    gain: float
+    apart: int
 
 
 def without_masked(record: Record, file: RecordFile, driving: Sequence[str]) -> Record:
@@ -119,3 +133,17 @@ def finest_noise(case: Case, own: float) -> float:
         entry for recording in case.recordings for entry in recording.record.channels.values()
     ]
     return min((entry.noise for entry in channels if entry.noise is not None), default=own)
+
+
+def noise_shape(channel: Channel) -> NoiseShape:
+    """Return what the averages of a channel's record and its filter make of white noise."""
+    filtering = channel.filtering
+    if filtering is None:
+        return NoiseShape(1.0, 1)
+    if filtering.filter is None:
+        return NoiseShape(1.0, filtering.smooth_over)
+    white = np.random.default_rng(WHITE_NOISE_SEED).standard_normal(len(channel.measured))
+    filtered = channel.filtered(white)
+    correlated = INDEPENDENT * len(filtered) / effective_samples(filtered)
+    apart = max(round(correlated), filtering.smooth_over)
+    return NoiseShape(float(np.std(filtered)), apart)

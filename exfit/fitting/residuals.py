@@ -347,8 +347,11 @@ def _stacked(blocks: Sequence[Array], axis: int = 0) -> Array:
 
 def noise_of(channel: Channel) -> float:
     """Return the standard deviation of a channel's noise, per unit: given, or estimated."""
-    if channel.noise is not None:
-        return channel.noise
+    return scatter_of(channel) if channel.noise is None else channel.noise
+
+
+def scatter_of(channel: Channel) -> float:
+    """Return the standard deviation (pu) of a channel's noise by its scatter, before a filter."""
     measured = channel.measured[channel.kept]
     apart = 1 if channel.filtering is None else channel.filtering.smooth_over
     # neighbours in one window of an average scatter little: they share most of it

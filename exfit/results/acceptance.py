@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from exfit.fitting.channels import noise_shape
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import noise_of
 from exfit.results.comparisons import Comparison
 
 MUCH_WORSE = 3.0  # times the error of the fit, or the noise of the record where that is larger
-WHITE_NOISE_SEED = 0
 
 
 def judged(
@@ -42,8 +42,8 @@ def _largest_error(
     fit_error = _error_of_fit(validation, fitted)
     if fit_error is None:
         return None
-    noise = next(_noise(each) for each in channels if each.signal == validation.judged_by)
-    return MUCH_WORSE * max(fit_error, noise)
+    channel = next(each for each in channels if each.signal == validation.judged_by)
+    return MUCH_WORSE * max(fit_error, noise_of(channel) * noise_shape(channel).gain)
 
 
 def _error_of_fit(validation: Comparison, fitted: Sequence[Comparison]) -> float | None:
@@ -51,15 +51,6 @@ def _error_of_fit(validation: Comparison, fitted: Sequence[Comparison]) -> float
     signal = validation.judged_by
     errors = [match.channels[signal].rmse for match in fitted if signal in match.channels]
     return max(errors, default=None)
-
-
-def _noise(channel: Channel) -> float:
-    """Return the standard deviation (pu) of a channel's noise, after its filter if it has one."""
-    noise = noise_of(channel)
-    if channel.filtering is None or channel.filtering.filter is None:
-        return noise
-    white = np.random.default_rng(WHITE_NOISE_SEED).standard_normal(len(channel.measured))
-    return noise * float(np.std(channel.filtered(white)))
 
 
 def _why_not(

@@ -1,7 +1,8 @@
 """What a fit comes to: one of five verdicts, and what may be wrong where it is not good."""
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from math import nan
+from typing import Annotated, ClassVar, Final, Literal
 
 VerdictWords = Literal[
     "good", "matches, not all determined", "misses the record", "no match", "not converged"
@@ -12,6 +13,9 @@ MATCHES: Final = "matches, not all determined"
 MISSES: Final = "misses the record"
 NO_MATCH: Final = "no match"
 NOT_CONVERGED: Final = "not converged"
+
+REJECTED = 0.01  # a probability below it
+VISIBLE = 0.005  # of the range of a signal: the width of a line in its figure
 
 
 @dataclass(frozen=True)
@@ -28,12 +32,59 @@ class Cause:
 
 
 @dataclass(frozen=True)
+class ResidualTests:
+    """What tests say of the residuals of a channel: whether they are noise, or can be seen.
+
+    whiteness  probability that white noise is as correlated (Ljung & Box 1978)
+    pattern    probability that white noise has sums as large after its steps
+    excess     probability that the record's own scatter leaves residuals as large
+    scatter    the record's own (pu), from sample to sample or at rest, where that is larger
+    times      standard deviation of the residuals, over the scatter
+    deviation  what stands out of the noise (pu) for a fiftieth of the record or longer
+    share      deviation, over the range of the signal
+
+    A probability is None where there are too few samples, or no errors at all.
+    """
+
+    DERIVED: ClassVar = {"noise": "are_noise", "seen": "are_seen"}
+
+    record: str
+    signal: str
+    whiteness: float | None
+    pattern: float | None
+    excess: Annotated[float, nan]
+    scatter: Annotated[float, nan]
+    times: Annotated[float, nan]
+    deviation: Annotated[float, nan]
+    share: Annotated[float, nan]
+
+    @property
+    def are_white(self) -> bool:
+        """Whether neither test of whiteness rejects the residuals."""
+        return not any(p is not None and p < REJECTED for p in (self.whiteness, self.pattern))
+
+    @property
+    def are_noise(self) -> bool:
+        """Whether no test says that the residuals are anything but the noise of the record."""
+        return self.are_white and not self.excess < REJECTED
+
+    @property
+    def are_seen(self) -> bool:
+        """Whether the residuals are a part of the step that a reader sees, and no noise."""
+        return not self.are_white and self.excess < REJECTED and self.share > VISIBLE
+
+
+@dataclass(frozen=True)
 class Verdict:
-    """What a fit comes to, with the ``reason`` for it and the likeliest causes, the first first."""
+    """What a fit comes to, with the ``reason`` for it and the likeliest causes, the first first.
+
+    ``residuals`` are the tests of each channel of each record, empty where none could be made.
+    """
 
     verdict: VerdictWords
     reason: str = ""
     causes: tuple[Cause, ...] = ()
+    residuals: tuple[ResidualTests, ...] = ()
 
     @property
     def matches(self) -> bool:

@@ -45,7 +45,8 @@ class Evidence:
 
     ``solution`` is where the search ended, in scaled parameters; ``records`` are those of the fit,
     ``validation`` the comparisons with those of none. ``uncertainty`` is None where it is not
-    known.
+    known. ``typical_that_matter`` are the typical values whose error moves a fitted parameter
+    beyond its interval.
     """
 
     case: Case
@@ -54,6 +55,7 @@ class Evidence:
     records: Sequence[FittedRecord]
     uncertainty: UncertaintyAnalysis | None
     validation: Sequence[Comparison] = ()
+    typical_that_matter: Sequence[str] = ()
 
     @cached_property
     def values(self) -> Mapping[str, float]:

@@ -1,0 +1,66 @@
+"""What the noise of recorded signals that drive a simulation does to its response."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.noise import noise
+from exfit.errors import SimulationError
+from exfit.fitting.setup import ExperimentSetup
+from exfit.simulation.inputs import RecordedInput
+from exfit.simulation.simulator import Simulator
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+SEED = 0
+REALISATIONS = 4
+
+
+def carried_noise(setup: ExperimentSetup, values: Values) -> list[Array]:
+    """Return by how much more noise on the recorded inputs moves each channel, pu.
+
+    White noise as strong as that of each input is added to it, several times: what the response
+    then does (REALISATIONS, errors) is what the record's own noise does to it. It is empty without
+    recorded inputs, or where the response to them diverges.
+    """
+    experiment, at = setup.experiment, setup.with_start_values(values)
+    simulator = experiment.with_inputs(at)
+    if not simulator.inputs.recorded:
+        return []
+    parameters, generator = experiment.parameters(at), np.random.default_rng(SEED)
+    steady = -np.inf if setup.test.steady is None else setup.test.steady
+
+    def response(simulator: Simulator) -> Array:
+        return simulator.samples(parameters, experiment.signals)[0]
+
+    try:
+        usual = response(simulator)
+        noisy = [response(_noisier(simulator, generator, steady)) for _ in range(REALISATIONS)]
+    except SimulationError:
+        return []
+    return [
+        np.stack([channel.filtered(channel.as_recorded(own[:, k] - usual[:, k])) for own in noisy])
+        for k, channel in enumerate(experiment.channels)
+    ]
+
+
+def _noisier(simulator: Simulator, generator: "np.random.Generator", steady: float) -> Simulator:
+    """Return a simulator whose recorded inputs have as much white noise again.
+
+    Their level is the mean until the instant ``steady`` (s), and as uncertain.
+    """
+
+    def noisier(recorded: RecordedInput) -> RecordedInput:
+        added = generator.normal(0.0, noise(recorded.samples), len(recorded.samples))
+        at_rest = recorded.time < steady
+        level = float(np.mean(added[at_rest])) if at_rest.any() else 0.0
+        return RecordedInput(recorded.time, recorded.samples + added - level)
+
+    recorded = {signal: noisier(own) for signal, own in simulator.inputs.recorded.items()}
+    inputs = replace(simulator.inputs, recorded=recorded)
+    return Simulator(
+        simulator.system, inputs, simulator.times, simulator.step, simulator.least, simulator.delay
+    )

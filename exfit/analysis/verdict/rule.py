@@ -1,0 +1,118 @@
+"""What a fit comes to, by one rule, which docs/verdict.md states."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from exfit.analysis.causes import Evidence, causes_of
+from exfit.analysis.diagnostics import NEAR_MINIMUM, distance_from_minimum
+from exfit.analysis.verdict.residual_tests import residual_tests
+from exfit.estimate import Stop
+from exfit.inference.wording import digits, listed
+from exfit.results.comparisons import Comparison, Overlay
+from exfit.results.verdict import (
+    GOOD,
+    MATCHES,
+    MISSES,
+    NO_MATCH,
+    NOT_CONVERGED,
+    ResidualTests,
+    Verdict,
+    VerdictWords,
+)
+
+MOST_CAUSES = 5  # that a reader is given
+OTHER_WAY = -0.3  # correlation of response and record: below it no noise and no lag explains it
+
+
+def verdict_of(evidence: Evidence) -> Verdict:
+    """Return what a fit comes to, why, and the likeliest causes."""
+    tests = residual_tests(evidence)
+    words, reason = _judged(evidence, tests)
+    return Verdict(words, reason, causes_of(evidence)[:MOST_CAUSES], tests)
+
+
+def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[VerdictWords, str]:
+    solution = evidence.solution
+    if solution.stop is Stop.INTERRUPTED:
+        return NOT_CONVERGED, "interrupted: the values are the best until then"
+    no_match = next(_no_match(evidence, tests), None)
+    if no_match is not None:
+        return NO_MATCH, no_match
+    if not solution.success:
+        return NOT_CONVERGED, solution.message
+    seen = [test for test in tests if test.are_seen]
+    if seen:
+        return MISSES, _missed(max(seen, key=lambda test: test.share), evidence)
+    doubts = [*_doubts(evidence, tests)]
+    if doubts:
+        return MATCHES, "; ".join(doubts)
+    return GOOD, "the residuals are noise, and every parameter is determined"
+
+
+def _no_match(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
+    """Yield the signals that the response matches no better than a constant would.
+
+    The signal that a record is judged by counts as it is; another where what is left can be seen.
+    """
+    seen = {(test.record, test.signal) for test in tests if test.are_seen}
+    for comparison in evidence.comparisons:
+        judged = comparison.judged_by
+        signals = [judged, *(signal for signal in comparison.channels if signal != judged)]
+        for signal in signals:
+            counts = signal == judged or (comparison.name, signal) in seen
+            if counts and not comparison.channels[signal].describes:
+                yield _how_it_fails(comparison, signal, evidence)
+
+
+def _how_it_fails(comparison: Comparison, signal: str, evidence: Evidence) -> str:
+    where = _label(comparison.name, signal, evidence)
+    if correlation(comparison.overlays[signal]) < OTHER_WAY:
+        return f"the response goes the other way{f' ({where})' if where else ''}"
+    what = where or "the record"
+    return f"the response matches {what} no better than a constant would"
+
+
+def correlation(overlay: Overlay) -> float:
+    """Return the correlation of a response with its record; 0 where one of them does not move."""
+    compared = np.isfinite(overlay.error)
+    measured, simulated = overlay.measured[compared], overlay.simulated[compared]
+    measured, simulated = measured - np.mean(measured), simulated - np.mean(simulated)
+    size = float(np.linalg.norm(measured) * np.linalg.norm(simulated))
+    return float(measured @ simulated) / size if size else 0.0
+
+
+def _missed(test: ResidualTests, evidence: Evidence) -> str:
+    signal = _label(test.record, test.signal, evidence) or test.signal
+    share = f"{digits(100.0 * test.share)} % of its range"
+    return f"{signal} is off by up to {share}, the residuals are {_size(test)}, and not white"
+
+
+def _size(test: ResidualTests) -> str:
+    return f"{digits(test.times)} times its scatter"
+
+
+def _label(record: str, signal: str, evidence: Evidence) -> str:
+    """Return which signal is meant, "" where there is no other."""
+    several = len(evidence.records) > 1
+    if not several and len(evidence.residuals.channels) == 1:
+        return ""
+    return f"{signal} of {record}" if several else signal
+
+
+def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
+    """Yield what keeps a fit that matches from being good."""
+    if evidence.undetermined:
+        verb = "is" if len(evidence.undetermined) == 1 else "are"
+        yield f"{listed(evidence.undetermined)} {verb} not determined"
+    for match in evidence.validation:
+        if not match.accepted:
+            yield f"{match.name} is not accepted"
+    if evidence.typical_that_matter:
+        yield f"typical values matter: {listed(evidence.typical_that_matter)}"
+    not_noise = [test for test in tests if not test.are_noise]
+    if not_noise:
+        signals = [_label(test.record, test.signal, evidence) or test.signal for test in not_noise]
+        yield f"the residuals of {listed(signals)} are not noise"
+    if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
+        yield "the search ended at a tolerance of the case, not at a minimum"
