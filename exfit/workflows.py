@@ -170,6 +170,7 @@ def fit(
         inputs=hashes,
         verdict=verdict,
         given_values=given_values(case),
+        typical_values=analysis.typical_values,
         sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
         strategy_given=method != case.estimate.strategy,
         parts=tuple(parts_of(case)),

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.causes.rest import INVISIBLE, other_levels, unsteady_signals
+from exfit.analysis.typical_values import typical_values_used
 from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ReferenceTable
@@ -16,12 +17,10 @@ from exfit.fitting.global_search import AT_TOLERANCE
 from exfit.fitting.references import is_table
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
-from exfit.fitting.system import system_of
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
 from exfit.plants import REFERENCES
 from exfit.results.comparisons import Comparison
-from exfit.simulation.kernels import parameters_used
 from exfit.simulation.simulator import Response
 
 Array = NDArray[np.float64]
@@ -150,7 +149,7 @@ def unphysical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
 
 def typical_notes(case: Case) -> Iterator[str]:
     """Yield which values were taken from the data sheet, because the case does not give them."""
-    typical = _typical_values(case)
+    typical = typical_values_used(case)
     for part in case.parts.all:
         names = [symbol for symbol in part.symbols if part.prefix + symbol in typical]
         if names and part.kind != "network":
@@ -158,14 +157,6 @@ def typical_notes(case: Case) -> Iterator[str]:
             yield f"typical values taken for {part.name}: {listed}"
     if case.parts.stabiliser is not None and not case.on_load:
         yield f"{case.parts.stabiliser.name} does not act: the breaker is open"
-
-
-def _typical_values(case: Case) -> dict[str, float]:
-    """Return the typical values that a response of any of the records depends on."""
-    views = (case, *(case.seen_from(recording) for recording in case.recordings))
-    used = {name for view in views for name in parameters_used(system_of(view))}
-    values = case.values()
-    return {name: values[name] for name in case.typical() if name in used}
 
 
 def simulation_notes(case: Case, values: Mapping[str, float], response: Response) -> Iterator[str]:

@@ -19,6 +19,7 @@ from exfit.analysis.diagnostics import (
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.analysis.phase_ends import phase_ends
+from exfit.analysis.typical_values import influence_of_typical_values
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
 from exfit.fitting.channel_weights import balanced, weight_notes
@@ -33,6 +34,7 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour
 from exfit.results.model import FittedParameter, Iteration, PhaseEnd
+from exfit.results.typical_values import TypicalValue, by_weight
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -59,6 +61,7 @@ class Analysis(NamedTuple):
     phase_ends: tuple[PhaseEnd, ...]
     interrupted: bool
     unfinished: bool
+    typical_values: Mapping[str, TypicalValue]
 
     @property
     def why(self) -> str:
@@ -85,15 +88,25 @@ def analysed(
     unfinished = determined.interrupted
     interrupted = unfinished or best.stop is estimate.Stop.INTERRUPTED
     uncertainty, behaviour, validation = determined.uncertainty, None, list[Comparison]()
-    ends = list[PhaseEnd]()
+    ends, typical = list[PhaseEnd](), dict[str, TypicalValue]()
     try:
         ends += phase_ends(case, setups, problem.residuals, history)
         validated = [aligned(case, setup, values) for setup in unseen]
         validation += [validation_of(case, fitted, *pair) for pair in validated]
         behaviour = behaviour_of(setups, values, validated)
+        if uncertainty is not None:
+            typical = influence_of_typical_values(case, problem.compressed, best.x, uncertainty)
     except KeyboardInterrupt:  # what the search came to stays
         interrupted = unfinished = True
-    return Analysis(uncertainty, tuple(validation), behaviour, tuple(ends), interrupted, unfinished)
+    return Analysis(
+        uncertainty,
+        tuple(validation),
+        behaviour,
+        tuple(ends),
+        interrupted,
+        unfinished,
+        typical,
+    )
 
 
 def fitted_parameters(
@@ -249,4 +262,5 @@ def evidence_of(
         ),
         uncertainty=analysis.uncertainty,
         validation=analysis.validation,
+        typical_values=by_weight(analysis.typical_values),
     )

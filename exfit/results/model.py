@@ -16,6 +16,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
+from exfit.results.typical_values import TypicalValue
 from exfit.results.verdict import Verdict
 from exfit.util.sources import NOT_STATED, TYPICAL
 from exfit.util.typed import IN_FILE, KEY, plain
@@ -175,7 +176,8 @@ class FitResult:
     ``fixed`` are the exciter's others, and helpers; ``machine``, ``network`` and ``stabiliser`` are
     all values of these parts by symbol, the fitted ones among them; their models are None where
     the case has no such part. Values that follow others by ``ties`` are among all of these.
-    ``sources`` says where every value comes from: typical, nameplate ..., not stated.
+    ``sources`` says where every value comes from: typical, nameplate ..., not stated;
+    ``typical_values`` what those that are typical and not 0 would move, if they were 20 % off.
 
     ``cost`` is what the fit made small, ``comparisons`` are with each record,
     ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
@@ -226,6 +228,7 @@ class FitResult:
     verdict: Verdict | None = None
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
+    typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
     phase_ends: tuple[PhaseEnd, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), metadata=IN_FILE)
     strategy_given: bool = field(default=True, metadata=IN_FILE)

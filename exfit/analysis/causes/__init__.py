@@ -12,6 +12,7 @@ from exfit.analysis.causes.rest import (
     wrong_start,
     wrong_voltage,
 )
+from exfit.analysis.causes.typical import typical_values
 from exfit.results.verdict import Cause
 
 __all__ = ["Evidence", "FittedRecord", "Recogniser", "causes_of"]
@@ -24,6 +25,7 @@ RECOGNISERS: tuple[Recogniser, ...] = (
     worse_than_constant,
     unsteady_record,
     unexplained_error,
+    typical_values,
 )  # the likeliest first
 
 

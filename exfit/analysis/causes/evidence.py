@@ -1,7 +1,7 @@
 """What is known of a fit when its causes are looked for."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from exfit import estimate
@@ -11,6 +11,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
+from exfit.results.typical_values import TypicalValue
 from exfit.results.verdict import Cause
 
 
@@ -45,8 +46,8 @@ class Evidence:
 
     ``solution`` is where the search ended, in scaled parameters; ``records`` are those of the fit,
     ``validation`` the comparisons with those of none. ``uncertainty`` is None where it is not
-    known. ``typical_that_matter`` are the typical values whose error moves a fitted parameter
-    beyond its interval.
+    known; ``typical_values`` are those that matter, with what they would move, the weightiest
+    first.
     """
 
     case: Case
@@ -55,7 +56,7 @@ class Evidence:
     records: Sequence[FittedRecord]
     uncertainty: UncertaintyAnalysis | None
     validation: Sequence[Comparison] = ()
-    typical_that_matter: Sequence[str] = ()
+    typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
 
     @cached_property
     def values(self) -> Mapping[str, float]:

@@ -10,6 +10,7 @@ from exfit.analysis.verdict.residual_tests import residual_tests
 from exfit.estimate import Stop
 from exfit.inference.wording import digits, listed
 from exfit.results.comparisons import Comparison, Overlay
+from exfit.results.typical_values import first_of
 from exfit.results.verdict import (
     GOOD,
     MATCHES,
@@ -108,8 +109,8 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
     for match in evidence.validation:
         if not match.accepted:
             yield f"{match.name} is not accepted"
-    if evidence.typical_that_matter:
-        yield f"typical values matter: {listed(evidence.typical_that_matter)}"
+    if evidence.typical_values:
+        yield f"typical values matter: {first_of([*evidence.typical_values])}"
     not_noise = [test for test in tests if not test.are_noise]
     if not_noise:
         signals = [_label(test.record, test.signal, evidence) or test.signal for test in not_noise]

@@ -20,6 +20,7 @@ from exfit.output.terminal.terminal import (
 )
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
+from exfit.util.sources import by_source
 
 
 def fit(console: Console, result: FitResult, before: FitResult | None = None) -> None:
@@ -46,6 +47,8 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     )
     _phase_ends(console, result)
     console.print(f"sub-steps: {result.substeps}")
+    if result.sources:
+        console.print(f"sources of the values: {source_counts(result)}")
     if result.minima is not None:
         remarks(console, "search:", [search_summary(result.minima, result.cost)], "bold")
     if result.knowledge is not None:
@@ -66,6 +69,12 @@ def _phase_ends(console: Console, result: FitResult) -> None:
             f"end of {end.phase}: iteration {end.iteration}, cost {end.cost:.4e}   "
             f"rmse {errors} pu   parameters_{end.phase}.yaml"
         )
+
+
+def source_counts(result: FitResult) -> str:
+    """Return how many values come from where."""
+    groups = by_source(result.sources, result.sources)
+    return ", ".join(f"{len(names)} {source}" for source, names in groups.items())
 
 
 def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:

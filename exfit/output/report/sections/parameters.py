@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from exfit.case.saturation import MEANINGS
 from exfit.results.description import PartDescription, SheetRow
 from exfit.results.model import FitResult, FittedParameter
+from exfit.results.typical_values import DEVIATION, by_weight, moved_parameters
 
 NO_ROW = SheetRow()  # of a result that holds no data sheet
 
@@ -30,17 +31,49 @@ class FixedGroup:
 
 
 @dataclass(frozen=True)
+class MatteringValue:
+    """A typical value that matters, what it would move, and how far beyond half its interval."""
+
+    name: str
+    value: float
+    moves: str
+    times: float
+
+
+@dataclass(frozen=True)
 class ParametersView:
-    """The fitted parameters, then the others, part by part."""
+    """The fitted parameters, then the others, part by part.
+
+    ``mattering`` are the typical values that would move a parameter if they were ``deviation`` (in
+    percent) off, ``harmless`` the others.
+    """
 
     fitted: Mapping[str, FittedParameter]
     fixed: tuple[FixedGroup, ...]
+    mattering: tuple[MatteringValue, ...]
+    harmless: tuple[str, ...]
+    deviation: float = 100.0 * DEVIATION
 
 
 def parameters(result: FitResult) -> ParametersView:
     """Return all parameters of a fit."""
     groups = (*_of_parts(result), *_helpers(result), *_networks_of_records(result))
-    return ParametersView(result.parameters, tuple(group for group in groups if group.rows))
+    weighty = by_weight(result.typical_values)
+    fitted = {name: parameter.value for name, parameter in result.parameters.items()}
+    return ParametersView(
+        result.parameters,
+        tuple(group for group in groups if group.rows),
+        tuple(
+            MatteringValue(
+                name,
+                typical.value,
+                moved_parameters(typical, fitted),
+                max(typical.matters_to.values()),
+            )
+            for name, typical in weighty.items()
+        ),
+        tuple(name for name in result.typical_values if name not in weighty),
+    )
 
 
 def _of_parts(result: FitResult) -> Iterator[FixedGroup]:

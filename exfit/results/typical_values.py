@@ -1,0 +1,51 @@
+"""Typical values that a fit rests on: how far what it found would move if they were wrong."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from exfit.inference.wording import listed
+
+DEVIATION = 0.2  # of a typical value: as far as units of one kind lie apart
+MOST_NAMED = 3  # parameters, and values, of a sentence
+
+
+@dataclass(frozen=True)
+class TypicalValue:
+    """A typical value that the responses depend on, and what it moves.
+
+    ``shifts`` is by how much each fitted parameter would move, in its own unit, if the value were
+    larger by DEVIATION: to first order. ``matters_to`` names those of the unit that would move by
+    more than half the width of their interval, with that shift in shares of the half width, the
+    largest first.
+    """
+
+    value: float
+    shifts: Mapping[str, float]
+    matters_to: Mapping[str, float]
+
+
+def moved_parameters(typical: TypicalValue, fitted: Mapping[str, float]) -> str:
+    """Return in words by how much a typical value would move what matters, given its values."""
+    return first_of(
+        [f"{name} by {_share(typical.shifts[name], fitted[name])}" for name in typical.matters_to]
+    )
+
+
+def by_weight(values: Mapping[str, TypicalValue]) -> dict[str, TypicalValue]:
+    """Return the typical values that matter, the one that exceeds an interval the most first."""
+    mattering = {name: value for name, value in values.items() if value.matters_to}
+    order = sorted(mattering, key=lambda name: -max(mattering[name].matters_to.values()))
+    return {name: mattering[name] for name in order}
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first few names as "A, B and 3 more"."""
+    others = len(names) - MOST_NAMED
+    if others <= 1:  # one more is as short as its name
+        return listed(names)
+    return listed([*names[:MOST_NAMED], f"{others} more"])
+
+
+def _share(shift: float, value: float) -> str:
+    """Return a shift in percent of a value, or as it is where that is 0."""
+    return f"{100.0 * abs(shift / value):.2g} %" if value else f"{abs(shift):.2g}"
