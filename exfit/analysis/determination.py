@@ -29,11 +29,19 @@ from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import Uncertainty
+from exfit.inference.wording import listed
 
 Array = NDArray[np.float64]
 Watch = Callable[[estimate.Progress], object]
 
 POINTS = 3  # of a side: only its end is asked for
+
+NO_MINIMUM = "has no interval: the search did not end at a minimum"
+NEEDS_PROFILE = (
+    "has no interval of linear theory, which does not hold over it: the default search or "
+    "`exfit profile` gives one"
+)
+UNFINISHED = "has no interval: its profile was interrupted"
 
 
 class Determination(NamedTuple):
@@ -67,9 +75,12 @@ def determination(
         uncertainty = uncertainty_of_solution(problem, best.x, of_record)
     except KeyboardInterrupt:
         return Determination(None, interrupted=True)
+    if uncertainty is None:
+        return Determination(None)
     own_end = best.success and best.stop not in AT_TOLERANCE
-    if uncertainty is None or search.interrupted or not (profiled and own_end):
-        return Determination(uncertainty)
+    if search.interrupted or not (profiled and own_end):
+        linear = by_linear_theory_alone(problem.compressed, best, uncertainty, of_record)
+        return Determination(linear)
     others = other_minima(search)
     # strategy auto may prefer a minimum that is not the lowest: their hull is about both
     solution, *others = sorted(
@@ -78,6 +89,19 @@ def determination(
     return with_profile_intervals(
         problem.compressed, solution, others, uncertainty, of_record, progress
     )
+
+
+def by_linear_theory_alone(
+    residuals: Residuals,
+    best: estimate.Result,
+    uncertainty: UncertaintyAnalysis,
+    of_record: Sequence[str],
+) -> UncertaintyAnalysis:
+    """Return the uncertainty with the intervals that linear theory serves, and no others."""
+    if not best.success:
+        return without_linear_intervals(uncertainty, uncertainty.confidence.names, NO_MINIMUM)
+    names = not_served_by_linear_theory(residuals, best.x, uncertainty, of_record)
+    return without_linear_intervals(uncertainty, names, NEEDS_PROFILE)
 
 
 def uncertainty_of_solution(
@@ -114,8 +138,10 @@ def with_profile_intervals(
     profiles = profiles_about(residuals, solution, near, rises, POINTS, progress)
     if profiles.lower is not None:
         return Determination(uncertainty, lower=profiles.lower)
-    with_profiles = with_intervals(uncertainty, residuals.free, profiles.by_index)
-    return Determination(with_profiles, interrupted=profiles.interrupted)
+    names = [residuals.free[index].name for index in rises]
+    served = without_linear_intervals(uncertainty, names, UNFINISHED)
+    with_profiles = with_intervals(served, residuals.free, profiles.by_index)
+    return Determination(without_tied_intervals(with_profiles), interrupted=profiles.interrupted)
 
 
 def what_to_profile(
@@ -138,6 +164,36 @@ def what_to_profile(
     return {index_of[name]: uncertainty.rises[name] for name in names}, near
 
 
+def without_linear_intervals(
+    uncertainty: UncertaintyAnalysis, names: Iterable[str], why: str
+) -> UncertaintyAnalysis:
+    """Return the uncertainty without the linear intervals of some parameters, and why."""
+    parameters = dict(uncertainty.confidence.parameters)
+    for name in names:
+        if parameters[name].interval is not None:
+            parameters[name] = replace(parameters[name], interval=None, why=why)
+    return without_tied_intervals(with_parameters(uncertainty, parameters))
+
+
+def without_tied_intervals(uncertainty: UncertaintyAnalysis) -> UncertaintyAnalysis:
+    """Return the uncertainty without the intervals of parameters tied to others on a bound.
+
+    What limits such an interval is the bound of the other parameter, and not the record.
+    """
+    parameters = dict(uncertainty.confidence.parameters)
+    for name, partners in uncertainty.tied_to_bounds.items():
+        why = f"has no interval: the record ties it to {listed(partners)}, on a bound"
+        parameters[name] = replace(parameters[name], interval=None, why=why)
+    return with_parameters(uncertainty, parameters)
+
+
+def with_parameters(
+    uncertainty: UncertaintyAnalysis, parameters: Mapping[str, Uncertainty]
+) -> UncertaintyAnalysis:
+    """Return the uncertainty with what is known of each parameter in place of its own."""
+    return replace(uncertainty, confidence=replace(uncertainty.confidence, parameters=parameters))
+
+
 def with_intervals(
     uncertainty: UncertaintyAnalysis,
     free: Sequence[FreeParameter],
@@ -153,7 +209,7 @@ def with_intervals(
             name = free[index].name
             each = [first, *filter(complete, others)]
             parameters[name] = of_profiles(parameters[name], free[index], each)
-    return replace(uncertainty, confidence=replace(uncertainty.confidence, parameters=parameters))
+    return with_parameters(uncertainty, parameters)
 
 
 def of_profiles(

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from exfit.estimate import half_square
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.uncertainty import UncertaintyAnalysis
+from exfit.inference import CORRELATED
 
 Array = NDArray[np.float64]
 
-MOST_RISE = 2.0  # times the rise that the linear theory predicts: there an end may be 30 % off
+MOST_RISE = 1.25  # times the rise that linear theory predicts: there an end may be 12 % off
 
 
 class TraceEnd(NamedTuple):
@@ -53,15 +54,21 @@ def not_served_by_linear_theory(
     """Return the parameters whose interval linear theory does not give, in their order.
 
     These are `nonlinear_parameters`, which ``uncertainty`` names, those on a bound or correlated
-    with one there, those that reach a bound, or take others to one, within their interval, and
-    those without an interval. ``theta`` (N,) is the solution.
+    with one there, those that reach a bound, or take others to one, within their interval, those
+    without an interval, and those that correlate with any of these and so follow it where linear
+    theory does not. ``theta`` (N,) is the solution.
     """
     leaving = {end.name for end in trace_ends(residuals, theta, uncertainty) if not end.within}
     failing = {*uncertainty.nonlinear, *uncertainty.leaning_on_bounds, *leaving}
+    parameters = uncertainty.confidence.parameters
+    failed = np.array([name in failing or not own.determined for name, own in parameters.items()])
+    with np.errstate(invalid="ignore"):
+        follows = np.abs(uncertainty.confidence.correlation.matrix[:, failed]) > CORRELATED
+    not_served = failed | follows.any(axis=1)
     return tuple(
         name
-        for name, parameter in uncertainty.confidence.parameters.items()
-        if (name in failing or not parameter.determined) and name not in of_record
+        for name, fails in zip(parameters, not_served, strict=True)
+        if fails and name not in of_record
     )
 
 

@@ -13,6 +13,7 @@ from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
 from exfit.inference import (
+    TIED,
     Confidence,
     Identifiability,
     Linearisation,
@@ -23,13 +24,15 @@ from exfit.inference import (
     confidence,
     effects,
     identifiability,
-    leaning_on_bounds,
+    partners_on_bounds,
     rises,
 )
 from exfit.inference.wording import listed
 from exfit.util.typed import IN_FILE, KEY
 
 Array = NDArray[np.float64]
+
+PLURALS = {"has": "have", "is": "are", "lies": "lie", "depends": "depend"}
 
 
 class Sensitivity(NamedTuple):
@@ -51,8 +54,9 @@ class UncertaintyAnalysis:
     ``nonlinear`` names the parameters over whose intervals the response is not linear;
     ``sensitivity`` is that of each channel over time, ``effects`` ranks the parameters by it;
     ``leaning_on_bounds`` names those that would be others if the parameters on a bound were let
-    go; ``rises`` is by how much the cost rises from its minimum to the ends of each profile's
-    interval, empty where that is not stored.
+    go, ``tied_to_bounds`` those of them that one on a bound decides, with that one; ``rises`` is by
+    how much the cost rises from its minimum to the ends of each profile's interval, empty where
+    that is not stored.
     """
 
     DERIVED: ClassVar = {"sentences": "sentences"}
@@ -64,6 +68,7 @@ class UncertaintyAnalysis:
     sensitivity: tuple[Sensitivity, ...] = field(default=(), metadata=IN_FILE)
     leaning_on_bounds: tuple[str, ...] = ()
     rises: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
+    tied_to_bounds: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def open(self) -> tuple[str, ...]:
@@ -80,9 +85,11 @@ class UncertaintyAnalysis:
         ]
         if len(vague) < 2:
             vague = []  # its own reason says more
-        reasons = [
-            f"{name} {parameter.why}" for name, parameter in without.items() if name not in vague
-        ]
+        by_reason = dict[str, list[str]]()
+        for name, parameter in without.items():
+            if name not in vague:
+                by_reason.setdefault(str(parameter.why), []).append(name)
+        reasons = [shared_reason(names, why) for why, names in by_reason.items()]
         if vague:
             reasons.append(f"{listed(vague)} are not determined by the record: see `exfit profile`")
         return (*reasons, *self.identifiability.sentences)
@@ -90,12 +97,15 @@ class UncertaintyAnalysis:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What a reader must know of it, in words."""
-        parameters = self.confidence.parameters
-        names = ", ".join(
-            name for name in self.nonlinear if parameters[name].method not in ("profile", "hull")
-        )
-        sentence = f"the response is not linear over the intervals of {names}: see `exfit profile`"
-        return (*self.confidence.sentences, *([sentence] if names else []), *self.open)
+        return (*self.confidence.sentences, *self.open)
+
+
+def shared_reason(names: Sequence[str], why: str) -> str:
+    """Return why one or several parameters have no interval, or an open one."""
+    if len(names) > 1:
+        verb, _, rest = why.partition(" ")
+        why = f"{PLURALS.get(verb, verb)} {rest}"
+    return f"{listed(names)} {why}"
 
 
 def uncertainty_at(
@@ -117,7 +127,8 @@ def uncertainty_of(problem: FitProblem, theta: Array, linear: Linearisation) -> 
         identifiability=identifiability(linear, intervals),
         effects=effects(linear, intervals.noise),
         sensitivity=tuple(sensitivity(problem, theta, linear)),
-        leaning_on_bounds=leaning_on_bounds(linear, intervals.noise),
+        leaning_on_bounds=tuple(partners_on_bounds(linear, intervals.noise)),
+        tied_to_bounds=partners_on_bounds(linear, intervals.noise, TIED),
         rises=rises(linear, intervals),
     )
 
@@ -191,6 +202,7 @@ def linearisation(
         channels=tuple(_channels(residuals, problem.compressed.sizes)),
         priors=tuple(_prior_rows(residuals)),
         nuisances=tuple(parameter.name in of_record for parameter in free),
+        through_zero=tuple(parameter.low < 0.0 < parameter.high for parameter in free),
     )
 
 

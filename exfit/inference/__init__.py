@@ -7,7 +7,9 @@ errors, intervals), `identifiability` (what can move together unseen, and what t
 
 from exfit.inference.combinations import WEAK, Combination, SignalChange
 from exfit.inference.confidence import (
+    CORRELATED,
     LEVEL,
+    TIED,
     UNDETERMINED,
     Confidence,
     Correlation,
@@ -16,7 +18,7 @@ from exfit.inference.confidence import (
     Uncertainty,
     closed,
     confidence,
-    leaning_on_bounds,
+    partners_on_bounds,
     rises,
 )
 from exfit.inference.fixings import Fixing
@@ -26,7 +28,9 @@ from exfit.inference.noise import Noise
 from exfit.inference.sensitivity import ParameterEffect, effects
 
 __all__ = [
+    "CORRELATED",
     "LEVEL",
+    "TIED",
     "UNDETERMINED",
     "WEAK",
     "Combination",
@@ -47,6 +51,6 @@ __all__ = [
     "confidence",
     "effects",
     "identifiability",
-    "leaning_on_bounds",
+    "partners_on_bounds",
     "rises",
 ]

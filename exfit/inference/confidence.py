@@ -11,12 +11,15 @@ from exfit.inference.factors import Factors, factored
 from exfit.inference.linear import Array, Linearisation
 from exfit.inference.noise import Noise, noise_of
 from exfit.inference.quantiles import student_quantile
-from exfit.inference.wording import error, listed
+from exfit.inference.wording import digits, error, listed
 from exfit.util.typed import IN_FILE
 
 LEVEL = 0.95
 UNDETERMINED = 0.3  # relative standard error: the response is no longer linear over the interval
-CORRELATED = 0.2  # with a parameter on a bound: left free it would widen the interval by 2 %
+CORRELATED = 0.2  # with another parameter: left free it would widen the interval by 2 %
+TIED = (
+    0.99  # correlation with a parameter on a bound: what is known of one is the bound of the other
+)
 
 Interval = tuple[float | None, float | None]  # None: the record sets no limit on that side
 IntervalMethod = Literal["linear", "profile", "hull"]
@@ -99,9 +102,9 @@ def confidence(lin: Linearisation) -> Confidence:
     which may pass a bound: it describes the record alone.
 
     There is none where the standard error exceeds UNDETERMINED of what counts as 100 %
-    (`Linearisation.size`): of the value on the logarithmic scale. On the linear one it is the
-    value too, but at least a tenth of the interval between the bounds, so that a value near zero
-    is not called undetermined for being small; for a nuisance it is that interval.
+    (`Linearisation.own_size`): of the value. Where zero lies between the bounds it counts no less
+    than a tenth of the interval between these, so that a value near zero is not called undetermined
+    for being small; for a nuisance it is that interval.
     """
     factors = factored(lin, lin.free)
     noise = noise_of(factors)
@@ -132,38 +135,50 @@ def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
     Half the squared quantile of Student's t, times the variance of the parameter over that by the
     cost alone, the inverse of its second derivatives (Royall & Tsou 2003). With one channel and
     least squares the ratio is the variance of the weighted errors, widened where they are not
-    white (Bates & Watts 1988, section 6.1). What has no variance, as on a bound, takes the mean
-    of the channels by their samples.
+    white (Bates & Watts 1988, section 6.1). A parameter on a bound is let go for it; what has no
+    variance then takes the mean of the channels by their samples.
     """
     half = 0.5 * student_quantile(intervals.dof, 0.5 * (1.0 + LEVEL)) ** 2
-    plain = np.diag(factored(lin, lin.free).inverse) * lin.size**2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = np.diag(intervals.covariance) / plain
+    spreads = tuple(channel_noise.spread for channel_noise in intervals.noise)
+    ratios = _variance_ratios(factored(lin, lin.free), spreads)
+    for k in np.flatnonzero(~lin.free):
+        let_go = lin.free.copy()
+        let_go[k] = True
+        ratios[k] = _variance_ratios(factored(lin, let_go), spreads)[k]
     ratios = np.where(np.isfinite(ratios), ratios, intervals.variance)
     return dict(zip(lin.names, (half * ratios).tolist(), strict=True))
 
 
-def leaning_on_bounds(lin: Linearisation, noise: tuple[Noise, ...]) -> tuple[str, ...]:
-    """Return the parameters whose estimates would be others if those on a bound were let go.
+def _variance_ratios(factors: Factors, spreads: tuple[float, ...]) -> Array:
+    """Return the variances (N,) over those by the cost alone, nan where there are none."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratios = np.diag(factors.covariance(spreads)) / np.diag(factors.inverse)
+    return np.asarray(ratios)
 
-    Those are all that correlate with one on a bound by more than CORRELATED, by linear theory for
+
+def partners_on_bounds(
+    lin: Linearisation, noise: tuple[Noise, ...], least: float = CORRELATED
+) -> dict[str, tuple[str, ...]]:
+    """Return which parameters would be others if those on a bound were let go, and which these are.
+
+    Those are all that correlate with one on a bound by more than ``least``, by linear theory for
     all parameters free, or that cannot be distinguished from one.
     """
     held = ~lin.free
     if not held.any():
-        return ()
+        return {}
     factors = factored(lin, np.ones_like(held))
     covariance = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
     errors = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
-        correlated = np.abs(covariance / np.outer(errors, errors)) > CORRELATED
-    undetermined = np.flatnonzero(held & factors.has_effect & ~factors.determined)
-    alike = {name for k in undetermined for name in factors.others(int(k))}
-    return tuple(
-        name
+        partners = np.abs(covariance / np.outer(errors, errors)) > least
+    for k in np.flatnonzero(held & factors.has_effect & ~factors.determined):
+        partners[:, k] |= np.isin(lin.names, factors.others(int(k)))
+    return {
+        name: tuple(lin.names[j] for j in np.flatnonzero(held & partners[k]))
         for k, name in enumerate(lin.names)
-        if lin.free[k] and (correlated[k, held].any() or name in alike)
-    )
+        if lin.free[k] and partners[k, held].any()
+    }
 
 
 def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
@@ -197,15 +212,16 @@ def reason(factors: Factors, k: int, share: float) -> str | None:
     """Return why a parameter has no interval."""
     lin = factors.lin
     if lin.held[k] is not None:
-        words = "the bound decides, not the record; the others hold for it there"
-        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: {words}"
+        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: the bound decides, not the record"
     if not factors.has_effect[k]:
         return "has no effect on the record"
     if not factors.determined[k]:
         return f"cannot be distinguished from {listed(factors.others(k))}"
     if not isfinite(share):
         return "the record has no more samples than the fit has parameters"
-    if share > UNDETERMINED:
-        words = error(lin, k, share)
+    relative = share * float(lin.size[k] / lin.own_size[k])
+    if relative > UNDETERMINED:
+        by_value = lin.own_size[k] == abs(lin.values[k])
+        words = f"{digits(100.0 * relative)} %" if by_value else error(lin, k, share)
         return f"is not determined by the record: standard error {words}; see `exfit profile`"
     return None

@@ -11,6 +11,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SMALL = 0.1  # of the interval: bounds usually lie a decade off what a linear parameter may be
+OF_EACH_PARAMETER = (
+    "units",
+    "values",
+    "logarithmic",
+    "width",
+    "held",
+    "nuisances",
+    "through_zero",
+)
 LEAST_CURVATURE = 1e-3  # of least squares: a loss that takes nearly every sample for an outlier
 
 
@@ -67,6 +76,7 @@ class Linearisation:
     curvature      (M,) psi'(e) of the loss; least squares: ones
     channels       covering all rows
     nuisances      True for what belongs to the record, as the instant of a step, not to the model
+    through_zero   True where zero lies between the bounds: the value may be zero by chance
 
     Raises ValueError for shapes that do not agree and for numbers that are not finite.
     """
@@ -84,14 +94,13 @@ class Linearisation:
     channels: tuple[ResidualBlock, ...]
     priors: tuple[PriorRow, ...] = ()
     nuisances: tuple[bool, ...] = ()
+    through_zero: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         samples, rows, count = len(self.errors), len(self.jacobian), len(self.names)
-        if not self.nuisances:
-            object.__setattr__(self, "nuisances", (False,) * count)
-        for name in ("units", "values", "logarithmic", "width", "held", "nuisances"):
-            if len(getattr(self, name)) != count:
-                raise ValueError(f"{name}: {len(getattr(self, name))} for {count} parameters")
+        for name, usual in (("nuisances", False), ("through_zero", True)):
+            object.__setattr__(self, name, getattr(self, name) or (usual,) * count)
+        self._check_lengths()
         for name in ("errors", "jacobian", "influence", "curvature"):
             shape = (rows, count) if name == "jacobian" else (samples,)
             if getattr(self, name).shape != shape:
@@ -102,6 +111,12 @@ class Linearisation:
             raise ValueError(f"channels: must cover the {samples} errors")
         if sum(len(self.jacobian[block.rows]) for block in self.channels) != rows:
             raise ValueError(f"channels: must cover the {rows} rows")
+
+    def _check_lengths(self) -> None:
+        count = len(self.names)
+        for name in OF_EACH_PARAMETER:
+            if len(getattr(self, name)) != count:
+                raise ValueError(f"{name}: {len(getattr(self, name))} for {count} parameters")
 
     @cached_property
     def size(self) -> Array:
@@ -115,6 +130,16 @@ class Linearisation:
         value = np.abs(self.values)
         linear = np.where(self.nuisances, self.width, np.maximum(value, SMALL * self.width))
         return np.asarray(np.where(self.logarithmic, value, linear))
+
+    @cached_property
+    def own_size(self) -> Array:
+        """The change that counts as 100 % where the question is whether a parameter is determined.
+
+        It is `size`, but the value itself where the bounds keep it from zero.
+        """
+        value = np.abs(self.values)
+        kept_from_zero = ~(np.array(self.through_zero) | np.array(self.nuisances)) & (value > 0.0)
+        return np.asarray(np.where(kept_from_zero, value, self.size))
 
     @property
     def free(self) -> Mask:

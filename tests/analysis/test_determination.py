@@ -10,17 +10,20 @@ from places import CONFIGS
 import exfit.workflows as workflows
 from exfit.analysis.determination import (
     FoundMinimum,
+    determination,
     limits_of,
     of_profiles,
     uncertainty_of_solution,
     with_profile_intervals,
+    without_tied_intervals,
 )
 from exfit.analysis.solution import INTERRUPTED_AFTERWARDS
 from exfit.case.load import load_case
 from exfit.estimate import CostProfile, ProfileEnd, least_squares
+from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.parameters import UNIT, FreeParameter
-from exfit.fitting.search import fitted, names_of_records
+from exfit.fitting.search import fitted, names_of_records, search
 from exfit.inference import Uncertainty
 
 RISE, BOUND, FLAT = ProfileEnd.RISE, ProfileEnd.BOUND, ProfileEnd.FLAT
@@ -43,6 +46,13 @@ def profile_with(low, high, ends=(RISE, RISE)):
     return CostProfile(0, x, np.ones(1), x[None], *limits, ends, x, 1.0, False)
 
 
+def local_end(residuals):
+    """Return the end of the descent from the start."""
+    return least_squares(
+        residuals, residuals.start, residuals.exact, residuals.bounds, x_scale=UNIT
+    )
+
+
 SECOND = {"KPR": 75.7, "KIR": 2.232, "KDR": 22.4, "TDR": 0.2038, "TE": 1.637, "KC": 0.0055,
           "KD": 0.0628}  # fmt: skip
 
@@ -60,10 +70,10 @@ def unit2():
     )
     linear = uncertainty_of_solution(problem, solution.x, of_record)
     minima = [FoundMinimum(end.x, end.cost) for end in (solution, other)]
-    determination = with_profile_intervals(
+    determined = with_profile_intervals(
         residuals, minima[0], minima[1:], linear, of_record, lambda _: None
     )
-    return residuals, minima, linear, determination.uncertainty
+    return residuals, minima, linear, determined.uncertainty
 
 
 def test_an_interval_is_that_of_the_profile():
@@ -151,15 +161,36 @@ def test_the_hull_holds_both_minima_within_the_bounds(unit2):
             assert high >= free.value(minimum.x[k]) * (1.0 - 1e-9)
 
 
-def test_a_local_search_has_no_profiles():
+def test_a_local_search_has_no_profiles_and_no_interval_where_linear_theory_does_not_serve():
     result = workflows.fit(case_of("ac8b_unit2"), search="local")
     methods = {parameter.interval_method for parameter in result.parameters.values()}
     assert methods == {"linear", None}
+    assert not any(parameter.interval for parameter in result.parameters.values())
+    assert any("`exfit profile` gives one" in text for text in result.knowledge.sentences)
+
+
+def test_a_search_that_ended_nowhere_has_no_intervals():
+    setups, problem = fitted(case_of("first_order"))
+    found = local_end(problem.compressed)
+    best = replace(found, success=False)
+    uncertainty = determination(
+        problem, SearchResult(best, None, (), best), setups, True, lambda _: None
+    ).uncertainty
+    for parameter in uncertainty.confidence.parameters.values():
+        assert parameter.interval is None
+        assert parameter.why == "has no interval: the search did not end at a minimum"
+
+
+def test_a_parameter_tied_to_one_on_its_bound_is_named_with_it(unit2):
+    _, _, linear, _ = unit2
+    tied = replace(linear, tied_to_bounds={"KPR": ("KD",)})
+    parameters = without_tied_intervals(tied).confidence.parameters
+    assert parameters["KPR"].interval is None
+    assert parameters["KPR"].why == "has no interval: the record ties it to KD, on a bound"
+    assert parameters["KIR"] == linear.confidence.parameters["KIR"]
 
 
 def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
-    search = workflows.search_case
-
     def beside(case, problem, *rest):
         result = search(case, problem, *rest)
         x = result.best.x + np.array([0.0, 5e-7])
@@ -170,7 +201,7 @@ def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
         "exfit.analysis.determination.not_served_by_linear_theory", lambda *_: ("a",)
     )
     whole = workflows.fit(case_of("first_order"))
-    monkeypatch.setattr(workflows, "search_case", beside)
+    monkeypatch.setattr("exfit.analysis.case_search.search", beside)
     result = workflows.fit(case_of("first_order"))
     assert result.cost == pytest.approx(whole.cost, rel=1e-9)
     assert result.values == pytest.approx(whole.values, rel=1e-7)

@@ -85,9 +85,13 @@ def test_the_standard_errors_of_ac1a_are_those_of_scipy(ac1a):
     )
 
 
-def test_kd_of_ac1a_has_no_interval_and_a_sentence_instead(ac1a):
+def test_without_profiles_ac1a_has_sentences_in_place_of_intervals(ac1a):
+    """KD is not determined, and none of the others is linear over its interval, or follows KD."""
     known = ac1a.knowledge.confidence.parameters
-    assert [name for name, one in known.items() if one.interval is None] == ["KD"]
+    assert not any(parameter.interval for parameter in known.values())
+    others = ", ".join(name for name in known if name not in ("KD", "KC"))
+    assert f"{others} and KC have no interval of linear theory, which does not hold over it: the " \
+        "default search or `exfit profile` gives one" in ac1a.knowledge.sentences  # fmt: skip
     assert known["KD"].why.startswith("is not determined by the record: standard error 5")
     assert f"KD {known['KD'].why}" in ac1a.knowledge.sentences
 
@@ -134,7 +138,7 @@ def test_the_gains_of_ac8b_make_one_exact_combination(ac8b):
         assert moves[name] == pytest.approx(-moves["KA"], rel=1e-6)
 
 
-def test_none_of_the_gains_of_ac8b_has_an_interval_and_the_others_have(ac8b):
+def test_without_profiles_no_parameter_of_ac8b_with_one_on_its_bound_has_an_interval(ac8b):
     known = ac8b.knowledge.confidence.parameters
     gains, bound, others = {"KPR", "KIR", "KDR", "KA"}, {"KC"}, {"TDR", "TE", "KD"}
     assert known.keys() == gains | bound | others
@@ -142,7 +146,11 @@ def test_none_of_the_gains_of_ac8b_has_an_interval_and_the_others_have(ac8b):
         assert known[name].std_error is None
         assert known[name].why.startswith("cannot be distinguished from")
         assert all(other in known[name].why for other in gains - {name})
-    assert all(known[name].interval is not None for name in others)
+    # they would be others if KC were let go
+    for name in others:
+        assert known[name].std_error is not None
+        assert known[name].interval is None
+        assert known[name].why.startswith("has no interval")
 
 
 def test_a_parameter_on_its_bound_is_said_to_be_there(ac8b):
@@ -248,7 +256,7 @@ def test_a_response_that_is_not_linear_over_the_intervals_is_reported(name, bent
     """The check system is nearly linear; AC1A meets its limits within the interval of KA."""
     found = fit(case_of(name)).knowledge
     assert ("KA" in found.nonlinear) == bent
-    assert any("not linear over the intervals" in text for text in found.sentences) == bent
+    assert any("linear theory, which does not hold" in text for text in found.sentences) == bent
 
 
 def test_an_interrupted_fit_claims_no_intervals():

@@ -1,6 +1,7 @@
 """Standard errors and intervals against certified values, SciPy, and what repetition shows."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from scipy.optimize import curve_fit, least_squares
 from scipy.stats import chi2, kstest
 from scipy.stats import t as student
 
-from exfit.inference import PriorRow, ResidualBlock, confidence, leaning_on_bounds, rises
+from exfit.inference import PriorRow, ResidualBlock, confidence, partners_on_bounds, rises
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 from exfit.util import typed
 
@@ -331,9 +332,10 @@ def test_a_parameter_leans_on_a_bound_if_letting_go_of_it_would_move_the_estimat
     }[column]
     rows, errors = np.column_stack([first, other, third]), 0.1 * rng.standard_normal(60)
     held = linearised(np.ones(3), errors, rows, held=("max", None, None))
-    assert leaning_on_bounds(held, confidence(held).noise) == (("b",) if leaning else ())
+    partners = partners_on_bounds(held, confidence(held).noise)
+    assert partners == ({"b": ("a",)} if leaning else {})
     free = linearised(np.ones(3), errors, rows)
-    assert leaning_on_bounds(free, confidence(free).noise) == ()
+    assert partners_on_bounds(free, confidence(free).noise) == {}
 
 
 def test_on_a_bound_the_bound_decides_and_the_others_hold_for_it():
@@ -343,7 +345,7 @@ def test_on_a_bound_the_bound_decides_and_the_others_hold_for_it():
     without = confidence(linearised([2.0, 3.0], errors, rows[:, 1:]))
     assert known.parameters["a"].interval is None
     assert known.parameters["a"].why == (
-        "lies on its min 0.0356: the bound decides, not the record; the others hold for it there"
+        "lies on its min 0.0356: the bound decides, not the record"
     )
     assert std_errors(known)[1:] == pytest.approx(std_errors(without))
     assert known.dof == pytest.approx(58)
@@ -447,13 +449,15 @@ def test_a_given_noise_is_not_rejected_for_being_correlated():
     assert np.mean([not confidence(one).noise[0].accepted for one in lins]) <= 0.03
 
 
-def test_on_a_bound_the_cost_rises_by_the_mean_variance_of_all_samples():
+def test_for_the_rise_a_parameter_on_a_bound_is_let_go():
     noise, cut = np.random.default_rng(18).standard_normal(len(T)), 50
     noise[:cut] *= 0.1
     both = (ResidualBlock("vt", slice(0, cut), 0.1), ResidualBlock("efd", slice(cut, len(T)), 1.0))
-    lin = linearised(TRUTH, noise, LINE, channels=both, held=(None, "max"))
-    mean = (cut * 0.1**2 + (len(T) - cut)) / len(T)
-    assert rises(lin, confidence(lin))["b"] == pytest.approx(0.5 * chi2.ppf(0.95, 1) * mean)
+    held = linearised(TRUTH, noise, LINE, channels=both, held=(None, "max"))
+    free = linearised(TRUTH, noise, LINE, channels=both)
+    known = confidence(held)
+    same_noise = replace(confidence(free), noise=known.noise, dof=known.dof)
+    assert rises(held, known)["b"] == pytest.approx(rises(free, same_noise)["b"])
 
 
 def test_the_partners_of_a_redundancy_are_named_beside_what_has_no_effect():
@@ -493,3 +497,18 @@ def test_arrays_that_cannot_be_are_refused():
         linearised(TRUTH, np.zeros(200), LINE, channels=(ResidualBlock("vt", slice(0, 100)),))
     with pytest.raises(ValueError, match="held: 1 for 2 parameters"):
         linearised(TRUTH, np.zeros(200), LINE, held=(None,))
+
+
+@pytest.mark.parametrize("through_zero", [True, False])
+def test_a_value_that_the_bounds_keep_from_zero_is_its_own_measure(through_zero):
+    errors = np.random.default_rng(20).standard_normal(400)  # a standard error of 0.05
+    lin = linearised(
+        [0.1], errors, np.ones((400, 1)), width=np.array([10.0]), through_zero=(through_zero,)
+    )
+    parameter = confidence(lin).parameters["a"]
+    assert (parameter.interval is not None) == through_zero
+    if not through_zero:
+        share = 100.0 * parameter.relative_error
+        assert parameter.why == (
+            f"is not determined by the record: standard error {share:.0f} %; see `exfit profile`"
+        )

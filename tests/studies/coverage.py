@@ -1,246 +1,222 @@
-"""Count how often the 95 % intervals of AC1A hold the truth, on records made by simulation.
+"""Count how often the printed 95 % intervals hold the truth, on records made by simulation.
 
-Run it as ``python tests/studies/coverage.py [COUNT]``. The unit and its test are those of
-configs/ac1a_typical.yaml, with KD fixed: that record does not determine it. Each record is the
-response to the true parameters with new noise, fitted from a start nearby.
+Run it as ``python tests/studies/coverage.py --records 500 --results coverage.json``. The cases are
+those of tests/support/coverage_cases.py; each record is the response to the true parameters with
+new noise, fitted as the command fits: from the start of the case and from further starts, with
+profiles where linear theory does not serve. What is in the file of results already is not done
+again, so that a study that was interrupted goes on.
 
-Linear theory can only hold where the response is linear over the standard errors. Here it is not:
-KC shows in those 2 % of the samples alone in which the rectifier is in its second mode, and VA
-peaks 0.7 % below VAMAX. The profiles ask for no linearity; and so that the intervals are judged
-by themselves as well, the same is done with KC fixed, and with the limit out of reach.
+The first ``--dense`` records of each case are also profiled densely: the others fitted anew at
+values over the whole range of a parameter, from all minima that the search found and from the
+truth. That interval, by the true covariance of the noise, is what the width of the printed one is
+compared with.
 """
 
+import argparse
+import json
 import os
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 import numpy as np
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
-from scipy.stats import binomtest, chi2, f
+from scipy.stats import binomtest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from linearised import autoregressive
+from coverage_cases import HARD_CASES, noisy, truth_of
+from dense_profiles import dense_intervals
 
-from exfit.case.load import load_case
-from exfit.estimate import least_squares
-from exfit.fitting.build import build_experiments
-from exfit.fitting.parameters import UNIT
-from exfit.fitting.problem import problem_of, residuals_of
-from exfit.fitting.residuals import Residuals
-from exfit.fitting.uncertainty import uncertainty_at
-from exfit.inference import LEVEL
+from exfit.analysis.case_search import SearchTask, search_outcome
+from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.util.files import write
 
-CASE = Path(__file__).parents[2] / "configs" / "ac1a_typical.yaml"
-# what the record of that case was made with: sample_data/README.md
-TRUTH = {"KA": 364.1523, "KF": 0.0413, "TE": 1.6724, "TF": 1.458, "TA": 0.0542, "KC": 0.486}
-TRUTH |= {"KD": 0.4039}
-STILL = {name: TRUTH[name] for name in ("KD", "KC")}
-CASES = {
-    "KD fixed": {"KD": TRUTH["KD"]},
-    "KD, KC fixed": STILL,
-    "KD, KC fixed, VAMAX 20": {**STILL, "VAMAX": 20.0, "VRMAX": 20.0},
-}
-COUNT, SEED = 1000, 2026
-NOISE = 1e-4  # pu
-PHI = 0.6  # of each error in the next one, 10 ms later
-ASIDE = 0.05  # of the truth: how far a start may be from it
-BAND = (0.93, 0.97)
-WORKERS = 2  # processes
-CHUNK = 5  # records at once
+RECORDS, SEED = 500, 2026
+DENSE = 20
+EVERY = 15.0  # s: how often the results are written
+BAND = (0.92, 0.98)
+WIDEST = 1.3  # times the dense profile's
 
 
-@dataclass(frozen=True)
-class Setting:
-    """Which of CASES it is, what noise the records have, and whether the fit is told how much."""
-
-    case: str
-    phi: float
-    given: float | None
-    profiled: bool = False
-
-    @property
-    def title(self):
-        """Return what it is called."""
-        kind = f"AR(1) noise of {self.phi:g}" if self.phi else "white noise"
-        told = "estimated" if self.given is None else "given"
-        return f"{self.case}; {kind}, {told}"
+def ignore(_):
+    """Ignore a message."""
 
 
-NOISES = ((0.0, None), (PHI, None), (0.0, NOISE), (PHI, NOISE))
-SETTINGS = (
-    Setting("KD fixed", 0.0, None, profiled=True),
-    Setting("KD fixed", PHI, None),
-    Setting("KD, KC fixed", 0.0, None, profiled=True),
-    *(Setting("KD, KC fixed, VAMAX 20", *noise) for noise in NOISES),
-)
+def record_of(task):
+    """Return what the fit of one record of a case came to."""
+    name, number, seed, dense = task
+    began = time.process_time()
+    rng = np.random.default_rng([seed, *name.encode(), number])
+    case, setups, problem = noisy(name, rng)
+    options = case.estimate
+    task = SearchTask(case, setups, (), options.strategy, options, SimulationCounter())
+    problem, _, _, search, determined = search_outcome(task, problem, ignore, ignore)
+    uncertainty = determined.uncertainty
+    fitted = problem.residuals.values(search.best.x)
+    seconds = time.process_time() - began
+    parameters = uncertainty.confidence.parameters if uncertainty else {}
+    outcome = {
+        "seconds": round(seconds, 3),
+        "success": search.best.success,
+        "cost": search.best.cost / problem.compressed.costs([truth_of(name, problem)])[0],
+        "parameters": {
+            parameter: {
+                "value": fitted[parameter],
+                "interval": known.interval,
+                "method": known.method,
+                "why": known.why,
+            }
+            for parameter, known in parameters.items()
+        },
+    }
+    if dense:
+        outcome["dense"] = dense_intervals(name, problem, search)
+        outcome["dense_seconds"] = round(time.process_time() - began - seconds, 3)
+    return name, number, outcome
 
 
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a fit came to: logarithms of estimate : truth, their standard errors, both (N,).
-
-    ``inside`` tells which intervals hold the truth (N,), nan where there is none, ``ellipsoid``
-    whether that of all does, ``profiled`` which intervals of the profiles do (N,).
-    """
-
-    missed: np.ndarray
-    told: np.ndarray
-    inside: np.ndarray
-    ellipsoid: bool
-    profiled: np.ndarray
-    inflation: float
-    converged: bool
+def holds(interval, truth):
+    """Return whether an interval, with None for an open side, holds the truth."""
+    low, high = interval
+    return (low is None or low <= truth) and (high is None or truth <= high)
 
 
-@cache
-def problem(name):
-    """Return the residuals of one of CASES, their samples the exact response to the truth."""
-    case, fixed = load_case(CASE), CASES[name]
-    values = {**case.values(), **TRUTH, **fixed}
-    (setup,) = build_experiments(case)
-    setup = setup.with_enough_substeps(values)
-    whole = residuals_of(case, (setup,))
-    exact = setup.experiment.samples(values)[0][:, 0]
-    (channel,) = setup.channels
-    experiment = replace(setup.experiment, channels=(replace(channel, measured=exact),))
-    return with_fixed(Residuals([experiment], whole.free, whole.fixed, whole.ties), fixed)
+def width(interval, parameter):
+    """Return the width of an interval in scaled units, an open side ending at the bound."""
+    low, high = interval
+    low, high = parameter.low if low is None else low, parameter.high if high is None else high
+    return parameter.scaled(high) - parameter.scaled(low)
 
 
-def with_fixed(residuals, values):
-    """Return residuals some of whose parameters are fixed."""
-    free = [one for one in residuals.free if one.name not in values]
-    still = {**residuals.fixed, **values}
-    return Residuals(residuals.experiments, free, still, residuals.ties)
+def is_closed(interval):
+    """Return whether there is an interval with limits on both sides."""
+    return interval is not None and None not in interval
 
 
-def with_noise(residuals, noise, given):
-    """Return residuals whose one channel has noise (M,) on it, pu."""
-    (experiment,), (channel,) = residuals.experiments, residuals.channels
-    noisy = replace(channel, measured=channel.measured + noise, noise=given)
-    seen = replace(experiment, channels=(noisy,))
-    return Residuals([seen], residuals.free, residuals.fixed, residuals.ties)
-
-
-def fitted(residuals, start):
-    """Return what a fit finds from a start, logarithms (N,)."""
-    return least_squares(
-        residuals, start, residuals.exact, residuals.bounds, "lm-then-dgn", x_scale=UNIT
-    )
-
-
-def outcome(residuals, aside, profiled):
-    """Fit from a start that is aside (N,) of the truth, and return what it came to."""
-    truth = np.log([TRUTH[one.name] for one in residuals.free])
-    found = fitted(residuals, truth + aside)
-    told = uncertainty_at(problem_of(residuals), found.x, ())
-    known, missed, values = told.confidence, found.x - truth, np.exp(found.x)
-    covariance = known.covariance / np.outer(values, values)
-    distance = float(missed @ np.linalg.solve(covariance, missed))
-    return Outcome(
-        missed=missed,
-        told=np.sqrt(np.diag(covariance)),
-        inside=np.array([holds(one, TRUTH[name]) for name, one in known.parameters.items()]),
-        ellipsoid=distance <= limit(len(truth), known.dof),
-        profiled=in_profiles(residuals, found, told.rises) if profiled else np.zeros(0),
-        inflation=known.noise[0].inflation,
-        converged=found.success,
-    )
-
-
-def holds(one, truth):
-    """Return whether the interval of a parameter holds the truth, nan if it has none."""
-    return np.nan if one.interval is None else one.interval[0] <= truth <= one.interval[1]
-
-
-def in_profiles(residuals, found, rises):
-    """Return for each parameter whether its profile, at the truth, is no higher than its rise."""
-    costs = [
-        fitted(with_fixed(residuals, {one.name: TRUTH[one.name]}), np.delete(found.x, k)).cost
-        for k, one in enumerate(residuals.free)
+def figures(parameter, truth, outcomes):
+    """Return the figures of one parameter over the outcomes of a case."""
+    every = [outcome["parameters"].get(parameter.name) for outcome in outcomes]
+    intervals = [known and known["interval"] for known in every]
+    printed = [interval for interval in intervals if interval is not None]
+    held = sum(holds(interval, truth) for interval in printed)
+    bounds = binomtest(held, len(printed)).proportion_ci(0.95, "exact") if printed else (0.0, 1.0)
+    pairs = [
+        (interval, outcome["dense"][parameter.name])
+        for interval, outcome in zip(intervals, outcomes, strict=True)
+        if "dense" in outcome
     ]
-    return np.array(costs) <= found.cost + np.array(list(rises.values()))
+    closing = [interval for interval, dense in pairs if is_closed(dense)]
+    both = [(interval, dense) for interval, dense in pairs if interval is not None]
+    widths = np.array([[width(interval, parameter) for interval in pair] for pair in both])
+    return {
+        "records": len(outcomes),
+        "printed": len(printed) / max(len(outcomes), 1),
+        "closed": sum(map(is_closed, intervals)) / max(len(outcomes), 1),
+        "holds": held / len(printed) if printed else None,
+        "bounds": [*bounds],
+        "dense closes": len(closing),
+        "closed where dense closes": sum(map(is_closed, closing)) / len(closing)
+        if closing
+        else None,
+        "width": float(np.median(widths[:, 0]) / np.median(widths[:, 1])) if both else None,
+        "dense holds": [sum(holds(dense, truth) for _, dense in pairs), len(pairs)],
+    }
 
 
-def limit(count, dof):
-    """Return how far the truth may be from the estimate, in the ellipsoid's own measure."""
-    return chi2.ppf(LEVEL, count) if np.isinf(dof) else count * f.ppf(LEVEL, count, dof)
+def percent(share):
+    """Return a share in per cent."""
+    return "-" if share is None else f"{100.0 * share:.1f}"
 
 
-def outcome_of(task):
-    """Return the outcome of a setting for one series of noise (M,) and one start."""
-    setting, noise, aside = task
-    noisy = with_noise(problem(setting.case), noise, setting.given)
-    return outcome(noisy, aside, setting.profiled)
-
-
-def outcomes(setting, count):
-    """Return the outcomes of fits to so many records."""
-    exact, rng = problem(setting.case), np.random.default_rng(SEED)
-    noise = NOISE * autoregressive(rng, setting.phi, (count, exact.count))
-    aside = np.log1p(ASIDE * rng.uniform(-1.0, 1.0, (count, len(exact.free))))
-    tasks = [(setting, one, start) for one, start in zip(noise, aside, strict=True)]
-    with ProcessPoolExecutor(WORKERS) as pool:
-        found = pool.map(outcome_of, tasks, chunksize=CHUNK)
-        return list(track(found, setting.title, count))
-
-
-def shares(held):
-    """Return the share that holds, of those (K,) that are not nan, with its 95 % bounds."""
-    held = held[np.isfinite(held)]
-    bounds = binomtest(int(np.sum(held)), len(held)).proportion_ci(0.95, "exact")
-    return f"{100 * np.mean(held):.1f}", f"{100 * bounds.low:.1f} ... {100 * bounds.high:.1f}"
-
-
-def table_of(names, setting, found):
-    """Return the table of a setting."""
-    inside, missed, told = (
-        np.array([getattr(one, name) for one in found], dtype=float)
-        for name in ("inside", "missed", "told")
-    )
-    spread, mean = missed.std(axis=0, ddof=1), missed.mean(axis=0)
-    table = Table(title=setting.title)
-    headings = ("parameter", "holds %", "95 % bounds", "none", "spread %", "told : spread", "bias")
-    for heading in (*headings, *(("profile %",) if setting.profiled else ())):
+def table_of(name, outcomes):
+    """Return the table of a case, and its figures by parameter."""
+    hard = HARD_CASES[name]
+    free = noisy(name, np.random.default_rng(0))[2].residuals.free
+    table = Table(title=f"{name}: {hard.title}; {len(outcomes)} records")
+    headings = ("parameter", "holds %", "95 % bounds", "printed %", "closed %")
+    more = ("of dense closed %", "width : dense", "dense holds", "methods")
+    for heading in (*headings, *more):
         table.add_column(heading, justify="right")
-    for k, name in enumerate(names):
-        figures = (
-            str(np.count_nonzero(np.isnan(inside[:, k]))),
-            f"{100 * spread[k]:.2f}",
-            f"{np.nanmedian(told[:, k]) / spread[k]:.2f}",
-            f"{mean[k] / spread[k]:+.2f}",
+    by_parameter = {}
+    for parameter in free:
+        numbers = figures(parameter, hard.truth[parameter.name], outcomes)
+        by_parameter[parameter.name] = numbers
+        share, ratio = numbers["holds"], numbers["width"]
+        poor = share is not None and not BAND[0] <= share <= BAND[1]
+        methods = [o["parameters"].get(parameter.name, {}).get("method") for o in outcomes]
+        table.add_row(
+            parameter.name,
+            ("* " if poor else "") + percent(share),
+            f"{percent(numbers['bounds'][0])} ... {percent(numbers['bounds'][1])}",
+            percent(numbers["printed"]),
+            percent(numbers["closed"]),
+            f"{percent(numbers['closed where dense closes'])} of {numbers['dense closes']}",
+            "-" if ratio is None else f"{ratio:.2f}" + (" *" if ratio > WIDEST else ""),
+            "{}/{}".format(*numbers["dense holds"]),
+            " ".join(f"{str(m)[0]}{methods.count(m)}" for m in sorted(set(methods), key=str)),
         )
-        profiled = [one.profiled[k] for one in found if setting.profiled]
-        more = [shares(np.array(profiled))[0]] if profiled else []
-        table.add_row(name, *shares(inside[:, k]), *figures, *more)
-    table.add_section()
-    table.add_row("ellipsoid", *shares(np.array([one.ellipsoid for one in found])))
-    table.add_row("all at once", *shares(np.min(inside, axis=1)))
-    share = np.nanmean(inside, axis=0)
-    out = [name for name, s in zip(names, share, strict=True) if not BAND[0] <= s <= BAND[1]]
-    converged = sum(one.converged for one in found)
-    wider = np.sqrt(np.mean([one.inflation for one in found]))
+    seconds = [outcome["seconds"] for outcome in outcomes]
+    dense = [outcome["dense_seconds"] for outcome in outcomes if "dense" in outcome]
+    ended = sum(outcome["success"] for outcome in outcomes)
     table.caption = (
-        f"{converged} converged; intervals {wider:.2f} times wider; "
-        f"outside {BAND[0]:.0%} to {BAND[1]:.0%}: {', '.join(out) or 'none'}"
+        f"{ended} converged; {np.mean(seconds):.2f} s of processor a record"
+        + (f", {np.mean(dense):.1f} s a dense profile" if dense else "")
+        + f"; * outside {BAND[0]:.0%} to {BAND[1]:.0%}, or wider than {WIDEST} times the dense one"
     )
-    return table
+    return table, by_parameter
+
+
+def stored(path):
+    """Return the outcomes of a file of results, by case and record; none without it."""
+    if path is None or not path.exists():
+        return {}
+    return json.loads(path.read_text(encoding="utf-8"))["outcomes"]
+
+
+def arguments():
+    """Return the arguments of the command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--records", type=int, default=RECORDS, help="of each case")
+    parser.add_argument("--case", action="append", choices=[*HARD_CASES], help="all by default")
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--threads", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--dense", type=int, default=DENSE, help="records with dense profiles")
+    parser.add_argument("--results", type=Path, help="JSON file, written as it goes")
+    return parser.parse_args()
 
 
 def main():
-    """Print a table for each setting."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
-    console = Console(width=100)
-    for setting in SETTINGS:
-        names = [one.name for one in problem(setting.case).free]
-        console.print(table_of(names, setting, outcomes(setting, count)))
+    """Fit the records of each case and print a table for each."""
+    given = arguments()
+    outcomes, figures_of, console = stored(given.results), {}, Console(width=120)
+
+    def save():
+        if given.results is not None:
+            content = {"seed": given.seed, "figures": figures_of, "outcomes": outcomes}
+            write(given.results, json.dumps(content))
+
+    with ProcessPoolExecutor(given.threads) as pool:
+        for name in given.case or HARD_CASES:
+            done, saved = outcomes.setdefault(name, {}), time.monotonic()
+            numbers = [n for n in range(given.records) if str(n) not in done]
+            tasks = [(name, number, given.seed, number < given.dense) for number in numbers]
+            try:
+                for count, (_, number, outcome) in enumerate(pool.map(record_of, tasks), 1):
+                    done[str(number)] = outcome
+                    if time.monotonic() > saved + EVERY:
+                        print(f"{name}: {count} of {len(tasks)}", flush=True)
+                        save()
+                        saved = time.monotonic()
+            finally:
+                save()
+            table, figures_of[name] = table_of(name, [done[key] for key in sorted(done, key=int)])
+            console.print(table)
+            save()
 
 
 if __name__ == "__main__":
