@@ -34,7 +34,7 @@ def notes(
 ) -> Iterator[str]:
     """Yield the notes on what a fit found; ``compared`` has sub-steps enough for its response."""
     values = residuals.values(solution.x)
-    yield from typical_notes(case)
+    yield from typical_notes(case, values)
     yield from search_range_notes(case)
     yield from unphysical_notes(case, values)
     for experiment, comparison in zip(residuals.experiments, compared, strict=True):
@@ -147,9 +147,10 @@ def unphysical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
             yield f"{text}: its data sheet's range is {row.physical_range}"
 
 
-def typical_notes(case: Case) -> Iterator[str]:
-    """Yield which values were taken from the data sheet, because the case does not give them."""
-    typical = typical_values_used(case)
+def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
+    """Yield which of the values that act are typical: marked as such, or left out of the case."""
+    used = typical_values_used(case)
+    typical = {name: value for name, value in used.items() if values[name] == value}
     for part in case.parts.all:
         names = [symbol for symbol in part.symbols if part.prefix + symbol in typical]
         if names and part.kind != "network":
@@ -161,7 +162,7 @@ def typical_notes(case: Case) -> Iterator[str]:
 
 def simulation_notes(case: Case, values: Mapping[str, float], response: Response) -> Iterator[str]:
     """Yield which values are typical or not physical, and whether the machine falls out of step."""
-    yield from typical_notes(case)
+    yield from typical_notes(case, values)
     yield from unphysical_notes(case, values)
     delta = response.signals.get("delta")
     if delta is not None and np.max(np.abs(delta)) > np.pi:

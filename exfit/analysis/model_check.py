@@ -86,7 +86,7 @@ def check(case: Case) -> Check:
         step=first.step,
         step_error=error,
         drift=drift,
-        notes=(*typical_notes(case), *search_range_notes(case)),
+        notes=(*typical_notes(case, case.values()), *search_range_notes(case)),
     )
 
 

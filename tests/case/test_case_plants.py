@@ -163,7 +163,8 @@ def test_fitted_values_of_all_parts_are_read_back(found, tmp_path):
 
 
 def test_what_is_typical_is_named_part_by_part(tmp_path):
-    told = "\n".join(typical_notes(load_case(written(tmp_path))))
+    case = load_case(written(tmp_path))
+    told = "\n".join(typical_notes(case, case.values()))
     assert "typical values taken for GENROU: Tpd0 6.35" in told
     assert "typical values taken for PSS1A:" in told
     assert "network" not in told
@@ -176,7 +177,7 @@ def test_a_stabiliser_on_open_circuit_is_said_not_to_act(tmp_path):
         ("  network: [{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}]\n", ""),
     )
     case = load_case(written(tmp_path, *opened))
-    assert any("PSS1A does not act" in note for note in typical_notes(case))
+    assert any("PSS1A does not act" in note for note in typical_notes(case, case.values()))
     assert not any(name.startswith("stabiliser") for name in system_of(case).parameters)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from exfit.inference.wording import listed
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
+from exfit.results.typical_values import by_weight, first_of
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,9 @@ def verdict(result: FitResult) -> Headline:
 def _determined(result: FitResult) -> str:
     own = {name: fitted for name, fitted in result.parameters.items() if not fitted.of_record}
     vague = [name for name, parameter in own.items() if not parameter.determined]
+    weighty = [*by_weight(result.typical_values)]
+    if not vague and weighty:
+        return f"typical values matter: {first_of(weighty)}"
     if not vague:
         return "every parameter determined"
     return f"{len(vague)} of {len(own)} parameters not determined: {listed(vague)}"

@@ -10,15 +10,20 @@ from exfit.inference import Correlation, ParameterEffect
 from exfit.output.report.charts import Chart, Panel, Series
 from exfit.output.report.layout import BINS, LEVEL, MILLI, TALL, TIME, line_style
 from exfit.results.model import FitResult
+from exfit.results.typical_values import by_weight
 
 PERCENT = 1e-2
 
 
 @dataclass(frozen=True)
 class IdentifiabilityView:
-    """What the records determine; ``unresolved`` says whether they leave something so."""
+    """What the records determine; ``unresolved`` says whether they leave something so.
+
+    ``typical``: whether typical values would move that if they were wrong.
+    """
 
     unresolved: bool
+    typical: bool
     effects: tuple[ParameterEffect, ...]
     sensitivity: tuple[Chart, ...]
     correlation: Correlation
@@ -34,6 +39,7 @@ def identifiability(result: FitResult) -> IdentifiabilityView | None:
     )
     return IdentifiabilityView(
         bool(uncertainty.sentences),
+        bool(by_weight(result.typical_values)),
         uncertainty.effects,
         tuple(charts),
         uncertainty.confidence.correlation,
