@@ -36,6 +36,7 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
         ties=Ties(ties),
         parameters=Parameters(free={row.symbol: _section(row) for row in free_of(model)}),
         given_values={key: given for key, given in case.given_values.items() if key not in own},
+        given_sources={key: word for key, word in case.given_sources.items() if key not in own},
     )
 
 

@@ -73,17 +73,19 @@ def _plant(model: Model, machine: Machine, inspection: Inspection) -> Iterator[s
     if model.name == ALONE:
         yield "  type: none"
         return
-    power = inspection.channel_of("p")
+    power, sources = inspection.channel_of("p"), dict[str, str]()
     if power is not None and _on_load(power):
         yield commented("  type: infinite-bus", f"{_plain(power.name)} shows power")
         yield from _network(inspection)
+        sources = _network_sources(inspection)
     else:
         yield commented("  type: open-circuit", "the breaker is open, at rated speed")
     yield commented(f"  machine: {machine.name}", machine.title)
     yield "  parameters:"
     for row in machine.sheet:
         yield parameter_line(row, yaml_number(row.typical), "    ")
-    yield from source_lines({row.symbol: TYPICAL for row in machine.sheet}, "  ")
+    sources |= {row.symbol: TYPICAL for row in machine.sheet}
+    yield from source_lines(sources, "  ")
 
 
 def _on_load(power: InspectedChannel) -> bool:
@@ -98,6 +100,12 @@ def _network(inspection: Inspection) -> Iterator[str]:
     yield commented(f"    X: {FILL_IN}", "pu, reactance to the source: transformer and grid")
     yield commented(f"    P: {_level(inspection, 'p')}", "pu of the machine, before the step")
     yield commented(f"    Q: {_level(inspection, 'q')}", "pu, before the step")
+
+
+def _network_sources(inspection: Inspection) -> dict[str, str]:
+    """Return where the values of the network come from that are not to be filled in."""
+    measured = [signal for signal in ("p", "q") if _level(inspection, signal) != FILL_IN]
+    return {"R": TYPICAL, **{signal.upper(): "measured" for signal in measured}}
 
 
 def _per_unit(channel: InspectedChannel) -> bool:

@@ -38,8 +38,12 @@ def test_plant_tests_and_records_stay():
 
 
 def test_values_given_for_the_exciter_are_left_behind_those_of_the_machine_are_not():
-    own = load_case(CASE).with_values({"KPR": 50.0, "machine.Tpd0": 7.0}, "--set")
-    assert [*with_exciter(own, "SEXS", MODELS["SEXS"]).given_values] == ["machine.Tpd0"]
+    values = {"KPR": 50.0, "TE": 0.9, "machine.Tpd0": 7.0}
+    own = load_case(CASE).with_values(values, "file", dict.fromkeys(values, "fitted"))
+    other = with_exciter(own, "SEXS", MODELS["SEXS"])
+    assert [*other.given_values] == ["machine.Tpd0"]
+    sources = other.sources()  # SEXS has a TE of its own
+    assert (sources["TE"], sources["machine.Tpd0"]) == ("not stated", "fitted")
 
 
 def test_ties_of_the_machine_stay_unless_they_follow_the_exciter():

@@ -69,6 +69,8 @@ def test_every_model_becomes_a_case_that_loads_as_it_stands(model, record, tmp_p
     values = case.values()
     for row in MODELS[model].sheet:
         assert values[row.symbol] == pytest.approx(row.typical, rel=1e-6)
+    others = [name for name in case.rows() if name not in case.free()]
+    assert case.typical() == tuple(others)
     (step,) = case.test.vref
     assert step.at.start == pytest.approx(AT, abs=0.05)
     assert step.at.min < AT < step.at.max
@@ -166,7 +168,11 @@ def test_on_load_the_record_gives_power_and_the_network_is_required(tmp_path):
     levels = {"vt": 1.0, "p": 0.8, "q": 0.1}
     columns = {name: level + rng.normal(0.0, NOISE, time.size) for name, level in levels.items()}
     path = started("ST1A", Columns({"t": time, **columns}, path=tmp_path / "r.csv"), tmp_path)
-    network = yaml.safe_load(path.read_text())["plant"]["network"]
+    plant = yaml.safe_load(path.read_text())["plant"]
+    network = plant["network"]
+    assert {symbol: plant["sources"].get(symbol) for symbol in network} == {
+        "f0": None, "R": "typical", "X": None, "P": "measured", "Q": "measured"
+    }  # fmt: skip
     assert network == {
         "f0": "?", "R": 0.0, "X": "?", "P": pytest.approx(0.8, abs=1e-3),
         "Q": pytest.approx(0.1, abs=1e-3),
