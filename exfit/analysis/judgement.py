@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from exfit.analysis.causes.match import MISFIT
 from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.errors import SimulationError
@@ -17,6 +16,8 @@ from exfit.inference.noise import LEAST_P, SURPRISING, whiteness
 from exfit.inference.wording import digits
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
+
+MISFIT = 2.0  # times the noise: three quarters of the squared error are not noise then
 
 
 def doubt_of(

@@ -53,6 +53,13 @@ class Nearest(NamedTuple):
     at: float
 
 
+class Extreme(NamedTuple):
+    """How far a signal went towards a limit: its largest ``share`` of the way from zero to it."""
+
+    limit: str
+    share: float
+
+
 class Followed(NamedTuple):
     """A limiter along a run: its value and its bound (n,), and where it is held."""
 
@@ -124,6 +131,24 @@ def nearest(simulator: Simulator, values: Values) -> tuple[Nearest, ...]:
             )
             by_key.setdefault(_key(limit_side.limiter), near)
     return tuple(sorted(by_key.values(), key=lambda near: near.percent))
+
+
+def extremes(simulator: Simulator, values: Values) -> tuple[Extreme, ...]:
+    """Return how far the response went towards each of its limits, 1 or more where it met them.
+
+    Left out is what was always on the other side of zero. Raises SimulationError where the start
+    is no rest.
+    """
+    run = simulator.run(values)
+    reached = []
+    for followed in _followed(simulator, values, run):
+        sides = followed.limiter.sign * followed.bound > 0.0
+        if np.any(sides):
+            share = float(np.max(followed.value[sides] / followed.bound[sides]))
+            met = bool(np.any(followed.held))
+            if share > 0.0 and np.isfinite(share):
+                reached.append(Extreme(followed.limiter.limit, max(share, 1.0) if met else share))
+    return tuple(reached)
 
 
 def _followed(simulator: Simulator, values: Values, run: Run) -> list[Followed]:

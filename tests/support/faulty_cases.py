@@ -5,9 +5,9 @@ one thing is made wrong: in the case, in the record, or in what the unit is. Wha
 be, and which cause it should name, stands in KINDS, beside the fault and not in view of any fit.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiments
 from exfit.records.record import Record
+from exfit.results.verdict import Cause
 
 Content = dict[str, Any]
 Signals = dict[str, np.ndarray]
@@ -423,10 +424,10 @@ def drawn(name: str, seed: tuple[int, ...]) -> FaultyCase:
     unit = UNITS[label]
     noise, sampling = float(rng.choice(NOISES)), float(rng.choice(SAMPLINGS))
     weights = {signal: 1.0 / times for signal, times in unit.noise.items()}
-    plain = content_of(unit, weights, float(rng.choice(kind.steps)))
-    truth = deepcopy(plain)
+    described = content_of(unit, weights, float(rng.choice(kind.steps)))
+    truth = deepcopy(described)
     truth["test"]["vt0"] = float(rng.uniform(0.98, 1.02))
-    case = deepcopy(plain)
+    case = deepcopy(described)
     case["parameters"] = {"fixed": dict(unit.fixed), "free": found(unit.free, rng)}
     sound, draft = deepcopy(case), Draft(rng, unit, noise, sampling, deepcopy(truth), case)
     kind.make(draft)
@@ -434,12 +435,14 @@ def drawn(name: str, seed: tuple[int, ...]) -> FaultyCase:
     white = {signal: noise * times * rng.standard_normal(len(time))
              for signal, times in unit.noise.items()}  # fmt: skip
     clock, spoilt = draft.spoil(time, recorded(draft.unit, time))
+    faulty = Record.from_arrays(clock, draft.cut(clock, noisy(spoilt, white)))
+    plain = Record.from_arrays(time, noisy(recorded(truth, time), white))
     return FaultyCase(
         kind=name,
         words=draft.words,
         unit=f"{label}, {noise:g} pu, {1e3 * sampling:g} ms",
-        faulty=Case.from_dict(draft.case, Record.from_arrays(clock, draft.cut(clock, noisy(spoilt, white))), name=name),
-        sound=Case.from_dict(sound, Record.from_arrays(time, noisy(recorded(truth, time), white)), name=name),
+        faulty=Case.from_dict(draft.case, faulty, name=name),
+        sound=Case.from_dict(sound, plain, name=name),
         noise=noise,
     )
 
@@ -454,3 +457,9 @@ def all_faults(seed: int, share: float = 1.0) -> Iterator[tuple[str, tuple[int, 
     for number, (name, kind) in enumerate(KINDS.items()):
         for repeat in range(max(1, round(share * kind.count))):
             yield name, (seed, number, repeat)
+
+
+def names_cause(expected: Sequence[str], causes: Sequence[Cause]) -> bool:
+    """Return whether any of some causes is one of those expected, by its words."""
+    words = [word for cause in expected for word in WORDS[cause]]
+    return any(word in cause.cause for cause in causes for word in words)

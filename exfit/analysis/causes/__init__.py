@@ -1,35 +1,89 @@
 """Why a fit is not as good as its records allow: each cause has a small function that sees it.
 
-A recogniser gets the `Evidence` of a fit and yields a `Cause` for each thing that it sees there:
-what it is, with its place and its figures, and what to do about it.
+A recogniser gets the `Evidence` of a fit and yields a `Suspicion` for each thing that may be wrong:
+the cause, with its place and its figures, what to do about it, and how likely the record is with
+it. Some look at the residuals; others fit the record once more with one thing left open. Where the
+residuals are noise nothing of that is done.
 """
 
-from exfit.analysis.causes.evidence import Evidence, FittedRecord, Recogniser
-from exfit.analysis.causes.match import other_way, unexplained_error, worse_than_constant
-from exfit.analysis.causes.rest import (
-    unsteady_record,
-    wrong_levels,
+from collections.abc import Iterator
+
+from exfit.analysis.causes.channels import (
+    clipped_channel,
+    wrong_offset,
+    wrong_scale,
     wrong_start,
-    wrong_voltage,
 )
+from exfit.analysis.causes.evidence import Evidence, FittedRecord
+from exfit.analysis.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
+from exfit.analysis.causes.rest import unsteady_record, wrong_levels, wrong_voltage
+from exfit.analysis.causes.steps import further_step, wrong_instant, wrong_sign, wrong_size
+from exfit.analysis.causes.suspicion import Recogniser, Suspicion
 from exfit.analysis.causes.typical import typical_values
+from exfit.analysis.causes.unit import (
+    another_model,
+    fixed_values,
+    machine_data,
+    narrow_bound,
+    not_ended,
+    wrong_limit,
+)
+from exfit.estimate import Stop
 from exfit.results.verdict import Cause
 
-__all__ = ["Evidence", "FittedRecord", "Recogniser", "causes_of"]
+__all__ = ["Evidence", "FittedRecord", "Recogniser", "Suspicion", "causes_of"]
 
-RECOGNISERS: tuple[Recogniser, ...] = (
-    other_way,
+ALWAYS: tuple[Recogniser, ...] = (
     wrong_voltage,
-    wrong_start,
-    wrong_levels,
-    worse_than_constant,
     unsteady_record,
-    unexplained_error,
+    wrong_levels,
     typical_values,
-)  # the likeliest first
+)
+FROM_RESIDUALS: tuple[Recogniser, ...] = (
+    not_ended,
+    other_clock,
+    spiky_channel,
+    ripple,
+    drift,
+)
+BY_TRIAL: tuple[Recogniser, ...] = (
+    wrong_voltage,
+    unsteady_record,
+    typical_values,
+    wrong_sign,
+    wrong_size,
+    wrong_instant,
+    wrong_scale,
+    wrong_offset,
+    wrong_start,
+    clipped_channel,
+    narrow_bound,
+    machine_data,
+    fixed_values,
+    wrong_limit,
+    further_step,
+    averaging,
+    another_model,
+)
 
 
-def causes_of(evidence: Evidence) -> tuple[Cause, ...]:
-    """Return what may be wrong with a fit, its test or its record, the likeliest first."""
-    causes = (cause for recognise in RECOGNISERS for cause in recognise(evidence))
-    return tuple(dict.fromkeys(causes))
+def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
+    """Return what may be wrong with a fit, its test or its record, the likeliest first.
+
+    ``matched``: a minimum whose residuals are noise, of which only what is at rest is looked at. An
+    interruption ends the trials with what was found by then.
+    """
+    if matched or evidence.solution.stop is Stop.INTERRUPTED:
+        recognisers = ALWAYS
+    else:
+        recognisers = (*FROM_RESIDUALS, *BY_TRIAL)
+    suspicions = sorted(_suspicions(evidence, recognisers), key=lambda each: -each.likelihood)
+    return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
+
+
+def _suspicions(evidence: Evidence, recognisers: tuple[Recogniser, ...]) -> Iterator[Suspicion]:
+    try:
+        for recognise in recognisers:
+            yield from recognise(evidence)
+    except KeyboardInterrupt:
+        return

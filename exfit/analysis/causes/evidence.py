@@ -1,18 +1,17 @@
 """What is known of a fit when its causes are looked for."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Unknown
-from exfit.fitting.residuals import Residuals
+from exfit.fitting.residuals import Residuals, noise_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
 from exfit.results.typical_values import TypicalValue
-from exfit.results.verdict import Cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +68,24 @@ class Evidence:
         return tuple(record.comparison for record in self.records)
 
     @property
+    def cost(self) -> float:
+        """What the fit made small, where it ended."""
+        return self.solution.cost
+
+    @cached_property
+    def noise_cost(self) -> float:
+        """The cost that the noise of the records alone would have, as they scatter."""
+        squares = (
+            channel.samples * (channel.weight * noise_of(channel)) ** 2
+            for channel in self.residuals.channels
+        )
+        return 0.5 * sum(squares)
+
+    def name_of(self, number: int) -> str:
+        """Return how a sentence names a record of several, "" where there is only one."""
+        return f" of {self.records[number].setup.name}" if len(self.records) > 1 else ""
+
+    @property
     def undetermined(self) -> tuple[str, ...]:
         """The parameters of the unit that the records do not limit on both sides."""
         of_records = {
@@ -81,6 +98,3 @@ class Evidence:
             return tuple(own)
         parameters = self.uncertainty.confidence.parameters
         return tuple(name for name in own if not parameters[name].determined)
-
-
-Recogniser = Callable[[Evidence], Iterator[Cause]]  # yields the causes of one kind that it sees

@@ -5,12 +5,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from exfit.analysis.causes.evidence import Evidence
+from exfit.analysis.causes.suspicion import CERTAIN, LAST, Suspicion
 from exfit.fitting.experiment import Channel
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
 from exfit.results.verdict import Cause
 
-FAR_FROM_START = 0.01  # of vt0: beyond the noise of a record
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
 FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 LEAST_LEVEL = 0.1  # pu: below it a deviation is not relative to the level
@@ -19,45 +19,35 @@ UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 INVISIBLE = 1e-7  # pu: no recorder shows it
 
 
-def wrong_start(evidence: Evidence) -> Iterator[Cause]:
-    """Yield a voltage before the first step that is not that of the record."""
-    for record in evidence.records:
-        measured, vt0 = record.comparison.features.measured, record.given_vt0
-        if measured is None or record.comparison.features.simulated is None or vt0 is None:
-            continue
-        if abs(measured.initial_value - vt0) > FAR_FROM_START * abs(vt0):
-            yield Cause(
-                f"vt0 is {vt0:g} pu, but the record starts from {measured.initial_value:.4g} pu",
-                "correct vt0, or the base of vt",
-            )
-
-
-def wrong_voltage(evidence: Evidence) -> Iterator[Cause]:
+def wrong_voltage(evidence: Evidence) -> Iterator[Suspicion]:
     """Yield a voltage that no machine is tested at, yet some might rest with."""
     if not evidence.case.kind.per_unit:
         return
     for record in evidence.records:
         measured = record.comparison.features.measured
         if measured is not None and abs(measured.initial_value - 1.0) > FAR_FROM_RATED:
-            yield Cause(
+            cause = Cause(
                 f"vt starts from {measured.initial_value:.4g} pu",
                 "check its unit, its base and, of phases, their connection",
             )
+            yield Suspicion(cause, CERTAIN)
 
 
-def unsteady_record(evidence: Evidence) -> Iterator[Cause]:
+def unsteady_record(evidence: Evidence) -> Iterator[Suspicion]:
     """Yield the signals that drift while the case calls the unit steady."""
     for record in evidence.records:
         if record.steady_until is not None:
             setup = record.setup
-            yield from unsteady_signals(setup.record, record.steady_until, setup.channels)
+            for cause in unsteady_signals(setup.record, record.steady_until, setup.channels):
+                yield Suspicion(cause, LAST)
 
 
-def wrong_levels(evidence: Evidence) -> Iterator[Cause]:
+def wrong_levels(evidence: Evidence) -> Iterator[Suspicion]:
     """Yield the signals that start elsewhere than their record."""
     for record in evidence.records:
         if record.steady_until is not None:
-            yield from other_levels(record.comparison, record.steady_until)
+            for cause in other_levels(record.comparison, record.steady_until):
+                yield Suspicion(cause, LAST)
 
 
 def other_levels(comparison: Comparison, steady: float) -> Iterator[Cause]:

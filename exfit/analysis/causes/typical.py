@@ -3,19 +3,21 @@
 from collections.abc import Iterator
 
 from exfit.analysis.causes.evidence import Evidence
+from exfit.analysis.causes.suspicion import LAST, Suspicion
 from exfit.results.typical_values import DEVIATION, first_of, moved_parameters
 from exfit.results.verdict import Cause
 
 
-def typical_values(evidence: Evidence) -> Iterator[Cause]:
+def typical_values(evidence: Evidence) -> Iterator[Suspicion]:
     """Yield the typical values that the parameters of the unit rest on."""
     names = [*evidence.typical_values]
     if not names:
         return
     first = evidence.typical_values[names[0]]
     moved = moved_parameters(first, evidence.values)
-    yield Cause(
+    cause = Cause(
         f"{first_of(names)} {'is' if len(names) == 1 else 'are'} typical: if {names[0]} "
         f"({first.value:g}) were {100.0 * DEVIATION:g} % off, that would move {moved}",
         "give the unit's own values, and say under sources where they come from",
     )
+    yield Suspicion(cause, LAST)

@@ -30,7 +30,8 @@ def verdict_of(evidence: Evidence) -> Verdict:
     """Return what a fit comes to, why, and the likeliest causes."""
     tests = residual_tests(evidence)
     words, reason = _judged(evidence, tests)
-    return Verdict(words, reason, causes_of(evidence)[:MOST_CAUSES], tests)
+    matched = words in (GOOD, MATCHES) and all(test.are_noise for test in tests)
+    return Verdict(words, reason, causes_of(evidence, matched)[:MOST_CAUSES], tests)
 
 
 def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[VerdictWords, str]:

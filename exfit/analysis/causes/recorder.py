@@ -1,0 +1,234 @@
+"""What a recorder adds to a record: ripple, drift, spikes, averages, another clock."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.analysis.causes.evidence import Evidence
+from exfit.analysis.causes.linear import LinearFit, blocks, linear_fit
+from exfit.analysis.causes.suspicion import CERTAIN, Suspicion, suspected
+from exfit.analysis.causes.trials import Opened, Trial, tried, with_experiment, with_opened
+from exfit.dsp.filtering import Filtering, MovingAverage
+from exfit.dsp.noise import NEIGHBOURS, noise
+from exfit.dsp.quality import spikes
+from exfit.dsp.step_detection import find_step
+from exfit.fitting.experiment import Channel, Nuisance
+from exfit.records.channel_inspection import SPIKE_LIMIT
+from exfit.results.verdict import Cause
+from exfit.util.sorting import median
+
+Array = NDArray[np.float64]
+
+FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
+FINER = 8  # points of the spectrum for each of a transform without padding
+MAINS = (50.0, 60.0)  # Hz
+FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, folds it to a drift
+MOST_SPIKES = 0.02  # of the samples: more are no spikes
+NEAREST_RATIO = 0.1  # of a factor between the clocks
+CLOCKS = {1e3: "ms", 1e6: "microseconds", 60.0: "minutes", 50.0: "cycles of 50 Hz"}
+WINDOWS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)  # s, of averages that are tried
+
+
+class ChannelErrors(NamedTuple):
+    """The errors of one channel: where they are among all, their times (s), their weight."""
+
+    number: int
+    channel: Channel
+    rows: slice
+    time: Array
+
+    def columns(self, count: int, own: Array) -> Array:
+        """Return columns (count, C) that are those of this channel, (M, C) pu, weighted."""
+        columns = np.zeros((count, own.shape[1]))
+        columns[self.rows] = self.channel.weight * own
+        return columns
+
+
+def errors_of_channels(evidence: Evidence) -> Iterator[ChannelErrors]:
+    """Yield the errors of each channel whose samples are compared one by one."""
+    for number, places in enumerate(blocks(evidence)):
+        experiment = evidence.residuals.experiments[number]
+        time = evidence.records[number].setup.record.time
+        for channel, rows in zip(experiment.channels, places, strict=True):
+            yield ChannelErrors(number, channel, rows, time[channel.kept])
+
+
+def ripple(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the channels in whose errors a line of the spectrum stands out."""
+    linear = linear_fit(evidence)
+    if linear is None:
+        return
+    for own in errors_of_channels(evidence):
+        frequency = _line(own, linear)
+        if frequency is None:
+            continue
+        phase = 2.0 * np.pi * frequency * own.time
+        columns = own.columns(len(linear.errors), np.column_stack([np.cos(phase), np.sin(phase)]))
+        explained = linear.with_columns(columns)
+        height = float(np.hypot(*explained.coefficients))
+        cause = Cause(
+            f"a ripple of {frequency:.1f} Hz, {height:.1e} pu, in "
+            f"{own.channel.signal}{evidence.name_of(own.number)}",
+            _against_ripple(frequency, own.time),
+        )
+        yield from suspected(evidence, explained.cost, 3, cause)
+
+
+def _line(own: ChannelErrors, linear: LinearFit) -> float | None:
+    """Return the frequency (Hz) at which the errors of a channel have most, None if too few."""
+    errors = linear.errors[own.rows]
+    if len(errors) < FEWEST_PERIODS:
+        return None
+    step, length = float(median(np.diff(own.time))), FINER * len(errors)
+    even = np.interp(own.time[0] + step * np.arange(len(errors)), own.time, errors)
+    power = np.abs(np.fft.rfft(even - np.mean(even), length)) ** 2
+    frequencies = np.fft.rfftfreq(length, step)
+    slowest = FEWEST_PERIODS / (own.time[-1] - own.time[0])
+    power[frequencies < slowest] = 0.0
+    return float(frequencies[np.argmax(power)])
+
+
+def _against_ripple(frequency: float, time: Array) -> str:
+    rate = 1.0 / float(median(np.diff(time)))
+    folded = [mains for mains in MAINS if mains > 0.5 * rate]
+    if folded or abs(frequency - 0.5 * rate) < FOLDED * rate:
+        return "record faster, or through an anti-alias filter; noise of its size is no harm"
+    return f"filter: {{lowpass: {0.4 * frequency:.2g}}} on the channel, or a sine"
+
+
+def drift(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the channels that drift all along the record."""
+    linear = linear_fit(evidence)
+    if linear is None:
+        return
+    for own in errors_of_channels(evidence):
+        way = (own.time - own.time[0]) / (own.time[-1] - own.time[0])
+        columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
+        explained = linear.with_columns(columns)
+        rate = 1.0 / float(median(np.diff(own.time)))
+        folds = any(
+            abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5
+            for mains in MAINS
+        )
+        folding = ", or ripple of the mains that its sampling folds," if folds else ""
+        cause = Cause(
+            f"a drift{folding} of {own.channel.signal}{evidence.name_of(own.number)}: "
+            f"{-explained.coefficients[0]:+.1e} pu from start to end",
+            "check the recorder, and whether speed and voltage were steady; use a shorter window",
+        )
+        yield from suspected(evidence, explained.cost, 2, cause)
+
+
+def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield the channels that have spikes, which count as errors of the model."""
+    if evidence.residuals.robust is not None:
+        return
+    for number, record in enumerate(evidence.records):
+        for channel in evidence.residuals.experiments[number].channels:
+            error = record.comparison.overlays[channel.signal].error
+            kept = np.isfinite(error)
+            time, own = record.comparison.time[kept], error[kept]
+            if len(own) < NEIGHBOURS:
+                continue
+            places = spikes(time, own, noise(own), SPIKE_LIMIT)
+            if not 0 < len(places) <= MOST_SPIKES * len(own):
+                continue
+            square = channel.weight**2 * float(np.sum(own[places] ** 2))
+            at = f"{time[places[0]]:.4g} s" + (" and later" if len(places) > 1 else "")
+            cause = Cause(
+                f"{len(places)} samples of {channel.signal}{evidence.name_of(number)} look like "
+                f"spikes, at {at}",
+                f"outliers: {SPIKE_LIMIT:g} on the channel leaves them out",
+            )
+            cost = max(evidence.cost - 0.5 * square, 0.0)
+            yield from suspected(evidence, cost, len(places), cause)
+
+
+def averaging(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the recorder shows averages, by the window that matches best."""
+    for number, experiment in enumerate(evidence.residuals.experiments):
+        record = evidence.records[number]
+        plain = all(channel.filtering is None for channel in experiment.channels)
+        moved = any(each.kind in ("at", "shift", "delay") for each in experiment.nuisances)
+        if not plain or moved:
+            continue
+        time, delay = record.setup.record.time, experiment.simulator.delay
+        window = _likeliest_window(evidence, number)
+        if window is None:
+            continue
+        channels = tuple(
+            replace(
+                channel,
+                filtering=Filtering(time, channel.kept, None, MovingAverage(window)),
+            )
+            for channel in experiment.channels
+        )
+        opened = Opened(
+            Nuisance("cause.delay", "delay"), delay + 0.5 * window, delay - window, delay + window
+        )
+
+        def cause(trial: Trial, window: float = window, number: int = number) -> Cause:
+            return Cause(
+                f"the recorder{evidence.name_of(number)} averages over some {1e3 * window:.0f} ms, "
+                f"and is {1e3 * trial.values['cause.delay']:.0f} ms late",
+                f"averaged: {window:.3g} on its channels, delay: {{start, min, max}}",
+            )
+
+        changed = with_experiment(
+            evidence.residuals, number, replace(experiment, channels=channels)
+        )
+        yield from tried(evidence, with_opened(changed, number, [opened]), 2, cause)
+
+
+def _likeliest_window(evidence: Evidence, number: int) -> float | None:
+    """Return the window (s) of the average that matches best, by linear theory."""
+    experiment = evidence.residuals.experiments[number]
+    time = evidence.records[number].setup.record.time
+    step = float(median(np.diff(time)))
+    costs = {}
+    for window in WINDOWS:
+        if not step < window < 0.1 * (time[-1] - time[0]):
+            continue
+        filtering = Filtering(time, np.ones(len(time), dtype=bool), None, MovingAverage(window))
+        channels = tuple(replace(channel, filtering=filtering) for channel in experiment.channels)
+        nuisance = Nuisance("cause.delay", "delay")
+        averaged = replace(
+            experiment, channels=channels, nuisances=(*experiment.nuisances, nuisance)
+        )
+        late = experiment.simulator.delay + 0.5 * window
+        values = {**evidence.values, "cause.delay": late}
+        moves = [*evidence.residuals.moves(evidence.solution.x), {"cause.delay": 1.0}]
+        errors, slopes = averaged.tangents(values, moves)
+        coefficients, *_ = np.linalg.lstsq(slopes, errors, rcond=None)
+        left = errors - slopes @ coefficients
+        costs[window] = float(left @ left)
+    return min(costs, key=lambda window: costs[window]) if costs else None
+
+
+def other_clock(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield that the times of a record are in another unit, by when it shows the first step."""
+    for number, record in enumerate(evidence.records):
+        overlay = record.comparison.overlays.get("vt")
+        instants = record.setup.test.instants
+        if overlay is None or not instants or instants[0] <= 0.0:
+            continue
+        kept = np.isfinite(overlay.measured)
+        try:
+            detected = find_step(record.comparison.time[kept], overlay.measured[kept])
+        except ValueError:
+            continue
+        if detected is None:
+            continue
+        for factor, unit in CLOCKS.items():
+            if abs(detected.at / (factor * instants[0]) - 1.0) < NEAREST_RATIO:
+                yield Suspicion(
+                    Cause(
+                        f"the time column{evidence.name_of(number)} may be in {unit}: it shows the "
+                        f"step at {detected.at:.4g}, the case has it at {instants[0]:g} s",
+                        f"time: {{column: ..., unit: {unit}}}",
+                    ),
+                    CERTAIN,
+                )

@@ -1,0 +1,31 @@
+"""The likeliest causes of a poor fit: faults made on purpose are named."""
+
+import pytest
+from faulty_cases import KINDS, WORDS, drawn, names_cause
+
+from exfit.workflows import fit
+
+SEED = 14
+LINES = 2  # in which the cause stands
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["sign of the step", "step off by 20 %", "base of ifd", "vt0", "ripple", "spikes", "Tpd0",
+     "limit not of the unit"],
+)  # fmt: skip
+def test_a_fault_is_among_the_likeliest_causes(kind):
+    fault = drawn(kind, (SEED, 0))
+    verdict = fit(fault.faulty, search="local").verdict
+    assert names_cause(KINDS[kind].causes, verdict.causes[:LINES]), verdict.causes
+    assert verdict.verdict != "good"
+
+
+def test_a_case_without_a_fault_has_no_cause():
+    verdict = fit(drawn("ripple", (SEED, 0)).sound, search="local").verdict
+    assert verdict.verdict == "good"
+    assert verdict.causes == ()
+
+
+def test_every_cause_of_the_study_has_its_words():
+    assert {cause for kind in KINDS.values() for cause in kind.causes} == WORDS.keys()
