@@ -1059,8 +1059,7 @@ def test_a_fit_no_better_than_a_constant_ends_with_3_and_says_why(run):
     ran = run("fit", case_file(wrong), "--no-plots")
     assert ran.code == 3
     told = " ".join(ran.out.split())
-    assert "no better than a constant" in told
-    assert "the response the other way" in told
+    assert "goes the other way" in told
 
 
 def test_an_acceptance_without_a_validation_waits_for_a_record_by_hand(run):

@@ -206,7 +206,7 @@ def test_a_signal_on_another_base_is_reported(noisy, tmp_path):
     """Field current relative to rated, as recorders give it."""
     scaled = MACHINE.replace("{column: ifd,", "{column: ifd, scale: 0.46,")
     notes = fit(case_of(scaled, tmp_path, noisy)).notes
-    assert any(note.startswith("ifd starts from") and "check its base" in note for note in notes)
+    assert any(note.startswith("the base of ifd") and "starts from" in note for note in notes)
 
 
 def test_a_known_reference_far_away_is_reached_too(tmp_path):

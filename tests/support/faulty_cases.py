@@ -462,4 +462,4 @@ def all_faults(seed: int, share: float = 1.0) -> Iterator[tuple[str, tuple[int, 
 def names_cause(expected: Sequence[str], causes: Sequence[Cause]) -> bool:
     """Return whether any of some causes is one of those expected, by its words."""
     words = [word for cause in expected for word in WORDS[cause]]
-    return any(word in cause.cause for cause in causes for word in words)
+    return any(word in cause.sentence for cause in causes for word in words)

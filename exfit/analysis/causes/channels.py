@@ -54,19 +54,19 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
     opened = [Opened(Nuisance("cause.scale", "scale", signal=signal), start, low, high)]
     if signal == "vt" and record.given_vt0 is None and levels is not None:
         opened.append(_voltage(evidence, number))
-    place = f"{signal}{evidence.name_of(number)}"
+    place, starts = f"{signal}{evidence.name_of(number)}", ""
+    if levels is not None:
+        starts = f": it starts from {levels[0]:.4g} pu, the response from {levels[1]:.4g} pu"
 
     def cause(trial: Trial) -> Cause:
         scale = trial.values["cause.scale"] / channel.scale
         if scale < 0.0:
             return Cause(
-                f"{place} is inverted: it rests at {levels[0] if levels else 0.0:.3g} pu, the "
-                f"response at {levels[1] if levels else 0.0:.3g} pu",
+                f"{place} is inverted{starts}",
                 "check the polarity; scale: -1 turns it",
             )
-        at_rest = "" if levels is None else f" (at rest {levels[0]:.4g}, response {levels[1]:.4g})"
         return Cause(
-            f"the base of {place}: times {scale:.4g} it would match{at_rest}",
+            f"the base of {place}{starts}; times {scale:.4g} it would match",
             f"check base, unit and, of phases, connection of {signal}",
         )
 

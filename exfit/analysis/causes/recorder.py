@@ -13,7 +13,6 @@ from exfit.analysis.causes.suspicion import CERTAIN, Suspicion, suspected
 from exfit.analysis.causes.trials import Opened, Trial, tried, with_experiment, with_opened
 from exfit.dsp.filtering import Filtering, MovingAverage
 from exfit.dsp.noise import NEIGHBOURS, noise
-from exfit.dsp.quality import spikes
 from exfit.dsp.step_detection import find_step
 from exfit.fitting.experiment import Channel, Nuisance
 from exfit.records.channel_inspection import SPIKE_LIMIT
@@ -21,12 +20,13 @@ from exfit.results.verdict import Cause
 from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 
 FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
 FINER = 8  # points of the spectrum for each of a transform without padding
 MAINS = (50.0, 60.0)  # Hz
 FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, folds it to a drift
-MOST_SPIKES = 0.02  # of the samples: more are no spikes
+MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
 CLOCKS = {1e3: "ms", 1e6: "microseconds", 60.0: "minutes", 50.0: "cycles of 50 Hz"}
 WINDOWS = (0.01, 0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)  # s, of averages that are tried
@@ -131,20 +131,28 @@ def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:
             error = record.comparison.overlays[channel.signal].error
             kept = np.isfinite(error)
             time, own = record.comparison.time[kept], error[kept]
-            if len(own) < NEIGHBOURS:
-                continue
-            places = spikes(time, own, noise(own), SPIKE_LIMIT)
-            if not 0 < len(places) <= MOST_SPIKES * len(own):
+            places = _spikes(own)
+            if not len(places):
                 continue
             square = channel.weight**2 * float(np.sum(own[places] ** 2))
             at = f"{time[places[0]]:.4g} s" + (" and later" if len(places) > 1 else "")
             cause = Cause(
-                f"{len(places)} samples of {channel.signal}{evidence.name_of(number)} look like "
-                f"spikes, at {at}",
+                f"{len(places)} samples of {channel.signal}{evidence.name_of(number)} are spikes, "
+                f"at {at}",
                 f"outliers: {SPIKE_LIMIT:g} on the channel leaves them out",
             )
             cost = max(evidence.cost - 0.5 * square, 0.0)
             yield from suspected(evidence, cost, len(places), cause)
+
+
+def _spikes(errors: Array) -> Places:
+    """Return the places of errors (M,) far beyond the noise, if these are few and alone."""
+    if len(errors) < NEIGHBOURS:
+        return np.zeros(0, np.intp)
+    far = np.abs(errors - np.median(errors)) > SPIKE_LIMIT * noise(errors)
+    places = np.flatnonzero(far)
+    alone = not np.any(far[1:-1] & far[:-2] & far[2:])
+    return places if alone and len(places) <= MOST_SPIKES * len(errors) else places[:0]
 
 
 def averaging(evidence: Evidence) -> Iterator[Suspicion]:
