@@ -11,7 +11,6 @@ from exfit.dsp.step_detection import DetectedStep, find_step
 from exfit.errors import RecordError
 
 STEPS_APART = 0.05  # s: steps found closer than this may differ by the shape of the rise alone
-SHAPE = 0.1  # of what the rise takes: so much its shape moves the instant that is detected
 MATCHED = 1e-5  # s: how closely the time between two steps is matched
 
 
@@ -78,7 +77,7 @@ def compared_clocks(curves: Sequence[Curve], signal: str) -> ComparedClocks:
         step = steps.get(curve.name)
         if step is None or at is None:
             continue
-        uncertainty = _uncertainty(step, at)
+        uncertainty = step.error + at.error
         if abs(at.at - step.at) > max(STEPS_APART, uncertainty):
             apart[curve.name] = _matched(reference, curve, signal, at.at - step.at, uncertainty)
             within[curve.name] = uncertainty
@@ -100,11 +99,6 @@ def _step_of(curve: Curve, signal: str) -> DetectedStep | None:
         return find_step(curve.time[kept], curve.signals[signal][kept])
     except ValueError:
         return None
-
-
-def _uncertainty(step: DetectedStep, other: DetectedStep) -> float:
-    """Return how well the time between two detected steps is known, s."""
-    return float(np.hypot(step.spread, other.spread)) + SHAPE * max(step.rise, other.rise)
 
 
 def _matched(reference: Curve, curve: Curve, signal: str, offset: float, within: float) -> float:

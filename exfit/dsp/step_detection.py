@@ -1,12 +1,14 @@
 """Detect the steps of a reference that was not recorded in the response to them."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from exfit.dsp.noise import noise
+from exfit.dsp.noise import noise, spread
+from exfit.dsp.onset import Onset, onset
 from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
@@ -18,40 +20,42 @@ DEPARTURE = (0.1, 5.0)  # of the whole change and times the noise: farther from 
 DEPARTURE_BEGUN = 0.2  # of a departure: nearer to its level than this it has hardly begun
 REST_TIMES = 12  # times what the departure takes: at rest, it does not move for so long
 LEAST_SPEED = (0.2, 4.0)  # of the step's own speed and times the noise: slower is no step
-FITTED_RISE = (0.25, 20.0, 0.6)  # of the step, times the noise, but no more of it: what is fitted
-FITTED_REST = 8.0  # times the later part of that rise: how much is fitted, rest and rise
+REACHED = 0.8  # of a first move: the step takes until then
+TIMES_OF_STEP = 3.0  # what it takes: then the response is near its rest
+WANDER = 2.5  # times what it moves at rest in the time of a step: less is no step
+LONGEST_REST = 500  # samples before a step, in which its scatter is looked at
+PEAK_PASSED = 0.3  # of a first move: where so much of it is lost, its peak is passed
 SPIKE_LIMIT_OF_RESPONSE = 6.0  # times the noise: the running median replaces what lies farther off
-TRIED_INSTANTS = 60  # at which the fit may start
-TRIED_LAGS = (0.1, 0.2, 0.4, 0.8)  # of the later part of the rise
-LAG_BOUNDS = (0.05, 1.5)  # of the same: the shortest and longest lag
-FITTED_PARAMETERS = 4  # level, steepness, instant and lag
+
+
+class MovesFromStartError(ValueError):
+    """A response without a rest before it moves."""
 
 
 @dataclass(frozen=True)
 class DetectedStep:
     """A step of the reference as the response shows it.
 
-    ``at`` is its instant (s), ``size`` the change of the response that lasts, with its sign, and
-    ``level`` where the response stood before, both in its unit. ``spread`` is the standard error
-    (s) that noise leaves in ``at``; it is fitted to the first ``rise`` (s) of the response.
+    ``at`` is its instant (s), which lies within ``error`` (s) of it at 95 %, ``size`` the change of
+    the response that lasts, with its sign, and ``level`` where the response stood before, both in
+    its unit. The response moves quickly ``until`` an instant (s).
     """
 
     at: float
+    error: float
     size: float
     level: float
-    spread: float
-    rise: float
+    until: float
 
 
 def find_step(time: Array, samples: Array) -> DetectedStep:
     """Return the first step of a reference from its response (M,), which is at rest before it.
 
-    A voltage follows a step of its reference late and smoothly: up to a quarter of the step (more
-    where noise is large) it is taken for a line through two equal lags, and ``at`` is where that
-    sets out. What shape it has instead moves ``at`` by up to a tenth of the time that this takes,
-    beside ``spread``. A step is detected if it is at least a tenth of all that changes in the
-    record; a later one that is slower than a fifth of it passes for its settling. Without a rest
-    after it, ``size`` is taken from the end of the record. Spikes and slow drift do no harm.
+    A voltage follows a step of its reference late and smoothly, a field voltage at once: `onset`
+    gives when the response sets out, whatever its shape. A step is detected if it is at least a
+    tenth of all that changes in the record; a later one that is slower than a fifth of it passes
+    for its settling. Without a rest after it, ``size`` is taken from the end of the record. Spikes
+    and slow drift do no harm.
 
     Args:
         time: (M,), s, increasing.
@@ -65,47 +69,135 @@ def find_step(time: Array, samples: Array) -> DetectedStep:
 
 
 def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
-    """Return all steps of a reference from its response (M,), the first as ``find_step`` does.
+    """Return all steps of a reference from its response (M,), which ``find_step`` returns first.
 
     The next one is looked for where the response to the one before has settled; what is slower than
-    a fifth of that one passes for its settling. Raises ValueError like ``find_step``.
+    a fifth of that one passes for its settling. None is a move of which the response does 40 %
+    elsewhere at rest as well, in the same time.
+
+    Raises ValueError like ``find_step``, and where nothing stands out of what it does at rest.
     """
     step, rest = _step(time, samples)
-    steps = [step]
+    steps, first = [step], rest
     while True:
-        time, samples = time[rest:], samples[rest:]
         try:
-            step, rest = _step(time, samples)
+            step, rest = _step(time[first:], samples[first:])
         except ValueError:
-            return tuple(steps)
+            break
         steps.append(step)
+        first += rest
+    distinct = tuple(_distinct(time, running_median(samples), steps))
+    if not distinct:
+        size = f"{abs(steps[0].size):.2g} at {steps[0].at:.4g} s"
+        raise ValueError(f"no step stands out: at rest it moves as much as by {size}")
+    return distinct
 
 
-def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
-    """Return the first step, and where the response to it has settled."""
+def _distinct(time: Array, smooth: Array, steps: Sequence[DetectedStep]) -> Iterator[DetectedStep]:
+    """Yield the steps that are larger than what the response does elsewhere at rest."""
+    ends = [*(int(np.searchsorted(time, step.at)) for step in steps), len(time) - 1]
+    moves, lasts = [], []
+    for step, begin, end in zip(steps, ends, ends[1:], strict=False):
+        way = np.abs(smooth[begin : end + 1] - step.level)
+        gone = min(int(np.argmax(way >= REACHED * abs(step.size))), len(way) - 1)
+        peak = _first_peak(way, gone)
+        moves.append(float(way[peak]))
+        lasts.append(max(int(np.argmax(way >= REACHED * way[peak])), 1))
+    rested = [0, *(int(b + TIMES_OF_STEP * lag) for b, lag in zip(ends, lasts, strict=False))]
+    rests = [smooth[begin:end] for begin, end in zip(rested, ends, strict=True)]
+    for step, move, lag in zip(steps, moves, lasts, strict=True):
+        if move > WANDER * max(_wander(rest, lag) for rest in rests):
+            yield step
+
+
+def _wander(rest: Array, lag: int) -> float:
+    """Return the largest move (in ``lag`` samples) of a response at rest (M,), 0 of few samples.
+
+    A rest too short to show it shows less; a random walk goes with the root of the time.
+    """
+    shown = min(lag, len(rest) // 2)
+    if shown == 0:
+        return 0.0
+    return float(np.max(np.abs(rest[shown:] - rest[:-shown])) * np.sqrt(lag / shown))
+
+
+def departure(time: Array, samples: Array) -> Onset:
+    """Return when a response (M,) leaves its rest, whether it stays away or returns.
+
+    Raises ValueError like ``find_step``, but for what leaves no lasting change.
+    """
+    rest = _left_rest(time, samples)
+    return _onset(time, samples, rest, len(samples) - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _LeftRest:
+    """A response that leaves its rest: smoothed (M,), its noise, ``level`` and how far it goes.
+
+    It is last near the level at the sample ``left``, and first beyond ``far`` at ``gone``.
+    """
+
+    smooth: Array
+    scatter: float
+    level: float
+    far: float
+    left: int
+    gone: int
+
+
+def _left_rest(time: Array, samples: Array) -> _LeftRest:
+    """Return where a response leaves its rest; raises ValueError where it does not."""
     if len(samples) < 2 * SAMPLES_AT_REST:
         raise ValueError(
             f"{len(samples)} samples: a step is detected in at least {2 * SAMPLES_AT_REST}"
         )
-    scatter, smooth = noise(samples), _running_median(samples)
-    departure = _departure(smooth, scatter)
-    left, gone = _crossing(time, np.abs(smooth - median(samples[:SAMPLES_AT_REST])), departure)
+    scatter, smooth = noise(samples), running_median(samples)
+    far = _departure(smooth, scatter)
+    left, gone = _crossing(time, np.abs(smooth - median(samples[:SAMPLES_AT_REST])), far)
     level = float(median(samples[max(left - REST_TIMES * (gone - left), 0) : left + 1]))
-    start, end = _settled(smooth, left, gone, scatter)
-    size = float(median(samples[start : end + 1])) - level
-    if abs(size) < departure:
-        raise ValueError(f"no step: what begins at {time[left]:g} s leaves no lasting change")
-    far = min(max(FITTED_RISE[0] * abs(size), FITTED_RISE[1] * scatter), FITTED_RISE[2] * abs(size))
-    left, gone = _crossing(time, (smooth - level) * np.sign(size), far)
-    clean = np.where(np.abs(samples - smooth) <= SPIKE_LIMIT_OF_RESPONSE * scatter, samples, smooth)
-    at, spread = _fitted(time, clean, left, gone)
-    if at < time[SAMPLES_AT_REST - 1]:
+    return _LeftRest(smooth, scatter, level, far, left, gone)
+
+
+def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
+    """Return the first step, and where the response to it has settled."""
+    rest = _left_rest(time, samples)
+    moves_until, start, end = _settled(rest)
+    size = float(median(samples[start : end + 1])) - rest.level
+    if abs(size) < rest.far:
+        begin = f"what begins at {time[rest.left]:g} s"
+        raise ValueError(f"no step: {begin} leaves no lasting change")
+    sets_out = _onset(time, samples, rest, max(start, rest.gone))
+    until = float(time[moves_until])
+    return DetectedStep(sets_out.at, sets_out.error, size, rest.level, until), start
+
+
+def _onset(time: Array, samples: Array, rest: _LeftRest, last: int) -> Onset:
+    """Return when a response sets out, by its samples up to the ``last``.
+
+    Raises ValueError where too few of them are before.
+    """
+    far_off = np.abs(samples - rest.smooth) > SPIKE_LIMIT_OF_RESPONSE * rest.scatter
+    clean = np.where(far_off, rest.smooth, samples)
+    peak = _first_peak(np.abs(rest.smooth[: last + 1] - rest.level), rest.gone)
+    # what is slower than noise from sample to sample moves an instant as well
+    at_rest = float(spread(clean[max(rest.left - LONGEST_REST, 0) : rest.left + 1]))
+    sets_out = onset(time, clean, rest.level, peak, max(rest.scatter, at_rest))
+    if sets_out.at < time[SAMPLES_AT_REST - 1]:
         raise _early(time)
-    return DetectedStep(at, size, level, spread, float(time[gone] - time[left])), start
+    return sets_out
 
 
-def _early(time: Array) -> ValueError:
-    return ValueError(f"it moves from the very beginning, {time[0]:g} s: no rest before a step")
+def _first_peak(way: Array, gone: int) -> int:
+    """Return where a way from rest is longest before it becomes much shorter."""
+    longest = np.maximum.accumulate(way[gone:])
+    passed = np.flatnonzero(way[gone:] < (1.0 - PEAK_PASSED) * longest)
+    return gone + int(np.argmax(way[gone : gone + int(passed[0])] if len(passed) else way[gone:]))
+
+
+def _early(time: Array) -> MovesFromStartError:
+    return MovesFromStartError(
+        f"it moves from the very beginning, {time[0]:g} s: no rest before a step"
+    )
 
 
 def _departure(smooth: Array, scatter: float) -> float:
@@ -118,7 +210,7 @@ def _departure(smooth: Array, scatter: float) -> float:
     return max(DEPARTURE[0] * change, DEPARTURE[1] * scatter)
 
 
-def _running_median(samples: Array) -> Array:
+def running_median(samples: Array) -> Array:
     """Return the running median (M,), mirrored at the ends."""
     padded = np.pad(samples, MEDIAN_SAMPLES // 2, mode="reflect")
     return np.asarray(median(sliding_window_view(padded, MEDIAN_SAMPLES), axis=-1))
@@ -136,54 +228,17 @@ def _crossing(time: Array, way: Array, far: float) -> tuple[int, int]:
     return (int(near[-1]) if len(near) else 0), gone
 
 
-def _settled(smooth: Array, left: int, gone: int, scatter: float) -> tuple[int, int]:
-    """Return the first and last place of what follows the step, as long as nothing else moves."""
+def _settled(rest: _LeftRest) -> tuple[int, int, int]:
+    """Return until where the response moves quickly, and the first and last place of its rest."""
+    smooth, left, gone = rest.smooth, rest.left, rest.gone
     lag = gone - left
     patience = REST_TIMES * lag
     speed = np.abs(smooth[lag:] - smooth[:-lag])
-    quick = max(LEAST_SPEED[0] * np.max(speed[left : gone + patience]), LEAST_SPEED[1] * scatter)
+    quick = max(
+        LEAST_SPEED[0] * np.max(speed[left : gone + patience]), LEAST_SPEED[1] * rest.scatter
+    )
     moves = np.flatnonzero(speed[left:] > quick) + left
     pauses = np.flatnonzero(np.diff(moves) > patience)
     end = int(moves[pauses[0] + 1]) if len(pauses) else len(smooth) - 1
-    return max(end - patience, gone), end
-
-
-def _fitted(time: Array, samples: Array, left: int, gone: int) -> tuple[float, float]:
-    """Return the instant at which a line through two equal lags sets out, and its standard error.
-
-    It is fitted to the rise, which ends at ``gone``, and the rest before it.
-    Level and steepness of the line are eliminated (Golub and Pereyra 1973).
-    """
-    from scipy.optimize import least_squares
-
-    rise = float(time[gone] - time[left])
-    first = min(
-        int(np.searchsorted(time, time[gone] - FITTED_REST * rise)), max(left - SAMPLES_AT_REST, 0)
-    )
-    origin = time[left]  # differences lose digits where the clock began long ago
-    t, y = time[first : gone + 1] - origin, samples[first : gone + 1]
-    y = y / np.ptp(y)
-
-    def misfit(guess: Array) -> Array:
-        return _misfit(t, y, guess[0], guess[1])
-
-    instants = np.linspace(t[0], t[-1], TRIED_INSTANTS, endpoint=False)
-    starts = [np.array([at, lag * rise]) for at in instants for lag in TRIED_LAGS]
-    best = min(starts, key=lambda guess: float(np.sum(misfit(guess) ** 2)))
-    low, high = (lag * rise for lag in LAG_BOUNDS)
-    fit = least_squares(misfit, best, bounds=([t[0], low], [t[-1], high]), x_scale=rise)
-    slopes = np.asarray(fit.jac)
-    variance = 2.0 * fit.cost / max(len(t) - FITTED_PARAMETERS, 1)
-    covariance = variance * np.linalg.pinv(slopes.T @ slopes)
-    # where the whole rise lies between two samples, its place is no worse known than it is long
-    return float(fit.x[0] + origin), min(float(np.sqrt(covariance[0, 0])), rise)
-
-
-def _misfit(time: Array, samples: Array, at: float, lag: float) -> Array:
-    """Return what the best line through two equal lags from ``at`` on leaves of the samples."""
-    ago = np.maximum(time - at, 0.0) / lag
-    shape = ago - 2.0 + (ago + 2.0) * np.exp(-ago)
-    shape = shape - np.mean(shape)
-    centred = samples - np.mean(samples)
-    size = shape @ shape
-    return np.asarray(centred - shape * (shape @ centred / size) if size > 0.0 else centred)
+    until = int(moves[pauses[0]] if len(pauses) else moves[-1]) + lag if len(moves) else gone
+    return min(until, end), max(end - patience, gone), end

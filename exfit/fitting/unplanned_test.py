@@ -41,8 +41,6 @@ OWN_REFERENCE = "the reference is the one recorded beside the response"
 EARLIER_STEPS = "the steps before the record are those of the case under validate"
 GIVE_STEP = "give it by --step SIZE and --at INSTANT (step and at in Python)"
 REST_SHARE = 0.5  # of the rest before a step: its instant is not sought farther back
-# standard errors: an instant that is sought farther off would hide a response that is late
-INSTANT_ERRORS = 4.0
 FIRST_SAMPLE_WITHIN = 8.0  # times the noise: how far a level may be from one sample
 SAME_LEVEL = 0.1  # of the largest step: how far a record may begin from where earlier steps led
 
@@ -241,9 +239,9 @@ def _events(
     for k, (step, size, end) in enumerate(zip(steps, sizes, ends, strict=True)):
         at: float | Unknown = step.at
         if not given.instants and not step.from_start:
-            within = INSTANT_ERRORS * step.error
-            low = max(step.at - within, _earliest(record, steps, k))
-            at = Unknown(start=step.at, min=low, max=min(step.at + within, end))
+            # one that is sought farther off would hide a response that is late
+            low = max(step.at - step.error, _earliest(record, steps, k))
+            at = Unknown(start=step.at, min=low, max=min(step.at + step.error, end))
         low, high = sorted(((1.0 - SIZE_WITHIN) * size, (1.0 + SIZE_WITHIN) * size))
         found = Unknown(start=size, min=low, max=high)
         events.append(FindableStep(at=at, step=size if given.sizes else found))

@@ -2,25 +2,33 @@
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.dsp.noise import UNIFORM_SPREAD
+from exfit.dsp.onset import Onset
 from exfit.dsp.quality import mains_frequency, noise_of
 from exfit.dsp.sampling import present_samples
-from exfit.dsp.step_detection import SAMPLES_AT_REST, DetectedStep, find_step, find_steps
+from exfit.dsp.step_detection import (
+    SAMPLES_AT_REST,
+    DetectedStep,
+    MovesFromStartError,
+    departure,
+    find_step,
+    find_steps,
+)
 
 Array = NDArray[np.float64]
 
 COARSE_SAMPLES = 20_000  # in which the steps of a longer record are first looked for
 COARSE_AROUND_STEP = 50  # of these, before and after a step, from which its instant is then taken
-SAME_STEP = 0.25  # s: channels may show one step this far apart, beside their standard errors
+SAME_STEP = 0.25  # s: channels may show one step this far apart, beside their errors
 INSTANT_WITHIN = 0.25  # s: how far the instant may be from where a record shows the step
-SAME_STEP_ERRORS = 3.0  # these standard errors
-# of a rise: its shape may move the instant by up to a tenth, equally likely each way
-SHAPE_ERROR = 0.1 * 3.0**-0.5
+SAME_STEP_ERRORS = 1.5  # times these errors
 MOST_LEVELS = 12  # of a signal that switches
+SURELY = 2.0  # times the error of an instant: it does not lie beyond
+REST_BEFORE = 2.0  # s: so long a rest before a step is looked at for what sets out with it
 END_SHARE = 0.1  # of a record or of the time between two steps: its end, where levels are taken
 MARGIN_SHARE = 0.005  # of the time between two steps, left out at its end
 LASTING_CHANGE = 3.0  # times the noise: a smaller change of level is none
@@ -29,33 +37,40 @@ CHANGE_FROM_START = 8.0  # times the noise: a smaller change since the first sam
 
 @dataclass(frozen=True)
 class LevelChange:
-    """A step of one channel: its instant and standard error (s), its size and level before it.
+    """A step of one channel: its instant (s), which lies within ``error`` at 95 %, size and level.
 
     Where the channel moves from its first sample on, the step was made there or before it; where it
-    jumps between levels, it is no response.
+    jumps between levels, it is no response. The channel moves quickly ``until`` an instant (s).
     """
 
     at: float
     error: float
     size: float
     level: float
+    until: float = -inf
     from_start: bool = False
     jumps: bool = False
 
 
 @dataclass(frozen=True)
 class ChannelSteps:
-    """The steps of one channel; ``remark`` says why it shows none."""
+    """The steps of one channel; ``remark`` says why it shows none.
+
+    It may show that it ``moves_from_start``, and whether it is a signal that ``responds`` to steps.
+    """
 
     changes: tuple[LevelChange, ...] = ()
     remark: str = ""
+    moves_from_start: bool = False
+    responds: bool = False
 
 
 @dataclass(frozen=True)
 class RecordedStep:
-    """A step of the test, with its instant from all channels that show it, ``seen_in``.
+    """A step of the test, with its instant from the channels that show it, ``seen_in``.
 
-    ``sizes`` are the lasting changes of level by channel.
+    The instant (s) lies within ``error`` of ``at`` at 95 %. ``sizes`` are the lasting changes of
+    level by channel. The step is ``recorded`` where a channel jumps.
     """
 
     at: float
@@ -63,6 +78,7 @@ class RecordedStep:
     seen_in: tuple[str, ...]
     sizes: Mapping[str, float]
     from_start: bool
+    recorded: bool = False
 
 
 def steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSteps:
@@ -83,8 +99,9 @@ def steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSte
     try:
         steps = find_steps(*_block_medians(t, y, block))
     except ValueError as fault:
-        return ChannelSteps(remark=str(fault))
-    return ChannelSteps(tuple(_refined(t, y, step, block) for step in steps))
+        early = isinstance(fault, MovesFromStartError)
+        return ChannelSteps(remark=str(fault), moves_from_start=early, responds=True)
+    return ChannelSteps(tuple(_refined(t, y, step, block) for step in steps), responds=True)
 
 
 def steps_of_signals(
@@ -96,9 +113,38 @@ def steps_of_signals(
     """
     own = {name: steps_of_channel(time, y, name in references) for name, y in signals.items()}
     if not any(channel.changes for channel in own.values()):
-        starting = changes_from_start(time, signals)
+        early = [name for name, channel in own.items() if channel.moves_from_start]
+        starting = changes_from_start(time, {name: signals[name] for name in early})
         own |= {name: ChannelSteps((change,)) for name, change in starting.items()}
-    return own, combined_steps({name: channel.changes for name, channel in own.items()})
+    steps = combined_steps({name: channel.changes for name, channel in own.items()})
+    responding = {name: signals[name] for name, channel in own.items() if channel.responds}
+    return own, tuple(_sharpened(time, responding, steps))
+
+
+def _sharpened(
+    time: Array, signals: Mapping[str, Array], steps: Sequence[RecordedStep]
+) -> Iterator[RecordedStep]:
+    """Yield the steps with instants from those channels as well that set out and then return."""
+    before = float(time[0])
+    for step in steps:
+        begin = max(0.5 * (before + step.at), step.at - REST_BEFORE)
+        near = slice(*np.searchsorted(time, [begin, step.at + step.error + SAME_STEP]))
+        before = step.at
+        others = [] if step.from_start or step.recorded else signals.keys() - step.seen_in
+        departures = [
+            _departure(*present_samples(time[near], signals[name][near])) for name in others
+        ]
+        known = Onset(step.at - step.error, step.at + step.error)
+        interval = _first_of([known, *(each for each in departures if each is not None)])
+        yield replace(step, at=interval.at, error=interval.error)
+
+
+def _departure(time: Array, samples: Array) -> Onset | None:
+    """Return when a channel sets out, None where it does not."""
+    try:
+        return departure(*_block_medians(time, samples, -(-len(time) // COARSE_SAMPLES) or 1))
+    except ValueError:
+        return None
 
 
 def _block_medians(time: Array, samples: Array, block: int) -> tuple[Array, Array]:
@@ -114,7 +160,7 @@ def _block_medians(time: Array, samples: Array, block: int) -> tuple[Array, Arra
 
 def _refined(time: Array, samples: Array, coarse: DetectedStep, block: int) -> LevelChange:
     """Return a step with its instant from smaller blocks, or single samples, around it."""
-    change = LevelChange(coarse.at, _error(coarse), coarse.size, coarse.level)
+    change = LevelChange(coarse.at, coarse.error, coarse.size, coarse.level, coarse.until)
     if block == 1:
         return change
     middle, reach = int(np.searchsorted(time, coarse.at)), COARSE_AROUND_STEP * block
@@ -125,12 +171,7 @@ def _refined(time: Array, samples: Array, coarse: DetectedStep, block: int) -> L
     except ValueError:
         return change
     same = abs(fine.at - coarse.at) <= 0.5 * (time[near][-1] - time[near][0])
-    return replace(change, at=fine.at, error=_error(fine)) if same else change
-
-
-def _error(step: DetectedStep) -> float:
-    """Return the standard error of an instant, from the noise and from the shape of the rise."""
-    return float(np.hypot(step.spread, SHAPE_ERROR * step.rise))
+    return replace(change, at=fine.at, error=fine.error) if same else change
 
 
 def switches(samples: Array) -> bool:
@@ -145,7 +186,7 @@ def _jumps(time: Array, samples: Array) -> Iterator[LevelChange]:
     for k in np.flatnonzero(np.diff(samples)):
         yield LevelChange(
             at=float(time[k] + time[k + 1]) / 2.0,
-            error=float(time[k + 1] - time[k]) * UNIFORM_SPREAD,
+            error=float(time[k + 1] - time[k]) / 2.0,
             size=float(samples[k + 1] - samples[k]),
             level=float(samples[k]),
             jumps=True,
@@ -171,7 +212,8 @@ def changes_from_start(time: Array, signals: Mapping[str, Array]) -> dict[str, L
 def combined_steps(changes: Mapping[str, Sequence[LevelChange]]) -> tuple[RecordedStep, ...]:
     """Return the steps of the test, given those of its channels.
 
-    What several channels show at one time is one step; two steps of one channel are two.
+    What several channels show at one time is one step; two steps of one channel are two, unless it
+    only returns while the others still move by the first.
     """
     in_time = sorted(
         ((change.at, name, change) for name, own in changes.items() for change in own),
@@ -181,7 +223,7 @@ def combined_steps(changes: Mapping[str, Sequence[LevelChange]]) -> tuple[Record
     for _, name, change in in_time:
         if groups and name not in groups[-1] and _close(change, groups[-1].values()):
             groups[-1][name] = change
-        else:
+        elif not (groups and _returns(name, change, groups[-1])):
             groups.append({name: change})
     return tuple(_combined(group) for group in groups)
 
@@ -194,25 +236,43 @@ def _close(change: LevelChange, others: Iterable[LevelChange]) -> bool:
     )
 
 
-def _combined(group: Mapping[str, LevelChange]) -> RecordedStep:
-    """Return the step that channels show, its instant their mean, weighted by standard errors.
+def _returns(name: str, change: LevelChange, group: Mapping[str, LevelChange]) -> bool:
+    """Return whether a channel only returns from its first move, as a field voltage does."""
+    first = group.get(name)
+    if first is None or change.jumps or change.size * first.size > 0.0:
+        return False
+    still_moving = any(change.at < other.until for key, other in group.items() if key != name)
+    return still_moving and abs(change.size) <= abs(first.size)
 
-    Where they scatter more than these errors explain, the error of the mean grows as much (Birge
-    1932). A recorded reference alone gives the instant: it does not respond, it jumps.
+
+def _combined(group: Mapping[str, LevelChange]) -> RecordedStep:
+    """Return the step that channels show.
+
+    No channel moves before the step, but some are late. A recorded reference alone gives the
+    instant: it does not respond, it jumps.
     """
     changes = [change for change in group.values() if change.jumps] or [*group.values()]
-    instants = np.array([change.at for change in changes])
-    # an error of nothing at all is one that the clock cannot show
-    errors = np.maximum([change.error for change in changes], 1e-9 + 1e-12 * np.abs(instants))
-    weights = errors**-2.0
-    mean = float(weights @ instants / np.sum(weights))
-    error = float(np.sum(weights) ** -0.5)
-    if len(instants) > 1:
-        excess = weights @ (instants - mean) ** 2 / (len(instants) - 1)
-        error *= max(1.0, float(np.sqrt(excess)))
-    sizes = {name: change.size for name, change in group.items()}
-    from_start = all(change.from_start for change in group.values())
-    return RecordedStep(mean, error, tuple(group), sizes, from_start)
+    interval = _first_of(
+        [Onset(change.at - change.error, change.at + change.error) for change in changes]
+    )
+    return RecordedStep(
+        interval.at,
+        interval.error,
+        tuple(group),
+        {name: change.size for name, change in group.items()},
+        from_start=all(change.from_start for change in group.values()),
+        recorded=any(change.jumps for change in group.values()),
+    )
+
+
+def _first_of(intervals: Sequence[Onset]) -> Onset:
+    """Return the interval of a step, given those of its channels.
+
+    The shortest counts, unless another channel has certainly set out before.
+    """
+    shortest = min(intervals, key=lambda interval: interval.error)
+    first = min(intervals, key=lambda interval: interval.at + SURELY * interval.error)
+    return first if first.at + SURELY * first.error < shortest.earliest else shortest
 
 
 def with_sizes(

@@ -93,11 +93,11 @@ def test_the_record_of_another_unit_is_not_accepted(unit, name, sign):
 
 
 def test_a_late_response_is_not_hidden_by_a_later_step():
-    """The instant is bound to where the record shows the step, a few of its standard errors."""
+    """The instant is bound to where the record shows the step, within its stated error."""
     slow = {**TRUTH["ac1a_typical"], "TA": 0.15}
     record = ROOT / "sample_data" / "ac1a_down.csv"
     match = validate(case_of("ac1a_typical"), slow, record)[-1]
-    assert abs(match.steps[0].at - 1.0) < 0.02
+    assert abs(match.steps[0].at - 1.0) < 0.03
     assert any("the response is too late" in note for note in match.notes)
 
 

@@ -544,7 +544,7 @@ def test_a_step_that_is_given_takes_the_place_of_the_one_found(run):
         (["--record", "down.csv", "--at", 7], ["at: 7 s lies outside", "down.csv", "0 ... 3 s"]),
         (
             ["--record", "down.csv", "--step", 1, "--step", 2],
-            ["step: 2 given for 1 step, at 0.4835 s"],
+            ["step: 2 given for 1 step, at 0.5 s"],
         ),
         (["--record", "down.csv", "--at", 1, "--at", 0.5], ["0.5 s is not after 1 s"]),
         (["--step", 1], ["case.yaml", "of a record that is given with them"]),

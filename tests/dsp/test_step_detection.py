@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from places import REFERENCE, SAMPLES
+from scipy.signal import lfilter
 from tables import read_columns
 
-from exfit.dsp.step_detection import find_step, find_steps
+from exfit.dsp.step_detection import departure, find_step, find_steps
 
 STEP_AT = 1.0  # s, in every record and reference
 STEP = 0.05  # pu, of the reference
@@ -82,7 +83,7 @@ def test_the_step_of_a_sample_record_is_found_within_three_samples(record):
 def test_on_load_the_instant_is_found_and_the_size_is_that_of_the_voltage():
     columns = read_columns(SAMPLES / "ac8b_on_line.csv", ["t", "vt"])
     detected = find_step(columns["t"], columns["vt"])
-    assert detected.at == pytest.approx(STEP_AT, abs=0.03)
+    assert abs(detected.at - STEP_AT) <= detected.error <= 0.06
     assert detected.size == pytest.approx(0.018, rel=0.02)  # the reference stepped by 0.02 pu
 
 
@@ -109,20 +110,18 @@ DIRT = {
 def test_what_a_recorder_does_moves_the_step_little(reference, dirt):
     for seed, step in enumerate([0.02, -0.05, 0.1]):
         detected = find_step(*recorded(reference, step, seed=seed, **DIRT[dirt]))
-        # what the shape of the rise errs by, and three standard errors
-        assert abs(detected.at - STEP_AT) <= 0.025 + 3.0 * detected.spread
-        assert detected.spread < 0.02
+        # of 40 x 3 errors at 95 %, some do not hold the truth, and none misses it by far
+        assert abs(detected.at - STEP_AT) <= 1.5 * detected.error + 0.005
+        assert detected.error < 0.12  # a voltage alone sets out smoothly
         assert detected.size == pytest.approx(step, rel=0.01)
 
 
-@every_reference
-def test_the_spread_is_what_noise_leaves_open(reference):
-    detected_steps = [find_step(*recorded(reference, seed=seed, size=3e-4)) for seed in range(12)]
-    spread = np.mean([detected.spread for detected in detected_steps])
-    # 12 values tell their own spread to a factor of 1.6 in 99 of 100 cases
-    assert np.std([detected.at for detected in detected_steps], ddof=1) == pytest.approx(
-        spread, rel=0.65
-    )
+def test_the_error_holds_the_instant():
+    records = [(reference, seed) for reference in REFERENCES for seed in range(8)]
+    detected_steps = [find_step(*recorded(name, seed=seed, size=3e-4)) for name, seed in records]
+    held = sum(abs(detected.at - STEP_AT) <= detected.error for detected in detected_steps)
+    # at 95 % fewer than 57 of 64 hold by chance once in 200 times
+    assert held >= 57
 
 
 @every_reference
@@ -130,7 +129,7 @@ def test_the_spread_is_what_noise_leaves_open(reference):
 def test_large_noise_is_survived(reference, step, worst):
     for seed in range(3):
         detected = find_step(*recorded(reference, step, seed=seed, size=1e-3, spikes=True))
-        assert detected.at == pytest.approx(STEP_AT, abs=worst)
+        assert abs(detected.at - STEP_AT) <= max(worst, detected.error)
         assert detected.size == pytest.approx(step, rel=0.03)
 
 
@@ -147,7 +146,7 @@ def test_the_unit_of_the_signal_and_the_origin_of_time_do_not_matter():
     # a minimum is flat: its place rounds at the root of what the samples round at
     assert scaled.at - 300.0 == pytest.approx(plain.at, abs=1e-5)
     assert find_step(time + 1e6, vt).at - 1e6 == pytest.approx(plain.at, abs=1e-4)
-    assert scaled.spread == pytest.approx(plain.spread, rel=1e-3)
+    assert scaled.error == pytest.approx(plain.error, rel=1e-3)
     assert scaled.size == pytest.approx(-13.8 * plain.size, rel=1e-12)
     assert scaled.level == pytest.approx(-13.8 * plain.level, rel=1e-12)
 
@@ -177,7 +176,8 @@ def test_all_steps_are_found_in_their_order_and_no_others(reference, steps):
     for step, at in zip(steps, instants, strict=True):
         vt = vt + response(time, reference, step, at)
     detected_steps = find_steps(time, vt)
-    assert [detected.at for detected in detected_steps] == pytest.approx(instants, abs=0.04)
+    for detected, at in zip(detected_steps, instants, strict=True):
+        assert abs(detected.at - at) <= max(0.04, detected.error)
     assert [detected.size for detected in detected_steps] == pytest.approx(steps, rel=0.03)
     assert detected_steps[0] == find_step(time, vt)
 
@@ -199,7 +199,7 @@ def test_a_jump_between_two_samples_is_placed_between_them():
     for vt in (jump, fast, fast + np.random.default_rng(8).normal(0.0, 1e-4, TIME.size)):
         detected = find_step(TIME, vt)
         assert detected.at == pytest.approx(3.0, abs=0.015)
-        assert detected.spread <= 0.015
+        assert detected.error <= 0.02
 
 
 def test_spikes_at_the_ends_are_no_step():
@@ -245,6 +245,36 @@ def test_a_step_soon_after_the_start_is_found():
     assert detected.at == pytest.approx(0.2, abs=0.02)
 
 
+def wandering(rng, count, interval, lag, deviation):
+    """Return what a channel does at rest: white noise behind a lag (s)."""
+    decay = np.exp(-interval / lag)
+    steps = rng.normal(0.0, deviation * np.sqrt(1.0 - decay**2), count)
+    return lfilter([1.0], [1.0, -decay], steps)
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.2, 1.0])
+def test_what_a_channel_does_at_rest_is_no_step(lag):
+    time = np.arange(0.0, 20.0, 0.01)
+    for seed in range(100, 106):
+        rng = np.random.default_rng(seed)
+        noise = rng.normal(0.0, 1e-5, time.size)
+        vt = 1.0 + wandering(rng, time.size, 0.01, lag, 5e-5) + noise
+        with pytest.raises(ValueError, match=r"stands out|no rest before|no lasting change"):
+            find_steps(time, vt)
+        (detected,) = find_steps(time, vt + response(time, "reference_ac1a", 0.02, 8.0))
+        assert detected.size == pytest.approx(0.02, rel=0.03)
+
+
+def test_a_response_that_returns_has_no_step_but_departs_in_time():
+    vt = np.where(TIME < 3.0, 0.0, np.exp(-(TIME - 3.0) / 0.3))
+    noisy = vt + np.random.default_rng(4).normal(0.0, 1e-3, TIME.size)
+    with pytest.raises(ValueError, match="no lasting change"):
+        find_step(TIME, noisy)
+    sets_out = departure(TIME, noisy)
+    assert sets_out.earliest <= 3.0 <= sets_out.latest
+    assert sets_out.error <= 0.015
+
+
 @given(
     st.integers(20, 60).flatmap(
         lambda count: arrays(float, count, elements=st.sampled_from([0.0, 0.1, 0.9, 1.0, 1.1]))
@@ -260,4 +290,4 @@ def test_whatever_is_recorded_gives_an_onset_within_it_or_a_sentence(samples, re
         return
     assert time[9] <= detected.at <= time[-1]
     assert detected.size != 0.0
-    assert 0.0 <= detected.spread <= time[-1]
+    assert 0.0 < detected.error <= time[-1]
