@@ -21,7 +21,7 @@ from exfit.analysis.case_description import (
     tests_of,
     values_by_part,
 )
-from exfit.analysis.case_search import SearchTask, search_outcome
+from exfit.analysis.case_search import SearchTask, search_outcome, with_lines
 from exfit.analysis.diagnostics import rest_notes, simulation_notes
 from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
 from exfit.analysis.iteration_responses import (
@@ -103,19 +103,21 @@ def fit(
     options = search_options(case, search)
     start = case.values()
     setups, problem = fitted(case)
-    residuals, counter = problem.residuals, SimulationCounter()
+    counter = SimulationCounter()
     unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
     hashes, case_text = input_hashes(case, used), _text_of(case)
+    task = SearchTask(case, setups, unseen, method, options, counter)
+    task, problem, line_notes = with_lines(task, problem, search_progress)
+    residuals = problem.residuals
 
     def announce(line: estimate.SolverIteration) -> None:
-        response = None if live is None else live_response(setups[0], residuals, line.x)
+        response = None if live is None else live_response(task.setups[0], residuals, line.x)
         if live is not None and response is not None:
             live(response)
         progress(iteration_of(line, residuals))
 
-    task = SearchTask(case, setups, unseen, method, options, counter)
     outcome = search_outcome(task, problem, announce, search_progress)
     problem, setups, unseen, found, determined = outcome
     residuals = problem.residuals
@@ -161,6 +163,7 @@ def fit(
         seconds=clock.perf_counter() - began,
         notes=(
             *found.notes,
+            *line_notes,
             *minima_notes(residuals, found, minima, analysis.uncertainty),
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
             *(cause.sentence for cause in verdict.causes),

@@ -11,7 +11,8 @@ from exfit.case.schema import Estimate
 from exfit.fitting.channel_weights import as_fitted, searched, weighted_alike
 from exfit.fitting.descents import Announce
 from exfit.fitting.global_search import SearchResult
-from exfit.fitting.problem import FitProblem
+from exfit.fitting.nuisances.found_lines import with_found_lines
+from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.search import continued_from, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
@@ -62,6 +63,23 @@ def search_outcome(
         found = continued_from(determined.lower, found, problem, announce, counter, options)
         determined = determination(problem, found, setups, profiled, progress)
     return SearchOutcome(problem, setups, unseen, found, determined)
+
+
+def with_lines(
+    task: SearchTask, problem: FitProblem, progress: Watch
+) -> tuple[SearchTask, FitProblem, tuple[str, ...]]:
+    """Return the tests and the problem with the lines that residuals of a first search show.
+
+    Notes say which. Raises KeyboardInterrupt where an interruption ended that search.
+    """
+    if not any(setup.automatic_sines for setup in task.setups):
+        return task, problem, ()
+    weighted, first = weighted_search(task, problem, lambda _: None, progress)
+    if first.interrupted or first.best.stop is estimate.Stop.INTERRUPTED:
+        raise KeyboardInterrupt
+    setups, notes = with_found_lines(task.setups, weighted.residuals, first.best.x)
+    disturbed = problem_of(residuals_of(task.case, setups))
+    return task._replace(setups=setups), disturbed, notes
 
 
 def weighted_search(

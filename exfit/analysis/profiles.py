@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.analysis.case_search import SearchTask, weighted_search
+from exfit.analysis.case_search import SearchTask, weighted_search, with_lines
 from exfit.analysis.diagnostics import search_range_notes
 from exfit.analysis.profile_hull import (
     FoundMinimum,
@@ -120,8 +120,11 @@ def profile(
     Source: Venzon & Moolgavkar 1988.
     """
     setups, problem = fitted(case)
+    names = tuple(names)
+    if not any(setup.automatic_sines for setup in setups):  # else more may become free
+        _indices(case, problem.residuals, names)
+    setups, problem, found = _found(case, setups, problem, progress)
     wanted = _indices(case, problem.residuals, names)
-    problem, found = _found(case, setups, problem, progress)
     residuals, records, others = problem.compressed, names_of_records(setups), other_minima(found)
     x = found.best.x
     for _ in range(MOST_MINIMA):
@@ -166,8 +169,8 @@ def _found(
     setups: tuple[ExperimentSetup, ...],
     problem: FitProblem,
     progress: Callable[[estimate.Progress], None],
-) -> tuple[FitProblem, SearchResult]:
-    """Return the problem of a case as it was searched, and that search.
+) -> tuple[tuple[ExperimentSetup, ...], FitProblem, SearchResult]:
+    """Return the tests and the problem of a case as they were searched, and that search.
 
     Raises KeyboardInterrupt where it was interrupted.
     """
@@ -175,10 +178,11 @@ def _found(
     start, judged = case.values(), case.validations if options.strategy == "auto" else ()
     unseen = tuple(build_experiment(case, recording, start) for recording in judged)
     task = SearchTask(case, setups, unseen, options.strategy, options, SimulationCounter())
+    task, problem, _ = with_lines(task, problem, progress)
     problem, found = weighted_search(task, problem, lambda _: None, progress)
     if found.best.stop is estimate.Stop.INTERRUPTED or found.interrupted:
         raise KeyboardInterrupt
-    return problem, found
+    return task.setups, problem, found
 
 
 def _notes(best: estimate.Result, x: Array) -> Iterator[str]:

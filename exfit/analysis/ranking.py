@@ -232,10 +232,11 @@ def _judgement(judged: Sequence[RankedModel]) -> str:
         )
     if possible:
         return f"the records refute all of these models but {possible[0]}"
-    fitted = min(judged, key=lambda model: model.bic).name
-    unseen = listed([model.name for model in judged if model.refuted_by == ("fit",)])
+    best = min(judged, key=lambda model: model.bic).name
+    if judged[0].name == best:
+        return f"no model describes all channels best; {best} is the best on the whole"
     return (
-        f"no model describes all records: {fitted} is the best on those fitted, {unseen} on those "
-        "that no fit saw. What the fitted step does not show, such as a limit that is typical "
-        "here, decides the others: give it, or fit all records together"
+        f"no model describes all records: {best} is the best on those fitted, {judged[0].name} on "
+        "those that no fit saw. What the fitted step does not show, such as a limit that is "
+        "typical here, decides the others: give it, or fit all records together"
     )

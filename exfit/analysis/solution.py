@@ -23,6 +23,7 @@ from exfit.analysis.typical_values import influence_of_typical_values
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
 from exfit.fitting.channel_weights import balanced, weight_notes
+from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
@@ -209,9 +210,20 @@ def aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[Experim
     """Return a test that was not fitted, and the values with what is found about its record.
 
     What that record leaves open about itself (its instants, its levels) is fitted to it, with the
-    parameters of the unit as they are. The test has sub-steps enough. Raises KeyboardInterrupt at
-    an interruption.
+    parameters of the unit as they are; so is a periodic disturbance that stands out of what is left
+    then. The test has sub-steps enough. Raises KeyboardInterrupt at an interruption.
     """
+    fine, own = _aligned(case, setup, values)
+    if not setup.automatic_sines:
+        return fine, own
+    residuals = Residuals([fine.experiment], fine.free, own)
+    theta = np.array([parameter.scaled(own[parameter.name]) for parameter in fine.free])
+    (disturbed,), _ = with_found_lines([fine], residuals, theta)
+    return _aligned(case, disturbed, values)
+
+
+def _aligned(case: Case, setup: ExperimentSetup, values: Values) -> tuple[ExperimentSetup, Values]:
+    """Return a test with sub-steps enough, and the values with those of its free parameters."""
     fine = setup.with_enough_substeps(values)
     if setup.free:
         robust = robust_of(case)

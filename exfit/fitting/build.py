@@ -14,7 +14,8 @@ from exfit.fitting.detected_steps import with_detected_steps
 from exfit.fitting.experiment import Channel, Experiment, Nuisance
 from exfit.fitting.input_steps import input_steps
 from exfit.fitting.levels import deviation, levels_of
-from exfit.fitting.nuisance import nuisance_parameters, prefix_of
+from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
+from exfit.fitting.nuisances.sine_parameters import with_sines
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recordings import record_of
 from exfit.fitting.references import references_of, span_of
@@ -61,8 +62,14 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         nuisances,
         recording.name,
     )
-    starts = tuple(_with_given_start(case, parameter) for parameter in free)
-    return ExperimentSetup(case.path, test, record, experiment, starts, references.files)
+    plain = ExperimentSetup(case.path, test, record, experiment, free, references.files)
+    return _with_given_starts(case, with_sines(case, recording, plain, values))
+
+
+def _with_given_starts(case: Case, setup: ExperimentSetup) -> ExperimentSetup:
+    """Return a test with the starts that were given for what is found about its record."""
+    free = tuple(_with_given_start(case, parameter) for parameter in setup.free)
+    return replace(setup, free=free)
 
 
 def _with_given_start(case: Case, parameter: FreeParameter) -> FreeParameter:

@@ -18,7 +18,7 @@ from exfit.case.schema import (
 from exfit.dsp.filtering import outliers
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.nuisance import prefix_of
+from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.plants import REFERENCES
 from exfit.records.record import Record
 from exfit.records.steps import INSTANT_WITHIN

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.filtering import Filtering
+from exfit.fitting.nuisances.sine import Sine
 from exfit.plants import VT0
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Simulator
@@ -18,7 +19,9 @@ Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
 
-NuisanceKind = Literal["at", "shift", "step", "vt0", "delay", "scale", "offset"]
+NuisanceKind = Literal[
+    "at", "shift", "step", "vt0", "delay", "scale", "offset", "frequency", "cosine", "sine"
+]
 
 NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
     "at": ("s", "instant of a step"),
@@ -28,6 +31,9 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
     "delay": ("s", "delay of the recorder"),
     "scale": ("", "factor of a channel"),
     "offset": ("pu", "offset of a channel"),
+    "frequency": ("Hz", "frequency of a periodic disturbance"),
+    "cosine": ("pu", "cosine of it, about the middle of the record"),
+    "sine": ("pu", "sine of it, about the middle of the record"),
 }  # unit and meaning of each kind
 
 
@@ -36,8 +42,8 @@ class Nuisance:
     """What a fit finds about a record, under ``name``: it is no parameter of the unit.
 
     ``step`` is the index in the inputs of a step whose instant or size it is, ``signal`` the
-    channel whose scale or offset it is. The instant of an only step is a ``shift`` of the whole
-    response: the simulation stays as it is.
+    channel whose scale, offset or periodic disturbance it is. The instant of an only step is a
+    ``shift`` of the whole response: the simulation stays as it is.
     """
 
     name: str
@@ -54,6 +60,10 @@ class Nuisance:
     def meaning(self) -> str:
         """What it is, in words."""
         return NUISANCES[self.kind][1]
+
+    def rescales(self, channel: "Channel") -> bool:
+        """Return whether it is the scale or the offset of a channel."""
+        return self.signal == channel.signal and self.kind in ("scale", "offset")
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +142,7 @@ class Experiment:
     """A simulated test and the channels that it is compared with.
 
     ``own`` holds the parameters of the system that this test alone has: where its signals start,
-    its network.
+    its network. ``sines`` are periodic disturbances of what is simulated.
     """
 
     simulator: Simulator
@@ -140,6 +150,7 @@ class Experiment:
     own: Values = field(default_factory=dict)
     nuisances: tuple[Nuisance, ...] = ()
     name: str = ""
+    sines: tuple[Sine, ...] = ()
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -189,7 +200,7 @@ class Experiment:
         of_record = {
             nuisance.kind: values[nuisance.name]
             for nuisance in self.nuisances
-            if nuisance.signal == channel.signal
+            if nuisance.rescales(channel)
         }
         if not of_record:
             return channel.measured
@@ -198,7 +209,8 @@ class Experiment:
 
     def samples(self, values: Values) -> tuple[Array, int]:
         """Return the simulated signals (M, channels), and the number of sub-steps."""
-        return self.with_inputs(values).samples(self.parameters(values), self.signals)
+        samples, parts = self.with_inputs(values).samples(self.parameters(values), self.signals)
+        return self._with_sines(samples, values), parts
 
     def errors(self, values: Values) -> tuple[Array, int]:
         """Return the weighted errors, one channel behind the other, and the sub-steps."""
@@ -219,7 +231,8 @@ class Experiment:
         Of a set without a start at rest they are no numbers; see ``Simulator.samples_of_many``.
         """
         systems = [self.parameters(values) for values in sets]
-        return self.simulator.samples_of_many(systems, self.signals, self._tests(sets))
+        samples, parts = self.simulator.samples_of_many(systems, self.signals, self._tests(sets))
+        return self._all_with_sines(samples, sets), parts
 
     def compared(self, samples: Array, values: Values) -> Array:
         """Return the weighted errors of simulated signals (M, channels)."""
@@ -244,7 +257,7 @@ class Experiment:
 
     def _moved_channel(self, channel: Channel) -> bool:
         """Return whether the scale or offset of a channel is found."""
-        return any(nuisance.signal == channel.signal for nuisance in self.nuisances)
+        return any(nuisance.rescales(channel) for nuisance in self.nuisances)
 
     def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
         """Return the weighted errors and their derivatives (errors, N).
@@ -268,8 +281,10 @@ class Experiment:
             [[self._direction(move) for move in own] for own in moves],
             self._tests(sets),
         )
+        samples = self._all_with_sines(samples, sets)
         derivatives = [
-            self._slopes_of(*own) for own in zip(samples, slopes, sets, moves, strict=True)
+            self._slopes_of(response, self._slopes_with_sines(own, values, move), values, move)
+            for response, own, values, move in zip(samples, slopes, sets, moves, strict=True)
         ]
         return self._compared_many(samples, sets), derivatives, parts
 
@@ -292,7 +307,35 @@ class Experiment:
         """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
         directions = [self._direction(move) for move in moves]
         simulator = self.with_inputs(values)
-        return simulator.tangents(self.parameters(values), self.signals, directions)
+        samples, slopes = simulator.tangents(self.parameters(values), self.signals, directions)
+        return self._with_sines(samples, values), self._slopes_with_sines(slopes, values, moves)
+
+    def _all_with_sines(self, samples: Array, sets: Sequence[Values]) -> Array:
+        """Return signals (K, M, channels) of several sets with their periodic disturbances."""
+        if not self.sines:
+            return samples
+        pairs = zip(samples, sets, strict=True)
+        return np.stack([self._with_sines(own, values) for own, values in pairs])
+
+    def _with_sines(self, samples: Array, values: Values) -> Array:
+        """Return simulated signals (M, channels) with their periodic disturbances."""
+        if not self.sines:
+            return samples
+        disturbed = np.array(samples)
+        for sine in self.sines:
+            place = self.signals.index(sine.signal)
+            disturbed[:, place] += sine.samples(self.simulator.times, values)
+        return disturbed
+
+    def _slopes_with_sines(self, slopes: Array, values: Values, moves: Sequence[Values]) -> Array:
+        """Return derivatives (M, channels, N) of signals with their periodic disturbances."""
+        if not self.sines:
+            return slopes
+        disturbed = np.array(slopes)
+        for sine in self.sines:
+            place = self.signals.index(sine.signal)
+            disturbed[:, place] += sine.slopes(self.simulator.times, values, moves)
+        return disturbed
 
     def _direction(self, move: Values) -> Direction:
         """Return a direction as the simulator takes it."""
@@ -320,7 +363,7 @@ class Experiment:
         self, channel: Channel, values: Values, moves: Sequence[Values]
     ) -> Array | None:
         """Return the derivatives of what was measured, if its scale or offset is found."""
-        nuisances = [nuisance for nuisance in self.nuisances if nuisance.signal == channel.signal]
+        nuisances = [nuisance for nuisance in self.nuisances if nuisance.rescales(channel)]
         if not nuisances:
             return None
         raw = (channel.measured - channel.offset) / channel.scale

@@ -11,7 +11,7 @@ from exfit.case.case import Case
 from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.fitting.nuisance import names_of
+from exfit.fitting.nuisances.parameters import names_of
 from exfit.fitting.references import with_recorded_steps
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter

@@ -36,7 +36,9 @@ class ExperimentSetup:
     """A test of a case beside its record, ready to be simulated.
 
     ``test`` has a number for everything; ``free`` are those of its values that a fit finds,
-    ``references`` the files of the test's signals beside the record, by signal.
+    ``references`` the files of the test's signals beside the record, by signal;
+    ``automatic_sines`` are the signals of which residuals may show a periodic disturbance, with
+    the range of its frequency, Hz.
     """
 
     case: Path
@@ -45,6 +47,7 @@ class ExperimentSetup:
     experiment: Experiment
     free: tuple[FreeParameter, ...]
     references: Mapping[str, Record] = field(default_factory=dict)
+    automatic_sines: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

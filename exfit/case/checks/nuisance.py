@@ -25,6 +25,8 @@ def nuisance_faults(
             yield from _automatic_faults(value.at("start"), record, has_record)
     yield from _ramp_faults(test.at("vref").entries)
     yield from _level_faults(test, record.at("channels", "vt"))
+    for _, channel in record.at("channels").sections:
+        yield from _frequency_faults(channel.at("sine", "frequency"))
     delay = record.at("delay")
     if kind.plays_back and (delay.number or 0.0) != 0.0:
         yield delay.fault(f"not allowed with plant {kind.name}")
@@ -50,6 +52,16 @@ def _automatic_faults(start: ContentNode, record: ContentNode, has_record: bool)
         yield start.fault("auto needs vt in the record")
 
 
+def _frequency_faults(frequency: ContentNode) -> Iterator[Fault]:
+    """Yield the faults of the frequency of a periodic disturbance."""
+    if frequency.is_section:
+        automatic = frequency.at("start").text == "auto"
+        yield from _bound_faults(frequency, needed=not automatic)
+    for number in (frequency, frequency.at("start"), frequency.at("min"), frequency.at("max")):
+        if number.number is not None and number.number <= 0.0:
+            yield number.fault(f"{show(number.number)} Hz must be above 0")
+
+
 def _ramp_faults(steps: Sequence[ContentNode]) -> Iterator[Fault]:
     for step in steps:
         automatic = "auto" in (step.at(key, "start").text for key in AUTOMATIC)
@@ -73,10 +85,15 @@ def _value_faults(value: ContentNode) -> Iterator[Fault]:
     if automatic and not (key in AUTOMATIC and value.place[-3:-1] == ("vref", 0)):
         text = "auto finds the first step of vref: its at and its step"
         yield value.at("start").fault(text)
-    for bound in ("min", "max"):
-        if bound not in value and not automatic:
-            yield value.at(bound).fault("is missing")
-    yield from bound_faults(value)
+    yield from _bound_faults(value, needed=not automatic)
     low, high = value.at("min").number, value.at("max").number
     if key in ("step", "scale") and low is not None and high is not None and low <= 0 <= high:
         yield value.at("min").fault(f"{show(low)} ... {show(high)} contains 0")
+
+
+def _bound_faults(value: ContentNode, needed: bool) -> Iterator[Fault]:
+    """Yield the bounds that are missing where they are ``needed``, or contradict the start."""
+    for bound in ("min", "max"):
+        if bound not in value and needed:
+            yield value.at(bound).fault("is missing")
+    yield from bound_faults(value)

@@ -107,7 +107,7 @@ def channel_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterato
 
 
 def _driving_faults(channel: ContentNode) -> Iterator[Fault]:
-    for key in ("weight", "noise", "filter", "outliers"):
+    for key in ("weight", "noise", "filter", "outliers", "sine"):
         if key in channel:
             text = "has no effect: the signal drives the simulation and is not compared"
             yield channel.at(key).fault(text)

@@ -13,6 +13,7 @@ from exfit.case.schema.records import (
     PhasesSection,
     RecordFile,
     Recording,
+    SineSection,
 )
 from exfit.case.schema.tests import (
     MOST_ROWS,
@@ -50,6 +51,7 @@ __all__ = [
     "ReferenceTable",
     "SaturationName",
     "SimulationSection",
+    "SineSection",
     "Stabiliser",
     "StepSection",
     "Switch",

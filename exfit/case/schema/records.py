@@ -31,6 +31,16 @@ def _channel(value: Any) -> Any:
     return {"column": value} if isinstance(value, str) else value
 
 
+class SineSection(Section):
+    """A small periodic disturbance of a channel, which the fit finds with the parameters."""
+
+    frequency: Findable = Field(
+        description="Its frequency, Hz; or {start, min, max} to fit it. start: auto takes it from "
+        "the residuals of a fit without it, if a line stands out of them and they are white "
+        "otherwise; if not, no sine is fitted, and a note says why.",
+    )
+
+
 class Compared(Section):
     """How a signal is compared with its record."""
 
@@ -53,6 +63,11 @@ class Compared(Section):
         description="Length over which the recorder averages around each sample, s; the simulation "
         "is averaged in the same way. If it averages over the time before the sample, give half "
         "of this length as delay.",
+    )
+    sine: SineSection | None = Field(
+        default=None,
+        description="A small periodic disturbance of constant amplitude, as a sway of the grid, "
+        "which is added to the simulated signal.",
     )
 
 

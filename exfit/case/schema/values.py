@@ -137,7 +137,7 @@ class FreeSection(Section):
 class Unknown(Section):
     """A value of a record or its test that is fitted, on a linear scale."""
 
-    start: Start = Field(description="Start value; auto: taken from the first step in the record.")
+    start: Start = Field(description="Start value; auto: taken from the record.")
     min: Number | None = Field(default=None, description="Lower bound; not required with auto.")
     max: Number | None = Field(default=None, description="Upper bound; not required with auto.")
 

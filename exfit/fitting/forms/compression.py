@@ -75,7 +75,8 @@ def compressed(residuals: Residuals) -> Residuals:
 
     The Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the
     same residuals where compression would not save much, or where it does not hold: with filters,
-    with a robust loss, and where the instants at which a record is read, or its scale, are found.
+    with a robust loss or periodic disturbances, and where the instants at which a record is read,
+    or its scale, are found.
 
     Source: Golub & Van Loan 2013, section 5.3 (the least-squares problem of a factor R is that of
     all rows).
@@ -91,9 +92,9 @@ def compressed(residuals: Residuals) -> Residuals:
 def _compressed_experiment(whole: Experiment) -> Experiment:
     """Return an experiment with fewer errors, the same where that does not pay or hold."""
     simulator = whole.simulator.on_grid()
-    possible = all(channel.plain for channel in whole.channels) and not any(
-        nuisance.kind in CHANGING_SAMPLES for nuisance in whole.nuisances
-    )
+    changing = any(nuisance.kind in CHANGING_SAMPLES for nuisance in whole.nuisances)
+    plain = all(channel.plain for channel in whole.channels)
+    possible = plain and not (changing or whole.sines)
     errors_on_grid = NEIGHBOURS * len(simulator.times) * len(whole.channels)
     if not possible or LEAST_GAIN * errors_on_grid >= sum(whole.sizes):
         return whole

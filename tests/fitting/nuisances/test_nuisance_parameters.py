@@ -23,7 +23,7 @@ from tables import read_columns
 
 from exfit.fitting.build import build_experiments
 from exfit.fitting.forms.linear import linear_form
-from exfit.fitting.nuisance import names_of
+from exfit.fitting.nuisances.parameters import names_of
 from exfit.fitting.problem import residuals_of
 from exfit.results.compare_with_record import compare_with_record
 from exfit.workflows import fit, simulate, validate
@@ -47,7 +47,9 @@ def everything_open(tmp_path):
     file = write(tmp_path / "up.csv", **up)
     level = {"scale": found_in(1.003, 0.9, 1.1), "offset": found_in(-0.002, -0.1, 0.1)}
     vt = {"column": "vt", **level, "filter": {"lowpass": 8.0}}
+    vt["sine"] = {"frequency": found_in(1.03, 0.9, 1.1)}
     efd = {"column": "efd", **level, "filter": {"median": 5}, "weight": 0.02}
+    swaying = {"vt": {"column": "vt", "sine": {"frequency": 2.0}}}
     records = [
         recording(
             "up",
@@ -61,7 +63,7 @@ def everything_open(tmp_path):
             mask=[[2.105, 2.305]],
             window=[0.2, 4.0],
         ),
-        recording("down", at=found_in(0.9967, 0.8, 1.2), window=[0.2, 4.0]),
+        recording("down", at=found_in(0.9967, 0.8, 1.2), channels=swaying, window=[0.2, 4.0]),
     ]
     records[0]["test"]["vt0"] = found_in(1.001, 0.9, 1.1)
     records[1]["test"]["vs"] = [
@@ -87,9 +89,14 @@ def test_the_exact_jacobian_is_that_of_differences_with_all_that_can_be_found(ev
         "up.vt.offset",
         "up.efd.scale",
         "up.efd.offset",
+        "up.vt.sine.frequency",
+        "up.vt.sine.cosine",
+        "up.vt.sine.sine",
         "down.vref.at",
         "down.vs.at",
         "down.vs.step",
+        "down.vt.sine.cosine",
+        "down.vt.sine.sine",
     ]
     exact = residuals.exact(residuals.start)
     assert exact.shape == (residuals.count + 1, len(residuals.free))

@@ -5,6 +5,7 @@ from typing import Literal
 
 from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
 from exfit.fitting.experiment import Nuisance
+from exfit.fitting.nuisances.sine import COSINE, FREQUENCY, SINE
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import REFERENCES
 from exfit.signals import SIGNALS
@@ -24,7 +25,12 @@ def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> boo
 
 def prefix_of(recording: Recording) -> str:
     """Return how the names of all begin that a fit finds about a record."""
-    return "" if recording.name == SINGLE else f"{recording.name}."
+    return prefix_from(recording.name)
+
+
+def prefix_from(name: str) -> str:
+    """Return how the names of all begin that a fit finds about a record of a name."""
+    return "" if name == SINGLE else f"{name}."
 
 
 def names_of(recording: Recording) -> tuple[str, ...]:
@@ -33,7 +39,16 @@ def names_of(recording: Recording) -> tuple[str, ...]:
     steps = [InputStep(0.0, 0.0, signal) for signal in REFERENCES for _ in test.events(signal)]
     prefix = prefix_of(recording)
     nuisances = [*_of_steps(prefix, test, steps, shift=False), *_of_record(prefix, test, file)]
-    return tuple(nuisance.name for nuisance, _ in nuisances)
+    return (*(nuisance.name for nuisance, _ in nuisances), *_sine_names(prefix, file))
+
+
+def _sine_names(prefix: str, file: RecordFile) -> Iterator[str]:
+    """Yield the names of all that a fit may find about the periodic disturbances of a record."""
+    for signal, channel in file.channels.items():
+        if channel.sine is not None:
+            fixed = not isinstance(channel.sine.frequency, Unknown)
+            for part in (COSINE, SINE) if fixed else (FREQUENCY, COSINE, SINE):
+                yield f"{prefix}{signal}.sine.{part}"
 
 
 def nuisance_parameters(

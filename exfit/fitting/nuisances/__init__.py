@@ -1,0 +1,1 @@
+"""What a fit finds about records beside the parameters of the unit."""
