@@ -15,6 +15,11 @@ def contradictions(result: FitResult) -> Iterator[str]:
     for match in (*result.comparisons, *result.validation):
         yield from (f"records: {match.name}: {text}" for text in _of_comparison(match))
     yield from _of_search(result)
+    if any(
+        not {*typical.matters_to} <= typical.shifts.keys() <= result.parameters.keys()
+        for typical in result.typical_values.values()
+    ):
+        yield "typical_values: what they move are not the parameters of the fit"
     if result.knowledge is not None:
         yield from (f"knowledge: {text}" for text in _of_uncertainty(result.knowledge))
     if result.behaviour is not None:

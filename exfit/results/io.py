@@ -40,7 +40,7 @@ def load_result(path: str | PathLike[str]) -> FitResult:
             f"{source}: version {version}: written by a later exfit; this one reads up to {VERSION}"
         )
     whole = {**content, "parts": _parts_of(content)} if version == 1 else content
-    if "sources" not in whole:
+    if version < VERSION and "sources" not in whole:
         whole = {**whole, "sources": _sources_of(whole)}
     try:
         result: FitResult = Reader(complete=version == VERSION).read(FitResult, whole)
@@ -74,8 +74,10 @@ def _refuse_constant(text: str) -> NoReturn:
 
 def _sources_of(content: Mapping[str, Any]) -> dict[str, str]:
     """Return where values come from, as far as a file of an earlier version says."""
-    typical, fitted = content.get("typical", ()), content["parameters"]
-    return {**dict.fromkeys(typical, TYPICAL), **dict.fromkeys(fitted, FITTED)}
+    typical, fitted = content.get("typical"), content["parameters"]
+    names = [name for name in typical if isinstance(name, str)] if isinstance(typical, list) else []
+    found = fitted if isinstance(fitted, dict) else {}
+    return {**dict.fromkeys(names, TYPICAL), **dict.fromkeys(found, FITTED)}
 
 
 def _parts_of(content: Mapping[str, Any]) -> list[Any]:

@@ -12,6 +12,7 @@ from exfit.analysis.typical_values import influence_of_typical_values, typical_v
 from exfit.case.case import Case
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import uncertainty_at
+from exfit.output.report import html
 from exfit.output.report.sections.parameters import parameters
 from exfit.results.typical_values import DEVIATION, by_weight, first_of
 from exfit.results.verdict import GOOD, MATCHES
@@ -146,7 +147,7 @@ def test_what_lies_on_a_bound_stays_there():
 
 
 @pytest.mark.parametrize("source", ["typical", "nameplate"])
-def test_a_fit_is_not_good_while_a_typical_value_matters(source):
+def test_a_fit_is_not_good_while_a_typical_value_matters(source, tmp_path):
     result = fit(first_order(fixed={"a": 2.0}, sources={"a": source}, k=1.0))
     assert result.parameters["k"].determined
     assert result.verdict.verdict == (MATCHES if source == "typical" else GOOD)
@@ -157,6 +158,7 @@ def test_a_fit_is_not_good_while_a_typical_value_matters(source):
         (row,) = parameters(result).mattering
         assert (row.name, row.value) == ("a", 2.0)
         assert row.moves.startswith("k by ")
+        assert f">{row.moves}</td>" in html(result, tmp_path)
     else:
         assert result.typical_values == {}
         assert parameters(result).mattering == ()

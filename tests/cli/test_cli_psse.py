@@ -315,6 +315,16 @@ def test_values_that_no_one_gave_are_named(run, fitted):
     assert "// ESAC1A: not stated: TB TC" in out
 
 
+def test_typical_values_that_matter_are_named(run, fitted):
+    moves = {"value": 1.0, "shifts": {"KA": 30.0, "TE": 0.1}, "matters_to": {"KA": 2.0}}
+    named(fitted, typical_values={"KE": moves, "SE1": {**moves, "matters_to": {}}})
+    _, out, err = run("export", fitted)
+    assert "what was fitted depends on typical values: KE\n" in err
+    assert "// what was fitted depends on typical values: KE." in out.splitlines()
+    named(fitted, typical_values={"KE": {**moves, "shifts": {"K": 1.0}}})
+    assert "typical_values: what they move are not the parameters" in run("export", fitted)[2]
+
+
 @pytest.mark.parametrize("name", [None, "ONE_AXIS"])
 def test_without_a_record_of_the_machine_only_the_exciter_is_written(run, fitted, name):
     named(fitted, machine_model=name)

@@ -116,6 +116,21 @@ def test_an_interval_of_the_version_before_is_that_of_linear_theory(saved):
         load_result(written(saved, parameters=parameters))
 
 
+def test_a_file_of_the_version_before_says_what_is_typical_and_fitted_alone(saved):
+    path, content = saved
+    older = {key: value for key, value in content.items() if key not in ("sources", "verdict")}
+    older |= {"version": 4, "typical": ["b"]}
+    path.with_name("older.json").write_text(json.dumps(older))
+    back = load_result(path.with_name("older.json"))
+    assert back.typical == ("b",)
+    assert {name: back.source_of(name) for name in (*back.parameters, "b", "c")} == {
+        **dict.fromkeys(back.parameters, "fitted"), "b": "typical", "c": "not stated"
+    }  # fmt: skip
+    for typical in (None, 3, [[]], {"b": 1}):
+        path.with_name("older.json").write_text(json.dumps({**older, "typical": typical}))
+        assert load_result(path.with_name("older.json")).typical == ()
+
+
 def test_no_damage_ends_in_a_traceback(saved):
     """Values of another kind, missing keys, cut files: ExfitError with the file, or no harm."""
     path, _ = saved

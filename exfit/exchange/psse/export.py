@@ -20,6 +20,7 @@ from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES
 from exfit.results.model import FitResult
 from exfit.results.translation import Translation
+from exfit.results.typical_values import by_weight, first_of
 from exfit.util.sources import NOT_STATED, TYPICAL, by_source
 from exfit.util.text import near, show
 
@@ -97,6 +98,9 @@ def _of_fit(result: FitResult) -> Iterator[str]:
     outside = [f"{name} {p.value:.4g}" for name, p in result.parameters.items() if not p.physical]
     if outside:
         yield f"not physical, outside the range of the data sheet: {', '.join(outside)}"
+    weighty = [*by_weight(result.typical_values)]
+    if weighty:
+        yield f"what was fitted depends on typical values: {first_of(weighty)}"
     if result.saturation != "quadratic":
         yield f"fitted with saturation: {result.saturation}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
 
