@@ -1,14 +1,12 @@
 """Responses on one axis, with their differences below."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from exfit.analysis.comparison import Agreement
 from exfit.analysis.curves import RECORD, Curve
-from exfit.analysis.differences import Difference
 from exfit.dsp.decimation import envelope
 from exfit.output.plots.style import (
     COLORS,
@@ -23,12 +21,17 @@ from exfit.output.plots.style import (
 )
 from exfit.signals import label_of
 
+if TYPE_CHECKING:
+    from exfit.analysis.comparison import Agreement
+    from exfit.analysis.differences import Difference
+
+
 OF_TWO = ((START, "-"), (SIMULATED, "--"))
 WIDTHS = (2.6, 2.2, 1.8, 1.4)  # points: curves that coincide are seen around each other
 TAKEN = (COLORS[0], START, SIMULATED)  # the first of the colours is a blue, too
 
 
-def agreement(compared: Agreement) -> Figure:
+def agreement(compared: "Agreement") -> Figure:
     """Return the signals of responses, with a record where there is one, and the differences.
 
     Of many responses only the differences from the reference are drawn: the record, or the first.
@@ -67,7 +70,9 @@ def _title(curve: Curve) -> str:
     return f"{curve.name}: {Path(curve.path.parent.name, curve.path.name)}{shifted}"
 
 
-def _curves(axes: Axes, compared: Agreement, signal: str, looks: dict[str, dict[str, Any]]) -> None:
+def _curves(
+    axes: Axes, compared: "Agreement", signal: str, looks: dict[str, dict[str, Any]]
+) -> None:
     """Draw a signal of all that have it, the record below the lines."""
     time = compared.time
     own = {each.second: each for each in compared.from_reference if each.signal == signal}
@@ -92,7 +97,7 @@ def _curves(axes: Axes, compared: Agreement, signal: str, looks: dict[str, dict[
 
 
 def _differences(
-    axes: Axes, differences: list[Difference], looks: dict[str, dict[str, Any]]
+    axes: Axes, differences: "list[Difference]", looks: dict[str, dict[str, Any]]
 ) -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
     of_records = any(difference.first == RECORD for difference in differences)
@@ -112,5 +117,5 @@ def _differences(
     tidy(axes)
 
 
-def _name(difference: Difference) -> str:
+def _name(difference: "Difference") -> str:
     return f"{difference.second} - {difference.first}"

@@ -1,19 +1,22 @@
 """Fits of several cases with several strategies: overlays, errors and costs."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from exfit.dsp.decimation import envelope
-from exfit.fleet.fits import FitRun, FitSeries
 from exfit.output.plots.axes import QuickAxes, logarithmic
 from exfit.output.plots.style import COLORS, MEASURED, MILLI, STYLES, new_figure, tidy
 from exfit.results.comparisons import Comparison
 from exfit.results.side_by_side import CONVERGED, outcome_of
 from exfit.signals import label_of
+
+if TYPE_CHECKING:
+    from exfit.fleet.fits import FitRun, FitSeries
+
 
 MOST_CASES = 8  # in one figure
 CASE_HEIGHT = 3.8  # inches
@@ -21,7 +24,7 @@ WIDEST, NARROWEST = 2.6, 1.0  # points: curves that coincide are seen around eac
 SMALL = 8  # points, the size of letters
 
 
-def fit_series(series: FitSeries) -> Figure:
+def fit_series(series: "FitSeries") -> Figure:
     """Return for each case the responses of its fits beside the record, their errors and costs.
 
     Of many cases the first are drawn; the others are named.
@@ -70,7 +73,7 @@ def responses_beside(overlay: Axes, errors: Axes, comparisons: Mapping[str, Comp
     tidy(errors)
 
 
-def _costs(axes: Axes, runs: Sequence[FitRun]) -> None:
+def _costs(axes: Axes, runs: "Sequence[FitRun]") -> None:
     """Draw the cost over the iterations of each fit; a cross ends one that has not converged."""
     for k, run in enumerate(runs):
         look = _look(k, len(runs))

@@ -1,18 +1,23 @@
 """Models of the same records: the responses of the best beside each record, and their errors."""
 
+from typing import TYPE_CHECKING
+
 from matplotlib.figure import Figure
 
-from exfit.fleet.ranking import Ranking
 from exfit.output.plots.axes import QuickAxes
 from exfit.output.plots.fit_series import responses_beside
 from exfit.output.plots.style import new_figure
+
+if TYPE_CHECKING:
+    from exfit.fleet.ranking import Ranking
+
 
 MOST_MODELS = 4  # in one figure
 FARTHEST = 10.0  # times the error of the best: beside a larger one no other is seen
 RECORD_HEIGHT = 3.8  # inches
 
 
-def ranking(ranked: Ranking) -> Figure:
+def ranking(ranked: "Ranking") -> Figure:
     """Return the first fitted record and the first unseen one with the responses of the best."""
     least = min(result.rmse for result in ranked.results.values())
     near = {k: fit for k, fit in ranked.results.items() if fit.rmse <= FARTHEST * least}

@@ -1,6 +1,7 @@
 """What a recorder's file holds, as a figure."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,9 +11,12 @@ from numpy.typing import NDArray
 
 from exfit.dsp.decimation import PIXELS, envelope
 from exfit.output.plots.style import LIMIT, SIMULATED, START, new_figure, panels, short, tidy
-from exfit.records.channel_inspection import InspectedChannel
-from exfit.records.inspection import Inspection
-from exfit.records.steps import RecordedStep
+
+if TYPE_CHECKING:
+    from exfit.records.channel_inspection import InspectedChannel
+    from exfit.records.inspection import Inspection
+    from exfit.records.steps import RecordedStep
+
 
 Array = NDArray[np.float64]
 
@@ -24,7 +28,7 @@ MOST_NAMES = 4  # of channels that are not drawn
 SHADE = "#d7dbe0"
 
 
-def inspection(inspected: Inspection, title: str) -> Figure:
+def inspection(inspected: "Inspection", title: str) -> Figure:
     """Return each channel in a panel of its own: steps marked, gaps shaded, spikes ringed.
 
     Of many channels those with a signal come first, then those that show a step; the rest are
@@ -51,7 +55,7 @@ def inspection(inspected: Inspection, title: str) -> Figure:
     return figure
 
 
-def _channel(axes: Axes, inspected: Inspection, channel: InspectedChannel) -> None:
+def _channel(axes: Axes, inspected: "Inspection", channel: "InspectedChannel") -> None:
     """Draw a channel with what was detected in it."""
     _samples(axes, inspected, channel.name)
     for first, last in channel.stuck:
@@ -71,7 +75,7 @@ def _channel(axes: Axes, inspected: Inspection, channel: InspectedChannel) -> No
     tidy(axes)
 
 
-def _samples(axes: Axes, inspected: Inspection, name: str) -> None:
+def _samples(axes: Axes, inspected: "Inspection", name: str) -> None:
     """Draw the samples of a channel, with the gaps of the clock shaded."""
     time, gaps = inspected.time, inspected.sampling.gaps
     for gap in gaps:
@@ -82,7 +86,7 @@ def _samples(axes: Axes, inspected: Inspection, name: str) -> None:
         axes.plot(*envelope(t, y, bins), color=START, linewidth=0.9)
 
 
-def _instants(axes: Axes, steps: Sequence[RecordedStep]) -> None:
+def _instants(axes: Axes, steps: "Sequence[RecordedStep]") -> None:
     """Write the instants of the steps above the panels."""
     for step in steps:
         axes.annotate(

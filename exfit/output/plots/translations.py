@@ -1,17 +1,22 @@
 """The responses of a fitted exciter and of another model to the same steps."""
 
+from typing import TYPE_CHECKING
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from exfit.dsp.decimation import envelope
 from exfit.output.plots.style import SIMULATED, START, new_figure, panels, tidy
-from exfit.results.translation import StepComparison, Translation
 from exfit.signals import label_of
+
+if TYPE_CHECKING:
+    from exfit.results.translation import StepComparison, Translation
+
 
 PERCENT = 100.0
 
 
-def translation(result: Translation, title: str) -> Figure:
+def translation(result: "Translation", title: str) -> Figure:
     """Return vt and efd of both models for each step, and the error of vt in percent of the step.
 
     Each plant has a column.
@@ -30,7 +35,7 @@ def translation(result: Translation, title: str) -> Figure:
     return figure
 
 
-def _signals(axes: Axes, result: Translation, steps: list[StepComparison], signal: str) -> None:
+def _signals(axes: Axes, result: "Translation", steps: "list[StepComparison]", signal: str) -> None:
     for step in steps:
         first = step is steps[0]
         labels = (result.source, result.target) if first else (None, None)
@@ -42,7 +47,7 @@ def _signals(axes: Axes, result: Translation, steps: list[StepComparison], signa
     tidy(axes)
 
 
-def _errors(axes: Axes, result: Translation, steps: list[StepComparison]) -> None:
+def _errors(axes: Axes, result: "Translation", steps: "list[StepComparison]") -> None:
     axes.axhline(0.0, color="black", linewidth=0.6)
     for step in steps:
         error = PERCENT * (step.target["vt"] - step.source["vt"]) / abs(step.step)
