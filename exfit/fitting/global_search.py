@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import nan
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,10 @@ from exfit.fitting.descents import (
     notes_of,
     stopped,
 )
-from exfit.fitting.further_starts import Way
 from exfit.util.strategies import FROM_FURTHER_STARTS
+
+if TYPE_CHECKING:
+    from exfit.fitting.further_starts import Way
 
 Array = NDArray[np.float64]
 
@@ -48,7 +50,7 @@ class SearchResult(NamedTuple):
     history: tuple[SolverIteration, ...]
     own: Result
     place: int | None = None
-    ways: tuple[Way, ...] = ()
+    ways: "tuple[Way, ...]" = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -70,7 +72,7 @@ class FurtherDescents(NamedTuple):
     """
 
     minima: MultistartResult
-    ways: tuple[Way, ...]
+    ways: "tuple[Way, ...]"
     why_direct: str
 
 
@@ -223,7 +225,7 @@ def after_search(last: SolverIteration, point: SolverIteration) -> SolverIterati
     )
 
 
-def ways_of(further: FurtherDescents, descents: Descents) -> tuple[Way, ...]:
+def ways_of(further: FurtherDescents, descents: Descents) -> "tuple[Way, ...]":
     """Return what each descent began with, those from the start of the case first."""
     own: tuple[Way, ...] = ("strategy",)
     return own * len(descents.ends) + further.ways
@@ -232,7 +234,7 @@ def ways_of(further: FurtherDescents, descents: Descents) -> tuple[Way, ...]:
 def interrupted(
     descents: Descents,
     minima: MultistartResult,
-    ways: tuple[Way, ...],
+    ways: "tuple[Way, ...]",
     best: Result,
     announce: Announce,
 ) -> SearchResult:

@@ -15,7 +15,6 @@ from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
-from exfit.fitting.further_starts import further_starts
 from exfit.fitting.global_search import (
     FurtherDescents,
     SearchResult,
@@ -177,6 +176,8 @@ class CaseSearches:
 
     def further(self, earlier: Sequence[estimate.Result]) -> FurtherDescents:
         """Return the minima from further starts and of earlier descents."""
+        from exfit.fitting.further_starts import further_starts
+
         counter = SimulationCounter()  # the sub-steps are those of a coarse grid
         starts = further_starts(self.problem, self.options.starts, counter)
         minima = estimate.multistart(

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else every process compiles all of exfit
 
 from rich.console import Console
 from rich.table import Table
