@@ -8,7 +8,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.dsp.quality import quantum
+from exfit.dsp.rounding import is_coarse, noise_before_rounding, rounding_waves
 from exfit.errors import SimulationError
+from exfit.fitting.experiment import Channel
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
@@ -20,6 +23,7 @@ from exfit.inference import (
     ParameterEffect,
     PriorRow,
     ResidualBlock,
+    Rounding,
     Uncertainty,
     confidence,
     effects,
@@ -199,7 +203,7 @@ def linearisation(
         jacobian=slopes / slopes_of(residuals, theta),
         influence=influence,
         curvature=curvature,
-        channels=tuple(_channels(residuals, problem.compressed.sizes)),
+        channels=tuple(_channels(residuals, problem.compressed.sizes, errors, slopes)),
         priors=tuple(_prior_rows(residuals)),
         nuisances=tuple(parameter.name in of_record for parameter in free),
         through_zero=tuple(parameter.low < 0.0 < parameter.high for parameter in free),
@@ -211,8 +215,13 @@ def _prior_rows(residuals: Residuals) -> Iterator[PriorRow]:
         yield PriorRow(k, prior.mean, prior.std, residuals.noise)
 
 
-def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[ResidualBlock]:
-    """Yield where the errors of each channel are among those of all, and its rows."""
+def _channels(
+    residuals: Residuals, rows: Sequence[int], errors: Array, slopes: Array
+) -> Iterator[ResidualBlock]:
+    """Yield where the errors of each channel are among those (M,) of all, and its rows.
+
+    ``slopes`` (R, N) are the derivatives of the errors, in as many rows or in fewer.
+    """
     several = len(residuals.experiments) > 1
     each = [
         (experiment, channel)
@@ -220,10 +229,32 @@ def _channels(residuals: Residuals, rows: Sequence[int]) -> Iterator[ResidualBlo
         for channel in experiment.channels
     ]
     places = zip(slices(rows), slices(residuals.sizes), strict=True)
-    for (experiment, channel), (own, errors) in zip(each, places, strict=True):
+    for (experiment, channel), (own, samples) in zip(each, places, strict=True):
         label = f"{experiment.name} {channel.signal}" if several else channel.signal
         noise = None if channel.noise is None else channel.noise * channel.weight
-        yield ResidualBlock(label, own, noise, channel.weight, errors)
+        block = ResidualBlock(label, own, noise, channel.weight, samples)
+        as_many = own.stop - own.start == samples.stop - samples.start
+        of_record = any(nuisance.signal == channel.signal for nuisance in experiment.nuisances)
+        if channel.plain and as_many and not of_record:
+            block = replace(block, rounding=_rounding(channel, errors[samples], slopes[own]))
+        yield block
+
+
+def _rounding(channel: Channel, errors: Array, slopes: Array) -> Rounding | None:
+    """Return what the steps of a recorder add to the weighted errors (M,) of a channel.
+
+    ``slopes`` (M, N) are the derivatives of these. None where the steps are no larger than its
+    noise.
+    """
+    readings, errors = channel.record, errors / channel.weight
+    step = quantum(readings)
+    if step is None or not is_coarse(step, float(np.sqrt(np.mean(errors**2)))):
+        return None
+    levels = readings + errors
+    noise = noise_before_rounding(readings, levels, slopes, step)
+    waves = rounding_waves(levels, step, noise)
+    variance = (noise**2 + step**2 / 12.0) * channel.weight**2
+    return Rounding(step * channel.weight, waves * channel.weight, variance)
 
 
 def slices(sizes: Sequence[int]) -> list[slice]:

@@ -23,7 +23,7 @@ from exfit.inference.confidence import (
 )
 from exfit.inference.fixings import Fixing
 from exfit.inference.identifiability import Identifiability, identifiability
-from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock
+from exfit.inference.linear import Linearisation, PriorRow, ResidualBlock, Rounding
 from exfit.inference.noise import Noise
 from exfit.inference.sensitivity import ParameterEffect, effects
 
@@ -45,6 +45,7 @@ __all__ = [
     "ParameterEffect",
     "PriorRow",
     "ResidualBlock",
+    "Rounding",
     "SignalChange",
     "Uncertainty",
     "closed",

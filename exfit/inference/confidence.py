@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import exp, inf, isfinite
+from statistics import NormalDist
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from exfit.inference.factors import Factors, factored
 from exfit.inference.linear import Array, Linearisation
 from exfit.inference.noise import Noise, noise_of
-from exfit.inference.quantiles import student_quantile
+from exfit.inference.quantiles import student_quantile, wave_quantile
 from exfit.inference.wording import digits, error, listed
 from exfit.util.typed import IN_FILE
 
@@ -20,6 +21,8 @@ CORRELATED = 0.2  # with another parameter: left free it would widen the interva
 TIED = (
     0.99  # correlation with a parameter on a bound: what is known of one is the bound of the other
 )
+
+NORMAL = NormalDist().inv_cdf(0.5 * (1.0 + LEVEL))
 
 Interval = tuple[float | None, float | None]  # None: the record sets no limit on that side
 IntervalMethod = Literal["linear", "profile", "hull"]
@@ -108,17 +111,18 @@ def confidence(lin: Linearisation) -> Confidence:
     """
     factors = factored(lin, lin.free)
     noise = noise_of(factors)
-    relative = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
+    relative = factors.covariance(noise)
     errors = np.sqrt(np.diag(relative))
     dof = degrees_of_freedom(factors, noise)
-    t = student_quantile(dof, 0.5 * (1.0 + LEVEL))
+    quantiles = quantiles_of(factors, noise, dof)
     with np.errstate(invalid="ignore"):
         correlation = relative / np.outer(errors, errors)  # nan for errors of 0
     return Confidence(
         level=LEVEL,
         dof=dof,
         parameters={
-            name: uncertainty(factors, k, float(errors[k]), t) for k, name in enumerate(lin.names)
+            name: uncertainty(factors, k, float(errors[k]), float(quantiles[k]))
+            for k, name in enumerate(lin.names)
         },
         correlation=Correlation(lin.names, correlation),
         noise=noise,
@@ -132,27 +136,45 @@ def confidence(lin: Linearisation) -> Confidence:
 def rises(lin: Linearisation, intervals: Confidence) -> dict[str, float]:
     """Return by how much the cost rises from its minimum to the ends of each profile's interval.
 
-    Half the squared quantile of Student's t, times the variance of the parameter over that by the
+    Half the squared quantile of its error, times the variance of the parameter over that by the
     cost alone, the inverse of its second derivatives (Royall & Tsou 2003). With one channel and
     least squares the ratio is the variance of the weighted errors, widened where they are not
     white (Bates & Watts 1988, section 6.1). A parameter on a bound is let go for it; what has no
     variance then takes the mean of the channels by their samples.
     """
-    half = 0.5 * student_quantile(intervals.dof, 0.5 * (1.0 + LEVEL)) ** 2
-    spreads = tuple(channel_noise.spread for channel_noise in intervals.noise)
-    ratios = _variance_ratios(factored(lin, lin.free), spreads)
+    noise, factors = intervals.noise, factored(lin, lin.free)
+    half = 0.5 * quantiles_of(factors, noise, intervals.dof) ** 2
+    ratios = _variance_ratios(factors, noise)
     for k in np.flatnonzero(~lin.free):
         let_go = lin.free.copy()
         let_go[k] = True
-        ratios[k] = _variance_ratios(factored(lin, let_go), spreads)[k]
+        ratios[k] = _variance_ratios(factored(lin, let_go), noise)[k]
     ratios = np.where(np.isfinite(ratios), ratios, intervals.variance)
     return dict(zip(lin.names, (half * ratios).tolist(), strict=True))
 
 
-def _variance_ratios(factors: Factors, spreads: tuple[float, ...]) -> Array:
+def quantiles_of(factors: Factors, noise: tuple[Noise, ...], dof: float) -> Array:
+    """Return half of each interval in standard errors (N,): the quantile of Student's t.
+
+    Less where the errors of a recorder's rounding dominate: they are bounded. There it is that of a
+    normal error and of waves of one phase, which may be any, over that of a normal error alone.
+    """
+    t = student_quantile(dof, 0.5 * (1.0 + LEVEL))
+    quantiles = np.full(len(factors.lin.names), t)
+    errors = factors.rounding_errors(noise)
+    if errors is None:
+        return quantiles
+    normal, waves = errors
+    total = np.sqrt(normal**2 + np.sum(waves**2, axis=1))
+    for k in np.flatnonzero(np.isfinite(total) & (total > 0.0)):
+        quantiles[k] *= wave_quantile(normal[k] / total[k], waves[k] / total[k], LEVEL) / NORMAL
+    return quantiles
+
+
+def _variance_ratios(factors: Factors, noise: tuple[Noise, ...]) -> Array:
     """Return the variances (N,) over those by the cost alone, nan where there are none."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = np.diag(factors.covariance(spreads)) / np.diag(factors.inverse)
+        ratios = np.diag(factors.covariance(noise)) / np.diag(factors.inverse)
     return np.asarray(ratios)
 
 
@@ -168,7 +190,7 @@ def partners_on_bounds(
     if not held.any():
         return {}
     factors = factored(lin, np.ones_like(held))
-    covariance = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
+    covariance = factors.covariance(noise)
     errors = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         partners = np.abs(covariance / np.outer(errors, errors)) > least
@@ -191,7 +213,7 @@ def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
 def uncertainty(factors: Factors, k: int, share: float, t: float) -> Uncertainty:
     """Return what is known of parameter k.
 
-    ``share``: its standard error, of 100 %; ``t``: half an interval in standard errors.
+    ``share``: its standard error, of 100 %; ``t``: half of its interval in standard errors.
     """
     lin = factors.lin
     why = reason(factors, k, share)

@@ -1,11 +1,16 @@
 """The normal equations of a fit, factored: what it determines, and what it cannot distinguish."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exfit.inference.linear import Array, Linearisation, Mask
+from exfit.inference.linear import Array, Linearisation, Mask, ResidualBlock
+
+if TYPE_CHECKING:
+    from exfit.inference.noise import Noise
 
 EXACTLY_REDUNDANT = 1e-9  # of the largest singular value: rounding, not a weak influence
 NO_EFFECT = 1e-12  # of the largest column: rounding
@@ -41,18 +46,58 @@ class Factors:
         determined[self.has_effect] = ~self.joined.any(axis=0)
         return determined
 
-    def covariance(self, noise: tuple[float, ...]) -> Array:
+    def covariance(self, noise: Sequence["Noise"]) -> Array:
         """Return the covariance of relative changes (N, N), nan where nothing is determined.
 
-        noise: the standard deviation of the weighted errors of each channel. It is A^-1 B A^-1,
-        A = sum of w J'J over the channels, w the mean psi', and B = sum of (noise w)^2 J'J (Huber
-        1981, section 7.6; White 1980); a prior adds its own row to both. For one channel without
-        priors it is noise^2 (J'J)^-1.
+        It is A^-1 B A^-1, A = sum of w J'J over the channels, w the mean psi', and B = sum of
+        w^2 J'CJ, C the covariance of the weighted errors (Huber 1981, section 7.6; White 1980); a
+        prior adds its own row to both. C is the variance of a channel, widened where its errors are
+        not white; for one channel without priors it is noise^2 (J'J)^-1 then.
+        """
+        lin, rows = self.lin, len(self.lin.jacobian)
+        pairs = zip(lin.channels, noise, strict=True)
+        blocks = [self._errors_seen(channel, channel_noise) for channel, channel_noise in pairs]
+        priors = self.left[rows : rows + len(lin.priors)].T * lin.prior_noise
+        return self.of_all(self.spread @ np.hstack([*blocks, priors]))
+
+    def _errors_seen(self, channel: ResidualBlock, noise: "Noise") -> Array:
+        """Return (r, K) so that its square is what B has of a channel, in the directions left.
+
+        Where the recorder rounds coarsely C is the larger of the widened variance and that with the
+        covariance of the rounding, whose waves come last.
+        """
+        own = np.asarray(self.left[channel.rows].T * np.sqrt(self.lin.mean_curvature(channel)))
+        widened = np.asarray(noise.spread * own)
+        if channel.rounding is None:
+            return widened
+        waves = channel.rounding.waves
+        variance = max(noise.std**2, channel.rounding.variance)
+        white = max(variance - float(np.mean(np.sum(waves**2, axis=1))), 0.0)
+        rounded = np.hstack([np.sqrt(white) * own, own @ waves])
+        return max(widened, rounded, key=lambda errors: float(np.sum(errors**2)))
+
+    def rounding_errors(self, noise: Sequence["Noise"]) -> tuple[Array, Array] | None:
+        """Return how the errors of a recorder's rounding spread relative changes.
+
+        That is the standard deviation (N,) of all other errors, which are normal, and the waves
+        (N, 2 K) that rounding adds; None unless the covariance of one channel is by its rounding.
         """
         lin = self.lin
-        curvature = lin.by_row([lin.mean_curvature(channel) for channel in lin.channels])
-        rows = np.append(lin.by_row(noise) * np.sqrt(curvature), lin.prior_noise)
-        return self.of_all(self.spread @ (self.left[: len(rows)] * rows[:, None]).T)
+        waves = [0 if c.rounding is None else c.rounding.waves.shape[1] for c in lin.channels]
+        pairs = zip(lin.channels, noise, strict=True)
+        blocks = [self._errors_seen(channel, each) for channel, each in pairs]
+        rounded = [
+            k
+            for k, (block, count) in enumerate(zip(blocks, waves, strict=True))
+            if count and block.shape[1] > len(lin.errors[lin.channels[k].samples])
+        ]
+        if len(rounded) != 1:
+            return None
+        count = waves[rounded[0]]
+        amplitudes = np.zeros((len(lin.names), count))
+        amplitudes[self.has_effect] = self.spread @ blocks[rounded[0]][:, -count:]
+        variance = np.diag(self.covariance(noise)) - np.sum(amplitudes**2, axis=1)
+        return np.sqrt(np.maximum(variance, 0.0)), amplitudes
 
     @property
     def inverse(self) -> Array:

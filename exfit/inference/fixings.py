@@ -64,7 +64,7 @@ def fixings(factors: Factors, noise: Sequence[Noise]) -> Iterator[Fixing]:
 
 def errors_of(factors: Factors, noise: Sequence[Noise]) -> Array:
     """Return the relative standard errors of the parameters (N,), infinite if not determined."""
-    covariance = factors.covariance(tuple(channel_noise.spread for channel_noise in noise))
+    covariance = factors.covariance(noise)
     return np.where(factors.determined, np.sqrt(np.diag(covariance)), inf)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,19 @@ OF_EACH_PARAMETER = (
 LEAST_CURVATURE = 1e-3  # of least squares: a loss that takes nearly every sample for an outlier
 
 
+class Rounding(NamedTuple):
+    """What a recorder that rounds to a ``step`` adds to the weighted errors of a channel.
+
+    ``waves`` (samples, 2 K): waves waves' is the covariance of what is the same again where the
+    signal stays at one level, cosines first, then sines; it is part of the ``variance`` of the
+    errors, noise and rounding.
+    """
+
+    step: float
+    waves: Array
+    variance: float
+
+
 @dataclass(frozen=True, eq=False)
 class ResidualBlock:
     """The errors of one signal in one record, on one clock, in the order of time.
@@ -32,6 +46,7 @@ class ResidualBlock:
     noise   standard deviation of its weighted errors as the user gave it
     weight  of its errors: weighted error = weight * (simulated - measured)
     errors  which of the errors, contiguous, where they are more than the rows
+    rounding  of a recorder whose steps are larger than its noise, with as many rows as errors
     """
 
     label: str
@@ -39,6 +54,7 @@ class ResidualBlock:
     noise: float | None = None
     weight: float = 1.0
     errors: slice | None = None
+    rounding: Rounding | None = None
 
     @property
     def samples(self) -> slice:

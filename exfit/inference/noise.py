@@ -1,9 +1,9 @@
 """The noise of each channel of a fit: how large, and how much of it is the same again."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import nan, sqrt
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from exfit.inference.wording import digits
 SURPRISING = 0.01  # of tests of what is true reject it
 LAGS = 20  # the most that a test of whiteness takes (Box, Jenkins & Reinsel 1994, section 8.2.2)
 SAMPLES_PER_LAG = 5
+SEEN = 1e-6  # of the largest: what a channel sees less of a direction is rounding
 LEAST_P = 1e-10  # a probability below it is not worth its digits
 
 
@@ -29,6 +30,7 @@ class Noise:
     p_value    of the test of whiteness; None if there are too few samples, or no errors at all
     effective  how many independent samples they are worth
     inflation  samples / effective: the factor on the variance
+    rounding   step of a recorder that rounds more coarsely than its noise; 0 for any other
     """
 
     label: str
@@ -40,6 +42,7 @@ class Noise:
     p_value: float | None
     effective: Annotated[float, nan]
     inflation: Annotated[float, nan]
+    rounding: float = 0.0
 
     @property
     def spread(self) -> float:
@@ -53,6 +56,11 @@ class Noise:
             yield (
                 f"the residuals of {self.label} are {digits(self.estimated / self.given)} times "
                 f"the noise given: {used} counts"
+            )
+        if self.rounding:
+            yield (
+                f"the recorder rounds {self.label} to {digits(self.rounding)} pu, more than its "
+                "noise: samples at one level have the same error, and the intervals allow for it"
             )
         if self.p_value is not None and self.p_value < SURPRISING:
             p = f"p {digits(self.p_value)}" if self.p_value > LEAST_P else f"p below {LEAST_P:.0e}"
@@ -78,12 +86,75 @@ def noise_of(factors: Factors) -> tuple[Noise, ...]:
     """
     lin = factors.lin
     share = 1.0 - factors.leverage / max(len(lin.errors), 1)
-    return tuple(_noise(factors, channel, share) for channel in lin.channels)
+    whole = tuple(
+        _noise(factors, channel, lin.influence[channel.samples], share) for channel in lin.channels
+    )
+    if len(whole) == 1 or np.any(lin.curvature != 1.0) or len(lin.errors) != len(lin.jacobian):
+        return whole
+    fits = [own_fit(factors, channel) for channel in lin.channels]
+    own = tuple(
+        _noise(factors, channel, fit.left_over, 1.0 - len(fit.amounts) / len(fit.left_over))
+        for channel, fit in zip(lin.channels, fits, strict=True)
+    )
+    return tuple(
+        by_own_fit if is_explained(factors, fit, k, own) else by_all
+        for k, (by_own_fit, by_all, fit) in enumerate(zip(own, whole, fits, strict=True))
+    )
 
 
-def _noise(factors: Factors, channel: ResidualBlock, share: float) -> Noise:
+class OwnFit(NamedTuple):
+    """What the errors (M,) of one channel would be, had the parameters been fitted to it alone.
+
+    left_over  of its errors (M,)
+    amounts    (K,) of what a fit to all channels left to be fitted to this one
+    seen       (K, r) how the channel sees the directions of `Factors.left`, in these K of its own
+    """
+
+    left_over: Array
+    amounts: Array
+    seen: Array
+
+
+def own_fit(factors: Factors, channel: ResidualBlock) -> OwnFit:
+    """Return what a change of the parameters explains of the errors of one channel.
+
+    An error of the parameters that another channel caused, by its larger noise, is no noise of
+    this one.
+    """
+    errors = factors.lin.errors[channel.samples]
+    basis, singular, directions = np.linalg.svd(factors.left[channel.rows], full_matrices=False)
+    some = singular > SEEN * np.max(singular, initial=0.0)
+    if 2 * np.count_nonzero(some) > len(errors):
+        some[:] = False
+    basis, seen = basis[:, some], singular[some, None] * directions[some]
+    amounts = basis.T @ errors
+    return OwnFit(errors - basis @ amounts, amounts, seen)
+
+
+def is_explained(factors: Factors, fit: OwnFit, place: int, noise: Sequence[Noise]) -> bool:
+    """Return whether the noise of all channels explains what one left to be fitted.
+
+    By a chi-square test at 1 %. Where it does not, as where the model cannot match two channels at
+    once, that is an error like any other.
+    """
     lin = factors.lin
-    influence = lin.influence[channel.samples]
+    lefts = [factors.left[channel.rows] for channel in lin.channels]
+    pairs = zip(lefts, noise, strict=True)
+    moves = np.sum([each.spread**2 * (left.T @ left) for left, each in pairs], axis=0)
+    variance = noise[place].spread ** 2
+    seen = fit.seen
+    covariance = variance * (np.eye(len(seen)) - 2.0 * seen @ seen.T) + seen @ moves @ seen.T
+    values, vectors = np.linalg.eigh(covariance)
+    some = values > SEEN * variance
+    if not some.any():
+        return True
+    amounts = vectors[:, some].T @ fit.amounts
+    tail = chi_square_tail(float(np.sum(amounts**2 / values[some])), int(np.count_nonzero(some)))
+    return tail >= SURPRISING
+
+
+def _noise(factors: Factors, channel: ResidualBlock, influence: Array, share: float) -> Noise:
+    lin = factors.lin
     samples = len(influence)
     # a share of the order of rounding: as many parameters as samples
     dof = samples * share if share > samples * np.finfo(float).eps else 0.0
@@ -103,6 +174,7 @@ def _noise(factors: Factors, channel: ResidualBlock, share: float) -> Noise:
         p_value=p_value,
         effective=effective,
         inflation=samples / effective,
+        rounding=0.0 if channel.rounding is None else channel.rounding.step / channel.weight,
     )
 
 

@@ -9,6 +9,7 @@ from exfit.inference.linear import Array
 
 NODES = 40  # of the quadrature: it is exact to rounding
 NEWTON_ROUNDING = 1e-14  # of the angle: a smaller step changes no digit
+PHASES, LEAST_NORMAL, BISECTED = 90, 1e-3, 1e-3  # of a wave; of its unit; and of the quantile
 LARGE = 50.0  # from here on the series of the gamma functions' ratio has all digits
 
 
@@ -50,6 +51,25 @@ def student_quantile(dof: float, probability: float) -> float:
         step = (probability - reached) / float(density(np.array(angle)))
         angle += step
     return sqrt(dof) * tan(angle)
+
+
+def wave_quantile(normal: float, waves: Array, level: float) -> float:
+    """Return what the size of a normal error and a wave of any phase stays below, at a level.
+
+    ``normal`` is the standard deviation of the first; ``waves`` (2 K,) are the amplitudes of the
+    cosines and sines of the phase and its multiples, over the root of 2.
+    """
+    cosines, sines = np.split(waves, 2)
+    phases = np.linspace(0.0, 2.0 * pi, PHASES, endpoint=False)[:, None] * np.arange(
+        1, len(cosines) + 1
+    )
+    wave = sqrt(2.0) * (np.cos(phases) @ sines - np.sin(phases) @ cosines)
+    law, low, high = NormalDist(0.0, max(normal, LEAST_NORMAL)), 0.0, 6.0
+    while high - low > BISECTED:
+        size = 0.5 * (low + high)
+        below = np.mean([law.cdf(size - w) - law.cdf(-size - w) for w in wave.tolist()])
+        low, high = (size, high) if below < level else (low, size)
+    return high
 
 
 def quadrature() -> tuple[Array, Array]:

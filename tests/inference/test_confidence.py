@@ -11,7 +11,8 @@ from scipy.optimize import curve_fit, least_squares
 from scipy.stats import chi2, kstest
 from scipy.stats import t as student
 
-from exfit.inference import PriorRow, ResidualBlock, confidence, partners_on_bounds, rises
+from exfit.dsp.rounding import noise_before_rounding, rounding_waves
+from exfit.inference import PriorRow, ResidualBlock, Rounding, confidence, partners_on_bounds, rises
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 from exfit.util import typed
 
@@ -512,3 +513,56 @@ def test_a_value_that_the_bounds_keep_from_zero_is_its_own_measure(through_zero)
         assert parameter.why == (
             f"is not determined by the record: standard error {share:.0f} %; see `exfit profile`"
         )
+
+
+def test_the_interval_holds_the_truth_as_often_where_the_recorder_rounds_coarsely():
+    """The signal settles within a step of the recorder: one error of its rounding counts most."""
+    rng, step, noise, covered, plain = np.random.default_rng(23), 0.5, 0.1, [], []
+    rows = np.column_stack([np.ones_like(T), np.exp(-8.0 * T)])
+    for _ in range(PROBLEMS):
+        zero = step * rng.uniform()
+        samples = rows @ TRUTH + noise * rng.standard_normal(len(T))
+        readings = zero + step * np.round((samples - zero) / step)
+        fitted = np.linalg.lstsq(rows, readings)[0]
+        levels = rows @ fitted
+        waves = rounding_waves(levels, step, noise_before_rounding(readings, levels, rows, step))
+        rounding = Rounding(step, waves, noise**2 + step**2 / 12.0)
+        channel = ResidualBlock("vt", slice(0, len(T)), rounding=rounding)
+        known = confidence(linearised(fitted, levels - readings, rows, channels=(channel,)))
+        covered.append(is_covered(known))
+        plain.append(is_covered(confidence(linearised(fitted, levels - readings, rows))))
+    share = np.mean(covered, axis=0)
+    assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
+    assert np.mean(plain, axis=0)[0] < 0.7
+    assert "the recorder rounds vt to 0.5 pu, more than its noise" in known.sentences[0]
+
+
+def two_channels(noise, conflict=0.0):
+    """Return the linearised fit of a line, seen by two channels, to their noise (2, M)."""
+    rows = np.vstack([LINE, LINE])
+    truth = np.append(LINE @ TRUTH, LINE @ (TRUTH + conflict)) + noise.ravel()
+    fitted = np.linalg.lstsq(rows, truth)[0]
+    samples = len(T)
+    both = (
+        ResidualBlock("vt", slice(0, samples)),
+        ResidualBlock("efd", slice(samples, 2 * samples)),
+    )
+    return linearised(fitted, rows @ fitted - truth, rows, channels=both)
+
+
+def test_an_error_that_another_channel_causes_is_no_noise_of_a_fine_one():
+    rng = np.random.default_rng(24)
+    noise = rng.standard_normal((PROBLEMS, 2, len(T))) * np.array([0.01, 1.0])[:, None]
+    known = [confidence(two_channels(errors)) for errors in noise]
+    fine = [each.noise[0].std for each in known]
+    assert np.median(fine) == pytest.approx(0.01, rel=0.02)
+    # the test at 1 % takes some for a conflict of the channels
+    assert np.mean([each.noise[0].inflation > 1.0 for each in known]) < 0.04
+    share = np.mean([is_covered(each) for each in known], axis=0)
+    assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
+
+
+def test_what_two_channels_contradict_each_other_in_is_noise_of_both():
+    noise = np.random.default_rng(25).standard_normal((2, len(T))) * np.array([[0.01], [0.1]])
+    known = confidence(two_channels(noise, conflict=0.2))
+    assert known.noise[0].inflation > 20.0
