@@ -1,7 +1,8 @@
 """What an engineer reads off a step response: rise, overshoot, peak, settling, final value."""
 
-from dataclasses import dataclass
-from math import nan
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isnan, nan
 from typing import Annotated
 
 import numpy as np
@@ -22,13 +23,16 @@ LABELS = (
     ("peak time", "peak_time", "s"),
     ("settling time 2 %", "settling_time", "s"),
 )  # of the features, with name and unit
+TIMES = ("rise_time", "peak_time", "settling_time")  # those that may be missing
 
 
 @dataclass(frozen=True)
 class Features:
     """Features of the response to one step: voltages per unit, times in s after the step.
 
-    A time that the record is too short to show is None.
+    A time that the record is too short to show is None. Of a noisy record ``errors`` holds by how
+    much a feature may be off, half of its 95 % interval, and ``why`` the reason where the noise
+    hides it.
     """
 
     initial_value: Annotated[float, nan]
@@ -37,6 +41,8 @@ class Features:
     overshoot_percent: Annotated[float, nan]
     peak_time: float | None
     settling_time: float | None
+    errors: Mapping[str, float] = field(default_factory=dict)
+    why: Mapping[str, str] = field(default_factory=dict)
 
 
 def features(time: Array, signal: Array, step_at: float, until: float) -> Features | None:
@@ -51,39 +57,94 @@ def features(time: Array, signal: Array, step_at: float, until: float) -> Featur
     if len(t) < 2:
         return None
     before = signal[time < step_at]
-    initial = float(np.mean(before)) if len(before) else float(y[0])
+    return features_after(t, y, float(np.mean(before)) if len(before) else float(y[0]))
+
+
+def features_after(t: Array, y: Array, initial: float) -> Features | None:
+    """Return the features of a response (M,) at times t (M,) after its step, from a level."""
+    figures = {
+        name: float(value) for name, (value,) in figures_of(t, y[None], np.array([initial])).items()
+    }
+    if isnan(figures["overshoot_percent"]):
+        return None
+    times = {name: None if isnan(figures[name]) else figures[name] for name in TIMES}
+    return Features(**{**figures, **times})  # type: ignore[arg-type]
+
+
+def figures_of(t: Array, curves: Array, initial: Array) -> dict[str, Array]:
+    """Return the features (K,) of responses (K, M) at times t (M,), from levels (K,), by name.
+
+    A time that is not shown is nan; so is all else of a response that goes nowhere.
+    """
     tail = t >= t[-1] - TAIL * (t[-1] - t[0])
-    final = float(np.mean(y[tail]))
-    if final == initial:
-        return None
-    way = (y - initial) / (final - initial)
-    peak = int(np.argmax(way))
+    final = curves[:, tail].mean(axis=1)
+    with np.errstate(all="ignore"):
+        way = (curves - initial[:, None]) / (final - initial)[:, None]
+    way[final == initial] = np.nan
+    begin, end = (_first_crossings(t, way, level) for level in RISE_LEVELS)
+    peak = np.argmax(way, axis=1)
+    at, height = _vertices(t, way, peak)
     # a response that still rises at the end passes the mean of its tail without any overshoot
-    overshoots = bool(way[peak] > 1.0 and not tail[peak])
-    begin, end = (_first_crossing(t, way, level) for level in RISE_LEVELS)
-    return Features(
-        initial_value=initial,
-        final_value=final,
-        rise_time=None if begin is None or end is None else end - begin,
-        overshoot_percent=100.0 * float(way[peak] - 1.0) if overshoots else 0.0,
-        peak_time=float(t[peak]) if overshoots else None,
-        settling_time=_settled(t, way),
-    )
+    overshoots = (height > 1.0) & ~tail[peak]
+    overshoot = np.where(overshoots, 100.0 * (height - 1.0), 0.0)
+    return {
+        "initial_value": initial,
+        "final_value": final,
+        "rise_time": end - begin,
+        "overshoot_percent": np.where(final == initial, np.nan, overshoot),
+        "peak_time": np.where(overshoots, at, np.nan),
+        "settling_time": _settled(t, way),
+    }
 
 
-def _first_crossing(t: Array, way: Array, level: float) -> float | None:
-    above = np.flatnonzero(way >= level)
-    if not len(above):
-        return None
-    k = int(above[0])
-    if k == 0:
-        return float(t[0])
-    return float(np.interp(level, way[k - 1 : k + 1], t[k - 1 : k + 1]))
+def _first_crossings(t: Array, way: Array, level: float) -> Array:
+    """Return when each response (K, M) first reaches a level, nan where it never does."""
+    above = way >= level
+    k, row = np.argmax(above, axis=1), np.arange(len(way))
+    before = np.maximum(k - 1, 0)
+    crossing = _between(t, way, row, before, k, np.full(len(way), level))
+    return np.where(above[row, k], np.where(k == 0, t[0], crossing), np.nan)
 
 
-def _settled(t: Array, way: Array) -> float | None:
-    outside = np.flatnonzero(np.abs(way - 1.0) > BAND)
-    if not len(outside):
-        return float(t[0])
-    k = int(outside[-1])
-    return None if k == len(t) - 1 else float(t[k + 1])
+def _settled(t: Array, way: Array) -> Array:
+    """Return when each response (K, M) is last outside its band, nan where it ends there."""
+    outside = np.abs(way - 1.0) > BAND
+    last, row = len(t) - 1 - np.argmax(outside[:, ::-1], axis=1), np.arange(len(way))
+    after = np.minimum(last + 1, len(t) - 1)
+    edge = np.where(way[row, last] > 1.0, 1.0 + BAND, 1.0 - BAND)
+    entered = np.where(last == len(t) - 1, np.nan, _between(t, way, row, last, after, edge))
+    return np.where(outside.any(axis=1), entered, t[0])
+
+
+def _between(
+    t: Array,
+    way: Array,
+    row: NDArray[np.intp],
+    before: NDArray[np.intp],
+    after: NDArray[np.intp],
+    level: Array,
+) -> Array:
+    """Return when the line through two samples of each response passes a level."""
+    low, high = way[row, before], way[row, after]
+    with np.errstate(all="ignore"):
+        share = np.clip((level - low) / (high - low), 0.0, 1.0)
+    share = np.where(high == low, 1.0, share)
+    return np.asarray(t[before] + share * (t[after] - t[before]))
+
+
+def _vertices(t: Array, way: Array, peak: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return time and height of the parabola through the highest sample and its neighbours."""
+    row, count = np.arange(len(way)), len(t)
+    inner = (peak > 0) & (peak < count - 1)
+    middle = np.clip(peak, 1, max(count - 2, 1)) if count > 2 else peak
+    if count < 3:
+        return t[peak], way[row, peak]
+    before, after = t[middle] - t[middle - 1], t[middle + 1] - t[middle]
+    rise = (way[row, middle] - way[row, middle - 1]) / before
+    fall = (way[row, middle + 1] - way[row, middle]) / after
+    bend = (fall - rise) / (before + after)
+    slope = (rise * after + fall * before) / (before + after)
+    with np.errstate(all="ignore"):
+        shift = np.where(inner & (bend < 0.0), -0.5 * slope / bend, 0.0)
+    height = way[row, peak] + np.where(inner, 0.5 * slope * shift, 0.0)
+    return t[peak] + shift, height

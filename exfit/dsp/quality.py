@@ -58,7 +58,7 @@ def _are_alone(samples: Array, outlying: Places, largest_change: float) -> bool:
     for run in np.split(outlying, np.flatnonzero(np.diff(outlying) > 1) + 1):
         before = samples[max(run[0] - LEVEL_SAMPLES, 0) : run[0]]
         after = samples[run[-1] + 1 : run[-1] + 1 + LEVEL_SAMPLES]
-        change = abs(float(np.median(after) - np.median(before)))
+        change = abs(float(median(after) - median(before)))
         if len(run) > LONGEST_SPIKE or change > largest_change:
             return False
     return True

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import Features, features
+from exfit.dsp.recorded_features import RecordedResponse, recorded_features
 from exfit.fitting.setup import ExperimentSetup, compared
 from exfit.results.comparisons import (
     Comparison,
@@ -53,8 +54,8 @@ def compare_with_record(
         accepted=True,
         channels=channels,
         features=StepFeatures(
-            measured=None if vt is None else _features(setup, vt.measured, at),
-            simulated=None if vt is None else _features(setup, vt.simulated, at),
+            measured=None if vt is None else _measured_features(setup, vt, at),
+            simulated=None if vt is None else _simulated_features(setup, vt, at),
         ),
         of_record={} if of_record is None else of_record,
         sha256=setup.record.sha256,
@@ -74,17 +75,32 @@ def _reference(setup: ExperimentSetup, values: Values, vt0: float) -> Array | No
     return vt0 + simulator.input("vref")
 
 
-def _features(setup: ExperimentSetup, signal: Array, values: Values) -> Features | None:
-    """Return the features of the first move of the reference that the record holds."""
-    kept = np.isfinite(signal)
+def _measured_features(setup: ExperimentSetup, vt: Overlay, values: Values) -> Features | None:
+    """Return the features of the record, with the error that its noise leaves them."""
+    kept = np.isfinite(vt.measured) & np.isfinite(vt.simulated)
     time = setup.record.time[kept]
+    window = _first_move(setup, time, values)
+    if window is None:
+        return None
+    return recorded_features(RecordedResponse(time, vt.measured[kept], vt.simulated[kept], *window))
+
+
+def _simulated_features(setup: ExperimentSetup, vt: Overlay, values: Values) -> Features | None:
+    """Return the features of the response."""
+    kept = np.isfinite(vt.simulated)
+    time = setup.record.time[kept]
+    window = _first_move(setup, time, values)
+    return None if window is None else features(time, vt.simulated[kept], *window)
+
+
+def _first_move(setup: ExperimentSetup, time: Array, values: Values) -> tuple[float, float] | None:
+    """Return when the reference first moves in the record, and until when it then stays, s."""
     inside = [change for change in _changes(setup, values) if change.at >= time[0]]
     if not inside or inside[0].signal != "vref":
         return None
     first = Inputs(float(time[0]), float(time[-1]), tuple(inside)).moves("vref")[0]
     later = [change.at for change in inside if change.at > first.end]
-    until = later[0] if later else float(time[-1])
-    return features(time, signal[kept], inside[0].at, until)
+    return inside[0].at, later[0] if later else float(time[-1])
 
 
 def _changes(setup: ExperimentSetup, values: Values) -> list[InputStep]:

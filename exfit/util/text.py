@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping
-from math import isfinite
+from math import floor, isfinite, log10
 from types import NoneType
 from typing import Any
 
@@ -57,6 +57,10 @@ def yaml_number(value: float) -> str:
     return f"{mantissa}{'' if '.' in mantissa else '.0'}{e}{exponent}"
 
 
+DIGITS = 5  # of a number without an error
+DIGITS_OF_ERROR = 2  # that a number is printed to
+MOST_DIGITS = 7  # of a number whose error is as good as none
+MOST_DECIMALS = 7  # of a number: a smaller one has an exponent
 LONGEST_VALUE = 60  # characters of a wrong value
 
 
@@ -78,6 +82,24 @@ def dotted(place: Place) -> str:
 def show(value: float) -> str:
     """Return a number in as few digits as identify it."""
     return f"{value:.12g}"
+
+
+def rounded(value: float | None, error: float | None = None) -> str:
+    """Return a number in the digits that its standard error allows, a dash for None.
+
+    They are those of the error's first two; without an error they are five.
+    """
+    if value is None:
+        return "-"
+    if error is None or not isfinite(error) or error <= 0.0 or not isfinite(value):
+        return f"{value:.{DIGITS}g}"
+    decimals = DIGITS_OF_ERROR - 1 - floor(log10(error))
+    if value != 0.0:
+        decimals = min(decimals, MOST_DIGITS - 1 - floor(log10(abs(value))))
+    if decimals > MOST_DECIMALS:
+        digits = max(decimals + floor(log10(abs(value))), 0) if value else 0
+        return f"{value:.{digits}e}"
+    return f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
 
 
 def show_value(value: Any) -> str:

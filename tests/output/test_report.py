@@ -25,6 +25,7 @@ from exfit.output.report.charts import Axis, Chart, Panel, Series, drawing, tick
 from exfit.output.report.sections.matches import fitted_matches, live_data
 from exfit.output.report.verdict import verdict
 from exfit.results.io import load_result, result_file
+from exfit.util.text import rounded
 
 MOST = 3_000_000  # bytes of a page
 ABOUT = {"Plant": "Höllental", "Unit": 2, "Rated": "120 MVA, 13.8 kV", "Tested by": "A & B"}
@@ -200,7 +201,9 @@ def test_every_signal_of_every_record_is_drawn_with_its_error(fits, pages, name)
         for signal in one["channels"].values():
             assert f"rmse {signal['rmse']:.3g} pu" in page.text
         if one["features"]["measured"]:
-            told = f"{one['features']['measured']['final_value']:.5g}"
+            measured = one["features"]["measured"]
+            error = measured["errors"].get("final_value")
+            told = rounded(measured["final_value"], error)
             rows = page.tables[f"{one['name']}: features of the first step of the reference, in vt"]
             assert ["final value", told] in [row[:2] for row in rows]
     data = json.loads(page.scripts[0])

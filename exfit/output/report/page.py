@@ -15,6 +15,7 @@ from exfit.output.report.charts import drawing
 from exfit.output.report.sections import SECTIONS
 from exfit.output.report.sections.matches import MatchView, OverlayChart, live_data
 from exfit.output.report.verdict import verdict
+from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
 
 if TYPE_CHECKING:
@@ -87,7 +88,8 @@ def _environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": _number, "drawing": drawing, "command": shlex.join}
+    environment.filters |= {"number": _number, "feature_cells": feature_cells}
+    environment.filters |= {"drawing": drawing, "command": shlex.join}
     environment.tests |= {"finite": _is_finite}
     environment.globals |= {"version": __version__, "features": LABELS, "long": LONG}
     return environment

@@ -5,24 +5,29 @@ from collections.abc import Iterable, Iterator, Sequence
 from rich.console import Console
 from rich.table import Table
 
-from exfit.dsp.features import LABELS, Features
-from exfit.output.terminal.terminal import number, plain_table, remarks
+from exfit.dsp.features import LABELS
+from exfit.output.terminal.terminal import plain_table, remarks
 from exfit.results.comparisons import Comparison
+from exfit.results.feature_digits import feature_cells
 
 BETWEEN_COLUMNS = 2  # characters
+FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interval
+WIDEST_NUMBER = 8  # characters
 LABEL_WIDTH = 25  # characters that the names and units of the features take
 
 
 def comparisons(console: Console, all_of_them: Sequence[Comparison]) -> None:
     """Show records side by side: how well each is met, and its step measured beside simulated."""
-    for beside in _beside_each_other(console, all_of_them):
+    for beside in _beside_each_other(console, all_of_them, ("simulated",)):
         console.print()
         console.print(_error_table(beside))
-        if any(
-            comparison.features.measured or comparison.features.simulated for comparison in beside
-        ):
-            console.print()
-            console.print(_feature_table(beside))
+    stepped = [
+        match for match in all_of_them if match.features.measured or match.features.simulated
+    ]
+    for beside in _beside_each_other(console, stepped, FEATURE_COLUMNS):
+        console.print()
+        console.print(_feature_table(beside))
+        remarks(console, "-", _hidden(beside), "dim")
 
 
 def rejections(console: Console, all_of_them: Iterable[Comparison]) -> None:
@@ -44,11 +49,12 @@ def validation(console: Console, all_of_them: Sequence[Comparison]) -> None:
 
 
 def _beside_each_other(
-    console: Console, comparisons: Sequence[Comparison]
+    console: Console, comparisons: Sequence[Comparison], columns: Sequence[str]
 ) -> Iterator[Sequence[Comparison]]:
-    """Yield as many comparisons at a time as the terminal has room for."""
-    widest = max(len(heading) for match in comparisons for heading in (match.name, "simulated"))
-    count = max(1, (console.width - LABEL_WIDTH) // (2 * (widest + BETWEEN_COLUMNS)))
+    """Yield as many comparisons at a time as there is room for, each with these columns."""
+    names = [len(comparison.name) for comparison in comparisons]
+    own = sum(max(WIDEST_NUMBER, len(column), *names) + BETWEEN_COLUMNS for column in columns)
+    count = max(1, (console.width - LABEL_WIDTH) // own) if names else 1
     for first in range(0, len(comparisons), count):
         yield comparisons[first : first + count]
 
@@ -79,18 +85,22 @@ def _rmse(comparison: Comparison, signal: str) -> str:
 
 
 def _feature_table(comparisons: Sequence[Comparison]) -> Table:
-    names = [comparison.name for comparison in comparisons]
-    headings = [f"{name}\n{kind}" for name in names for kind in ("measured", "simulated")]
+    headings = [
+        f"{comparison.name}\n{kind}" for comparison in comparisons for kind in FEATURE_COLUMNS
+    ]
     table = _folding(plain_table("step of vt", "unit", *headings, numbers=headings))
     for label, key, unit in LABELS:
         cells = [
-            _feature(features, key)
-            for comparison in comparisons
-            for features in (comparison.features.measured, comparison.features.simulated)
+            cell for comparison in comparisons for cell in feature_cells(comparison.features, key)
         ]
         table.add_row(label, unit, *cells)
     return table
 
 
-def _feature(features: Features | None, key: str) -> str:
-    return "-" if features is None else number(getattr(features, key))
+def _hidden(comparisons: Iterable[Comparison]) -> Iterator[str]:
+    """Yield which features of the records are missing, and why."""
+    for comparison in comparisons:
+        measured = comparison.features.measured
+        for label, key, _ in LABELS if measured is not None else ():
+            if measured is not None and key in measured.why:
+                yield f"{comparison.name}: {label}: {measured.why[key]}"
