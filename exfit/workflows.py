@@ -128,7 +128,8 @@ def fit(
     comparisons = comparisons_of(fine, residuals, values, history)
     analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
     minima = minima_of(residuals, found, analysis.uncertainty)
-    verdict = verdict_of(evidence_of(case, residuals, best, fine, comparisons, analysis))
+    interrupted = analysis.interrupted or found.interrupted
+    evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted)
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
     return FitResult(
@@ -153,7 +154,7 @@ def fit(
         status=best.status,
         message=best.message,
         success=best.success,
-        interrupted=analysis.interrupted or found.interrupted,
+        interrupted=interrupted,
         phase_ends=analysis.phase_ends,
         history=tuple(history),
         nfev=best.nfev,
@@ -166,12 +167,11 @@ def fit(
             *line_notes,
             *minima_notes(residuals, found, minima, analysis.uncertainty),
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
-            *(cause.sentence for cause in verdict.causes),
         ),
         validation=analysis.validation,
         versions=versions(),
         inputs=hashes,
-        verdict=verdict,
+        verdict=verdict_of(evidence),
         given_values=given_values(case),
         typical_values=analysis.typical_values,
         sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),

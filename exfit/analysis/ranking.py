@@ -21,8 +21,8 @@ from exfit.inference.noise import SURPRISING, effective_samples, whiteness
 from exfit.inference.wording import listed
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
-from exfit.results.side_by_side import CONVERGED, INTERRUPTED, NOT_ACCEPTED, outcome_of
-from exfit.results.verdict import GOOD, MATCHES
+from exfit.results.side_by_side import NOT_ACCEPTED, outcome_of
+from exfit.results.verdict import GOOD, MATCHES, MISSES
 
 Array = NDArray[np.float64]
 Records = Literal["fit", "validation"]
@@ -30,7 +30,8 @@ Records = Literal["fit", "validation"]
 # difference of the criterion from which on a model is refuted: a rival with as many parameters
 # fits so much more of the noise by chance in one record of thirty, even with seven of them
 STRONG = 10.0
-JUDGED = (CONVERGED, NOT_ACCEPTED)  # a search that has not ended well says nothing of its model
+# a search that has not ended well says nothing of its model
+JUDGED = (GOOD, MATCHES, MISSES, NOT_ACCEPTED)
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def _ranked(
     return RankedModel(
         name=name,
         model=result.model,
-        outcome=_outcome(result),
+        outcome=outcome_of(result),
         rmse=_rmse(result.comparisons),
         validation_rmse=_rmse(result.validation) if result.validation else None,
         bic=bic,
@@ -154,14 +155,6 @@ def _ranked(
         typical={key: result.fixed[key] for key in result.typical if key in result.fixed},
         refuted_by=refuted_by,
     )
-
-
-def _outcome(result: FitResult) -> str:
-    """Return the verdict on a fit, or what speaks against one that matches its records."""
-    outcome, verdict = outcome_of(result), result.verdict
-    if verdict is None or outcome == INTERRUPTED or (verdict.matches and outcome != CONVERGED):
-        return outcome
-    return verdict.verdict
 
 
 def _rmse(comparisons: Sequence[Comparison]) -> float:

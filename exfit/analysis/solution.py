@@ -189,7 +189,6 @@ def fit_notes(
     analysis: Analysis,
 ) -> Iterator[str]:
     """Yield what must be known beside the numbers of a fit."""
-    yield from (match.reason for match in analysis.validation if match.reason)
     if case.accept is not None and not case.validations:
         yield NOTHING_TO_ACCEPT
     if not best.success:
@@ -260,6 +259,7 @@ def evidence_of(
     setups: Sequence[ExperimentSetup],
     comparisons: Sequence[Comparison],
     analysis: Analysis,
+    interrupted: bool,
 ) -> Evidence:
     """Return what the verdict on a fit and the causes of a poor one are worked out from."""
     return Evidence(
@@ -275,4 +275,5 @@ def evidence_of(
         uncertainty=analysis.uncertainty,
         validation=analysis.validation,
         typical_values=by_weight(analysis.typical_values),
+        interrupted=interrupted,
     )

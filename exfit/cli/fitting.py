@@ -59,10 +59,13 @@ def fit(
     look for a lower minimum than the one that the start of CASE leads to.
 
     Writes result.json, parameters.yaml, history.csv, response.csv, iterations.csv and figures to
-    runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far. Exit code 0: converged, or ended
-    at a tolerance that the case gives; 1: bad input; 3: not converged, no match at all, or a
-    validation that is not accepted: beyond the limit of accept in the case, without it no better
-    than a constant or beyond 3 times the error of the fit.
+    runs/CASE-fit, or to DIR. Ctrl-C keeps the best point so far.
+
+    The first line of the result is the verdict: good | matches, not all determined | misses the
+    record | no match | not converged. The likeliest causes follow, at most five, each with what to
+    do. Exit code 0: the first two; 1: bad input; 3: the others, or a validation that is not
+    accepted: beyond the limit of accept in the case, without it no better than a constant or beyond
+    3 times the error of the fit.
 
     --set overrides --parameters, and both override the case: they give the start of a free
     parameter, and the value of another. The result says which values they changed.
@@ -90,15 +93,13 @@ def fit(
         folder = output.folder(f"{case.stem}-fit")
         fit_again_and_again(case, given, folder, strategy, search, output)
         return
-    from exfit.results.side_by_side import CONVERGED, outcome_of
-
     loaded = given.load(case)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
         result = fit_live(loaded, folder, strategy, search, output)
     else:
         result = _fit(loaded, folder, strategy, search, output)
-    if outcome_of(result) != CONVERGED:
+    if not result.holds:
         raise SystemExit(NOT_CONVERGED)
 
 

@@ -60,7 +60,7 @@ def fit_several(
         draw_each(figures, output)
     if series.failed:
         raise ExfitError("\n".join(f"{name}: {fault}" for name, fault in series.failed.items()))
-    if not series.all_converged:
+    if not series.all_hold:
         raise SystemExit(NOT_CONVERGED)
 
 

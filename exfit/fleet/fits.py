@@ -13,7 +13,7 @@ from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import checked_search, checked_strategy, fitted
 from exfit.results.model import FitResult, Iteration
-from exfit.results.side_by_side import CONVERGED, outcome_of
+from exfit.results.side_by_side import outcome_of
 from exfit.util.typed import plain
 from exfit.workflows import CaseOrPath
 
@@ -69,10 +69,10 @@ class FitSeries:
         return {name: tuple(run for run in self.runs if run.case_name == name) for name in names}
 
     @property
-    def all_converged(self) -> bool:
-        """Whether all fits were run, and each converged and is accepted."""
+    def all_hold(self) -> bool:
+        """Whether all fits were run, and each matches its records and is accepted."""
         done = not (self.failed or self.not_run or self.interrupted)
-        return done and all(outcome_of(result) == CONVERGED for result in self.results.values())
+        return done and all(result.holds for result in self.results.values())
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of all fits as plain data, as ``exfit fit --json`` prints them."""

@@ -13,7 +13,7 @@ __all__ = ["Figure", "fit_figure", "fit_html"]
 TABLE = """\
 <div>
 <p><b>{{ result.model }}</b> fitted to {{ records }}:
-{{ result.outcome }} ({{ result.message }}),
+{{ verdict }},
 rmse {{ "%.3g" | format(result.rmse) }} pu, fit {{ "%.2f" | format(fit_percent) }} %</p>
 <table>
 <thead><tr>
@@ -43,16 +43,22 @@ def fit_html(result: FitResult) -> str:
     from jinja2 import Environment
 
     template = Environment(autoescape=True, trim_blocks=True).from_string(TABLE)
+    causes = () if result.verdict is None else result.verdict.causes
     unresolved = () if result.knowledge is None else result.knowledge.sentences
     return template.render(
         result=result,
+        verdict=result.outcome if result.verdict is None else result.verdict.sentence,
         records=", ".join(comparison.record for comparison in result.comparisons),
         fit_percent=result.comparison.fit_percent,
         rows=[
             (parameter.meaning, _cells(name, parameter))
             for name, parameter in result.parameters.items()
         ],
-        remarks=[*(f"unresolved: {text}" for text in unresolved), *result.notes],
+        remarks=[
+            *(cause.sentence for cause in causes),
+            *(f"unresolved: {text}" for text in unresolved),
+            *result.notes,
+        ],
     )
 
 

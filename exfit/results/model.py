@@ -17,7 +17,7 @@ from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
 from exfit.results.typical_values import TypicalValue
-from exfit.results.verdict import Verdict
+from exfit.results.verdict import NO_MATCH, Verdict
 from exfit.util.sources import NOT_STATED, TYPICAL
 from exfit.util.typed import IN_FILE, KEY, plain
 
@@ -315,10 +315,15 @@ class FitResult:
 
     @property
     def outcome(self) -> str:
-        """How the search ended: at a minimum, at a tolerance of the case, or short of both."""
+        """How the search ended: at a minimum, at a tolerance of the case, or short of both.
+
+        At the minimum of a fit that is no match it has not converged to anything.
+        """
         if self.status in AT_TOLERANCE:
             return "ended at a tolerance"
-        return "converged" if self.success else "not converged"
+        if not self.success:
+            return "not converged"
+        return "converged" if self.describes else "ended at a minimum"
 
     @property
     def accepted(self) -> bool:
@@ -328,7 +333,21 @@ class FitResult:
     @property
     def describes(self) -> bool:
         """Whether the response matches every record better than a constant would."""
-        return all(match.judged.describes for match in self.comparisons)
+        own = all(match.judged.describes for match in self.comparisons)
+        return own and (self.verdict is None or self.verdict.verdict != NO_MATCH)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the fit matches its records, and its validations are accepted.
+
+        It then ends with exit code 0. Of a result of an earlier version, that its search converged
+        and the response is better than a constant.
+        """
+        if self.interrupted or not self.accepted:
+            return False
+        if self.verdict is None:
+            return self.success and self.describes
+        return self.verdict.matches
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain data: everything but the history, samples and descriptions.
@@ -357,6 +376,6 @@ class FitResult:
     def __repr__(self) -> str:
         """Return the model, the record, the match and the values in one line."""
         values = ", ".join(f"{name}={each.value:.5g}" for name, each in self.parameters.items())
-        state = "" if self.success else ", not converged"
+        state = "" if self.verdict is None else f", {self.verdict.verdict}"
         to = ", ".join(match.record for match in self.comparisons)
         return f"<FitResult {self.model} to {to}: rmse {self.rmse:.3g} pu{state}; {values}>"

@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 from exfit.results.model import FitResult
 
-CONVERGED = "converged"
-NOT_CONVERGED, INTERRUPTED = "not converged", "interrupted"
-NO_MATCH, NOT_ACCEPTED = "no match", "not accepted"
+INTERRUPTED, NOT_ACCEPTED = "interrupted", "not accepted"  # beside the verdicts
 DIGITS = 9  # significant digits of a number in the table
 
 
@@ -27,24 +25,21 @@ class ParameterValue(NamedTuple):
 
 
 def outcome_of(result: FitResult) -> str:
-    """Return in a word how a fit ended; it is trusted where that is CONVERGED."""
+    """Return the verdict on a fit in its words, or what speaks against one that matches."""
     if result.interrupted:
         return INTERRUPTED
-    if not result.success:
-        return NOT_CONVERGED
-    if not result.describes:
-        return NO_MATCH
-    return CONVERGED if result.accepted else NOT_ACCEPTED
+    if result.verdict is None:
+        return result.outcome if result.accepted else NOT_ACCEPTED
+    if result.verdict.matches and not result.accepted:
+        return NOT_ACCEPTED
+    return result.verdict.verdict
 
 
 def explanation_of(result: FitResult) -> str:
     """Return in a sentence why a fit ended so."""
-    outcome = outcome_of(result)
-    if outcome == NO_MATCH:
-        return "the response matches the record no better than a constant would"
-    if outcome == NOT_ACCEPTED:
+    if outcome_of(result) == NOT_ACCEPTED:
         return "; ".join(match.reason for match in result.validation if match.reason)
-    return result.message
+    return result.message if result.verdict is None else result.verdict.reason
 
 
 def parameters_beside(

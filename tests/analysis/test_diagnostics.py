@@ -12,6 +12,7 @@ def test_a_voltage_that_is_found_is_not_held_against_its_start(tmp_path):
     synthetic(tmp_path, {**TEST, "vt0": 0.987}, TIME, noise=2e-5)
     found = fit(case_of(one({**TEST, "vt0": found_in(1.01, 0.9, 1.1)}), tmp_path))
     assert not [note for note in found.notes if note.startswith("vt0")]
+    assert not [cause for cause in found.verdict.causes if cause.cause.startswith("vt0")]
 
 
 @pytest.mark.parametrize(
@@ -39,7 +40,7 @@ def test_spikes_that_a_robust_loss_bears_are_no_misfit(tmp_path):
     plain = one(TEST, free=["KA", "TE"])
     for content, noted in ((plain, True), ({**plain, "estimate": {"loss": "huber"}}, False)):
         found = fit(case_of(content, tmp_path))
-        assert any("are spikes" in note for note in found.notes) == noted
+        assert any("are spikes" in cause.cause for cause in found.verdict.causes) == noted
 
 
 @pytest.mark.parametrize(("every", "words"), [(60, "10 of {}"), (600, "1 of {}")])

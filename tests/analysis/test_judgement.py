@@ -11,7 +11,6 @@ from exfit.analysis.judgement import doubt_of
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import fitted
-from exfit.results.side_by_side import CONVERGED, outcome_of
 
 RNG = np.random.default_rng(3)
 NOISE = 1e-3 * RNG.standard_normal((2, len(TIME)))
@@ -76,7 +75,7 @@ def test_an_end_before_a_minimum_casts_doubt():
 def test_auto_goes_on_from_a_minimum_that_noise_and_validation_exclude():
     """Here dgn ends at 1.068 of the lowest cost (TE 10), 22 times worse on the step down."""
     result = exfit.fit(ROOT / "configs" / "ac8b_unit2_ka_free.yaml", "auto")
-    assert outcome_of(result) == CONVERGED
+    assert result.holds
     lowest = result.minima.minima[0].cost
     assert result.cost <= 1.01 * lowest < 1.05 * lowest < max(result.minima.end_costs)
     assert result.parameters["TE"].value == pytest.approx(1.84, rel=0.15)  # truth, error 4 %
@@ -93,7 +92,7 @@ def test_an_end_that_auto_trusts_is_the_lowest_and_holds_on_the_validation(name)
     points = low + (high - low) * np.random.default_rng(5).random((3, len(low)))
     starts = [{free: residuals.values(x)[free] for free in case.free()} for x in points]
     results = [exfit.fit(case, "auto", values=start) for start in ({}, *starts)]
-    trusted = [result for result in results if outcome_of(result) == CONVERGED]
+    trusted = [result for result in results if result.holds]
     assert trusted
     costs = [result.cost for result in results]
     costs += [result.minima.minima[0].cost for result in results if result.minima is not None]

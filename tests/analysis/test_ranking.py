@@ -9,6 +9,7 @@ from cases import FIRST_ORDER, TIME, TRUTH
 import exfit
 from exfit.analysis.ranking import STRONG, Likelihood, _gap, ranked, ranking_sentences
 from exfit.results.comparisons import Overlay
+from exfit.results.verdict import NOT_CONVERGED, Verdict
 
 SAMPLES = 2000
 
@@ -139,7 +140,7 @@ def test_records_that_contradict_each_other_are_reported(result):
 def test_a_search_that_has_not_ended_well_neither_refutes_nor_is_refuted(result):
     errors = 1e-3 * white(1)
     fits = {
-        "A": with_errors(result, 1e-2 * errors, success=False),
+        "A": with_errors(result, 1e-2 * errors, verdict=Verdict(NOT_CONVERGED)),
         "B": with_errors(result, errors),
         "C": with_errors(result, 2.0 * errors),
     }

@@ -424,7 +424,7 @@ def test_the_iteration_limit_ends_with_3_and_leaves_the_best_point(run):
     assert printed["nit"] == 1
     assert printed["cost"] < printed["start_cost"]
     assert Path("runs/case-fit/parameters.yaml").is_file()
-    assert "NOT CONVERGED" in run("fit", case, "--no-plots").out
+    assert "verdict: not converged" in run("fit", case, "--no-plots").out
 
 
 def test_a_validation_beyond_its_limit_ends_with_3(run):
@@ -432,7 +432,7 @@ def test_a_validation_beyond_its_limit_ends_with_3(run):
     ran = run("fit", case, "--no-plots")
     assert ran.code == 3
     assert "not accepted: on down-step" in ran.out
-    assert "converged" in ran.out
+    assert "verdict: matches" in ran.out
     ran = run("validate", case, "--no-plots")
     assert ran.code == 3
     assert ran.out.splitlines()[1].startswith("not accepted: on down-step")
@@ -446,12 +446,12 @@ def test_a_validation_much_worse_than_the_fit_ends_with_3_and_accept_alone_judge
     Path("down.csv").write_text(csv_text(TIME, 1.05 * np.array(samples["v"], float)))
     ran = run("fit", case_file(), "--no-plots")
     assert ran.code == 3
-    _, reason = ran.out[ran.out.index("converged: ") :].splitlines()[:2]
+    _, reason = ran.out[ran.out.index("verdict: ") :].splitlines()[:2]
     assert reason.startswith("not accepted: on down-step the error is")
     printed = json.loads(run("fit", case_file(), "--no-plots", "--json").out)
     (match,) = printed["validation"]
     assert not match["accepted"]
-    assert printed["notes"][0] == match["reason"]
+    assert match["reason"]
     assert run("validate", case_file(), "--no-plots").code == 3
     case = case_file(changed(CASE, ("accept", {"rmse": 0.2})))
     assert run("fit", case, "--no-plots").code == 0
@@ -659,7 +659,7 @@ def test_ctrl_c_keeps_the_best_point_and_ends_with_3():
     ran = program(INTERRUPTED, "fit", case_file(), "--no-plots")
     assert ran.code == 3
     assert ran.err == ""
-    assert "NOT CONVERGED: interrupted" in ran.out
+    assert "verdict: not converged: interrupted" in ran.out
     stored = json.loads(Path("runs/case-fit/result.json").read_text())
     assert stored["interrupted"]
     assert not stored["success"]
@@ -1059,7 +1059,8 @@ def test_a_fit_no_better_than_a_constant_ends_with_3_and_says_why(run):
     ran = run("fit", case_file(wrong), "--no-plots")
     assert ran.code == 3
     told = " ".join(ran.out.split())
-    assert "goes the other way" in told
+    assert "verdict: no match: the response goes the other way cause:" in told
+    assert "converged" not in told
 
 
 def test_an_acceptance_without_a_validation_waits_for_a_record_by_hand(run):

@@ -48,14 +48,14 @@ def test_every_case_is_fitted_with_every_strategy_as_it_is_alone():
         assert result.cost == alone.cost
         assert result.values == alone.values
     assert [*series.by_case] == ["a", "b"]
-    assert not series.all_converged  # two iterations are not enough
+    assert not series.all_hold  # two iterations are not enough
 
 
 def test_without_a_strategy_each_case_has_its_own():
     cases = [case_file("a.yaml", estimate={"strategy": "lm"}), case_file("b.yaml")]
     assert [fit.name for fit in planned(cases, [])] == ["a-lm", "b-lm-then-dgn"]
     series = exfit.fit_all(cases)
-    assert series.all_converged
+    assert series.all_hold
     assert [result.strategy_given for result in series.results.values()] == [False, False]
 
 
@@ -111,7 +111,7 @@ def test_an_interruption_keeps_what_is_done_and_the_best_point_of_the_fit_that_r
     assert (stopped.interrupted, stopped.nit) == (True, 2)
     assert stopped.cost < stopped.start_cost
     assert series.interrupted
-    assert not series.all_converged
+    assert not series.all_hold
     assert series.to_dict()["not_run"] == ["c-lm"]
 
 
@@ -124,7 +124,7 @@ def test_a_fit_that_fails_keeps_no_other_from_running():
     assert [*series.failed] == ["a-lm", "b-lm"]
     assert run_all(plan).results == {}
     assert [*series.results] == ["c-lm"]
-    assert not series.all_converged
+    assert not series.all_hold
 
 
 def other_record():
@@ -149,4 +149,4 @@ def test_the_table_has_a_line_for_each_fit_and_blanks_where_a_model_has_no_such_
     assert [row["run"] for row in rows] == ["a-lm", "b-lm"]
     assert float(rows[0]["k"]) == pytest.approx(first.values["k"], rel=1e-8)
     assert float(rows[1]["f"]) == pytest.approx(second.cost, rel=1e-8)
-    assert {row["outcome"] for row in rows} == {"converged"}
+    assert {row["outcome"] for row in rows} == {"good"}

@@ -22,7 +22,6 @@ from rich.table import Table
 import exfit
 from exfit.case.load import load_case
 from exfit.fitting.search import fitted
-from exfit.results.side_by_side import CONVERGED, outcome_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CASES = (
@@ -62,7 +61,7 @@ def fit_from(case, start):
     stage = "search" if "search" in phases else "lm-then-dgn" if "lm" in phases else "dgn"
     return Fit(
         cost=result.cost,
-        trusted=outcome_of(result) == CONVERGED,
+        trusted=result.holds,
         validation=max((match.rmse / match.limit for match in result.validation), default=0.0),
         stage=stage,
         simulations=result.simulations,

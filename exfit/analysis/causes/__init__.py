@@ -28,7 +28,6 @@ from exfit.analysis.causes.unit import (
     not_ended,
     wrong_limit,
 )
-from exfit.estimate import Stop
 from exfit.results.verdict import Cause
 
 __all__ = ["Evidence", "FittedRecord", "Recogniser", "Suspicion", "causes_of"]
@@ -73,10 +72,7 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     ``matched``: a minimum whose residuals are noise, of which only what is at rest is looked at. An
     interruption ends the trials with what was found by then.
     """
-    if matched or evidence.solution.stop is Stop.INTERRUPTED:
-        recognisers = ALWAYS
-    else:
-        recognisers = (*FROM_RESIDUALS, *BY_TRIAL)
+    recognisers = ALWAYS if matched or evidence.interrupted else (*FROM_RESIDUALS, *BY_TRIAL)
     suspicions = sorted(_suspicions(evidence, recognisers), key=lambda each: -each.likelihood)
     return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
 

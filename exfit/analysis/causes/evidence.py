@@ -46,7 +46,7 @@ class Evidence:
     ``solution`` is where the search ended, in scaled parameters; ``records`` are those of the fit,
     ``validation`` the comparisons with those of none. ``uncertainty`` is None where it is not
     known; ``typical_values`` are those that matter, with what they would move, the weightiest
-    first.
+    first. ``interrupted``: the search, or what follows it, was cut short.
     """
 
     case: Case
@@ -56,6 +56,7 @@ class Evidence:
     uncertainty: UncertaintyAnalysis | None
     validation: Sequence[Comparison] = ()
     typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
+    interrupted: bool = False
 
     @cached_property
     def values(self) -> Mapping[str, float]:
@@ -86,15 +87,19 @@ class Evidence:
         return f" of {self.records[number].setup.name}" if len(self.records) > 1 else ""
 
     @property
-    def undetermined(self) -> tuple[str, ...]:
-        """The parameters of the unit that the records do not limit on both sides."""
+    def own(self) -> tuple[str, ...]:
+        """The free parameters of the unit, without what belongs to a record."""
         of_records = {
             nuisance.name
             for experiment in self.residuals.experiments
             for nuisance in experiment.nuisances
         }
-        own = [free.name for free in self.residuals.free if free.name not in of_records]
+        return tuple(free.name for free in self.residuals.free if free.name not in of_records)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """The parameters of the unit that the records do not limit on both sides."""
         if self.uncertainty is None:
-            return tuple(own)
+            return self.own
         parameters = self.uncertainty.confidence.parameters
-        return tuple(name for name in own if not parameters[name].determined)
+        return tuple(name for name in self.own if not parameters[name].determined)

@@ -1,13 +1,12 @@
 """What a fit comes to, by one rule, which docs/verdict.md states."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from exfit.analysis.causes import Evidence, causes_of
 from exfit.analysis.diagnostics import NEAR_MINIMUM, distance_from_minimum
 from exfit.analysis.verdict.residual_tests import residual_tests
-from exfit.estimate import Stop
 from exfit.inference.wording import digits, listed
 from exfit.results.comparisons import Comparison, Overlay
 from exfit.results.typical_values import first_of
@@ -17,6 +16,7 @@ from exfit.results.verdict import (
     MISSES,
     NO_MATCH,
     NOT_CONVERGED,
+    Cause,
     ResidualTests,
     Verdict,
     VerdictWords,
@@ -31,12 +31,15 @@ def verdict_of(evidence: Evidence) -> Verdict:
     tests = residual_tests(evidence)
     words, reason = _judged(evidence, tests)
     matched = words in (GOOD, MATCHES) and all(test.are_noise for test in tests)
-    return Verdict(words, reason, causes_of(evidence, matched)[:MOST_CAUSES], tests)
+    causes = causes_of(evidence, matched)
+    if words == MATCHES:
+        causes = (*causes, *_undetermined(evidence))
+    return Verdict(words, reason, causes[:MOST_CAUSES], tests)
 
 
 def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[VerdictWords, str]:
     solution = evidence.solution
-    if solution.stop is Stop.INTERRUPTED:
+    if evidence.interrupted:
         return NOT_CONVERGED, "interrupted: the values are the best until then"
     no_match = next(_no_match(evidence, tests), None)
     if no_match is not None:
@@ -86,12 +89,8 @@ def correlation(overlay: Overlay) -> float:
 
 def _missed(test: ResidualTests, evidence: Evidence) -> str:
     signal = _label(test.record, test.signal, evidence) or test.signal
-    share = f"{digits(100.0 * test.share)} % of its range"
-    return f"{signal} is off by up to {share}, the residuals are {_size(test)}, and not white"
-
-
-def _size(test: ResidualTests) -> str:
-    return f"{digits(test.times)} times its scatter"
+    share, times = digits(100.0 * test.share), digits(test.times)
+    return f"{signal} is off by {share} % of its range (rmse {times} x noise)"
 
 
 def _label(record: str, signal: str, evidence: Evidence) -> str:
@@ -104,17 +103,40 @@ def _label(record: str, signal: str, evidence: Evidence) -> str:
 
 def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]:
     """Yield what keeps a fit that matches from being good."""
-    if evidence.undetermined:
-        verb = "is" if len(evidence.undetermined) == 1 else "are"
-        yield f"{listed(evidence.undetermined)} {verb} not determined"
+    undetermined = evidence.undetermined
+    if undetermined:
+        verb = "is" if len(undetermined) == 1 else "are"
+        yield f"{len(undetermined)} of {len(evidence.own)} parameters {verb} not determined"
     for match in evidence.validation:
         if not match.accepted:
             yield f"{match.name} is not accepted"
     if evidence.typical_values:
         yield f"typical values matter: {first_of([*evidence.typical_values])}"
-    not_noise = [test for test in tests if not test.are_noise]
-    if not_noise:
-        signals = [_label(test.record, test.signal, evidence) or test.signal for test in not_noise]
-        yield f"the residuals of {listed(signals)} are not noise"
+    yield from _not_noise(tests, evidence)
     if distance_from_minimum(evidence.residuals, evidence.solution) > NEAR_MINIMUM:
-        yield "the search ended at a tolerance of the case, not at a minimum"
+        yield "the search ended before a minimum"
+
+
+def _not_noise(tests: Sequence[ResidualTests], evidence: Evidence) -> Iterator[str]:
+    """Yield which residuals are not noise, or more of it than their record has."""
+
+    def signals(chosen: Iterable[ResidualTests]) -> str:
+        return listed([_label(t.record, t.signal, evidence) or t.signal for t in chosen])
+
+    coloured = [test for test in tests if not test.are_white]
+    larger = [test for test in tests if test.are_white and not test.are_noise]
+    if coloured:
+        yield f"the residuals of {signals(coloured)} are not noise"
+    if larger:
+        yield f"the residuals of {signals(larger)} exceed the scatter of the record"
+
+
+def _undetermined(evidence: Evidence) -> Iterator[Cause]:
+    """Yield which parameters the records do not determine."""
+    names = evidence.undetermined
+    if len(names) == 1:
+        remedy = "fix it if it is known, or plan a test that shows it (`exfit identify`)"
+        yield Cause(f"{names[0]} is not determined", remedy)
+    elif names:
+        remedy = "fix those that are known, or plan a test that shows them (`exfit identify`)"
+        yield Cause(f"{listed(names)} are not determined", remedy)

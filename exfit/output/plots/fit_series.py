@@ -11,7 +11,6 @@ from exfit.dsp.decimation import envelope
 from exfit.output.plots.axes import QuickAxes, logarithmic
 from exfit.output.plots.style import COLORS, MEASURED, MILLI, STYLES, new_figure, tidy
 from exfit.results.comparisons import Comparison
-from exfit.results.side_by_side import CONVERGED, outcome_of
 from exfit.signals import label_of
 
 if TYPE_CHECKING:
@@ -74,12 +73,12 @@ def responses_beside(overlay: Axes, errors: Axes, comparisons: Mapping[str, Comp
 
 
 def _costs(axes: Axes, runs: "Sequence[FitRun]") -> None:
-    """Draw the cost over the iterations of each fit; a cross ends one that has not converged."""
+    """Draw the cost over the iterations of each fit; a cross ends one that does not hold."""
     for k, run in enumerate(runs):
         look = _look(k, len(runs))
         costs = [line.cost if line.cost > 0.0 else float("nan") for line in run.result.history]
         axes.plot(costs, label=run.result.strategy, **look)
-        marker = "o" if outcome_of(run.result) == CONVERGED else "X"
+        marker = "o" if run.result.holds else "X"
         axes.plot(
             len(costs) - 1,
             costs[-1],

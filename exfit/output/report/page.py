@@ -14,7 +14,7 @@ from exfit.errors import ExfitError
 from exfit.output.report.charts import drawing
 from exfit.output.report.sections import SECTIONS
 from exfit.output.report.sections.matches import MatchView, OverlayChart, live_data
-from exfit.output.report.verdict import verdict
+from exfit.output.report.verdict import headline
 from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
 
@@ -36,7 +36,7 @@ def html(result: FitResult, folder: Path) -> str:
         .get_template("report.html.jinja")
         .render(
             title=f"{result.model}: {result.name}",
-            verdict=verdict(result),
+            headline=headline(result),
             sections=sections,
             folder=str(folder),
             data=list(live_data(_overlays(content for _, content in sections))),

@@ -11,11 +11,13 @@ from exfit.fleet.fits import FitRun, FitSeries, PlannedFit, Progress
 from exfit.output.terminal.side_by_side import side_by_side
 from exfit.output.terminal.terminal import remarks
 from exfit.results.model import FitResult, Iteration
-from exfit.results.side_by_side import CONVERGED, explanation_of, outcome_of
+from exfit.results.side_by_side import explanation_of, outcome_of
+from exfit.results.verdict import MATCHES, MISSES
 
 HEADS = ("fit", "it", "f", "rmse", "s", "")
 FORMS = ("{:>4}", "{:>10}", "{:>10}", "{:>7}", "{:<13}")  # behind the name
 MOST_OF_NAME = 28  # characters: the line has then 80
+BRIEF = {MATCHES: "matches", MISSES: "misses"}  # what a line has no room for
 
 
 class SeriesProgress:
@@ -45,8 +47,8 @@ class SeriesProgress:
         """Show a fit that has ended."""
         result, outcome = run.result, outcome_of(run.result)
         numbers = (f"{result.cost:.4e}", f"{result.rmse:.4e}", f"{result.seconds:.2f}")
-        style = "" if outcome == CONVERGED else "yellow"
-        line = self._line((run.name, f"{result.nit}", *numbers, outcome))
+        style = "" if result.holds else "yellow"
+        line = self._line((run.name, f"{result.nit}", *numbers, BRIEF.get(outcome, outcome)))
         self.console.print(Text(line, style), soft_wrap=True)
         self._show(run.name, "writing numbers")
         self._done += 1
@@ -110,5 +112,5 @@ def _tables(console: Console, series: FitSeries) -> None:
 def _outcomes(console: Console, results: Mapping[str, FitResult]) -> None:
     for name, result in results.items():
         outcome = outcome_of(result)
-        style = "green" if outcome == CONVERGED else "bold red"
+        style = "green" if result.holds else "bold red"
         remarks(console, f"{name}: {outcome}:", [explanation_of(result)], style)

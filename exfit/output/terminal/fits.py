@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from exfit.inference import ParameterEffect
 from exfit.output.terminal.comparisons import comparisons, rejections
@@ -20,7 +19,10 @@ from exfit.output.terminal.terminal import (
 )
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
+from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.sources import by_source
+
+STYLES = {GOOD: "bold green", MATCHES: "bold yellow"}  # of verdicts; of the others bold red
 
 
 def fit(console: Console, result: FitResult, before: FitResult | None = None) -> None:
@@ -29,12 +31,12 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     The values of a fit ``before`` are printed beside the new ones.
     """
     console.print()
+    verdict(console, result)
+    console.print()
     console.print(fitted_table(result, before))
     console.print()
-    outcome = result.outcome if result.success else result.outcome.upper()
-    style = "green" if result.success else "bold red"
-    console.print(Text.assemble((outcome, style), f": {result.message}"))
-    rejections(console, result.validation)
+    if result.success:
+        remarks(console, f"{result.outcome}:", [result.message], "bold")
     several = len(result.comparisons) > 1
     figures = f"cost {result.start_cost:.4e} -> {result.cost:.4e}"
     if not several:
@@ -55,10 +57,20 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
         console.print()
         remarks(console, "sensitivity:", ranking(result.knowledge.effects), "bold")
         unresolved(console, result.knowledge.sentences)
-    reasons = [match.reason for match in result.validation]
-    notes(console, (text for text in result.notes if text not in reasons))
+    notes(console, result.notes)
     if result.validation or several:
         comparisons(console, [*result.comparisons, *result.validation])
+
+
+def verdict(console: Console, result: FitResult) -> None:
+    """Show in a line what a fit comes to, then why it may be so and what to do."""
+    if result.verdict is not None:
+        style = STYLES.get(result.verdict.verdict, "bold red")
+        remarks(console, "verdict:", [result.verdict.sentence], style)
+    rejections(console, result.validation)
+    if result.verdict is not None:
+        kind = "note:" if result.verdict.verdict == GOOD else "cause:"
+        remarks(console, kind, (cause.sentence for cause in result.verdict.causes))
 
 
 def _phase_ends(console: Console, result: FitResult) -> None:

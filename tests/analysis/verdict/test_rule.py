@@ -62,6 +62,24 @@ def test_a_noise_that_the_case_gives_hides_no_misfit(tmp_path):
         assert verdict(content, tmp_path).verdict == MISSES
 
 
+@pytest.mark.parametrize(
+    ("at", "step", "drift", "missed"),
+    [
+        (1.0, 0.05, 0.0, False),
+        (0.93, 0.05, 0.0, True),
+        (1.0, 0.04, 0.0, True),
+        (1.0, 0.05, 1e-4, True),
+    ],
+)
+def test_an_error_far_above_the_noise_misses_the_record(tmp_path, at, step, drift, missed):
+    """Of a step that the case has 70 ms early or a fifth too small, and of a record that drifts."""
+    shown = synthetic(tmp_path, TEST, TIME)["vt"]
+    write(tmp_path / "record.csv", t=TIME, vt=shown + drift * TIME)
+    test = {"vt0": 1.0, "vref": [{"at": at, "step": step}]}
+    found = verdict(one(test, free=["KA", "TE", "TA"]), tmp_path)
+    assert (found.verdict == MISSES) == missed
+
+
 def test_what_is_masked_does_not_count(tmp_path):
     shown = synthetic(tmp_path, TEST, TIME, seed=1)["vt"]
     shown[(TIME > 3.0) & (TIME < 3.5)] += 0.01
