@@ -208,6 +208,8 @@ def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:
     judged = [model for model in models if model.refuted_by is not None]
     if len(judged) > 1:
         yield _judgement(judged)
+    if models and not any(model.matches for model in models):
+        yield "none of these models matches the records"
     for model in models:
         if model.refuted_by is None:
             yield f"{model.name} is not judged: its search ended {model.outcome}"

@@ -90,7 +90,7 @@ def planned_models(
 ) -> tuple[PlannedFit, ...]:
     """Return the fit of each model; raises CaseError or ModelError where one cannot be planned."""
     own = case.parts.exciter
-    if own is None:
+    if own is None or own.name == ALONE:
         raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to rank"])
     cases: dict[str, Case] = {}
     for given in _names(own.name, [models] if isinstance(models, str) else [*models]):

@@ -154,6 +154,20 @@ def test_a_search_that_has_not_ended_well_neither_refutes_nor_is_refuted(result)
     )
 
 
+def test_models_none_of_which_matches_are_reported(result):
+    errors = 1e-3 * white(1)
+    missed = replace(result.verdict, verdict="misses the record")
+    fits = {
+        "A": with_errors(result, errors, verdict=missed),
+        "B": with_errors(result, 2.0 * errors, verdict=missed),
+    }
+    models = ranked(fits)
+    assert [model.outcome for model in models] == ["misses the record"] * 2
+    assert "none of these models matches the records" in ranking_sentences(models)
+    fits["A"] = with_errors(result, errors)
+    assert "none of these models matches the records" not in ranking_sentences(ranked(fits))
+
+
 def test_no_model_at_all_is_no_ranking():
     assert ranked({}) == ()
     assert [*ranking_sentences(())] == []

@@ -45,8 +45,9 @@ def test_models_that_cannot_be_planned_are_refused(case):
         planned_models(case, ["AC8C"])
     with pytest.raises(CaseError, match="models: esac1a: given more than once"):
         planned_models(case, ["AC1A", "esac1a"])
-    with pytest.raises(CaseError, match="has no exciter to rank"):
-        planned_models(exfit.load_case(CONFIGS / "machine_playback.yaml"))
+    for name in ("machine_playback", "first_order"):
+        with pytest.raises(CaseError, match="has no exciter to rank"):
+            planned_models(exfit.load_case(CONFIGS / f"{name}.yaml"))
 
 
 def test_the_models_of_a_record_are_ranked_and_the_true_one_is_found(case):

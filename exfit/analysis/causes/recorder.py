@@ -96,7 +96,8 @@ def _against_ripple(frequency: float, time: Array) -> str:
     folded = [mains for mains in MAINS if mains > 0.5 * rate]
     if folded or abs(frequency - 0.5 * rate) < FOLDED * rate:
         return "record faster, or through an anti-alias filter; noise of its size is no harm"
-    return f"filter: {{lowpass: {0.4 * frequency:.2g}}} on the channel, or a sine"
+    lowpass = f"filter: {{lowpass: {0.4 * frequency:.2g}}}"
+    return f"sine: {{frequency: {{start: auto}}}} on the channel, or {lowpass} if it is fast"
 
 
 def drift(evidence: Evidence) -> Iterator[Suspicion]:
