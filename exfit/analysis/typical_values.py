@@ -17,6 +17,8 @@ from exfit.simulation.kernels import parameters_used
 
 Array = NDArray[np.float64]
 
+IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
+
 
 def typical_values_used(case: Case) -> dict[str, float]:
     """Return the typical values that a response of any of the records depends on."""
@@ -86,15 +88,22 @@ def _in_own_units(residuals: Residuals, theta: Array, typical: Mapping[str, floa
 
 
 def _half_widths(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> dict[str, float]:
-    """Return half the width of each interval of the unit that has both ends."""
+    """Return half the width of the interval of each parameter of the unit.
+
+    Without one that has both ends it is twice the standard error, where that is known.
+    """
     of_records = {
         nuisance.name for experiment in residuals.experiments for nuisance in experiment.nuisances
     }
     half_widths = {}
     for name, own in uncertainty.confidence.parameters.items():
         low, high = own.interval or (None, None)
-        if low is not None and high is not None and name not in of_records:
+        if name in of_records:
+            continue
+        if low is not None and high is not None:
             half_widths[name] = 0.5 * (high - low)
+        elif own.std_error is not None:
+            half_widths[name] = IN_STANDARD_ERRORS * own.std_error
     return half_widths
 
 

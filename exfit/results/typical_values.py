@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from exfit.inference.wording import listed
+from exfit.inference.wording import digits, listed
 
 DEVIATION = 0.2  # of a typical value: as far as units of one kind lie apart
 MOST_NAMED = 3  # parameters, and values, of a sentence
@@ -15,8 +15,8 @@ class TypicalValue:
 
     ``shifts`` is by how much each fitted parameter would move, in its own unit, if the value were
     larger by DEVIATION: to first order. ``matters_to`` names those of the unit that would move by
-    more than half the width of their interval, with that shift in shares of the half width, the
-    largest first.
+    more than half the width of their interval (twice the standard error, where there is none),
+    with that shift in shares of the half width, the largest first.
     """
 
     value: float
@@ -47,5 +47,11 @@ def first_of(names: Sequence[str]) -> str:
 
 
 def _share(shift: float, value: float) -> str:
-    """Return a shift in percent of a value, or as it is where that is 0."""
-    return f"{100.0 * abs(shift / value):.2g} %" if value else f"{abs(shift):.2g}"
+    """Return a shift in percent of a value, or as it is where that is 0.
+
+    One of the first order that exceeds the value itself says no more than that it is large.
+    """
+    if not value:
+        return digits(abs(shift))
+    share = abs(shift / value)
+    return f"{digits(100.0 * share)} %" if share <= 1.0 else "more than 100 %"

@@ -14,7 +14,7 @@ from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import uncertainty_at
 from exfit.output.report import html
 from exfit.output.report.sections.parameters import parameters
-from exfit.results.typical_values import DEVIATION, by_weight, first_of
+from exfit.results.typical_values import DEVIATION, by_weight, first_of, moved_parameters
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.workflows import fit
 
@@ -69,6 +69,15 @@ def shares(result, name):
     """Return the predicted shift of each parameter, as a share of its value for 100 % of one."""
     shifts = result.typical_values[name].shifts
     return {key: shift / result.parameters[key].value / DEVIATION for key, shift in shifts.items()}
+
+
+def half_width(result, name):
+    """Return half of a parameter's interval, twice its standard error where it has none."""
+    parameter = result.parameters[name]
+    if not parameter.determined:
+        return 2.0 * parameter.std_error
+    low, high = parameter.interval
+    return 0.5 * (high - low)
 
 
 def refitted(exciter, found, relative):
@@ -176,11 +185,29 @@ def test_what_weighs_most_comes_first(found):
     for value in found.typical_values.values():
         assert [*value.matters_to.values()] == sorted(value.matters_to.values(), reverse=True)
         for name, times in value.matters_to.items():
-            low, high = found.parameters[name].interval
-            assert times == pytest.approx(abs(value.shifts[name]) / (0.5 * (high - low)))
+            assert times == pytest.approx(abs(value.shifts[name]) / half_width(found, name))
             assert times > 1.0
+    moved = replace(
+        value, shifts={"a": 0.5, "b": -3.0, "c": 0.12345}, matters_to=dict.fromkeys("abc")
+    )
+    fitted_values = {"a": 2.0, "b": 1.0, "c": 0.0}
+    assert moved_parameters(moved, fitted_values) == "a by 25 %, b by more than 100 % and c by 0.12"
     assert first_of("ABCD") == "A, B, C and D"
     assert first_of("ABCDE") == "A, B, C and 2 more"
+
+
+def test_without_an_interval_twice_the_standard_error_counts():
+    """KC and KD free: linear theory does not hold over the intervals, a local fit prints none."""
+    content = config("ac1a_typical")
+    del content["validate"]
+    content["plant"]["sources"] = {"Xppd": "typical"}
+    content["estimate"] = {"search": "local"}
+    result = fit(Case.from_dict(content))
+    (value,) = result.typical_values.values()
+    without = [name for name in value.matters_to if not result.parameters[name].determined]
+    assert without
+    for name, times in value.matters_to.items():
+        assert times == pytest.approx(abs(value.shifts[name]) / half_width(result, name))
 
 
 def test_derivatives_that_are_not_finite_give_nothing(monkeypatch):
