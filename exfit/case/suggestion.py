@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from exfit.case.templates import commented
-from exfit.records.channel_inspection import AT_REST_PU, SPIKE_LIMIT, InspectedChannel
+from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel
 from exfit.records.channel_recognition import connection_of
 from exfit.records.inspection import InspectedPhases, Inspection
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep
@@ -17,7 +17,6 @@ from exfit.signals import COMPARED, RECORDED, SIGNALS
 from exfit.util.text import yaml_number
 
 FILL_IN = '"?"'  # no number: a case that holds it is refused by place
-LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower
 DIGITS = 4
 COLUMNS_LISTED = 6  # among which the voltage may be
 
@@ -104,22 +103,13 @@ def bump_section(inspection: Inspection, vt0: bool = False) -> list[str]:
     return lines
 
 
-def in_per_unit(channel: InspectedChannel) -> bool:
-    """Return whether a channel seems to be in per unit: it says so, or nothing, and looks so."""
-    if channel.unit is not None:
-        return channel.unit == "pu"
-    if channel.signal in ("vt", "vref"):
-        return channel.level <= AT_REST_PU[1]
-    return max(abs(channel.low), abs(channel.high)) <= LARGEST_PU
-
-
 def _step(inspection: Inspection, step: RecordedStep) -> Iterator[str]:
     reference = inspection.channel_of("vref")
     if reference is not None and reference.name in step.seen_in:
         own = min((change.at for change in reference.steps), key=lambda at: abs(at - step.at))
         size = step.sizes.get(reference.name, 0.0)
         yield f"    - at: {_number(own)}"
-        if in_per_unit(reference):
+        if reference.seems_per_unit:
             yield f"      step: {_number(size)}"
         else:
             yield commented(f"      step: {FILL_IN}", f"pu; {reference.name} {size:+.4g}")
@@ -141,7 +131,9 @@ def _change_of_vt(inspection: Inspection, step: RecordedStep) -> str:
     voltage = inspection.channel_of("vt")
     if voltage is not None and voltage.name in step.sizes:
         size = step.sizes[voltage.name]
-        return f"; vt changed by {_number(size if in_per_unit(voltage) else size / voltage.level)}"
+        return (
+            f"; vt changed by {_number(size if voltage.seems_per_unit else size / voltage.level)}"
+        )
     for group in inspection.phases:
         if group.name in step.sizes:
             return f"; vt changed by {_number(step.sizes[group.name] / group.level)}"
@@ -173,7 +165,7 @@ def _about_phases(inspection: Inspection, group: InspectedPhases) -> Iterator[st
 def _about(channel: InspectedChannel) -> str:
     """Return what to check of a channel."""
     why = f"{channel.signal} by {channel.why}"
-    if in_per_unit(channel):
+    if channel.seems_per_unit:
         return f"{why}; {'pu' if channel.unit else 'taken for pu'}, {channel.level:.5g} at rest"
     if channel.unit == "%":
         return f"{why}; {channel.level:.5g} % at rest"
@@ -185,9 +177,9 @@ def _channel(channel: InspectedChannel, drives: bool) -> str:
     entries = {"column": _text(channel.name)}
     if channel.unit == "%":
         entries["scale"] = "0.01"
-    elif not in_per_unit(channel) and quantity_of(channel.unit):
+    elif not channel.seems_per_unit and quantity_of(channel.unit):
         entries |= {"unit": str(channel.unit), "base": FILL_IN}
-    elif not in_per_unit(channel):
+    elif not channel.seems_per_unit:
         entries |= {"unit": FILL_IN, "base": FILL_IN}
     if channel.spikes and not drives:
         entries["outliers"] = f"{SPIKE_LIMIT:g}"

@@ -19,7 +19,6 @@ from exfit.case.schema import (
     Unknown,
     start_value,
 )
-from exfit.case.suggestion import in_per_unit
 from exfit.dsp.quality import noise_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
@@ -129,7 +128,7 @@ def _inspected(file: RecordFile, folder: Path) -> Inspection:
 def _with_own_reference(recording: Recording, inspection: Inspection | None) -> Recording:
     """Return a recording with the reference that its file holds per unit, if it holds one."""
     reference = None if inspection is None else inspection.reference
-    if reference is None or not in_per_unit(reference) or recording.test.vref == "recorded":
+    if reference is None or not reference.seems_per_unit or recording.test.vref == "recorded":
         return recording
     channels = {**recording.record.channels, "vref": ChannelSection(column=reference.name)}
     test = recording.test.model_copy(update={"vref": "recorded"})

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.noise import UNIFORM_SPREAD
-from exfit.dsp.quality import mains_frequency, noise_of, quantum, spikes, stuck
+from exfit.dsp.quality import drift_at_rest, mains_frequency, noise_of, quantum, spikes, stuck
 from exfit.dsp.sampling import present_samples
+from exfit.records.ripple import Ripple, ripple_at_rest
 from exfit.records.steps import ChannelSteps, LevelChange, RecordedStep, switches
 
 Array = NDArray[np.float64]
@@ -17,6 +18,10 @@ SPIKE_LIMIT = 6.0  # times the noise: a sample farther off the line through its 
 PLACES_LISTED = 5  # of spikes and of other faults, the first ones
 NOISELESS = 1e-6  # of the range: with less noise a channel at rest stands still, as simulated ones
 OWN_NOISE = 1.01  # times what rounding leaves: the noise of a channel that is not rounded coarsely
+POSITIVE_AT_REST = ("vt", "efd", "ifd", "it")
+NEGATIVE = 5.0  # times the noise below zero: what is positive is inverted
+LEAST_DRIFT = 0.01  # of all that a channel changes: with less it is at rest
+LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower
 AT_REST_PU = (0.3, 1.7)  # a voltage in per unit lies between these before a step
 
 
@@ -27,8 +32,9 @@ class InspectedChannel:
     ``level`` is where it rests before the first step, the median without one. ``spikes`` counts all
     of them, ``spikes_at`` are the instants (s) of the first; ``stuck`` are the intervals (s) in
     which it stands still; ``frequency`` (Hz) is that of a waveform, whose noise, spikes and steps
-    are not looked for. ``remark`` says why there is no step. ``unit_from`` is the source of the
-    unit: file or name.
+    are not looked for. ``drift`` is how far it moves before the first step, beyond chance, and
+    ``ripple`` a line in its spectrum at rest. ``remark`` says why there is no step. ``unit_from``
+    is the source of the unit: file or name.
     """
 
     name: str
@@ -46,6 +52,8 @@ class InspectedChannel:
     frequency: float | None = None
     steps: tuple[LevelChange, ...] = ()
     remark: str = ""
+    drift: float = 0.0
+    ripple: Ripple | None = None
     signal: str | None = None
     why: str = ""
 
@@ -71,6 +79,36 @@ class InspectedChannel:
             yield f"does not change from {start:.6g} to {end:.6g} s"
         if self._is_implausible_voltage():
             yield f"{self.level:.5g} at rest cannot be a voltage in pu: what is its unit?"
+        if self.inverted:
+            yield (
+                f"rests at {self.level:.5g}{self._unit}, but {self.signal} is positive at rest: if "
+                "the channel is inverted, scale: -1 on it turns it"
+            )
+        if self.drift:
+            yield (
+                f"moves by {abs(self.drift):.2g}{self._unit} before the first step: it does not "
+                "start at rest; begin the window later, or describe an earlier step by begin"
+            )
+        if self.ripple is not None:
+            yield f"{self.ripple.in_words}: {self.ripple.remedy}"
+
+    @property
+    def _unit(self) -> str:
+        return f" {self.unit}" if self.unit else ""
+
+    @property
+    def seems_per_unit(self) -> bool:
+        """Whether it seems to be in per unit: it says so, or nothing, and looks so."""
+        if self.unit is not None:
+            return self.unit == "pu"
+        if self.signal in ("vt", "vref"):
+            return abs(self.level) <= AT_REST_PU[1]
+        return max(abs(self.low), abs(self.high)) <= LARGEST_PU
+
+    @property
+    def inverted(self) -> bool:
+        """Whether it is negative at rest although its signal is positive there."""
+        return self.signal in POSITIVE_AT_REST and self.level < -NEGATIVE * self.noise
 
     def _spikes_in_words(self) -> str:
         instants = ", ".join(f"{at:.6g}" for at in self.spikes_at)
@@ -110,6 +148,10 @@ def inspect_channel(
         NOISELESS * float(np.ptp(y)), OWN_NOISE * UNIFORM_SPREAD * (rounding or 0.0)
     )
     still = stuck(y) if noisy else ()
+    rest = y[t < _rests(t, steps)[0][1]] if steps else y[:0]
+    drift = (
+        0.0 if frequency or switches(y) or (steps and steps[0].from_start) else drift_at_rest(rest)
+    )
     return InspectedChannel(
         name,
         *unit,
@@ -125,7 +167,20 @@ def inspect_channel(
         frequency=frequency,
         steps=own_steps.changes,
         remark=own_steps.remark,
+        drift=drift if abs(drift) > LEAST_DRIFT * float(np.ptp(y)) else 0.0,
+        ripple=None if not noise else ripple_at_rest(t, y, _rests(t, steps)),
     )
+
+
+def _rests(time: Array, steps: Sequence[RecordedStep]) -> list[tuple[float, float]]:
+    """Return where a record rests: before its first step, and long after its last."""
+    first, last = float(time[0]), float(time[-1])
+    if not steps:
+        return [(first, last)]
+    return [
+        (first, steps[0].at - steps[0].error),
+        (0.5 * (steps[-1].at + last), last),
+    ]
 
 
 def _level_at_rest(time: Array, samples: Array, steps: Sequence[RecordedStep]) -> float:

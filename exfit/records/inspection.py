@@ -16,6 +16,7 @@ from exfit.errors import RecordError
 from exfit.records.channel_inspection import PLACES_LISTED, InspectedChannel, inspect_channel
 from exfit.records.channel_recognition import Guess, guess_signals, three_phases
 from exfit.records.clock import Clock, check_finite
+from exfit.records.contradictions import contradictions
 from exfit.records.formats.table import Table, listed, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.steps import (
@@ -87,7 +88,8 @@ class Inspection:
     def findings(self) -> tuple[str, ...]:
         """What must be known before the record is used, in sentences."""
         of_channels = (finding for channel in self.channels for finding in channel.findings)
-        return (*_clock_findings(self), *of_channels)
+        between = contradictions(self.channels, self.steps)
+        return (*_clock_findings(self), *of_channels, *between)
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from exfit.analysis.causes.evidence import Evidence
 from exfit.analysis.causes.suspicion import CERTAIN, LAST, Suspicion
+from exfit.dsp.quality import drift_at_rest
 from exfit.fitting.experiment import Channel
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
@@ -14,8 +15,6 @@ from exfit.results.verdict import Cause
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
 FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 LEAST_LEVEL = 0.1  # pu: below it a deviation is not relative to the level
-FEWEST_IN_HALF = 4  # samples at rest, of each half
-UNSTEADY = 6.0  # standard errors between both halves of what is called steady
 INVISIBLE = 1e-7  # pu: no recorder shows it
 
 
@@ -77,13 +76,8 @@ def unsteady_signals(
         at_rest = samples[before & np.isfinite(samples)]
         # averages over a window scatter little from each to the next: one of each window counts
         at_rest = at_rest[:: smooth.get(signal, 1)]
-        half = len(at_rest) // 2
-        if half < FEWEST_IN_HALF:
-            continue
-        # noise from neighbours: a drift does not pass for it
-        noise = float(np.std(np.diff(at_rest))) / np.sqrt(2.0)
-        drift = abs(float(at_rest[:half].mean() - at_rest[half:].mean()))
-        if drift > max(UNSTEADY * noise * np.sqrt(2.0 / half), INVISIBLE):
+        drift = abs(drift_at_rest(at_rest))
+        if drift > INVISIBLE:
             yield Cause(
                 f"{signal} moves by {drift:.2g} pu before {steady:g} s, where the record should be "
                 "at rest",

@@ -1,0 +1,85 @@
+"""What the channels of a record contradict in each other, or in what a test can be."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from exfit.records.channel_inspection import InspectedChannel
+from exfit.records.steps import RecordedStep
+from exfit.signals import SIGNALS
+
+LARGEST_STEP = 0.2  # pu: no regulator is tested with more
+FOLLOWS = ("efd", "ifd", "vref")  # signals that rise for good where vt does
+CERTAIN_CHANGE = (0.01, 6.0)  # of the level and times the noise: a change whose sign is certain
+SAME_BASE = 0.2  # of their level: how far efd and ifd in per unit may be from each other at rest
+
+
+def contradictions(
+    channels: Sequence[InspectedChannel], steps: Sequence[RecordedStep]
+) -> Iterator[str]:
+    """Yield what contradicts itself in the channels of a file, in sentences."""
+    by_signal = {channel.signal: channel for channel in channels if channel.signal}
+    voltage = by_signal.get("vt")
+    for step in steps:
+        yield from _too_large(by_signal, step)
+        if voltage is not None:
+            yield from _opposite(voltage, by_signal, step)
+    yield from _different_bases(by_signal)
+
+
+def size_in_words(size: float) -> str:
+    """Return why a step of the reference (pu) is none that a regulator is tested with."""
+    return (
+        f"{size:+.4g} pu is {100.0 * size:+.4g} % of rated voltage, beyond "
+        f"{100.0 * LARGEST_STEP:g} %: no regulator is tested so; 5 % is 0.05 pu"
+    )
+
+
+def _too_large(channels: Mapping[str, InspectedChannel], step: RecordedStep) -> Iterator[str]:
+    """Yield the changes of the voltage and its reference that no test makes."""
+    for signal in ("vref", "vt"):
+        channel = channels.get(signal)
+        if channel is None or step.from_start or channel.name not in step.sizes:
+            continue
+        # a reference may be recorded as its deviation; a voltage in kV is relative to its level
+        base = 1.0 if channel.seems_per_unit else abs(channel.level)
+        size = step.sizes[channel.name] / base if base else 0.0
+        if abs(size) > LARGEST_STEP:
+            yield f"{channel.name}: changes at {step.at:.4g} s; {size_in_words(size)}"
+
+
+def _opposite(
+    voltage: InspectedChannel, channels: Mapping[str, InspectedChannel], step: RecordedStep
+) -> Iterator[str]:
+    """Yield the signals that fall for good where the voltage rises, or the other way round."""
+    change = step.sizes.get(voltage.name)
+    if change is None or not _certain(voltage, change):
+        return
+    for signal in FOLLOWS:
+        channel = channels.get(signal)
+        size = 0.0 if channel is None else step.sizes.get(channel.name, 0.0)
+        if channel is None or channel.inverted or not _certain(channel, size):
+            continue
+        if size * change < 0.0:
+            moves = ("falls", "rises") if size < 0.0 else ("rises", "falls")
+            yield (
+                f"{channel.name}: {moves[0]} by {abs(size):.3g} at {step.at:.4g} s where "
+                f"{voltage.name} {moves[1]}: if it is the {SIGNALS[signal].name}, the channel is "
+                "inverted, and scale: -1 with an offset turns it"
+            )
+
+
+def _certain(channel: InspectedChannel, size: float) -> bool:
+    share, times = CERTAIN_CHANGE
+    return abs(size) > max(share * abs(channel.level), times * channel.noise)
+
+
+def _different_bases(channels: Mapping[str, InspectedChannel]) -> Iterator[str]:
+    """Yield that field voltage and field current in per unit rest at different levels."""
+    efd, ifd = channels.get("efd"), channels.get("ifd")
+    if efd is None or ifd is None or not (efd.seems_per_unit and ifd.seems_per_unit):
+        return
+    larger = max(efd.level, ifd.level)
+    if min(efd.level, ifd.level) > 0.0 and abs(efd.level - ifd.level) > SAME_BASE * larger:
+        yield (
+            f"{efd.name} rests at {efd.level:.4g}, {ifd.name} at {ifd.level:.4g}: in per unit of "
+            "the air-gap line both are equal at rest, so that one of them has another base"
+        )
