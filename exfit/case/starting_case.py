@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from textwrap import wrap
 
 from exfit.case.suggestion import FILL_IN, bump_section, record_section, relative, weights_section
 from exfit.case.templates import commented, parameter_line, source_lines
@@ -13,8 +14,11 @@ from exfit.records.inspection import Inspection
 from exfit.util.sources import TYPICAL
 from exfit.util.text import yaml_number
 
+WIDTH = 80  # columns of a note
 ALONE = "FIRST_ORDER"  # the model whose output is vt itself
 ON_LOAD = 0.05  # pu of power at rest: with less the breaker is taken for open
+FIELD_WITHOUT_LOAD = (0.95, 1.6)  # of the voltage: air-gap line, and its excess by saturation
+FIELD_ON_LOAD = (0.5, 5.0)  # of the voltage: under-excited to ceiling
 BOUNDS = (0.1, 10.0)  # times the typical value
 
 
@@ -52,7 +56,8 @@ def starting_case(
         "# Values are typical: replace them by those of the unit, and the words under",
         "# `sources`. `exfit check` tries the case, `exfit identify` shows what its test",
         "# resolves, `exfit fit` fits.",
-        *(f"# note: {_plain(text)}." for text in inspection.findings),
+        *(line for text in inspection.findings for line in _note(text)),
+        *(line for text in _other_bases(model, inspection) for line in _note(text)),
         "# about: {Plant: ..., Unit: ..., Rated: ..., Tested by: ...}  # for reports",
         f"model: {name}",
         *_plant(model, machine, inspection),
@@ -86,6 +91,28 @@ def _plant(model: Model, machine: Machine, inspection: Inspection) -> Iterator[s
         yield parameter_line(row, yaml_number(row.typical), "    ")
     sources |= {row.symbol: TYPICAL for row in machine.sheet}
     yield from source_lines(sources, "  ")
+
+
+def _note(text: str) -> list[str]:
+    """Return a note as lines of comment."""
+    return wrap(f"# note: {_plain(text)}.", WIDTH, subsequent_indent="#   ", break_long_words=False)
+
+
+def _other_bases(model: Model, inspection: Inspection) -> Iterator[str]:
+    """Yield the field signals whose level in per unit is none that the machine has at rest."""
+    power, voltage = inspection.channel_of("p"), inspection.channel_of("vt")
+    loaded = power is not None and _on_load(power)
+    vt = voltage.level if voltage is not None and voltage.seems_per_unit else 1.0
+    low, high = (share * vt for share in (FIELD_ON_LOAD if loaded else FIELD_WITHOUT_LOAD))
+    for signal in () if model.name == ALONE else ("efd", "ifd"):
+        channel = inspection.channel_of(signal)
+        if channel is None or not channel.seems_per_unit or low <= channel.level <= high:
+            continue
+        where = "on load" if loaded else "with the breaker open"
+        yield (
+            f"{channel.name} rests at {channel.level:.4g}, the model {where} at {low:.3g} to "
+            f"{high:.3g} pu: 1 pu of {signal} is that of the air-gap line; give the channel a base"
+        )
 
 
 def _on_load(power: InspectedChannel) -> bool:

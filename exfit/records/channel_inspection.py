@@ -148,10 +148,6 @@ def inspect_channel(
         NOISELESS * float(np.ptp(y)), OWN_NOISE * UNIFORM_SPREAD * (rounding or 0.0)
     )
     still = stuck(y) if noisy else ()
-    rest = y[t < _rests(t, steps)[0][1]] if steps else y[:0]
-    drift = (
-        0.0 if frequency or switches(y) or (steps and steps[0].from_start) else drift_at_rest(rest)
-    )
     return InspectedChannel(
         name,
         *unit,
@@ -167,9 +163,17 @@ def inspect_channel(
         frequency=frequency,
         steps=own_steps.changes,
         remark=own_steps.remark,
-        drift=drift if abs(drift) > LEAST_DRIFT * float(np.ptp(y)) else 0.0,
-        ripple=None if not noise else ripple_at_rest(t, y, _rests(t, steps)),
+        drift=_drift(t, y, steps) if noise else 0.0,
+        ripple=ripple_at_rest(t, y, _rests(t, steps)) if noise else None,
     )
+
+
+def _drift(time: Array, samples: Array, steps: Sequence[RecordedStep]) -> float:
+    """Return how far a channel moves before the first step, 0 by chance or where that is little."""
+    if not steps or steps[0].from_start:
+        return 0.0
+    drift = drift_at_rest(samples[time < _rests(time, steps)[0][1]])
+    return drift if abs(drift) > LEAST_DRIFT * float(np.ptp(samples)) else 0.0
 
 
 def _rests(time: Array, steps: Sequence[RecordedStep]) -> list[tuple[float, float]]:

@@ -7,6 +7,7 @@ import pytest
 import yaml
 from columns import Columns
 from places import SAMPLES
+from step_records import step_record
 
 from exfit.case.load import load_case
 from exfit.case.starting_case import bounds_of, free_of, starting_case
@@ -193,3 +194,15 @@ def test_a_path_leads_from_the_case_to_the_record(record, tmp_path):
     case = load_case(started("SEXS", record("SEXS"), folder))
     assert (folder / case.record.file).resolve() == (tmp_path / "record.csv").resolve()
     assert Path(case.record.file).is_absolute() is False
+
+
+def test_a_field_voltage_that_rests_where_the_model_does_not_is_noted(tmp_path):
+    content = dict(step_record(1, length=6.0).table.content)
+    sound = {"t": content["t"], "vt": content["vt"], "efd": content["efd"]}
+    for scale in (1.0, 1.0 / 3.0):
+        inspection = inspect(Columns({**sound, "efd": scale * sound["efd"]}))
+        text = starting_case(MODELS["AC1A"], "AC1A", MACHINES["GENROU"], inspection, tmp_path)
+        notes = " ".join(line.lstrip("# ") for line in text.splitlines() if line.startswith("#"))
+        assert ("efd rests at 0.373" in notes) == (scale != 1.0)
+        assert ("the model with the breaker open at 0.95 to 1.6 pu" in notes) == (scale != 1.0)
+        assert max(map(len, text.splitlines())) <= 100
