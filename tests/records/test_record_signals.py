@@ -199,7 +199,8 @@ def test_a_voltage_off_by_the_connection_is_noted(tmp_path, connection):
     entry = {**PHASES, "kind": "rms", "connection": connection}
     write(tmp_path / "record.csv", **columns)
     result = fit(case_of(one({"vref": TEST["vref"]}, {"vt": entry}, ["KA"]), tmp_path))
-    noted = any("vt starts from 0.577" in note and "connection" in note for note in result.notes)
+    causes = [cause for cause in result.verdict.causes if "vt starts from 0.577" in cause.cause]
+    noted = any("connection" in cause.remedy for cause in causes)
     assert noted == (connection == "phase-to-phase")
 
 
