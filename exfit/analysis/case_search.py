@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from exfit import estimate
-from exfit.analysis.determination import Determination, determination
+from exfit.analysis.intervals.determination import Determination, determination
 from exfit.analysis.judgement import doubt_of
 from exfit.case.case import Case
 from exfit.case.schema import Estimate

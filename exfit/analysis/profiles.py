@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.analysis.case_search import SearchTask, weighted_search, with_lines
 from exfit.analysis.diagnostics import search_range_notes
-from exfit.analysis.profile_hull import (
+from exfit.analysis.intervals.profile_hull import (
     FoundMinimum,
     limits_of,
     other_minima,

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.analysis.behaviour import behaviour_of
 from exfit.analysis.causes import Evidence, FittedRecord
-from exfit.analysis.determination import Determination
 from exfit.analysis.diagnostics import (
     notes,
     outlier_notes,
@@ -17,6 +16,7 @@ from exfit.analysis.diagnostics import (
     tolerance_notes,
 )
 from exfit.analysis.given_values import given_value_notes
+from exfit.analysis.intervals.determination import Determination
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.analysis.phase_ends import phase_ends
 from exfit.analysis.typical_values import influence_of_typical_values

@@ -60,7 +60,7 @@ class UncertaintyAnalysis:
     ``leaning_on_bounds`` names those that would be others if the parameters on a bound were let
     go, ``tied_to_bounds`` those of them that one on a bound decides, with that one; ``rises`` is by
     how much the cost rises from its minimum to the ends of each profile's interval, empty where
-    that is not stored.
+    that is not stored; ``by_few_samples`` says of which instants one or two samples decide.
     """
 
     DERIVED: ClassVar = {"sentences": "sentences"}
@@ -73,6 +73,7 @@ class UncertaintyAnalysis:
     leaning_on_bounds: tuple[str, ...] = ()
     rises: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
     tied_to_bounds: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    by_few_samples: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def open(self) -> tuple[str, ...]:

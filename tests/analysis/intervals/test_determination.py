@@ -8,14 +8,14 @@ import pytest
 from places import CONFIGS
 
 import exfit.workflows as workflows
-from exfit.analysis.determination import (
+from exfit.analysis.intervals.determination import (
     FoundMinimum,
     determination,
     limits_of,
     of_profiles,
     uncertainty_of_solution,
     with_profile_intervals,
-    without_tied_intervals,
+    without_limits_of_others,
 )
 from exfit.analysis.solution import INTERRUPTED_AFTERWARDS
 from exfit.case.load import load_case
@@ -184,7 +184,7 @@ def test_a_search_that_ended_nowhere_has_no_intervals():
 def test_a_parameter_tied_to_one_on_its_bound_is_named_with_it(unit2):
     _, _, linear, _ = unit2
     tied = replace(linear, tied_to_bounds={"KPR": ("KD",)})
-    parameters = without_tied_intervals(tied).confidence.parameters
+    parameters = without_limits_of_others(tied).confidence.parameters
     assert parameters["KPR"].interval is None
     assert parameters["KPR"].why == "has no interval: the record ties it to KD, on a bound"
     assert parameters["KIR"] == linear.confidence.parameters["KIR"]
@@ -198,7 +198,7 @@ def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
         return result._replace(best=replace(result.best, x=x, cost=cost), minima=None, place=None)
 
     monkeypatch.setattr(
-        "exfit.analysis.determination.not_served_by_linear_theory", lambda *_: ("a",)
+        "exfit.analysis.intervals.determination.not_served_by_linear_theory", lambda *_: ("a",)
     )
     whole = workflows.fit(case_of("first_order"))
     monkeypatch.setattr("exfit.analysis.case_search.search", beside)

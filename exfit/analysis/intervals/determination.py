@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.analysis.profile_hull import (
+from exfit.analysis.intervals.instants import decided_by_few_samples, minima_between_samples
+from exfit.analysis.intervals.profile_hull import (
     FoundMinimum,
     allowed,
     complete,
@@ -35,6 +36,7 @@ Array = NDArray[np.float64]
 Watch = Callable[[estimate.Progress], object]
 
 POINTS = 3  # of a side: only its end is asked for
+REFUTING = 1e-3  # of the rise: a minimum lower by more refutes the solution
 
 NO_MINIMUM = "has no interval: the search did not end at a minimum"
 NEEDS_PROFILE = (
@@ -81,10 +83,15 @@ def determination(
     if search.interrupted or not (profiled and own_end):
         linear = by_linear_theory_alone(problem.compressed, best, uncertainty, of_record)
         return Determination(linear)
-    others = other_minima(search)
+    between = minima_between_samples(problem, best.x)
+    margin = REFUTING * max(uncertainty.rises.values(), default=0.0)
+    lowest = min(between, key=lambda minimum: minimum.cost, default=None)
+    if lowest is not None and lowest.cost < best.cost - margin:
+        return Determination(uncertainty, lower=lowest.x)
     # strategy auto may prefer a minimum that is not the lowest: their hull is about both
     solution, *others = sorted(
-        [FoundMinimum(best.x, best.cost), *others], key=lambda minimum: minimum.cost
+        [FoundMinimum(best.x, best.cost), *other_minima(search), *between],
+        key=lambda minimum: minimum.cost,
     )
     return with_profile_intervals(
         problem.compressed, solution, others, uncertainty, of_record, progress
@@ -116,7 +123,8 @@ def uncertainty_of_solution(
     except SimulationError:
         return None
     nonlinear = nonlinear_parameters(problem.compressed, theta, uncertainty, of_record)
-    return replace(uncertainty, nonlinear=nonlinear)
+    by_few_samples = decided_by_few_samples(problem, theta)
+    return replace(uncertainty, nonlinear=nonlinear, by_few_samples=by_few_samples)
 
 
 def with_profile_intervals(
@@ -134,14 +142,14 @@ def with_profile_intervals(
     """
     rises, near = what_to_profile(residuals, solution, others, uncertainty, of_record)
     if not rises:
-        return Determination(uncertainty)
+        return Determination(without_limits_of_others(uncertainty))
     profiles = profiles_about(residuals, solution, near, rises, POINTS, progress)
     if profiles.lower is not None:
         return Determination(uncertainty, lower=profiles.lower)
     names = [residuals.free[index].name for index in rises]
     served = without_linear_intervals(uncertainty, names, UNFINISHED)
     with_profiles = with_intervals(served, residuals.free, profiles.by_index)
-    return Determination(without_tied_intervals(with_profiles), interrupted=profiles.interrupted)
+    return Determination(without_limits_of_others(with_profiles), interrupted=profiles.interrupted)
 
 
 def what_to_profile(
@@ -153,9 +161,7 @@ def what_to_profile(
 ) -> tuple[dict[int, float], list[FoundMinimum]]:
     """Return the rises of the parameters to profile, and the minima that are not refuted."""
     index_of = {parameter.name: index for index, parameter in enumerate(residuals.free)}
-    own = {
-        index_of[name]: rise for name, rise in uncertainty.rises.items() if name not in of_record
-    }
+    own = {index_of[name]: rise for name, rise in uncertainty.rises.items()}
     largest = max(own.values(), default=0.0)
     near = [other for other in others if allowed(solution, other, largest)]
     if near:
@@ -172,17 +178,20 @@ def without_linear_intervals(
     for name in names:
         if parameters[name].interval is not None:
             parameters[name] = replace(parameters[name], interval=None, why=why)
-    return without_tied_intervals(with_parameters(uncertainty, parameters))
+    return without_limits_of_others(with_parameters(uncertainty, parameters))
 
 
-def without_tied_intervals(uncertainty: UncertaintyAnalysis) -> UncertaintyAnalysis:
-    """Return the uncertainty without the intervals of parameters tied to others on a bound.
+def without_limits_of_others(uncertainty: UncertaintyAnalysis) -> UncertaintyAnalysis:
+    """Return the uncertainty without intervals that something else than the record limits.
 
-    What limits such an interval is the bound of the other parameter, and not the record.
+    That is the bound of another parameter, for those tied to it, or one sample that decides an
+    instant.
     """
     parameters = dict(uncertainty.confidence.parameters)
     for name, partners in uncertainty.tied_to_bounds.items():
         why = f"has no interval: the record ties it to {listed(partners)}, on a bound"
+        parameters[name] = replace(parameters[name], interval=None, why=why)
+    for name, why in uncertainty.by_few_samples.items():
         parameters[name] = replace(parameters[name], interval=None, why=why)
     return with_parameters(uncertainty, parameters)
 

@@ -1,0 +1,1 @@
+"""The intervals of a fit: by linear theory, of profiles and of their hulls over the minima."""
