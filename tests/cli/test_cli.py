@@ -782,7 +782,7 @@ def test_results_are_written_and_shown_before_a_figure_is_drawn(run, monkeypatch
         return draw(self, *announce)
 
     monkeypatch.setattr(FigureFiles, "draw", drawn)
-    monkeypatch.setattr(plots, "png", lambda figure: b"")
+    monkeypatch.setattr(plots, "encoded", lambda picture: b"")
     ran = run("fit", case_file(), *filter(None, [option]))
     assert ran.code == 0
     (before,) = shown

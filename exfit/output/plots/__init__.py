@@ -8,7 +8,7 @@ from exfit.output.plots.ranking import ranking
 from exfit.output.plots.records import inspection
 from exfit.output.plots.responses import overview, response
 from exfit.output.plots.search import convergence, trajectories, waterfall
-from exfit.output.plots.style import png
+from exfit.output.plots.style import drawn, encoded, png
 from exfit.output.plots.translations import translation
 from exfit.output.plots.uncertainty import correlation, profiles, sensitivity
 
@@ -16,6 +16,8 @@ __all__ = [
     "agreement",
     "convergence",
     "correlation",
+    "drawn",
+    "encoded",
     "fit_series",
     "inspection",
     "iterations",

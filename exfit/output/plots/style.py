@@ -39,7 +39,17 @@ def short(name: str, most: int = LONGEST_NAME) -> str:
 
 def png(figure: Figure) -> bytes:
     """Return a figure as the bytes of a PNG file."""
-    return as_png(pixels(figure, DPI), DPI)
+    return encoded(drawn(figure))
+
+
+def drawn(figure: Figure) -> NDArray[np.uint8]:
+    """Return the pixels of a figure: rows of red, green, blue and opacity."""
+    return pixels(figure, DPI)
+
+
+def encoded(picture: NDArray[np.uint8]) -> bytes:
+    """Return pixels as the bytes of a PNG file; most of it without the interpreter's lock."""
+    return as_png(picture, DPI)
 
 
 def tidy(axes: Axes) -> None:
