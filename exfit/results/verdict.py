@@ -15,6 +15,7 @@ NO_MATCH: Final = "no match"
 NOT_CONVERGED: Final = "not converged"
 
 REJECTED = 0.01  # a probability below it
+NEGLIGIBLE = 1e-3  # of the variance of the scatter: what inputs carry is not tested for
 VISIBLE = 0.005  # of the range of a signal: the width of a line in its figure
 
 
@@ -42,6 +43,7 @@ class ResidualTests:
     times      standard deviation of the residuals, over the scatter
     deviation  what stands out of the noise (pu) for a fiftieth of the record or longer
     share      deviation, over the range of the signal
+    carried    share of the variance of the scatter that recorded inputs carry into the response
 
     A probability is None where there are too few samples, or no errors at all.
     """
@@ -57,10 +59,16 @@ class ResidualTests:
     times: Annotated[float, nan]
     deviation: Annotated[float, nan]
     share: Annotated[float, nan]
+    carried: Annotated[float, nan] = 0.0
 
     @property
     def are_white(self) -> bool:
-        """Whether neither test of whiteness rejects the residuals."""
+        """Whether neither test of whiteness rejects the residuals.
+
+        Noise that recorded inputs carry is coloured: residuals that are no larger may be, too.
+        """
+        if self.carried > NEGLIGIBLE and not self.excess < REJECTED:
+            return True
         return not any(p is not None and p < REJECTED for p in (self.whiteness, self.pattern))
 
     @property

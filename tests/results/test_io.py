@@ -131,6 +131,15 @@ def test_a_file_of_the_version_before_says_what_is_typical_and_fitted_alone(save
         assert load_result(path.with_name("older.json")).typical == ()
 
 
+def test_a_result_of_the_version_before_has_no_verdict(saved):
+    path, content = saved
+    assert content["verdict"]["verdict"] == "good"
+    del content["verdict"]
+    with pytest.raises(ExfitError, match="verdict: missing"):
+        load_result(written(saved))
+    assert load_result(written((path, content), version=4)).verdict is None
+
+
 def test_no_damage_ends_in_a_traceback(saved):
     """Values of another kind, missing keys, cut files: ExfitError with the file, or no harm."""
     path, _ = saved

@@ -1,7 +1,7 @@
 """What a result says of itself: the figures of an overlay, and the JSON of a fit."""
 
 import io
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,9 @@ from places import ROOT
 from exfit import workflows
 from exfit.results.comparisons import Overlay
 from exfit.results.model import FitResult
+from exfit.results.side_by_side import outcome_of
 from exfit.results.tables import table
+from exfit.results.verdict import GOOD, MATCHES, MISSES, NO_MATCH, NOT_CONVERGED, Verdict
 from exfit.util.typed import IN_FILE, plain
 
 INSIDE = {"comparisons": "records"}  # under another name
@@ -49,6 +51,30 @@ def test_the_json_of_a_fit_has_every_field_with_its_value(fitted):
     assert "history" not in told
     assert tuple(told["typical"]) == fitted.typical
     assert told["fit"] == plain(fitted.comparison) == told["records"][0]
+
+
+@pytest.mark.parametrize(
+    ("words", "holds"),
+    [(GOOD, True), (MATCHES, True), (MISSES, False), (NO_MATCH, False), (NOT_CONVERGED, False)],
+)
+def test_a_fit_holds_by_its_verdict_and_its_validations(fitted, words, holds):
+    result = replace(fitted, verdict=Verdict(words))
+    assert result.holds is holds
+    assert outcome_of(result) == words
+    rejected = replace(result.comparison, accepted=False, reason="it is another unit")
+    for worse in (
+        replace(result, validation=(rejected,)),
+        replace(result, interrupted=True),
+    ):
+        assert not worse.holds
+        assert outcome_of(worse) not in (GOOD, MATCHES)
+
+
+def test_a_result_without_a_verdict_holds_where_it_converged(fitted):
+    """As those of an earlier version."""
+    earlier = replace(fitted, verdict=None)
+    assert earlier.holds
+    assert not replace(earlier, success=False).holds
 
 
 def test_a_long_table_keeps_the_extremes_of_every_column(monkeypatch):

@@ -31,10 +31,11 @@ RARE = 3.0  # standard errors that the largest of all stretches of noise hardly 
 
 
 class Scatter(NamedTuple):
-    """A standard deviation, and the variance of its logarithm."""
+    """A standard deviation, the variance of its logarithm, the share that inputs carry."""
 
     std: float
     log_variance: float
+    carried: float = 0.0
 
 
 def sample_scatter(std: float, samples: int) -> Scatter:
@@ -77,7 +78,7 @@ def with_carried(scatter: Scatter, carried: Array) -> Scatter:
     own = (1.0 - share) ** 2 * scatter.log_variance
     independent = float(np.mean([effective_samples(realisation) for realisation in carried]))
     of_carried = share**2 * (1.0 + 1.0 / len(carried)) * OF_RMS / independent
-    return Scatter(sqrt(total), own + of_carried)
+    return Scatter(sqrt(total), own + of_carried, share)
 
 
 def excess(rmse: float, scatter: Scatter) -> float:

@@ -102,6 +102,7 @@ def _tests_of(
         times=rmse / largest,
         deviation=deviation,
         share=deviation / max(_range(overlay), LEAST_NOISE),
+        carried=max(each.carried for each in scatter),
     )
 
 

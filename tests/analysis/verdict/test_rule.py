@@ -141,6 +141,11 @@ def test_what_drives_carries_its_noise_into_the_response(tmp_path):
     """The field voltage's own noise, integrated by the machine, is no error of the model."""
     content = config("machine_playback")
     found = verdict(content, tmp_path)
-    assert found.verdict == MATCHES
+    assert found.matches
+    assert all(tests.are_noise for tests in found.residuals)
     tests = found.residuals[0]
     assert tests.whiteness < 0.01 < tests.excess
+    assert tests.carried > 0.1
+    content["plant"]["free"] = {"Tpd0": content["plant"]["free"]["Tpd0"]}
+    content["plant"]["parameters"] |= {"S10": 0.06, "S12": 0.4}
+    assert not verdict(content, tmp_path).matches
