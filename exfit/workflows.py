@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from exfit import __version__, estimate
 from exfit.analysis.case_description import (
     fixed_values,
+    identified_values,
     input_hashes,
     input_names,
     parts_of,
@@ -132,13 +133,15 @@ def fit(
     evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted)
     own_values = values_by_part(case, values)
     models = {part.kind: part.name for part in case.parts.all}
+    parameters = fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why)
+    identified = identified_values(parameters, analysis.validation)
     return FitResult(
         case=case.path,
         about=case.about,
         model=case.subject,
         strategy=method,
         saturation=case.saturation,
-        parameters=fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why),
+        parameters=parameters,
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
         fixed=fixed_values(case, values),
         machine=own_values.get("machine", {}),
@@ -177,7 +180,7 @@ def fit(
         sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
         strategy_given=method != case.estimate.strategy,
         parts=tuple(parts_of(case)),
-        tests=tuple(tests_of(case, used)),
+        tests=tuple(tests_of(case, used, identified)),
         behaviour=analysis.behaviour,
         files=input_names(case, used),
         case_text=case_text,

@@ -1,30 +1,37 @@
 """A case in words and tables, as its report shows it: its models, its tests, its files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from exfit.case.case import Case
 from exfit.case.parts import Part
 from exfit.case.schema import (
-    BumpTest,
     ChannelSection,
     FindableStep,
     PhasesSection,
+    Recording,
     Reference,
     ReferenceFile,
     ReferenceTable,
     Unknown,
-    start_value,
 )
+from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.fitting.setup import ExperimentSetup
+from exfit.inference import Interval
 from exfit.plants import NETWORK, REFERENCES
 from exfit.records.reading import file_hash
 from exfit.records.record import Record
+from exfit.results.comparisons import Comparison
 from exfit.results.description import (
     NetworkParameter,
     PartDescription,
     RecordedTest,
     SheetRow,
 )
+from exfit.results.model import FittedParameter
+from exfit.util.text import rounded
+
+Estimated = tuple[float, float | None]  # a value, and half of its 95 % interval
+Identified = Mapping[str, Estimated]  # what a fit found about its records, by name
 
 
 def labelled_records(case: Case) -> list[str]:
@@ -99,8 +106,13 @@ def parts_of(case: Case) -> Iterator[PartDescription]:
         )
 
 
-def tests_of(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[RecordedTest]:
-    """Yield the tests of a case with their records; ``setups`` as for `input_hashes`."""
+def tests_of(
+    case: Case, setups: Sequence[ExperimentSetup], identified: Identified
+) -> Iterator[RecordedTest]:
+    """Yield the tests of a case with their records; ``setups`` as for `input_hashes`.
+
+    ``identified`` holds what the fit identified about the records.
+    """
     roles = [*("fitted" for _ in case.recordings), *("validation" for _ in case.validations)]
     recordings = (*case.recordings, *case.validations)
     for role, recording, setup in zip(roles, recordings, setups, strict=True):
@@ -111,7 +123,7 @@ def tests_of(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[Recorded
             role=role,
             file=recording.record.file,
             plant=view.kind.title,
-            done="; ".join(_events(recording.test)) or "no step of its own",
+            done="; ".join(_events(recording, identified)) or "no step of its own",
             channels="; ".join(_channel(*entry) for entry in recording.record.channels.items()),
             samples=len(time),
             first=float(time[0]),
@@ -133,12 +145,13 @@ def _network(view: Case) -> dict[str, NetworkParameter]:
     }
 
 
-def _events(test: BumpTest) -> Iterator[str]:
+def _events(recording: Recording, identified: Identified) -> Iterator[str]:
     """Yield what was done to the unit, in words."""
+    test, prefix = recording.test, prefix_of(recording)
     if test.vt0 is not None:
-        yield f"vt0 {_given(test.vt0, 'g', 'pu')}"
+        yield f"vt0 {_given(test.vt0, 'g', 'pu', identified.get(f'{prefix}vt0'))}"
     for signal in REFERENCES:
-        yield from _reference(signal, getattr(test, signal))
+        yield from _reference(signal, getattr(test, signal), prefix, identified)
     for event in test.E:
         yield f"E {event.step:+g} pu at {event.at:g} s"
     for switch in test.network:
@@ -147,7 +160,7 @@ def _events(test: BumpTest) -> Iterator[str]:
         yield f"network switched at {switch.at:g} s: {', '.join(changes)}"
 
 
-def _reference(signal: str, given: Reference) -> Iterator[str]:
+def _reference(signal: str, given: Reference, prefix: str, identified: Identified) -> Iterator[str]:
     """Yield what the reference, or the stabiliser's signal, did."""
     if isinstance(given, ReferenceTable):
         (start, first), (end, last) = given.table[0], given.table[-1]
@@ -158,12 +171,18 @@ def _reference(signal: str, given: Reference) -> Iterator[str]:
     elif isinstance(given, str):
         yield f"{signal} as recorded"
     else:
-        yield from (_event(signal, event) for event in given)
+        for number, event in enumerate(given):
+            which = f"{prefix}{signal}{number + 1 if number else ''}"
+            own = (identified.get(f"{which}.step"), identified.get(f"{which}.at"))
+            yield _event(signal, event, *own)
 
 
-def _event(signal: str, event: FindableStep) -> str:
-    """Return a step or ramp of a signal."""
-    change = f"{signal} {_given(event.step, '+g', 'pu')} at {_given(event.at, 'g', 's')}"
+def _event(
+    signal: str, event: FindableStep, size: Estimated | None, instant: Estimated | None
+) -> str:
+    """Return a step or ramp of a signal, as it was given or identified."""
+    change = f"{signal} {_given(event.step, '+g', 'pu', size)}"
+    change += f" at {_given(event.at, 'g', 's', instant)}"
     return change if event.ramp is None else f"{change}, in a ramp of {event.ramp:g} s"
 
 
@@ -172,10 +191,35 @@ def _channel(signal: str, entry: ChannelSection | PhasesSection) -> str:
     return signal if entry.base is None else f"{signal}, 1 pu = {entry.base:g} {entry.unit}"
 
 
-def _given(value: float | Unknown, form: str, unit: str) -> str:
-    """Return a value of a test; one that the fit identified is among the parameters."""
+def _given(
+    value: float | Unknown, form: str, unit: str, identified: Estimated | None = None
+) -> str:
+    """Return a value of a test, as it was given or identified, with half its 95 % interval."""
     if not isinstance(value, Unknown):
         return f"{value:{form}} {unit}"
-    start = start_value(value)
-    about = "" if start is None else f"about {start:{form}} {unit} "
-    return f"{about}(found by the fit)"
+    if identified is None:
+        return "unknown"
+    number, half = identified
+    sign = "+" if form.startswith("+") and number > 0.0 else ""
+    error = "" if half is None else f" +- {half:.2g}"
+    return f"{sign}{rounded(number, half)}{error} {unit} (found by the fit)"
+
+
+def identified_values(
+    parameters: Mapping[str, FittedParameter], validations: Iterable[Comparison]
+) -> dict[str, Estimated]:
+    """Return what a fit identified about its records, each with half of its 95 % interval."""
+    of_validations = {
+        name: (value, None) for match in validations for name, value in match.of_record.items()
+    }
+    fitted = {
+        name: (parameter.value, _half_of(parameter.interval))
+        for name, parameter in parameters.items()
+        if parameter.of_record
+    }
+    return {**of_validations, **fitted}
+
+
+def _half_of(interval: Interval | None) -> float | None:
+    low, high = interval or (None, None)
+    return None if low is None or high is None else 0.5 * (high - low)

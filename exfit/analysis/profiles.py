@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
 ENCLOSED = "the intervals enclose another minimum, which the record does not refute"
+ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 POINTS = 5  # of a side: enough for a smooth figure
@@ -68,6 +69,14 @@ class Profile:
     rise: float
     linear: Interval | None
     others: tuple[Branch, ...] = ()
+
+    @property
+    def rounding_error(self) -> float | None:
+        """The standard error that tables round it to: of its interval, or of the linear one."""
+        for low, high in ((self.low, self.high), self.linear or (None, None)):
+            if low is not None and high is not None:
+                return (high - low) / ERRORS_IN_INTERVAL
+        return None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from exfit.errors import ExfitError
 from exfit.output.plots import overlay
 from exfit.output.terminal.terminal import interval, number
 from exfit.results.model import FitResult, FittedParameter
-from exfit.util.text import near
+from exfit.util.text import near, rounded
 
 __all__ = ["Figure", "fit_figure", "fit_html"]
 
@@ -64,14 +64,15 @@ def fit_html(result: FitResult) -> str:
 
 def _cells(name: str, parameter: FittedParameter) -> tuple[str, ...]:
     """Return what the table says of a parameter."""
+    digits = parameter.rounding_error
     note = f" ({parameter.interval_note})" if parameter.interval_note else ""
     bound = f", on its {parameter.at_bound}" if parameter.at_bound else ""
     return (
         name,
         number(parameter.start),
-        f"{number(parameter.value)}{bound}",
+        f"{rounded(parameter.value, digits)}{bound}",
         number(parameter.stderr, 2),
-        f"{interval(parameter.interval)}{note}",
+        f"{interval(parameter.interval, digits)}{note}",
         parameter.unit,
     )
 

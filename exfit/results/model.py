@@ -19,6 +19,7 @@ from exfit.results.description import Behaviour, GivenInPlace, PartDescription, 
 from exfit.results.typical_values import TypicalValue
 from exfit.results.verdict import NO_MATCH, Verdict
 from exfit.util.sources import NOT_STATED, TYPICAL
+from exfit.util.text import rounded
 from exfit.util.typed import IN_FILE, KEY, plain
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names
+ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
 PARTS = ("machine", "network", "stabiliser")  # their parameters are named machine.Tpd0
 
 
@@ -92,6 +94,14 @@ class FittedParameter:
     def stderr(self) -> float | None:
         """The standard error, in its unit; None where nothing determines it."""
         return self.std_error
+
+    @property
+    def rounding_error(self) -> float | None:
+        """The standard error that tables round the value to; None where none is known."""
+        low, high = self.interval or (None, None)
+        if self.std_error is not None or low is None or high is None:
+            return self.std_error
+        return (high - low) / ERRORS_IN_INTERVAL
 
     @property
     def determined(self) -> bool:
@@ -375,7 +385,10 @@ class FitResult:
 
     def __repr__(self) -> str:
         """Return the model, the record, the match and the values in one line."""
-        values = ", ".join(f"{name}={each.value:.5g}" for name, each in self.parameters.items())
+        values = ", ".join(
+            f"{name}={rounded(each.value, each.rounding_error)}"
+            for name, each in self.parameters.items()
+        )
         state = "" if self.verdict is None else f", {self.verdict.verdict}"
         to = ", ".join(match.record for match in self.comparisons)
         return f"<FitResult {self.model} to {to}: rmse {self.rmse:.3g} pu{state}; {values}>"

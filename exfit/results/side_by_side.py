@@ -15,13 +15,14 @@ class ParameterValue(NamedTuple):
     """A parameter of one of several results: its value, and whether it was fitted there.
 
     ``at_bound`` is the bound that it lies on; it is not ``resolved`` where the record does not
-    determine it.
+    determine it; ``rounding_error`` is the standard error that tables round it to.
     """
 
     value: float
     fitted: bool
     at_bound: str | None
     resolved: bool
+    rounding_error: float | None = None
 
 
 def outcome_of(result: FitResult) -> str:
@@ -66,7 +67,9 @@ def _value(result: FitResult, values: Mapping[str, float], name: str) -> Paramet
     if parameter is None:
         return ParameterValue(values[name], False, None, True)
     resolved = result.knowledge is None or parameter.determined
-    return ParameterValue(parameter.value, True, parameter.at_bound, resolved)
+    return ParameterValue(
+        parameter.value, True, parameter.at_bound, resolved, parameter.rounding_error
+    )
 
 
 def results_table(results: Mapping[str, tuple[str, FitResult]]) -> str:

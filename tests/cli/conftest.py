@@ -22,9 +22,10 @@ def run(capsys):
 
 @pytest.fixture
 def empty_folder(tmp_path, monkeypatch):
-    """Work in an empty folder, in no terminal."""
-    for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "COLUMNS"):
+    """Work in an empty folder, in no terminal, 80 columns wide."""
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):
         monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("COLUMNS", "80")
     place = tmp_path / "work"
     place.mkdir()
     monkeypatch.chdir(place)

@@ -356,6 +356,29 @@ def test_a_fit_without_a_terminal_prints_plain_lines_of_80_columns(run):
         assert word in ran.out
 
 
+@pytest.mark.parametrize("columns", [60, 80])
+def test_no_number_is_cut_however_narrow_the_terminal_is(run, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    ran = run("fit", case_file(), "--no-plots")
+    assert "…" not in ran.out
+    tables = ran.out[ran.out.index("parameter ") :]
+    assert max(map(len, tables.splitlines())) <= columns
+    wide = run("fit", case_file(), "--no-plots", "-o", "again").out
+    numbers = re.findall(r"\d+\.\d+", wide[wide.index("parameter ") : wide.index("cost ")])
+    assert all(number in tables for number in numbers)
+
+
+def test_a_pipe_without_columns_gets_every_sentence_in_one_line(run, monkeypatch):
+    wrapped = run("fit", case_file(), "--no-plots", "-o", "first").out
+    monkeypatch.delenv("COLUMNS")
+    whole = run("fit", case_file(), "--no-plots", "-o", "second").out
+    begins = ("note:", "unresolved:", "sensitivity:", "converged", "GOOD", "MATCHES")
+    assert [line for line in whole.splitlines() if line.startswith("      ") and ":" in line] == []
+    for line in wrapped.splitlines():
+        if line.startswith(begins):
+            assert any(own.startswith(line.rstrip()) for own in whole.splitlines())
+
+
 def test_a_value_on_its_bound_is_marked(run):
     ran = run("fit", case_file(changed(CASE, ("parameters.free.k.max", 3.0))), "--no-plots")
     (line,) = [line for line in ran.out.splitlines() if line.startswith("k ")]

@@ -23,6 +23,7 @@ from exfit.output.plots.style import (
 )
 from exfit.results.model import FitResult, Minima
 from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES
+from exfit.util.text import rounded
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
@@ -95,7 +96,8 @@ def trajectories(result: FitResult) -> Figure:
                 ax.axhline(limit, color=LIMIT, linewidth=1.0, linestyle=":")
         unit = f" {parameter.unit}" if parameter.unit else ""
         bound = f" (on its {parameter.at_bound})" if parameter.at_bound else ""
-        ax.set_title(f"{short(name, LONGEST)} = {parameter.value:.5g}{unit}{bound}", fontsize=9)
+        value = rounded(parameter.value, parameter.rounding_error)
+        ax.set_title(f"{short(name, LONGEST)} = {value}{unit}{bound}", fontsize=9)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         tidy(ax)
         lowest = k + columns >= len(names)

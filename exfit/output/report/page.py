@@ -17,6 +17,7 @@ from exfit.output.report.sections.matches import MatchView, OverlayChart, live_d
 from exfit.output.report.verdict import headline
 from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
+from exfit.util.text import rounded
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -88,7 +89,7 @@ def _environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": _number, "feature_cells": feature_cells}
+    environment.filters |= {"number": _number, "rounded": rounded, "feature_cells": feature_cells}
     environment.filters |= {"drawing": drawing, "command": shlex.join}
     environment.tests |= {"finite": _is_finite}
     environment.globals |= {"version": __version__, "features": LABELS, "long": LONG}

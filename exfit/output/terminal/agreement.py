@@ -7,7 +7,7 @@ from exfit.analysis.comparison import Agreement
 from exfit.analysis.curves import RECORD
 from exfit.dsp.features import LABELS
 from exfit.output.terminal.side_by_side import Row, side_by_side, tables
-from exfit.output.terminal.terminal import notes, number, plain_table
+from exfit.output.terminal.terminal import notes, number, plain_table, show_table
 
 
 def agreement(console: Console, result: Agreement) -> None:
@@ -16,11 +16,11 @@ def agreement(console: Console, result: Agreement) -> None:
         shifted = f", shifted by {curve.shift:.6g} s" if curve.shift else ""
         console.print(f"{curve.name:6}  {curve.path}{shifted}", soft_wrap=True, markup=False)
     console.print()
-    console.print(_differences(result))
+    show_table(console, _differences(result))
     console.print()
     whose = "the record" if result.from_reference[0].first == RECORD else "A"
     console.print(f"against {whose}: f, half the sum of squares over the samples")
-    console.print(_matches(result))
+    show_table(console, _matches(result))
     if result.features and result.step_at is not None:
         console.print()
         console.print(f"{result.judged} after the step at {result.step_at:.4g} s")

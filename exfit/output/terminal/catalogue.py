@@ -8,7 +8,7 @@ from rich.text import Text
 
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Sheet
-from exfit.output.terminal.terminal import plain_table
+from exfit.output.terminal.terminal import plain_table, show_table
 
 
 def catalogue(
@@ -21,17 +21,17 @@ def catalogue(
     table = plain_table("exciter", "also", "")
     for exciter in models:
         table.add_row(exciter.name, ", ".join(exciter.aliases), exciter.title.partition(" (")[0])
-    console.print(table)
+    show_table(console, table)
     console.print()
     table = plain_table("machine", "")
     for machine in machines:
         table.add_row(machine.name, machine.title)
-    console.print(table)
+    show_table(console, table)
     console.print()
     table = plain_table("stabiliser", "")
     for stabiliser in stabilisers:
         table.add_row(stabiliser.name, stabiliser.title.partition(" (")[0])
-    console.print(table)
+    show_table(console, table)
 
 
 def model(console: Console, described: Model) -> None:

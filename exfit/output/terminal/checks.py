@@ -3,7 +3,7 @@
 from rich.console import Console
 
 from exfit.analysis.model_check import STEPS, Check
-from exfit.output.terminal.terminal import notes, plain_table
+from exfit.output.terminal.terminal import notes, plain_table, show_table
 
 
 def check(console: Console, result: Check) -> None:
@@ -14,7 +14,7 @@ def check(console: Console, result: Check) -> None:
         table = plain_table("parameter", *heads, "best", numbers=[*heads, "best"])
         for name, row in result.deviations.items():
             table.add_row(name, *(f"{value:.0e}" for value in row), f"{min(row):.1e}")
-        console.print(table)
+        show_table(console, table)
         _verdict(console, result.agrees, "derivatives agree", "derivatives DISAGREE")
     else:
         console.print("no free parameter: no derivative to check")

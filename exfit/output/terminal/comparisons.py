@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from exfit.dsp.features import LABELS
-from exfit.output.terminal.terminal import plain_table, remarks
+from exfit.output.terminal.terminal import plain_table, remarks, show_table
 from exfit.results.comparisons import Comparison
 from exfit.results.feature_digits import feature_cells
 
@@ -20,13 +20,13 @@ def comparisons(console: Console, all_of_them: Sequence[Comparison]) -> None:
     """Show records side by side: how well each is met, and its step measured beside simulated."""
     for beside in _beside_each_other(console, all_of_them, ("simulated",)):
         console.print()
-        console.print(_error_table(beside))
+        show_table(console, _error_table(beside))
     stepped = [
         match for match in all_of_them if match.features.measured or match.features.simulated
     ]
     for beside in _beside_each_other(console, stepped, FEATURE_COLUMNS):
         console.print()
-        console.print(_feature_table(beside))
+        show_table(console, _feature_table(beside))
         remarks(console, "-", _hidden(beside), "dim")
 
 

@@ -15,12 +15,14 @@ from exfit.output.terminal.terminal import (
     number,
     plain_table,
     remarks,
+    show_table,
     unresolved,
 )
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.sources import by_source
+from exfit.util.text import rounded
 
 STYLES = {GOOD: "bold green", MATCHES: "bold yellow"}  # of verdicts; of the others bold red
 
@@ -33,7 +35,7 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     console.print()
     verdict(console, result)
     console.print()
-    console.print(fitted_table(result, before))
+    show_table(console, fitted_table(result, before))
     console.print()
     if result.success:
         remarks(console, f"{result.outcome}:", [result.message], "bold")
@@ -109,9 +111,10 @@ def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
             uncertainty = result.knowledge.confidence.parameters[name]
             style = style or ("yellow" if uncertainty.why else "")
             error = error_of(uncertainty, parameter.of_record)
-        old = () if before is None else (number(before.values.get(name)),)
-        values = (number(parameter.start), *old, number(parameter.value))
-        limits = interval(parameter.interval)
+        digits = parameter.rounding_error
+        old = () if before is None else (rounded(before.values.get(name), digits),)
+        values = (number(parameter.start), *old, rounded(parameter.value, digits))
+        limits = interval(parameter.interval, digits)
         table.add_row(name, *values, limits, error, parameter.unit, mark, style=style)
     return table
 

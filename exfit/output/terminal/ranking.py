@@ -5,7 +5,7 @@ from rich.text import Text
 
 from exfit.analysis.ranking import RankedModel
 from exfit.fleet.ranking import Ranking
-from exfit.output.terminal.terminal import number, plain_table, remarks
+from exfit.output.terminal.terminal import number, plain_table, remarks, show_table
 
 NOT_REFUTED = "*"  # behind the name of a model
 LEGEND = "rmse in pu; BIC above the lowest; * not refuted by the records"
@@ -46,7 +46,7 @@ def _table(console: Console, models: tuple[RankedModel, ...]) -> None:
             model.outcome,
             style="" if model.possible else "dim",
         )
-    console.print(table)
+    show_table(console, table)
     if unseen:
         console.print("unseen: rmse of the records that no fit saw", style="dim")
     console.print(LEGEND, style="dim", markup=False, soft_wrap=True)

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.text import Text
 
 from exfit.dsp.sampling import Sampling
-from exfit.output.terminal.terminal import notes, number, plain_table
+from exfit.output.terminal.terminal import notes, number, plain_table, show_table
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 
@@ -70,7 +70,7 @@ def _channels(console: Console, channels: Sequence[InspectedChannel]) -> None:
             number(channel.quantum, 2),
         )
         table.add_row(*(Text(cell) for cell in cells))
-    console.print(table)
+    show_table(console, table)
 
 
 def _steps(console: Console, result: Inspection) -> None:
@@ -82,4 +82,4 @@ def _steps(console: Console, result: Inspection) -> None:
         sizes = ", ".join(f"{name} {size:+.4g}" for name, size in step.sizes.items())
         at = f"{step.at:.4f}" if not step.from_start else f"<= {step.at:.4g}"
         table.add_row(at, "-" if step.from_start else f"{step.error:.1g}", Text(sizes))
-    console.print(table)
+    show_table(console, table)

@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from exfit.output.terminal.terminal import number, plain_table
+from exfit.output.terminal.terminal import number, plain_table, show_table
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import ParameterValue, parameters_beside
+from exfit.util.text import rounded
 
 COST = "f"  # label of its row
 BETWEEN_COLUMNS = 2  # characters
@@ -83,7 +84,7 @@ def tables(console: Console, headings: Sequence[str], rows: Sequence[Row]) -> No
         table = plain_table("", "unit", *names, numbers=names)
         for row in rows:
             table.add_row(row.label, row.unit, *(row.cells[k] for k in columns))
-        console.print(table)
+        show_table(console, table)
         if columns[-1] != len(headings) - 1:
             console.print()
 
@@ -123,7 +124,7 @@ def _cell(value: ParameterValue | None) -> str:
     if not value.fitted:
         return number(value.value) + FIXED
     mark = ON_BOUND if value.at_bound else " " if value.resolved else UNRESOLVED
-    return number(value.value) + mark
+    return rounded(value.value, value.rounding_error) + mark
 
 
 def _figures(fits: Sequence[FitResult]) -> Iterator[Row]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rich.console import Console
 from rich.table import Table
 
-from exfit.output.terminal.terminal import notes, number, plain_table
+from exfit.output.terminal.terminal import notes, number, plain_table, show_table
 from exfit.results.translation import LoopFigures, StepComparison, Translation
 
 LOOP_ROWS = (
@@ -23,12 +23,12 @@ def translation(console: Console, result: Translation) -> None:
     style = "bold red" if result.poor else "bold"
     console.print(result.verdict, style=style, markup=False)
     console.print()
-    console.print(_parameters(result))
+    show_table(console, _parameters(result))
     console.print()
-    console.print(_steps(result))
+    show_table(console, _steps(result))
     console.print()
     if result.loops:
-        console.print(_loops(result))
+        show_table(console, _loops(result))
         console.print()
     if result.lost:
         lost = ", ".join(f"{name} {value:g}" for name, value in result.lost.items())

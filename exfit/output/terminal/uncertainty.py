@@ -7,7 +7,15 @@ from rich.console import Console
 from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.inference import ParameterEffect
-from exfit.output.terminal.terminal import error_of, notes, number, plain_table, unresolved
+from exfit.output.terminal.terminal import (
+    error_of,
+    notes,
+    number,
+    plain_table,
+    show_table,
+    unresolved,
+)
+from exfit.util.text import rounded
 
 
 def profiles(console: Console, result: Profiles) -> None:
@@ -16,11 +24,13 @@ def profiles(console: Console, result: Profiles) -> None:
     table = plain_table("parameter", *numbers, "unit", numbers=numbers)
     for profile in result.profiles:
         linear = (None, None) if profile.linear is None else profile.linear
-        cells = (number(value) for value in (profile.value, profile.low, profile.high, *linear))
+        error = profile.rounding_error
+        values = (profile.value, profile.low, profile.high, *linear)
+        cells = (rounded(value, error) for value in values)
         style = "yellow" if any(profile.ends) else ""
         table.add_row(profile.name, *cells, profile.unit, style=style)
     console.print()
-    console.print(table)
+    show_table(console, table)
     console.print()
     sides = ("no lower limit", "no upper limit")
     unresolved(
@@ -46,7 +56,7 @@ def design(console: Console, result: Design) -> None:
     tests = [result.own.confidence, *(plan.confidence for plan in result.plans)]
     for name in result.own.confidence.names:
         table.add_row(name, *(error_of(confidence.parameters[name]) for confidence in tests))
-    console.print(table)
+    show_table(console, table)
     console.print()
     if result.own.effects:
         effects(console, result.own.effects)
@@ -63,4 +73,4 @@ def effects(console: Console, ranked: Sequence[ParameterEffect]) -> None:
         changes = (f"{change:.2e}" for change in effect.rms.values())
         table.add_row(effect.parameter, *changes, number(effect.of_noise, 2))
     console.print("change for 1 % of each parameter, rms over the test, the strongest first")
-    console.print(table)
+    show_table(console, table)
