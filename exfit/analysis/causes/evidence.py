@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from exfit import estimate
+from exfit.analysis.intervals.determination import NEEDS_PROFILE
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, Unknown
 from exfit.fitting.residuals import Residuals, noise_of
@@ -101,5 +102,14 @@ class Evidence:
         """The parameters of the unit that the records do not limit on both sides."""
         if self.uncertainty is None:
             return self.own
+        parameters, profiled = self.uncertainty.confidence.parameters, {*self.own}
+        profiled -= {*self.without_profile}
+        return tuple(n for n in self.own if n in profiled and not parameters[n].determined)
+
+    @property
+    def without_profile(self) -> tuple[str, ...]:
+        """The parameters of the unit whose intervals only a profile shows, which was not run."""
+        if self.uncertainty is None:
+            return ()
         parameters = self.uncertainty.confidence.parameters
-        return tuple(name for name in self.own if not parameters[name].determined)
+        return tuple(name for name in self.own if parameters[name].why == NEEDS_PROFILE)

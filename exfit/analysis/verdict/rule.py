@@ -107,6 +107,8 @@ def _doubts(evidence: Evidence, tests: Sequence[ResidualTests]) -> Iterator[str]
     if undetermined:
         verb = "is" if len(undetermined) == 1 else "are"
         yield f"{len(undetermined)} of {len(evidence.own)} parameters {verb} not determined"
+    elif evidence.without_profile:
+        yield "intervals are missing, which linear theory does not give"
     for match in evidence.validation:
         if not match.accepted:
             yield f"{match.name} is not accepted"
@@ -140,3 +142,8 @@ def _undetermined(evidence: Evidence) -> Iterator[Cause]:
     elif names:
         remedy = "fix those that are known, or plan a test that shows them (`exfit identify`)"
         yield Cause(f"{listed(names)} are not determined", remedy)
+    if evidence.without_profile:
+        cause = (
+            f"linear theory does not hold over the intervals of {listed(evidence.without_profile)}"
+        )
+        yield Cause(cause, "fit with the default search, or use `exfit profile`")
