@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.analysis.causes.before_fit import case_warnings, record_warnings
 from exfit.analysis.diagnostics import search_range_notes, typical_notes
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiments, planned
@@ -33,7 +34,8 @@ class Check:
 
     ``deviations`` holds, for each free parameter, the largest difference between the exact column
     of the Jacobian and the central difference at each of STEPS, relative to the column's largest
-    element; ``step_error`` is by how much halving every step moves the response (pu).
+    element; ``step_error`` is by how much halving every step moves the response (pu). ``warnings``
+    are what to correct before a fit.
     """
 
     deviations: Mapping[str, tuple[float, ...]]
@@ -43,6 +45,7 @@ class Check:
     step_error: float
     drift: float
     notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def agrees(self) -> bool:
@@ -58,11 +61,11 @@ class Check:
 def check(case: Case) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
     if case.recordings:
-        setups = build_experiments(case)
-        experiments = [
-            setup.with_enough_substeps(setup.with_start_values(case.values())).experiment
-            for setup in setups
-        ]
+        setups = tuple(
+            setup.with_enough_substeps(setup.with_start_values(case.values()))
+            for setup in build_experiments(case)
+        )
+        experiments = [setup.experiment for setup in setups]
     else:
         setups, experiments = (), [planned(case)]
     free = free_parameters(case, setups)
@@ -87,6 +90,7 @@ def check(case: Case) -> Check:
         step_error=error,
         drift=drift,
         notes=(*typical_notes(case, case.values()), *search_range_notes(case)),
+        warnings=(*case_warnings(case), *record_warnings(case, setups, case.values())),
     )
 
 

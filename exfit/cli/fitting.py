@@ -93,7 +93,11 @@ def fit(
         folder = output.folder(f"{case.stem}-fit")
         fit_again_and_again(case, given, folder, strategy, search, output)
         return
+    from exfit.analysis.causes.before_fit import case_warnings
+
     loaded = given.load(case)
+    for warning in case_warnings(loaded):
+        click.echo(f"warning: {warning}", err=True)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
         result = fit_live(loaded, folder, strategy, search, output)
@@ -123,7 +127,11 @@ def _fit(
 @click.command(short_help="Check a case before its fit.")
 @case_argument
 def check(case: Path) -> None:
-    """Check CASE before a fit: derivatives, bypassed blocks, sub-steps, a run without a step."""
+    """Check CASE before a fit: its record, derivatives, bypassed blocks, a run without a step.
+
+    Warns of an inverted channel, another base, a step that no regulator is tested with, ripple, a
+    start that is not at rest, and of a validation that sees what is fitted.
+    """
     from exfit import workflows
     from exfit.output import terminal
 

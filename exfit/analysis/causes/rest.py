@@ -49,15 +49,17 @@ def wrong_levels(evidence: Evidence) -> Iterator[Suspicion]:
                 yield Suspicion(cause, LAST)
 
 
-def other_levels(comparison: Comparison, steady: float) -> Iterator[Cause]:
-    """Yield the signals of a comparison that start elsewhere than their record."""
+def other_levels(
+    comparison: Comparison, steady: float, far: float = FAR_FROM_BASE
+) -> Iterator[Cause]:
+    """Yield the signals of a comparison that start elsewhere than their record, ``far`` off."""
     for signal, overlay in comparison.overlays.items():
         before = (comparison.time < steady) & np.isfinite(overlay.error)
         if signal == "vt" or not before.any():
             continue
         measured = float(np.mean(overlay.measured[before]))
         simulated = float(np.mean(overlay.simulated[before]))
-        if abs(measured - simulated) > FAR_FROM_BASE * max(abs(simulated), LEAST_LEVEL):
+        if abs(measured - simulated) > far * max(abs(simulated), LEAST_LEVEL):
             yield Cause(
                 f"{signal} starts from {simulated:.4g} pu, its record from {measured:.4g} pu",
                 "check its base, and the data and the power that the case gives the machine",

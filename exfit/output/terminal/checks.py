@@ -3,7 +3,7 @@
 from rich.console import Console
 
 from exfit.analysis.model_check import STEPS, Check
-from exfit.output.terminal.terminal import notes, plain_table, show_table
+from exfit.output.terminal.terminal import notes, plain_table, remarks, show_table
 
 
 def check(console: Console, result: Check) -> None:
@@ -28,6 +28,7 @@ def check(console: Console, result: Check) -> None:
     console.print(f"sub-steps: {result.substeps} in each step of {step}")
     console.print(f"halving every step moves the response by {result.step_error:.1e} pu")
     console.print(f"bypassed: {', '.join(result.bypassed) or 'nothing'}")
+    remarks(console, "warning:", result.warnings)
     notes(console, result.notes)
 
 
