@@ -36,7 +36,7 @@ from exfit.output import plots, terminal
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "gallery.md"
 FOLDER = PAGE.parent / "img"
-OTHERS = "thesis_"  # pictures of another page: tests/studies/thesis.py
+OTHERS = ("thesis_", "verdict_")  # pictures of other pages: those of tests/studies
 BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 
 DPI = 84  # of the figures: 756 points wide, that of a page

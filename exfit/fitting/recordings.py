@@ -32,6 +32,10 @@ from exfit.util.text import show
 
 Array = NDArray[np.float64]
 
+OTHER_CLOCK = 50.0  # between a record and a step: ms, or cycles of the mains, are taken for s
+SLOW_SAMPLES = 0.5  # s apart: no recorder of a step is slower
+TINY = 1e-9  # of an instant: a record ends later
+
 
 class Column(NamedTuple):
     """The place of a signal in a file and how it becomes per unit."""
@@ -116,7 +120,9 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
             text = (
                 f"holds {show(start)} ... {show(end)} s, but {case.path} has a step at {show(at)} s"
             )
-            raise RecordError(f"{path}: {text}{f'; {BEFORE_RECORD}' if at < start else ''}")
+            hint = f"; {BEFORE_RECORD}" if at < start else _clock_hint(at / max(end, at * TINY))
+            raise RecordError(f"{path}: {text}{hint}")
+    _refuse_other_clock(case, test, record, path)
     _refuse_short_tables(case, test, (float(start), float(end)), path)
     steady = test.steady
     if steady is not None and steady > end:
@@ -129,6 +135,24 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
         raise RecordError(
             f"{path}: begins at {show(start)} s, with {what}: nothing before it shows "
             f"vt0, and {case.path} does not give it"
+        )
+
+
+def _clock_hint(ratio: float) -> str:
+    """Return a question where a step is that many times later than a record ends."""
+    return "; is the time column in another unit?" if ratio > OTHER_CLOCK else ""
+
+
+def _refuse_other_clock(case: Case, test: BumpTest, record: Record, path: Path) -> None:
+    """Raise RecordError where the steps lie between the first samples, which are seconds apart."""
+    step = float(np.median(np.diff(record.time)))
+    if test.begin is not None or not test.instants or step < SLOW_SAMPLES:
+        return
+    last = test.instants[-1] - float(record.time[0])
+    if last < step and len(record.time) * step > OTHER_CLOCK * last:
+        raise RecordError(
+            f"{path}: samples are {show(step)} s apart, but {case.path} has its last step "
+            f"{show(last)} s after the first of them: is the time column in another unit?"
         )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from faulty_units import OF_MODEL, PLANT, UNITS, Unit
 
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiments
@@ -24,65 +25,6 @@ GOOD, MATCHES = "good", "matches, not all determined"
 MISSES, NO_MATCH, NOT_CONVERGED = "misses the record", "no match", "not converged"
 REFUSED = "refused"  # before any fit
 
-PLANT = {
-    "type": "open-circuit",
-    "machine": "GENROU",
-    "parameters": {
-        "Tpd0": 6.0, "Tppd0": 0.035, "Xd": 1.8, "Xpd": 0.3, "Xppd": 0.25, "Xl": 0.2, "S10": 0.12,
-        "S12": 0.4,
-    },
-}  # fmt: skip
-AC1A = {
-    "TR": 0.0, "TB": 0.0, "TC": 0.0, "KE": 1.0, "VAMAX": 14.5, "VAMIN": -14.5, "VRMAX": 14.5,
-    "VRMIN": -14.5, "E1": 4.18, "SE1": 0.10, "E2": 3.14, "SE2": 0.03, "KC": 0.486, "KD": 0.4039,
-}  # fmt: skip
-AC8B = {
-    "KA": 0.5564, "TA": 0.0, "TR": 0.0, "KE": 1.0, "VPIDMAX": 999.0, "VPIDMIN": -999.0,
-    "VRMAX": 35.0, "VRMIN": -35.0, "VFEMAX": 999.0, "VEMIN": 0.0, "E1": 6.5, "SE1": 0.3, "E2": 9.0,
-    "SE2": 3.0, "KC": 0.3, "KD": 0.5,
-}  # fmt: skip
-ST1A = {
-    "TR": 0.01, "VIMAX": 99.0, "VIMIN": -99.0, "TC1": 0.0, "TB1": 0.0, "TA": 0.02, "VAMAX": 14.5,
-    "VAMIN": -14.5, "VRMAX": 7.8, "VRMIN": -6.7, "KC": 0.08, "TF": 1.0, "KLR": 4.54, "ILR": 4.4,
-    "KF": 0.0,
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit whose parameters are known, what is recorded of it, and other models of its kind.
-
-    ``noise`` is that of each recorded signal, of vt's; ``ceiling`` limits its exciter from above,
-    where ``ceilings`` (pu) cut the response to a step of 5 %.
-    """
-
-    model: str
-    fixed: Mapping[str, float]
-    free: Mapping[str, float]
-    noise: Mapping[str, float]
-    rivals: tuple[str, ...]
-    ceiling: str
-    ceilings: tuple[float, float]
-
-
-BRUSHLESS = {"KA": 364.15, "KF": 0.0413, "TE": 1.6724, "TF": 1.458, "TA": 0.0542}
-PID = {"KPR": 78.84, "KIR": 6.0, "KDR": 30.0, "TDR": 0.1638, "TE": 1.4044}
-STATIC = {"KA": 190.0, "TB": 8.0, "TC": 1.0}
-UNITS = {
-    "AC1A": Unit("AC1A", AC1A, BRUSHLESS, {"vt": 1.0}, ("AC8B", "SEXS"), "VRMAX", (4.0, 8.0)),
-    "AC8B": Unit("AC8B", AC8B, PID, {"vt": 1.0}, ("AC1A", "SEXS"), "VRMAX", (3.0, 6.0)),
-    "ST1A": Unit(
-        "ST1A", ST1A, STATIC, {"vt": 1.0, "efd": 50.0}, ("SEXS", "AC1A"), "VRMAX", (1.6, 2.2)
-    ),
-    "AC1A, ifd": Unit(
-        "AC1A", AC1A, BRUSHLESS, {"vt": 1.0, "ifd": 10.0}, ("AC8B", "SEXS"), "VRMAX", (4.0, 8.0)
-    ),
-}  # fmt: skip
-OF_MODEL = {
-    "AC1A": (AC1A, BRUSHLESS),
-    "AC8B": (AC8B, PID),
-    "SEXS": ({"EMIN": -10.0, "EMAX": 10.0}, {"TATB": 0.1, "TB": 10.0, "K": 200.0, "TE": 0.05}),
-}
 NOISES = (5e-5, 1e-4, 3e-4)  # pu, of vt
 SAMPLINGS = (0.005, 0.01, 0.02)  # s
 AT, DURATION = 1.0, 8.0  # s: the step, and the record
@@ -140,7 +82,10 @@ class Kind:
 
 @dataclass(frozen=True, eq=False)
 class FaultyCase:
-    """A case with a fault, the same without it, and the noise of a weighted error."""
+    """A case with a fault, the same without it, and the noise of a weighted error.
+
+    ``exact`` is the faulty record before noise was added.
+    """
 
     kind: str
     words: str
@@ -148,13 +93,14 @@ class FaultyCase:
     faulty: Case
     sound: Case
     noise: float
+    exact: Signals
 
 
 def wrong_model(draft: Draft) -> None:
     rival = str(draft.rng.choice(draft.of.rivals))
     fixed, free = OF_MODEL[rival]
     draft.case["model"], draft.words = rival, f"{rival} for {draft.of.model}"
-    draft.case["parameters"] = {"fixed": dict(fixed), "free": found(free, draft.rng)}
+    draft.case["parameters"] = {"fixed": dict(fixed), "free": free_near(free, draft.rng)}
 
 
 def flipped_sign(draft: Draft) -> None:
@@ -378,12 +324,12 @@ WORDS = {
     "spikes": ("spike",),
     "bound": ("bound", "on its min", "on its max"),
     "second step": ("further step", "second step", "another step"),
-    "clock": ("time column", "unit of the time", "holds"),
+    "clock": ("time column",),
     "iterations": ("iterations",),
 }
 
 
-def found(values: Mapping[str, float], rng: np.random.Generator) -> Content:
+def free_near(values: Mapping[str, float], rng: np.random.Generator) -> Content:
     """Return free parameters that start near the truth, between wide bounds."""
     starts = {
         name: truth * float(np.exp(rng.uniform(-START_ASIDE, START_ASIDE)))
@@ -428,7 +374,7 @@ def drawn(name: str, seed: tuple[int, ...]) -> FaultyCase:
     truth = deepcopy(described)
     truth["test"]["vt0"] = float(rng.uniform(0.98, 1.02))
     case = deepcopy(described)
-    case["parameters"] = {"fixed": dict(unit.fixed), "free": found(unit.free, rng)}
+    case["parameters"] = {"fixed": dict(unit.fixed), "free": free_near(unit.free, rng)}
     sound, draft = deepcopy(case), Draft(rng, unit, noise, sampling, deepcopy(truth), case)
     kind.make(draft)
     time = np.arange(0.0, DURATION, sampling)
@@ -444,6 +390,7 @@ def drawn(name: str, seed: tuple[int, ...]) -> FaultyCase:
         faulty=Case.from_dict(draft.case, faulty, name=name),
         sound=Case.from_dict(sound, plain, name=name),
         noise=noise,
+        exact=draft.cut(clock, spoilt),
     )
 
 
@@ -459,7 +406,10 @@ def all_faults(seed: int, share: float = 1.0) -> Iterator[tuple[str, tuple[int, 
             yield name, (seed, number, repeat)
 
 
-def names_cause(expected: Sequence[str], causes: Sequence[Cause]) -> bool:
-    """Return whether any of some causes is one of those expected, by its words."""
+def cause_rank(expected: Sequence[str], causes: Sequence[Cause]) -> int:
+    """Return the line, from 1 on, of the first cause that is expected, by its words; else 0."""
     words = [word for cause in expected for word in WORDS[cause]]
-    return any(word in cause.sentence for cause in causes for word in words)
+    for line, cause in enumerate(causes, 1):
+        if any(word in cause.sentence for word in words):
+            return line
+    return 0

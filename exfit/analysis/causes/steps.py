@@ -82,10 +82,10 @@ def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
             changes = [trial.values[each.nuisance.name] / each.start - 1.0 for each in opened]
             if max(map(abs, changes)) < LEAST_CHANGE:
                 return None
-            found = ", ".join(f"{trial.values[each.nuisance.name]:+.4g}" for each in opened)
+            sizes = ", ".join(f"{trial.values[each.nuisance.name]:+.4g}" for each in opened)
             given = ", ".join(f"{each.start:+.4g}" for each in opened)
             return Cause(
-                f"the size of the step{evidence.name_of(number)}: {found} pu would match, the case "
+                f"the size of the step{evidence.name_of(number)}: {sizes} pu would match, the case "
                 f"has {given} pu",
                 "correct step, or let the fit find it: step: {start, min, max}",
             )

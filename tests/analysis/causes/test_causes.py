@@ -1,8 +1,10 @@
 """The likeliest causes of a poor fit: faults made on purpose are named."""
 
 import pytest
-from faulty_cases import KINDS, WORDS, drawn, names_cause
+from faulty_cases import KINDS, WORDS, cause_rank, drawn
 
+from exfit.errors import RecordError
+from exfit.records.record import Record
 from exfit.workflows import fit
 
 SEED = 14
@@ -17,7 +19,7 @@ LINES = 2  # in which the cause stands
 def test_a_fault_is_among_the_likeliest_causes(kind):
     fault = drawn(kind, (SEED, 1))
     verdict = fit(fault.faulty, search="local").verdict
-    assert names_cause(KINDS[kind].causes, verdict.causes[:LINES]), verdict.causes
+    assert cause_rank(KINDS[kind].causes, verdict.causes[:LINES]), verdict.causes
     assert verdict.verdict != "good"
 
 
@@ -29,3 +31,13 @@ def test_a_case_without_a_fault_has_no_cause():
 
 def test_every_cause_of_the_study_has_its_words():
     assert {cause for kind in KINDS.values() for cause in kind.causes} == WORDS.keys()
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_a_time_column_in_another_unit_is_asked_for(factor):
+    """Before a fit, which would simulate for hours or has no step in its record."""
+    case = drawn("ripple", (SEED, 1)).sound
+    (record,) = case.given_records.values()
+    other = Record.from_arrays(factor * record.time, record.signals)
+    with pytest.raises(RecordError, match=r"is the time column in another unit\?"):
+        fit(case.with_record(other))
