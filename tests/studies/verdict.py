@@ -24,11 +24,22 @@ from rich.progress import track
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from faulty_cases import KINDS, MATCHES, MISSES, REFUSED, FaultyCase, all_faults, cause_rank, drawn
+from faulty_cases import (
+    KINDS,
+    MATCHES,
+    MISSES,
+    NO_MATCH,
+    REFUSED,
+    FaultyCase,
+    all_faults,
+    cause_rank,
+    drawn,
+)
 from places import ROOT
 
 from exfit.errors import ExfitError
 from exfit.output.plots.style import GREEN, LIMIT, MEASURED, SIMULATED, WIDTH
+from exfit.results.comparisons import Overlay
 from exfit.results.model import FitResult
 from exfit.results.verdict import Cause
 from exfit.workflows import fit
@@ -38,6 +49,7 @@ SEEN = 20.0  # chi-square: a fault that raises the cost by less is not to be see
 LINES = 2  # in which the cause should stand
 VISIBLE = 0.01  # of the range of a signal: a deviation that a reader of a figure sees
 STRETCH = 50  # of a record: for so long it lasts
+NEAR_CONSTANT = 5.0  # per cent: a match within this of a constant's may be called either
 BAND = 1.5  # a deviation within this factor of the visible one may be called either
 WORKERS = 2  # processes
 DPI = 84  # of the figure
@@ -53,13 +65,18 @@ MARKS = ("<!-- made by tests/studies/verdict.py -->", "<!-- end of what it made 
 
 
 class Outcome(NamedTuple):
-    """What a fit of a faulty case came to; ``rank`` is the line of the cause, 0 without it."""
+    """What a fit of a faulty case came to; ``rank`` is the line of the cause, 0 without it.
+
+    ``share`` is the largest deviation of the response from the exact record, of its range;
+    ``matched`` the fit percentage to it, of the signal that it is least for.
+    """
 
     kind: str
     unit: str
     words: str
     raised: float
     share: float
+    matched: float
     verdict: str
     rank: int
     causes: tuple[str, ...]
@@ -72,10 +89,18 @@ class Outcome(NamedTuple):
 
     @property
     def right(self) -> tuple[str, ...]:
-        """The verdicts that are right: what no reader would see does not miss the record."""
+        """The verdicts that are right.
+
+        No better than by a constant is no match; what no reader would see does not miss the record.
+        Near the border both are.
+        """
         verdicts = KINDS[self.kind].verdicts
-        if verdicts != (MISSES,) or self.share > BAND * VISIBLE:
+        if verdicts != (MISSES,):
             return verdicts
+        if self.matched < NEAR_CONSTANT:
+            return (NO_MATCH,) if self.matched < -NEAR_CONSTANT else (NO_MATCH, MISSES)
+        if self.share > BAND * VISIBLE:
+            return (MISSES,)
         return (MATCHES,) if self.share < VISIBLE / BAND else (MISSES, MATCHES)
 
 
@@ -90,7 +115,7 @@ def outcome(task: tuple[str, tuple[int, ...]]) -> Outcome:
     except ExfitError as refusal:
         texts = (str(refusal),)
         rank = cause_rank(KINDS[name].causes, [Cause(str(refusal), "")])
-        return Outcome(name, fault.unit, fault.words, np.inf, 1.0, REFUSED, rank, texts, own)
+        return Outcome(name, fault.unit, fault.words, np.inf, 1.0, 0.0, REFUSED, rank, texts, own)
     verdict = result.verdict
     assert verdict is not None
     return Outcome(
@@ -99,6 +124,7 @@ def outcome(task: tuple[str, tuple[int, ...]]) -> Outcome:
         words=fault.words,
         raised=2.0 * (result.cost - sound.cost) / fault.noise**2,
         share=deviation(fault, result),
+        matched=least_match(fault, result),
         verdict=verdict.verdict,
         rank=cause_rank(KINDS[name].causes, verdict.causes),
         causes=tuple(cause.sentence for cause in verdict.causes),
@@ -119,6 +145,14 @@ def deviation(fault: FaultyCase, result: FitResult) -> float:
         moved = max(np.ptp(exact), np.ptp(overlay.simulated))
         shares.append(float(np.max(lasting)) / float(moved))
     return max(shares)
+
+
+def least_match(fault: FaultyCase, result: FitResult) -> float:
+    """Return the fit percentage of a response to the exact record, the least of its signals."""
+    overlays = result.comparison.overlays.items()
+    return min(
+        Overlay(fault.exact[signal], overlay.simulated).fit_percent for signal, overlay in overlays
+    )
 
 
 def outcomes(seed: int, share: float) -> list[Outcome]:

@@ -21,11 +21,11 @@ from exfit.analysis.causes.steps import further_step, wrong_instant, wrong_sign,
 from exfit.analysis.causes.suspicion import Recogniser, Suspicion
 from exfit.analysis.causes.typical import typical_values
 from exfit.analysis.causes.unit import (
-    another_model,
     fixed_values,
     machine_data,
     narrow_bound,
     not_ended,
+    with_model,
     wrong_limit,
 )
 from exfit.results.verdict import Cause
@@ -62,7 +62,6 @@ BY_TRIAL: tuple[Recogniser, ...] = (
     wrong_limit,
     further_step,
     averaging,
-    another_model,
 )
 
 
@@ -72,8 +71,11 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     ``matched``: a minimum whose residuals are noise, of which only what is at rest is looked at. An
     interruption ends the trials with what was found by then.
     """
-    recognisers = ALWAYS if matched or evidence.interrupted else (*FROM_RESIDUALS, *BY_TRIAL)
+    nothing_to_explain = matched or evidence.interrupted
+    recognisers = ALWAYS if nothing_to_explain else (*FROM_RESIDUALS, *BY_TRIAL)
     suspicions = sorted(_suspicions(evidence, recognisers), key=lambda each: -each.likelihood)
+    if not nothing_to_explain:
+        suspicions = with_model(evidence, suspicions)
     return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
 
 

@@ -1,6 +1,6 @@
 """What the case says of the unit: machine data, limits, bounds, the model itself."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import log, sqrt
 
@@ -28,7 +28,8 @@ SATURATION = (f"{MACHINE}S10", f"{MACHINE}S12")
 USUAL_ERROR = 0.5  # of the logarithm of a value that is given
 RARE = 5.0  # log-likelihood: other fixed values are wrong less often than machine data
 OF_SCATTER = 10.0  # variance of the logarithm of a squared scatter, times the samples it is from
-STRUCTURE = 0.05  # of the error beyond the noise: what explains the rest is no cause but the model
+MOST_NUMBERS = 3  # that a cause brings with it
+STRUCTURE = 0.01  # of the error beyond the noise: what leaves more is less likely than the model
 
 
 def machine_data(evidence: Evidence) -> Iterator[Suspicion]:
@@ -187,16 +188,23 @@ def not_ended(evidence: Evidence) -> Iterator[Suspicion]:
         )
 
 
-def another_model(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the model, which is likelier than whatever leaves much of the error."""
+def with_model(evidence: Evidence, suspicions: Sequence[Suspicion]) -> list[Suspicion]:
+    """Return suspicions, the likeliest first, with that of the model among them.
+
+    It comes behind what explains nearly all, but no later than second where nothing explains the
+    error down to the noise of the records.
+    """
     samples = max(1, evidence.residuals.samples)
     noise = evidence.noise_cost * (1.0 + 2.0 * sqrt(OF_SCATTER / samples))
     beyond = evidence.cost - noise
-    if beyond > 0.0 and evidence.case.kind.has_exciter:
-        yield Suspicion(
-            Cause(
-                f"the model: the unit may be of another type than {evidence.case.subject}",
-                "compare others: exfit rank CASE --models A,B",
-            ),
-            likelihood(evidence, noise + STRUCTURE * beyond),
-        )
+    if beyond <= 0.0 or not evidence.case.kind.has_exciter:
+        return [*suspicions]
+    own = likelihood(evidence, noise + STRUCTURE * beyond)
+    place = sum(suspicion.likelihood > own for suspicion in suspicions)
+    if not any(each.likelihood > likelihood(evidence, noise, MOST_NUMBERS) for each in suspicions):
+        place = min(place, 1)
+    cause = Cause(
+        f"the model: the unit may be of another type than {evidence.case.subject}",
+        "compare others: exfit rank CASE --models A,B",
+    )
+    return [*suspicions[:place], Suspicion(cause, own), *suspicions[place:]]
