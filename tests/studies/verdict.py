@@ -10,9 +10,11 @@ docs/verification.md and docs/img/verdict_faults.png. It takes some ten minutes 
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from textwrap import fill
 from typing import NamedTuple
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
@@ -53,6 +55,7 @@ NEAR_CONSTANT = 5.0  # per cent: a match within this of a constant's may be call
 BAND = 1.5  # a deviation within this factor of the visible one may be called either
 WORKERS = 2  # processes
 DPI = 84  # of the figure
+PAGE_WIDTH = 120  # letters
 PAGE, FIGURE = ROOT / "docs" / "verification.md", ROOT / "docs" / "img" / "verdict_faults.png"
 LEAST_DRAWN = 1.0  # chi-square
 MARKERS = {
@@ -207,26 +210,38 @@ def section(results: Sequence[Outcome], seed: int) -> str:
         if (number := sum(each.kind == name and not each.is_seen for each in results))
     )
     plain = len(results) - len(alarms) - len(doubted)
-    lines = [
+    wrong = Counter(
+        f"{each.kind}: {each.verdict}"
+        for each in results
+        if each.is_seen and each.verdict not in each.right
+    )
+    paragraphs = [
         f"{len(results)} cases with one fault each, drawn at random (seed {seed}) over four units "
         "(AC1A, AC8B, ST1A with efd, AC1A with ifd), with noise of 5e-5 to 3e-4 pu and sampling of "
         "5 to 20 ms (`python tests/studies/verdict.py`). The right verdict and cause of each were "
-        "set before the fits, in `tests/support/faulty_cases.py`. A fault counts as seen where it "
-        f"raises the lowest cost that a fit reaches by more than {SEEN:g} in chi-square.",
+        "set before the fits, in `tests/support/faulty_cases.py`; a response that deviates from "
+        f"the exact record by less than {100 * VISIBLE:g} % of its range does not miss it, and one "
+        "no better than a constant is no match. A fault counts as seen where it raises the lowest "
+        f"cost that a fit reaches by more than {SEEN:g} in chi-square.",
         "",
-        f"* Of {count} faults that are seen, {good} are called good; the verdict is right for "
-        f"{right} ({right / count:.0%}), and the cause is among the first {LINES} lines for "
-        f"{named} ({named / count:.0%}).",
+        f"* {count} faults are seen: {good} of them called good, {right} ({right / count:.1%}) "
+        f"with the right verdict, {named} ({named / count:.1%}) with the cause in the first "
+        f"{LINES} lines.",
+        f"* Another verdict: {'; '.join(f'{words} ({k})' for words, k in wrong.items())}.",
         f"* Not to be seen in their record: {hidden}.",
         f"* The same {len(results)} cases without their fault: {plain} good, {len(doubted)} "
         f"matches, not all determined, {len(alarms)} worse.",
         "",
         "![Chi-square of each fault by kind, and what was said of it](img/verdict_faults.png)",
         "",
-        "",
-        *table(results),
     ]
-    return "\n".join(lines)
+    wrapped = [fill(text, PAGE_WIDTH, subsequent_indent=indent(text)) for text in paragraphs]
+    return "\n".join([*wrapped, *table(results)])
+
+
+def indent(text: str) -> str:
+    """Return what the further lines of a paragraph begin with."""
+    return "  " if text.startswith("* ") else ""
 
 
 def figure(results: Sequence[Outcome]) -> Figure:
