@@ -28,6 +28,7 @@ from exfit.plants import REFERENCES
 from exfit.records.clock import Clock
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
+from exfit.util.sorting import median
 from exfit.util.text import show
 
 Array = NDArray[np.float64]
@@ -145,7 +146,7 @@ def _clock_hint(ratio: float) -> str:
 
 def _refuse_other_clock(case: Case, test: BumpTest, record: Record, path: Path) -> None:
     """Raise RecordError where the steps lie between the first samples, which are seconds apart."""
-    step = float(np.median(np.diff(record.time)))
+    step = float(median(np.diff(record.time)))
     if test.begin is not None or not test.instants or step < SLOW_SAMPLES:
         return
     last = test.instants[-1] - float(record.time[0])

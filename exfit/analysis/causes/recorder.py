@@ -150,7 +150,7 @@ def _spikes(errors: Array) -> Places:
     """Return the places of errors (M,) far beyond the noise, if these are few and alone."""
     if len(errors) < NEIGHBOURS:
         return np.zeros(0, np.intp)
-    far = np.abs(errors - np.median(errors)) > SPIKE_LIMIT * noise(errors)
+    far = np.abs(errors - median(errors)) > SPIKE_LIMIT * noise(errors)
     places = np.flatnonzero(far)
     alone = not np.any(far[1:-1] & far[:-2] & far[2:])
     return places if alone and len(places) <= MOST_SPIKES * len(errors) else places[:0]
