@@ -216,12 +216,13 @@ def section(results: Sequence[Outcome], seed: int) -> str:
         if each.is_seen and each.verdict not in each.right
     )
     paragraphs = [
-        f"{len(results)} cases with one fault each, drawn at random (seed {seed}) over four units "
-        "(AC1A, AC8B, ST1A with efd, AC1A with ifd), with noise of 5e-5 to 3e-4 pu and sampling of "
-        "5 to 20 ms, searched from 3 further starts (`python tests/studies/verdict.py`). The right verdict and cause of each were "
-        "set before the fits, in `tests/support/faulty_cases.py`; a response that deviates from "
-        f"the exact record by less than {100 * VISIBLE:g} % of its range does not miss it, and one "
-        "no better than a constant is no match. A fault counts as seen where it raises the lowest "
+        f"`python tests/studies/verdict.py` draws {len(results)} cases with one fault each (seed "
+        f"{seed}), over four units (AC1A, AC8B, ST1A with efd, AC1A with ifd), noise of 5e-5 to "
+        "3e-4 pu and sampling of 5 to 20 ms, and searches from 3 further starts. The right "
+        "verdict and cause of each were set before these fits, in "
+        "`tests/support/faulty_cases.py`; a response that deviates from the exact record by less "
+        f"than {100 * VISIBLE:g} % of its range does not miss it, and one no better than a "
+        "constant is no match. A fault counts as seen where it raises the lowest "
         f"cost that a fit reaches by more than {SEEN:g} in chi-square.",
         "",
         f"* {count} faults are seen: {good} of them called good, {right} ({right / count:.1%}) "
