@@ -21,6 +21,7 @@ from exfit.analysis.curves import (
 )
 from exfit.analysis.differences import Difference, differences
 from exfit.dsp.features import Features, features
+from exfit.dsp.recorded_features import RecordedResponse, recorded_features
 from exfit.errors import ExfitError, RecordError
 from exfit.results.comparisons import judged_of
 from exfit.results.io import WHOLE_FIT, load_result
@@ -201,12 +202,23 @@ def _listed(curve: Curve) -> str:
 
 
 def _features_of(curves: Sequence[Curve], signal: str, at: float) -> Iterator[tuple[str, Features]]:
-    """Yield the features of each curve, until the first of them ends."""
+    """Yield the features of each curve, until the first of them ends; of a record without noise."""
     until = min(float(curve.time[-1]) for curve in curves)
+    responses = [
+        curve
+        for curve in curves
+        if not curve.measured and np.isfinite(curve.signals.get(signal, np.nan)).all()
+    ]
     for curve in curves:
         if signal in curve.signals:
             kept = np.isfinite(curve.signals[signal])
-            of_curve = features(curve.time[kept], curve.signals[signal][kept], at, until)
+            time, samples = curve.time[kept], curve.signals[signal][kept]
+            if curve.measured and responses:
+                guide = np.interp(time, responses[0].time, responses[0].signals[signal])
+                recorded = RecordedResponse(time, samples, guide, at, until)
+                of_curve = recorded_features(recorded)
+            else:
+                of_curve = features(time, samples, at, until)
             if of_curve is not None:
                 yield curve.name, of_curve
 

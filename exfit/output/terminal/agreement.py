@@ -5,9 +5,10 @@ from rich.table import Table
 
 from exfit.analysis.comparison import Agreement
 from exfit.analysis.curves import RECORD
-from exfit.dsp.features import LABELS
+from exfit.dsp.features import LABELS, Features
 from exfit.output.terminal.side_by_side import Row, side_by_side, tables
 from exfit.output.terminal.terminal import notes, number, plain_table, show_table
+from exfit.util.text import rounded
 
 
 def agreement(console: Console, result: Agreement) -> None:
@@ -67,8 +68,15 @@ def _features(console: Console, result: Agreement) -> None:
         Row(
             label,
             unit,
-            tuple(number(getattr(features, key)) for features in result.features.values()),
+            tuple(_feature(features, key) for features in result.features.values()),
         )
         for label, key, unit in LABELS
     ]
     tables(console, [*result.features], rows)
+
+
+def _feature(features: Features, key: str) -> str:
+    """Return a feature; of a record with half of its 95 % interval."""
+    half = features.errors.get(key)
+    text = rounded(getattr(features, key), half)
+    return text if half is None else f"{text} +- {half:.2g}"
