@@ -61,7 +61,7 @@ class Ripple:
         if self.frequency < SLOW:
             return sine
         lowpass = float(f"{PASSED * self.frequency:.2g}")
-        return f"filter: {{lowpass: {lowpass:g}}} on the channel removes it from both, or {sine}"
+        return f"{sine}, or filter: {{lowpass: {lowpass:g}}} if the response is slower"
 
 
 def ripple_at_rest(time: Array, samples: Array, rests: list[tuple[float, float]]) -> Ripple | None:

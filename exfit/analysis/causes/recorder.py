@@ -16,6 +16,7 @@ from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.step_detection import find_step
 from exfit.fitting.experiment import Channel, Nuisance
 from exfit.records.channel_inspection import SPIKE_LIMIT
+from exfit.records.ripple import MAINS, Ripple
 from exfit.results.verdict import Cause
 from exfit.util.sorting import median
 
@@ -24,7 +25,6 @@ Places = NDArray[np.intp]
 
 FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
 FINER = 8  # points of the spectrum for each of a transform without padding
-MAINS = (50.0, 60.0)  # Hz
 FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, folds it to a drift
 MOST_SPIKES = 0.05  # of the samples: more are no spikes
 NEAREST_RATIO = 0.1  # of a factor between the clocks
@@ -72,7 +72,7 @@ def ripple(evidence: Evidence) -> Iterator[Suspicion]:
         cause = Cause(
             f"a ripple of {frequency:.1f} Hz, {height:.1e} pu, in "
             f"{own.channel.signal}{evidence.name_of(own.number)}",
-            _against_ripple(frequency, own.time),
+            Ripple(frequency, height, 1.0 / float(median(np.diff(own.time)))).remedy,
         )
         yield from suspected(evidence, explained.cost, 3, cause)
 
@@ -89,15 +89,6 @@ def _line(own: ChannelErrors, linear: LinearFit) -> float | None:
     slowest = FEWEST_PERIODS / (own.time[-1] - own.time[0])
     power[frequencies < slowest] = 0.0
     return float(frequencies[np.argmax(power)])
-
-
-def _against_ripple(frequency: float, time: Array) -> str:
-    rate = 1.0 / float(median(np.diff(time)))
-    folded = [mains for mains in MAINS if mains > 0.5 * rate]
-    if folded or abs(frequency - 0.5 * rate) < FOLDED * rate:
-        return "record faster, or through an anti-alias filter; noise of its size is no harm"
-    lowpass = f"filter: {{lowpass: {0.4 * frequency:.2g}}}"
-    return f"sine: {{frequency: {{start: auto}}}} on the channel, or {lowpass} if it is fast"
 
 
 def drift(evidence: Evidence) -> Iterator[Suspicion]:
