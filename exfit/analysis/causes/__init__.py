@@ -6,7 +6,8 @@ it. Some look at the residuals; others fit the record once more with one thing l
 residuals are noise nothing of that is done.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import isfinite
 
 from exfit.analysis.causes.channels import (
     clipped_channel,
@@ -63,6 +64,7 @@ BY_TRIAL: tuple[Recogniser, ...] = (
     further_step,
     averaging,
 )
+FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not worth a line
 
 
 def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
@@ -75,8 +77,17 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     recognisers = ALWAYS if nothing_to_explain else (*FROM_RESIDUALS, *BY_TRIAL)
     suspicions = sorted(_suspicions(evidence, recognisers), key=lambda each: -each.likelihood)
     if not nothing_to_explain:
-        suspicions = with_model(evidence, suspicions)
+        suspicions = likely(with_model(evidence, suspicions))
     return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
+
+
+def likely(suspicions: Sequence[Suspicion]) -> list[Suspicion]:
+    """Return suspicions without those that the first makes unlikely; the second stays."""
+    compared = [each for each in suspicions if isfinite(each.likelihood)]
+    left_out = [
+        each for each in compared[2:] if each.likelihood < compared[0].likelihood - FAR_LESS_LIKELY
+    ]
+    return [each for each in suspicions if each not in left_out]
 
 
 def _suspicions(evidence: Evidence, recognisers: tuple[Recogniser, ...]) -> Iterator[Suspicion]:

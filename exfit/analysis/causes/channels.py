@@ -26,6 +26,7 @@ from exfit.results.verdict import Cause
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+LEAST_CHANGE = 0.02  # of vt's scale: no base is wrong by less
 LARGEST_FACTOR = 3.0  # of a scale, about what the levels at rest say
 FARTHEST_VOLTAGE = 0.2  # pu: how far vt0 may be from the case's
 FEWEST_CLIPPED = 5  # samples at one extreme value: white noise has one, rounded noise a few
@@ -58,13 +59,15 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
     if levels is not None:
         starts = f": it starts from {levels[0]:.4g} pu, the response from {levels[1]:.4g} pu"
 
-    def cause(trial: Trial) -> Cause:
+    def cause(trial: Trial) -> Cause | None:
         scale = trial.values["cause.scale"] / channel.scale
         if scale < 0.0:
             return Cause(
                 f"{place} is inverted{starts}",
                 "check the polarity; scale: -1 turns it",
             )
+        if signal == "vt" and abs(scale - 1.0) < LEAST_CHANGE:
+            return None
         return Cause(
             f"the base of {place}{starts}; times {scale:.4g} it would match",
             f"check base, unit and, of phases, connection of {signal}",
