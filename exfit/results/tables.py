@@ -12,6 +12,7 @@ from exfit.dsp.decimation import kept_rows
 from exfit.inference import ParameterEffect
 from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.model import FitResult, PhaseEnd
+from exfit.results.side_by_side import outcome_of
 from exfit.util.sources import NOT_STATED, SOURCES
 from exfit.util.text import yaml_number
 
@@ -125,7 +126,7 @@ def effects_table(effects: Sequence[ParameterEffect]) -> str:
 
 def parameter_file(result: FitResult) -> str:
     """Return the values as YAML, to be read back by simulate and validate."""
-    state = "interrupted" if result.interrupted else result.message
+    state = outcome_of(result)
     matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in result.comparisons)
     lines = [
         f"# {result.model} fitted to {', '.join(matches)}; {state}",

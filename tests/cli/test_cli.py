@@ -469,8 +469,9 @@ def test_a_validation_much_worse_than_the_fit_ends_with_3_and_accept_alone_judge
     Path("down.csv").write_text(csv_text(TIME, 1.05 * np.array(samples["v"], float)))
     ran = run("fit", case_file(), "--no-plots")
     assert ran.code == 3
-    _, reason = ran.out[ran.out.index("verdict: ") :].splitlines()[:2]
-    assert reason.startswith("not accepted: on down-step the error is")
+    above, below = ran.out.split("\nparameter ", 1)
+    assert "\nnot accepted: on down-step the error is" in above
+    assert "on down-step the error is" not in below
     printed = json.loads(run("fit", case_file(), "--no-plots", "--json").out)
     (match,) = printed["validation"]
     assert not match["accepted"]

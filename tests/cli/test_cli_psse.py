@@ -271,7 +271,7 @@ def result_of(folder):
 def test_a_fit_comes_back_from_its_export_with_every_digit(run, fitted):
     code, out, err = run("export", fitted, "-o", "out.dyr", "--bus", "101", "--id", "G1")
     assert (code, out) == (0, "written to out.dyr\n")
-    assert "did not converge" in err
+    assert "the fit does not hold: not converged" in err
     text = Path("out.dyr").read_text()
     assert max(map(len, text.splitlines())) <= WIDTH
     comments = [line for line in text.splitlines() if line.startswith("//")]

@@ -195,18 +195,20 @@ def test_a_steady_part_that_is_none_is_refused_or_reported(tmp_path):
     with pytest.raises(RecordError, match=r"ends at 20 s, before test\.steady_until = 100 s"):
         fit(case_of(beyond, tmp_path))
     late = fit(case_of(MACHINE.replace("steady_until: 1.0", "steady_until: 5.0"), tmp_path))
-    assert any("before 5 s, where the record should be at rest" in note for note in late.notes)
+    words = "before 5 s, where the record should be at rest"
+    assert any(words in cause.cause for cause in late.verdict.causes)
 
 
 def test_a_steady_part_behind_noise_is_not_complained_of(noisy, tmp_path):
-    assert not any("at rest" in note for note in fit(case_of(MACHINE, tmp_path, noisy)).notes)
+    found = fit(case_of(MACHINE, tmp_path, noisy))
+    assert not any("at rest" in cause.cause for cause in found.verdict.causes)
 
 
 def test_a_signal_on_another_base_is_reported(noisy, tmp_path):
     """Field current relative to rated, as recorders give it."""
     scaled = MACHINE.replace("{column: ifd,", "{column: ifd, scale: 0.46,")
-    notes = fit(case_of(scaled, tmp_path, noisy)).notes
-    assert any(note.startswith("the base of ifd") and "starts from" in note for note in notes)
+    causes = [cause.cause for cause in fit(case_of(scaled, tmp_path, noisy)).verdict.causes]
+    assert any(text.startswith("the base of ifd") and "starts from" in text for text in causes)
 
 
 def test_a_known_reference_far_away_is_reached_too(tmp_path):

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from exfit.analysis.translation.start import StartValue
 from exfit.analysis.translation.steps import DEFAULT_MACHINE, TranslationTask
 from exfit.results.model import FitResult
+from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.translation import UNDETERMINED, StepComparison, TranslatedParameter
 from exfit.util.sources import NOT_STATED, least_certain
 
@@ -71,8 +72,8 @@ def translation_notes(
 def _fit_notes(task: TranslationTask) -> Iterator[str]:
     """Yield what of the fit itself must be known."""
     result, source = task.result, task.source.name
-    if not result.success:
-        yield f"the fit of {source} did not converge: {result.message}"
+    if not result.holds:
+        yield f"the fit of {source} does not hold: {outcome_of(result)}: {explanation_of(result)}"
     own = {name: entry for name, entry in result.parameters.items() if name in task.own}
     unknown = [name for name, entry in own.items() if not entry.determined]
     if unknown:

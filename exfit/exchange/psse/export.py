@@ -19,6 +19,7 @@ from exfit.models import MODELS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES
 from exfit.results.model import FitResult
+from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.translation import Translation
 from exfit.results.typical_values import by_weight, first_of
 from exfit.util.sources import NOT_STATED, TYPICAL, by_source
@@ -93,8 +94,8 @@ def _translated(result: FitResult, translation: Translation) -> FitResult:
 
 def _of_fit(result: FitResult) -> Iterator[str]:
     """Yield what of the fit itself the reader must know."""
-    if not result.success:
-        yield f"the fit did not converge: {result.message}"
+    if not result.holds:
+        yield f"the fit does not hold: {outcome_of(result)}: {explanation_of(result)}"
     outside = [f"{name} {p.value:.4g}" for name, p in result.parameters.items() if not p.physical]
     if outside:
         yield f"not physical, outside the range of the data sheet: {', '.join(outside)}"
