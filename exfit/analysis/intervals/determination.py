@@ -184,11 +184,13 @@ def without_linear_intervals(
 def without_limits_of_others(uncertainty: UncertaintyAnalysis) -> UncertaintyAnalysis:
     """Return the uncertainty without intervals that something else than the record limits.
 
-    That is the bound of another parameter, for those tied to it, or one sample that decides an
-    instant.
+    That is the bound of another parameter, for those tied to it whose profile does not close, or
+    one sample that decides an instant.
     """
     parameters = dict(uncertainty.confidence.parameters)
     for name, partners in uncertainty.tied_to_bounds.items():
+        if parameters[name].determined and parameters[name].method != "linear":
+            continue  # a profile, in which the other may leave its bound, is closed
         why = f"has no interval: the record ties it to {listed(partners)}, on a bound"
         parameters[name] = replace(parameters[name], interval=None, why=why)
     for name, why in uncertainty.by_few_samples.items():

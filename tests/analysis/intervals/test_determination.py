@@ -190,6 +190,15 @@ def test_a_parameter_tied_to_one_on_its_bound_is_named_with_it(unit2):
     assert parameters["KIR"] == linear.confidence.parameters["KIR"]
 
 
+def test_a_closed_profile_of_a_parameter_tied_to_a_bound_is_printed(unit2):
+    _, _, _, profiled = unit2
+    tied = replace(profiled, tied_to_bounds={"KPR": ("KD",), "KC": ("KD",)})
+    parameters = without_limits_of_others(tied).confidence.parameters
+    assert parameters["KPR"].interval == profiled.confidence.parameters["KPR"].interval
+    assert profiled.confidence.parameters["KC"].interval[0] is None
+    assert parameters["KC"].interval is None
+
+
 def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
     def beside(case, problem, *rest):
         result = search(case, problem, *rest)
