@@ -13,10 +13,11 @@ class SignalRow(NamedTuple):
 
     ``noise`` is the standard deviation that a recorder's channel typically has, in that unit; a
     signal without one is never compared with a record. ``jumps`` says that it follows a step of
-    the reference at once. The rest serves the recognition of a recorder's columns: the
-    ``quantity`` of the column's unit, the ``words`` that recorders use, the surest first, whether
-    the unit alone is enough, and the ``turn``, as a signal with common words must not take the
-    columns of others. ``base`` says what 1 pu is. A signal without words is in no record.
+    the reference at once, ``positive`` that it is above zero at rest. The rest serves the
+    recognition of a recorder's columns: the ``quantity`` of the column's unit, the ``words`` that
+    recorders use, the surest first, whether the unit alone is enough, and the ``turn``, as a
+    signal with common words must not take the columns of others. ``base`` says what 1 pu is. A
+    signal without words is in no record.
     """
 
     symbol: str
@@ -24,6 +25,7 @@ class SignalRow(NamedTuple):
     unit: str = "pu"
     noise: float | None = None
     jumps: bool = False
+    positive: bool = False
     quantity: str = ""
     words: tuple[str, ...] = ()
     unit_suffices: bool = False
@@ -40,7 +42,8 @@ RATED_VOLTAGE, AIR_GAP_LINE, RATED_POWER = "rated, line to line", "air-gap line"
 
 ROWS = (
     SignalRow(
-        "vt", "terminal voltage", noise=1e-4, quantity="voltage", turn=7, base=RATED_VOLTAGE,
+        "vt", "terminal voltage", noise=1e-4, positive=True, quantity="voltage", turn=7,
+        base=RATED_VOLTAGE,
         words=(
             "vt", "ut", "ug", "vg", "ugen", "vgen", "uterm", "vterm", "ugenerator",
             "terminal voltage", "generator voltage", "stator voltage", "generatorspannung",
@@ -56,7 +59,7 @@ ROWS = (
         ),
     ),
     SignalRow(
-        "efd", "field voltage", noise=5e-3, jumps=True, quantity="voltage", turn=2,
+        "efd", "field voltage", noise=5e-3, jumps=True, positive=True, quantity="voltage", turn=2,
         base=AIR_GAP_LINE,
         words=(
             "efd", "vfd", "ufd", "vf", "uf", "field voltage", "ufield", "vfield",
@@ -64,7 +67,8 @@ ROWS = (
         ),
     ),
     SignalRow(
-        "ifd", "field current", noise=5e-3, quantity="current", turn=3, base=AIR_GAP_LINE,
+        "ifd", "field current", noise=5e-3, positive=True, quantity="current", turn=3,
+        base=AIR_GAP_LINE,
         words=(
             "ifd", "if", "field current", "ifield", "erregerstrom", "feldstrom", "lad ifd",
             "field i", "field amps", "fld amps",
@@ -84,7 +88,8 @@ ROWS = (
         unit_suffices=True,
     ),
     SignalRow(
-        "it", "stator current", noise=1e-3, quantity="current", turn=6, base="rated current",
+        "it", "stator current", noise=1e-3, positive=True, quantity="current", turn=6,
+        base="rated current",
         words=(
             "it", "ig", "igen", "istator", "stator current", "armature current",
             "generator current", "statorstrom", "generatorstrom",
@@ -105,6 +110,7 @@ ROWS = (
 SIGNALS: Mapping[str, SignalRow] = {row.symbol: row for row in ROWS}
 RECORDED = tuple(row.symbol for row in ROWS if row.words)
 COMPARED = tuple(row.symbol for row in ROWS if row.noise is not None)
+POSITIVE_AT_REST = tuple(row.symbol for row in ROWS if row.positive)
 NOISE: Mapping[str, float] = {row.symbol: row.noise for row in ROWS if row.noise is not None}
 
 

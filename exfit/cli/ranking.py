@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @case_argument
 @click.option(
     "--models",
-    metavar="NAME,NAME...",
+    metavar="NAME[,NAME]",
     help="Exciters, or files of models; all: the whole catalogue (default: those of the same type, "
     "AC, DC or ST, as that of CASE).",
     shell_complete=completion.several_exciters,

@@ -245,10 +245,10 @@ def _rounding(channel: Channel, errors: Array, slopes: Array) -> Rounding | None
     """Return what the steps of a recorder add to the weighted errors (M,) of a channel.
 
     ``slopes`` (M, N) are the derivatives of these. None where the steps are no larger than its
-    noise.
+    noise, and for a planned test, which has no errors.
     """
     readings, errors = channel.record, errors / channel.weight
-    step = quantum(readings)
+    step = quantum(readings) if errors.any() else None
     if step is None or not is_coarse(step, float(np.sqrt(np.mean(errors**2)))):
         return None
     levels = readings + errors

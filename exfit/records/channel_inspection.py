@@ -11,6 +11,7 @@ from exfit.dsp.quality import drift_at_rest, mains_frequency, noise_of, quantum,
 from exfit.dsp.sampling import present_samples
 from exfit.records.ripple import Ripple, ripple_at_rest
 from exfit.records.steps import ChannelSteps, LevelChange, RecordedStep, switches
+from exfit.signals import POSITIVE_AT_REST
 
 Array = NDArray[np.float64]
 
@@ -18,7 +19,6 @@ SPIKE_LIMIT = 6.0  # times the noise: a sample farther off the line through its 
 PLACES_LISTED = 5  # of spikes and of other faults, the first ones
 NOISELESS = 1e-6  # of the range: with less noise a channel at rest stands still, as simulated ones
 OWN_NOISE = 1.01  # times what rounding leaves: the noise of a channel that is not rounded coarsely
-POSITIVE_AT_REST = ("vt", "efd", "ifd", "it")
 NEGATIVE = 5.0  # times the noise below zero: what is positive is inverted
 LEAST_DRIFT = 0.01  # of all that a channel changes: with less it is at rest
 LARGEST_PU = 30.0  # what a signal in per unit stays below: ceilings are lower

@@ -280,9 +280,10 @@ def test_a_unit_is_found_alike_from_ramp_table_and_channel(tmp_path):
             assert abs(other.parameters[name].value - parameter.value) < 0.1 * (high - low), name
 
 
+@pytest.mark.long
 def test_the_sample_record_of_a_ramp_and_a_jump_leads_to_the_unit_that_made_it():
     """Another integrator computed it; seven parameters and the instant of the jump."""
-    result = fit(CONFIGS / "ac1a_ramp.yaml", search="local")
+    result = fit(CONFIGS / "ac1a_ramp.yaml")
     for name in ("KA", "TA", "TE", "KF", "TF", "KC", "KD"):
         low, high = result.parameters[name].interval
         assert low < TRUE_UNIT[name] < high

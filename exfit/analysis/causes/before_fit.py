@@ -16,11 +16,11 @@ from exfit.dsp.sampling import present_samples
 from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import MACHINE
-from exfit.records.channel_inspection import POSITIVE_AT_REST
 from exfit.records.contradictions import LARGEST_STEP, size_in_words
 from exfit.records.ripple import ripple_at_rest
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Overlay
+from exfit.signals import POSITIVE_AT_REST
 from exfit.util.text import show
 
 Values = Mapping[str, float]

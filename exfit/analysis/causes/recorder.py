@@ -202,6 +202,8 @@ def _likeliest_window(evidence: Evidence, number: int) -> float | None:
         values = {**evidence.values, "cause.delay": late}
         moves = [*evidence.residuals.moves(evidence.solution.x), {"cause.delay": 1.0}]
         errors, slopes = averaged.tangents(values, moves)
+        if not np.isfinite(slopes).all():
+            return None
         coefficients, *_ = np.linalg.lstsq(slopes, errors, rcond=None)
         left = errors - slopes @ coefficients
         costs[window] = float(left @ left)

@@ -103,16 +103,22 @@ def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
         assert ours.values[name] == pytest.approx(value, rel=1e-6)
 
 
-def test_errors_and_intervals_are_those_of_all_samples(tmp_path):
-    whole = residuals(dense_case(tmp_path))
+@pytest.mark.parametrize("channels", [{"vt": "vt"}, CHANNELS], ids=["vt", "vt and efd"])
+def test_errors_and_intervals_are_those_of_all_samples(tmp_path, channels):
+    """Several channels share out their degrees of freedom by samples, as they are too few to fit.
+
+    Of all samples each channel has its own: of 20,000 samples and 7 parameters no part in 1000.
+    """
+    agree = 1e-6 if len(channels) == 1 else 1e-3
+    whole = residuals(dense_case(tmp_path, channels=channels))
     ours = confidence(linearisation(problem_of(whole), whole.start, ()))
     every = confidence(linearisation(FitProblem(whole, whole), whole.start, ()))
     assert ours.dof == pytest.approx(every.dof, rel=1e-6)
     for name, one_ in every.parameters.items():
-        assert ours.parameters[name].std_error == pytest.approx(one_.std_error, rel=1e-6)
+        assert ours.parameters[name].std_error == pytest.approx(one_.std_error, rel=agree)
     for ours_, theirs in zip(ours.noise, every.noise, strict=True):
-        assert ours_.std == pytest.approx(theirs.std, rel=1e-9)
-        assert ours_.p_value == theirs.p_value
+        assert ours_.std == pytest.approx(theirs.std, rel=agree)
+        assert len(channels) > 1 or ours_.p_value == theirs.p_value
 
 
 def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
