@@ -29,13 +29,13 @@ from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.uncertainty import UncertaintyAnalysis, uncertainty_at
 from exfit.inference import LEVEL, Interval
+from exfit.results.model import ERRORS_IN_INTERVAL
 from exfit.util.text import near
 
 Array = NDArray[np.float64]
 
 LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
 ENCLOSED = "the intervals enclose another minimum, which the record does not refute"
-ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
 POINTS = 5  # of a side: enough for a smooth figure

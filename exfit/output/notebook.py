@@ -71,7 +71,7 @@ def _cells(name: str, parameter: FittedParameter) -> tuple[str, ...]:
         name,
         number(parameter.start),
         f"{rounded(parameter.value, digits)}{bound}",
-        number(parameter.stderr, 2),
+        number(parameter.linear_error, 2),
         f"{interval(parameter.interval, digits)}{note}",
         parameter.unit,
     )

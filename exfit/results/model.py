@@ -96,10 +96,15 @@ class FittedParameter:
         return self.std_error
 
     @property
+    def linear_error(self) -> float | None:
+        """The standard error where linear theory serves: where the interval is its own."""
+        return self.std_error if self.interval is not None and not self.interval_note else None
+
+    @property
     def rounding_error(self) -> float | None:
-        """The standard error that tables round the value to; None where none is known."""
+        """The standard error that tables round to, of the interval where that is not linear."""
         low, high = self.interval or (None, None)
-        if self.std_error is not None or low is None or high is None:
+        if self.linear_error is not None or low is None or high is None:
             return self.std_error
         return (high - low) / ERRORS_IN_INTERVAL
 

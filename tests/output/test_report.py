@@ -152,7 +152,7 @@ def saved_of(run):
 def rounding_error(parameter):
     """Return the standard error that a stored parameter is rounded to."""
     low, high = parameter["interval"] or (None, None)
-    if parameter["std_error"] is not None or low is None or high is None:
+    if parameter["interval_method"] == "linear" or low is None or high is None:
         return parameter["std_error"]
     return (high - low) / 3.92
 
@@ -176,6 +176,8 @@ def test_every_fitted_parameter_is_reported_with_its_interval_or_the_reason_why_
             limits = f"{low} … {high}" if low and high else limits
             method = "" if one["interval_method"] == "linear" else one["interval_method"]
             assert row[3] == " ".join(filter(None, [limits, method, one["why"]]))
+        linear = one["interval"] is not None and one["interval_method"] == "linear"
+        assert row[4] == (f"{one['std_error']:.2g}" if linear else "–")
         assert row[5] == f"{one['min']:.5g} … {one['max']:.5g}"
 
 

@@ -73,6 +73,51 @@ def test_the_verdict_and_its_causes_come_first_whole_and_once(missed, width):
     assert max(map(len, lines[:table])) <= width
 
 
+def shown(result, width):
+    """Return what the terminal shows of a fit, line by line."""
+    stream = io.StringIO()
+    terminal.fit(Console(file=stream, width=width), result)
+    return stream.getvalue().splitlines()
+
+
+def with_interval(result, method, interval):
+    """Return a fit whose parameters all have this interval, found so."""
+    parameters = {
+        name: replace(parameter, interval=interval, interval_method=method)
+        for name, parameter in result.parameters.items()
+    }
+    return replace(result, parameters=parameters)
+
+
+@pytest.mark.parametrize(
+    ("method", "interval"),
+    [("profile", (1.0, 9.0)), ("hull", (1.0, None)), ("profile", None), (None, None)],
+)
+def test_a_standard_error_is_shown_beside_an_interval_of_linear_theory_alone(
+    missed, method, interval
+):
+    distrusted = with_interval(missed, method, interval)
+    for name, parameter in missed.parameters.items():
+        error = f"{100.0 * parameter.std_error / abs(parameter.value):.2g} %"
+        texts = [
+            "\n".join(line for line in shown(result, 80) if line.startswith(f"{name} "))
+            for result in (missed, distrusted)
+        ]
+        assert [error in text for text in texts] == [True, False]
+        assert distrusted.parameters[name].std_error == parameter.std_error
+        cells = [f"<td>{parameter.std_error:.2g}</td>" in fit_html(f) for f in (missed, distrusted)]
+        assert cells == [True, False]
+
+
+def test_a_value_has_the_digits_of_the_interval_that_stands_beside_it(missed):
+    low, high = 1.0, 1.4
+    wide = with_interval(missed, "profile", (low, high))
+    for parameter in wide.parameters.values():
+        assert parameter.rounding_error == pytest.approx((high - low) / 4.0, rel=0.05)
+    for parameter in with_interval(missed, "linear", (low, high)).parameters.values():
+        assert parameter.rounding_error == parameter.std_error
+
+
 def test_what_does_not_match_is_nowhere_called_good_or_converged(missed):
     result = replace(missed, verdict=Verdict("no match", "the response goes the other way"))
     stream = io.StringIO()

@@ -110,7 +110,8 @@ def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
         if result.knowledge is not None:
             uncertainty = result.knowledge.confidence.parameters[name]
             style = style or ("yellow" if uncertainty.why else "")
-            error = error_of(uncertainty, parameter.of_record)
+            if parameter.linear_error is not None:
+                error = error_of(uncertainty, parameter.of_record)
         digits = parameter.rounding_error
         old = () if before is None else (rounded(before.values.get(name), digits),)
         values = (number(parameter.start), *old, rounded(parameter.value, digits))
