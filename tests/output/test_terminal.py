@@ -89,6 +89,30 @@ def with_interval(result, method, interval):
     return replace(result, parameters=parameters)
 
 
+@pytest.mark.parametrize("width", [60, 80])
+def test_all_that_is_shown_of_a_fit_keeps_within_the_terminal_without_blanks_at_the_ends(
+    missed, width
+):
+    for method in ("linear", "profile", "hull"):
+        lines = shown(with_interval(missed, method, (1.0, 9.0)), width)
+        assert [line for line in lines if line != line.rstrip() or len(line) > width] == []
+
+
+@pytest.mark.parametrize("width", [50, 60, 80])
+def test_a_narrow_terminal_has_the_values_and_their_intervals_in_one_table(missed, width):
+    """The start is left out where it has no room: the case has it."""
+    for method, remark in (("linear", ""), ("profile", "profile")):
+        result = with_interval(missed, method, (1.0, 9.0))
+        lines = shown(result, width)
+        heads = [line.split() for line in lines if line.startswith("parameter ")]
+        rows = [line for line in lines if line.startswith("a ")]
+        assert len(heads) == len(rows) == 1
+        assert {"fitted", "interval", "unit"} <= {*heads[0]}
+        assert width == 60 or ("start" in heads[0]) == (width == 80)
+        assert re.search(r"1\.0+ \.\.\. 9\.0+ ", rows[0])
+        assert rows[0].endswith(remark)
+
+
 @pytest.mark.parametrize(
     ("method", "interval"),
     [("profile", (1.0, 9.0)), ("hull", (1.0, None)), ("profile", None), (None, None)],

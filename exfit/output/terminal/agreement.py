@@ -7,7 +7,13 @@ from exfit.analysis.comparison import Agreement
 from exfit.analysis.curves import RECORD
 from exfit.dsp.features import LABELS, Features
 from exfit.output.terminal.side_by_side import Row, side_by_side, tables
-from exfit.output.terminal.terminal import notes, number, plain_table, show_table
+from exfit.output.terminal.terminal import (
+    notes,
+    number,
+    paragraph,
+    plain_table,
+    show_table,
+)
 from exfit.util.text import rounded
 
 
@@ -20,11 +26,11 @@ def agreement(console: Console, result: Agreement) -> None:
     show_table(console, _differences(result))
     console.print()
     whose = "the record" if result.from_reference[0].first == RECORD else "A"
-    console.print(f"against {whose}: f, half the sum of squares over the samples")
+    paragraph(console, f"against {whose}: f, half the sum of squares over the samples")
     show_table(console, _matches(result))
     if result.features and result.step_at is not None:
         console.print()
-        console.print(f"{result.judged} after the step at {result.step_at:.4g} s")
+        paragraph(console, f"{result.judged} after the step at {result.step_at:.4g} s")
         _features(console, result)
     if len(result.results) > 1:
         console.print()
@@ -32,12 +38,13 @@ def agreement(console: Console, result: Agreement) -> None:
     console.print()
     notes(console, result.notes)
     time = result.differences[0].time
-    console.print(f"compared over {time[0]:g} ... {time[-1]:g} s at {len(time)} instants")
+    paragraph(console, f"compared over {time[0]:g} ... {time[-1]:g} s at {len(time)} instants")
     worst = max(result.differences, key=lambda difference: difference.interpolation)
     if worst.interpolation:
-        console.print(
+        paragraph(
+            console,
             f"between samples: a cubic, up to {worst.interpolation:.1e} pu from a straight line "
-            f"({worst.signal})"
+            f"({worst.signal})",
         )
 
 

@@ -8,7 +8,7 @@ from rich.text import Text
 
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Sheet
-from exfit.output.terminal.terminal import plain_table, show_table
+from exfit.output.terminal.terminal import paragraph, plain_table, remarks, show_table
 
 
 def catalogue(
@@ -45,17 +45,17 @@ def machine(console: Console, described: Machine) -> None:
 
 
 def _describe(console: Console, described: Model | Machine, *drawing: str) -> None:
-    console.print(f"[bold]{described.name}[/]: {described.title}")
+    remarks(console, f"{described.name}:", [described.title], "bold")
     for text in drawing:
         console.print()
         console.print(text, markup=False, soft_wrap=True)
     console.print()
-    console.print(data_sheet(described.sheet))
+    show_table(console, data_sheet(described.sheet))
     console.print()
-    console.print(f"states: {', '.join(described.states)}")
+    paragraph(console, f"states: {', '.join(described.states)}")
     free = [row.symbol for row in described.sheet if row.free]
     if free:
-        console.print(f"free in the case of `exfit new`: {', '.join(free)}")
+        paragraph(console, f"free in the case of `exfit new`: {', '.join(free)}")
 
 
 def data_sheet(rows: Sheet) -> Table:

@@ -3,13 +3,13 @@
 from rich.console import Console
 
 from exfit.analysis.model_check import STEPS, Check
-from exfit.output.terminal.terminal import notes, plain_table, remarks, show_table
+from exfit.output.terminal.terminal import notes, paragraph, plain_table, remarks, show_table
 
 
 def check(console: Console, result: Check) -> None:
     """Show what a check shows of a case."""
     if result.deviations:
-        console.print("exact Jacobian against central differences, relative, by their step")
+        paragraph(console, "exact Jacobian against central differences, relative, by their step")
         heads = [f"{step:.0e}" for step in STEPS]
         table = plain_table("parameter", *heads, "best", numbers=[*heads, "best"])
         for name, row in result.deviations.items():
@@ -17,7 +17,7 @@ def check(console: Console, result: Check) -> None:
         show_table(console, table)
         _verdict(console, result.agrees, "derivatives agree", "derivatives DISAGREE")
     else:
-        console.print("no free parameter: no derivative to check")
+        paragraph(console, "no free parameter: no derivative to check")
     _verdict(
         console,
         result.flat,
@@ -25,12 +25,12 @@ def check(console: Console, result: Check) -> None:
         f"a run without a step is NOT flat: it drifts by {result.drift:.1e} pu in 60 s",
     )
     step = f"{result.step:g} s"
-    console.print(f"sub-steps: {result.substeps} in each step of {step}")
-    console.print(f"halving every step moves the response by {result.step_error:.1e} pu")
-    console.print(f"bypassed: {', '.join(result.bypassed) or 'nothing'}")
+    paragraph(console, f"sub-steps: {result.substeps} in each step of {step}")
+    paragraph(console, f"halving every step moves the response by {result.step_error:.1e} pu")
+    paragraph(console, f"bypassed: {', '.join(result.bypassed) or 'nothing'}")
     remarks(console, "warning:", result.warnings)
     notes(console, result.notes)
 
 
 def _verdict(console: Console, good: bool, yes: str, no: str) -> None:
-    console.print(f"[green]{yes}[/]" if good else f"[bold red]{no}[/]")
+    paragraph(console, yes if good else no, "green" if good else "bold red")

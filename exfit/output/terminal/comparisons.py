@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from exfit.dsp.features import LABELS
-from exfit.output.terminal.terminal import plain_table, remarks, show_table
+from exfit.output.terminal.terminal import paragraph, plain_table, remarks, show_table
 from exfit.results.comparisons import Comparison
 from exfit.results.feature_digits import feature_cells
 
@@ -41,7 +41,7 @@ def validation(console: Console, all_of_them: Sequence[Comparison]) -> None:
     for role, chosen in (("fitted, not judged:", False), ("validated:", True)):
         records = [f"{m.name} ({m.record})" for m in all_of_them if m.validation is chosen]
         if records:
-            console.print(f"{role} {', '.join(records)}", soft_wrap=True, markup=False)
+            paragraph(console, f"{role} {', '.join(records)}")
     for match in all_of_them:
         remarks(console, "step:", (step.text for step in match.steps))
         remarks(console, "note:", match.notes)

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from exfit.fleet.fits import FitRun, FitSeries, PlannedFit, Progress
 from exfit.output.terminal.side_by_side import side_by_side
-from exfit.output.terminal.terminal import remarks
+from exfit.output.terminal.terminal import paragraph, remarks
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.verdict import MATCHES, MISSES
@@ -86,7 +86,7 @@ def fit_series(console: Console, series: FitSeries) -> None:
         console.print(Text.assemble(f"{name}: ", ("failed", "bold red")), soft_wrap=True)
     if series.not_run:
         names = ", ".join(series.not_run)
-        console.print(Text(f"not run, interrupted: {names}", "bold red"), soft_wrap=True)
+        paragraph(console, f"not run, interrupted: {names}", "bold red")
 
 
 def _tables(console: Console, series: FitSeries) -> None:
@@ -101,10 +101,7 @@ def _tables(console: Console, series: FitSeries) -> None:
         results = {run.result.strategy: run.result for run in runs}
         first = runs[0].result
         console.print()
-        console.print(
-            Text(f"{name}: {first.model} fitted to {first.comparison.record}", "bold"),
-            soft_wrap=True,
-        )
+        paragraph(console, f"{name}: {first.model} fitted to {first.comparison.record}", "bold")
         side_by_side(console, results, start=True)
         _outcomes(console, results)
 

@@ -10,9 +10,11 @@ from exfit.output.terminal.comparisons import comparisons, rejections
 from exfit.output.terminal.terminal import (
     NO_BREAK,
     error_of,
+    in_groups,
     interval,
     notes,
     number,
+    paragraph,
     plain_table,
     remarks,
     show_table,
@@ -35,24 +37,28 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     console.print()
     verdict(console, result)
     console.print()
-    show_table(console, fitted_table(result, before))
+    show_table(console, fitted_table(result, before), _expendable(result))
     console.print()
     if result.success:
         remarks(console, f"{result.outcome}:", [result.message], "bold")
     several = len(result.comparisons) > 1
-    figures = f"cost {result.start_cost:.4e} -> {result.cost:.4e}"
+    figures = [f"cost {result.start_cost:.4e} -> {result.cost:.4e}"]
     if not several:
         comparison = result.comparison
-        figures += f"   rmse {comparison.rmse:.3e} pu   fit {comparison.fit_percent:.2f} %"
-    console.print(figures)
-    console.print(
-        f"{result.nit} iterations, {result.nfev} residuals, {result.njev} Jacobians, "
-        f"{result.simulations} simulations, {result.seconds:.2f} s"
+        figures += [f"rmse {comparison.rmse:.3e} pu", f"fit {comparison.fit_percent:.2f} %"]
+    paragraph(console, in_groups(figures), indent=2)
+    effort = (
+        f"{result.nit} iterations",
+        f"{result.nfev} residuals",
+        f"{result.njev} Jacobians",
+        f"{result.simulations} simulations",
+        f"{result.seconds:.2f} s",
     )
+    paragraph(console, in_groups(effort, ", "), indent=2)
     _phase_ends(console, result)
-    console.print(f"sub-steps: {result.substeps}")
+    paragraph(console, f"sub-steps: {result.substeps}")
     if result.sources:
-        console.print(f"sources of the values: {source_counts(result)}")
+        remarks(console, "sources of the values:", [source_counts(result)], "")
     if result.minima is not None:
         remarks(console, "search:", [search_summary(result.minima, result.cost)], "bold")
     if result.knowledge is not None:
@@ -79,16 +85,18 @@ def _phase_ends(console: Console, result: FitResult) -> None:
     """Show where each phase of the search handed over to the next."""
     for end in result.phase_ends:
         errors = ", ".join(f"{match.rmse:.3e}" for match in end.comparisons)
-        console.print(
-            f"end of {end.phase}: iteration {end.iteration}, cost {end.cost:.4e}   "
-            f"rmse {errors} pu   parameters_{end.phase}.yaml"
+        figures = (
+            f"end of {end.phase}: iteration {end.iteration}, cost {end.cost:.4e}",
+            f"rmse {errors} pu",
+            f"parameters_{end.phase}.yaml",
         )
+        paragraph(console, in_groups(figures), indent=2)
 
 
 def source_counts(result: FitResult) -> str:
     """Return how many values come from where."""
     groups = by_source(result.sources, result.sources)
-    return ", ".join(f"{len(names)} {source}" for source, names in groups.items())
+    return in_groups((f"{len(names)} {source}" for source, names in groups.items()), ", ")
 
 
 def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
@@ -98,26 +106,39 @@ def ranking(effects: Sequence[ParameterEffect]) -> Iterator[str]:
         yield f"1 % of each moves the response by, in units of the noise: {', '.join(ranked)}"
 
 
+def _expendable(result: FitResult) -> tuple[str, str]:
+    """Return which columns a narrow terminal can do without, the one that says least first."""
+    linear = any(parameter.linear_error is not None for parameter in result.parameters.values())
+    return ("start", "error") if linear else ("error", "start")
+
+
 def fitted_table(result: FitResult, before: FitResult | None = None) -> Table:
     """Return the fitted values with their intervals; what belongs to a record comes last."""
     former = () if before is None else ("before",)
     numbers = ("start", *former, "fitted", "95 % interval", "error")
-    table = plain_table("parameter", *numbers, "unit", "", numbers=numbers)
+    marks = {name: ", ".join(_marks(each)) for name, each in result.parameters.items()}
+    remark = ("",) if any(marks.values()) else ()
+    table = plain_table("parameter", *numbers, "unit", *remark, numbers=numbers)
     for name, parameter in result.parameters.items():
-        style = "yellow" if parameter.at_bound or not parameter.physical else ""
-        mark = ", ".join(_marks(parameter))
-        error = "-"
-        if result.knowledge is not None:
-            uncertainty = result.knowledge.confidence.parameters[name]
-            style = style or ("yellow" if uncertainty.why else "")
-            if parameter.linear_error is not None:
-                error = error_of(uncertainty, parameter.of_record)
+        vague = result.knowledge is not None and parameter.why
+        style = "yellow" if parameter.at_bound or not parameter.physical or vague else ""
         digits = parameter.rounding_error
         old = () if before is None else (rounded(before.values.get(name), digits),)
         values = (number(parameter.start), *old, rounded(parameter.value, digits))
         limits = interval(parameter.interval, digits)
-        table.add_row(name, *values, limits, error, parameter.unit, mark, style=style)
+        mark = (marks[name],) if remark else ()
+        table.add_row(
+            name, *values, limits, _error(result, name), parameter.unit, *mark, style=style
+        )
     return table
+
+
+def _error(result: FitResult, name: str) -> str:
+    """Return the standard error of a parameter, a dash where linear theory does not serve."""
+    parameter = result.parameters[name]
+    if result.knowledge is None or parameter.linear_error is None:
+        return "-"
+    return error_of(result.knowledge.confidence.parameters[name], parameter.of_record)
 
 
 def _marks(parameter: FittedParameter) -> Iterator[str]:

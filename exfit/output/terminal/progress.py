@@ -14,6 +14,7 @@ from exfit.analysis.iteration_responses import LiveResponse
 from exfit.case.case import Case
 from exfit.estimate import Progress
 from exfit.output.terminal.sketch import LEAST_HEIGHT, LEAST_WIDTH, sketched
+from exfit.output.terminal.terminal import paragraph
 from exfit.results.model import Iteration
 from exfit.results.tables import yes_or_no
 
@@ -77,11 +78,12 @@ class LiveIterations:
         """Show one more iteration."""
         self.lines.append(iteration)
         if len(self.lines) == 1:
-            self.console.print(self.title, markup=False)
+            paragraph(self.console, self.title)
         if self._live is None:
+            columns = _fitting(self.console.width)
             if len(self.lines) == 1:
-                self.console.print(_row(HISTORY), soft_wrap=True)
-            self.console.print(_row(_cells(iteration)), soft_wrap=True)
+                self.console.print(_row(HISTORY[:columns]), soft_wrap=True)
+            self.console.print(_row(_cells(iteration)[:columns]), soft_wrap=True)
         else:
             self._draw(self._live)
 

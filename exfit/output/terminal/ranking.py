@@ -1,11 +1,10 @@
 """Models of the same records, ranked: their table, and what the records say of them."""
 
 from rich.console import Console
-from rich.text import Text
 
 from exfit.analysis.ranking import RankedModel
 from exfit.fleet.ranking import Ranking
-from exfit.output.terminal.terminal import number, plain_table, remarks, show_table
+from exfit.output.terminal.terminal import number, paragraph, plain_table, remarks, show_table
 
 NOT_REFUTED = "*"  # behind the name of a model
 LEGEND = "rmse in pu; BIC above the lowest; * not refuted by the records"
@@ -29,7 +28,7 @@ def ranking(console: Console, ranked: Ranking) -> None:
         remarks(console, f"{name}: failed:", [fault], "bold red")
     if ranked.series.not_run:
         names = ", ".join(ranked.series.not_run)
-        console.print(Text(f"not run, interrupted: {names}", "bold red"), soft_wrap=True)
+        paragraph(console, f"not run, interrupted: {names}", "bold red")
 
 
 def _table(console: Console, models: tuple[RankedModel, ...]) -> None:
@@ -48,8 +47,8 @@ def _table(console: Console, models: tuple[RankedModel, ...]) -> None:
         )
     show_table(console, table)
     if unseen:
-        console.print("unseen: rmse of the records that no fit saw", style="dim")
-    console.print(LEGEND, style="dim", markup=False, soft_wrap=True)
+        paragraph(console, "unseen: rmse of the records that no fit saw", "dim")
+    paragraph(console, LEGEND, "dim")
 
 
 def _error(rmse: float | None) -> str:

@@ -6,7 +6,13 @@ from rich.console import Console
 from rich.text import Text
 
 from exfit.dsp.sampling import Sampling
-from exfit.output.terminal.terminal import notes, number, plain_table, show_table
+from exfit.output.terminal.terminal import (
+    notes,
+    number,
+    paragraph,
+    plain_table,
+    show_table,
+)
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 
@@ -16,12 +22,12 @@ NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers
 def inspection(console: Console, result: Inspection, record: Sequence[str]) -> None:
     """Show what a file holds, and the sections of a case that it suggests."""
     clock = " and ".join(result.clock.columns)
-    console.print(
+    paragraph(
+        console,
         f"{result.path.name}: {len(result.time)} samples by {clock}, "
         f"{result.sampling.start:.6g} ... {result.sampling.end:.6g} s",
-        markup=False,
     )
-    console.print(in_words(result.sampling), markup=False)
+    paragraph(console, in_words(result.sampling))
     console.print()
     _channels(console, result.channels)
     console.print()
@@ -30,7 +36,7 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     if result.findings:
         notes(console, result.findings)
         console.print()
-    console.print("for a case; what is in # comments is a guess to check:")
+    paragraph(console, "for a case; what is in # comments is a guess to check:")
     console.print()
     console.print("\n".join(record), markup=False, soft_wrap=True)
     console.print()

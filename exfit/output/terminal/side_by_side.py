@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from exfit.output.terminal.terminal import number, plain_table, show_table
+from exfit.output.terminal.terminal import number, paragraph, plain_table, show_table
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import ParameterValue, parameters_beside
 from exfit.util.text import rounded
@@ -68,7 +68,7 @@ def side_by_side(
     shown = {mark for row in parameters for cell in row.cells for mark in MARKS if mark in cell}
     if shown:
         legend = ", ".join(f"{mark} {words}" for mark, words in MARKS.items() if mark in shown)
-        console.print(legend, style="dim", markup=False)
+        paragraph(console, legend, "dim")
 
 
 def _start(fit: FitResult) -> dict[str, str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len, set_cell_size
 from rich.console import Console
+from rich.segment import Segment, Segments
 from rich.table import Column, Table
 from rich.text import Text
 
@@ -21,7 +22,11 @@ if TYPE_CHECKING:
 
 BETWEEN_COLUMNS = 2  # characters
 NARROW = 80  # columns where the width is unknown
-UNBROKEN = re.compile(r"`[^`]*`|\d (?:%|pu|s|Hz)(?!\w)")  # commands, and figures with their units
+DEEPEST_INDENT = 14  # characters: more would leave a sentence a narrow column
+UNIT = r"(?:%|pu|s|Hz)(?!\w)"
+UNBROKEN = re.compile(  # commands, ranges, and figures with their units
+    rf"`[^`]*`|\d \.\.\. -?[\d.]+(?:e-?\d+)?(?: {UNIT})?|\d {UNIT}"
+)
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
@@ -41,21 +46,35 @@ def wraps(console: Console) -> bool:
     return console.is_terminal or "COLUMNS" in os.environ
 
 
-def show_table(console: Console, table: Table) -> None:
-    """Show a table; one wider than the terminal in parts, each with the first column."""
-    for k, part in enumerate(parts_of(table, console.width)):
+def show_table(console: Console, table: Table, expendable: Sequence[str] = ()) -> None:
+    """Show a table; one wider than the terminal in parts, each with the first column.
+
+    Columns that are ``expendable`` are left out, one after the other, where that spares the parts.
+    """
+    for k, part in enumerate(parts_of(table, console.width, expendable)):
         if k:
             console.print()
-        width = max(console.width, _total(map(_least_width, part.columns)))
-        console.print(part, width=width, crop=False, soft_wrap=False)
+        options = console.options.update(width=max(console.width, _width(part)))
+        for line in console.render_lines(part, options, pad=False):
+            cells = [*_without_blanks_behind(line), Segment.line()]
+            console.print(Segments(cells), crop=False, soft_wrap=True)
 
 
-def parts_of(table: Table, width: int) -> Iterator[Table]:
+def _without_blanks_behind(line: Sequence[Segment]) -> Iterator[Segment]:
+    """Yield a line of a table without the blanks that fill its last column."""
+    length = len("".join(segment.text for segment in line).rstrip())
+    for segment in line:
+        yield Segment(segment.text[:length], segment.style)
+        length = max(length - len(segment.text), 0)
+
+
+def parts_of(table: Table, width: int, expendable: Sequence[str] = ()) -> Iterator[Table]:
     """Yield a table, or parts of it that are no wider than so many columns of characters."""
+    for shorter in _shorter(table, expendable):
+        if _width(shorter) <= width:
+            yield shorter
+            return
     widths = [_least_width(column) for column in table.columns]
-    if _total(widths) <= width:
-        yield table
-        return
     first, *others = range(len(widths))
     places = [first]
     for k in others:
@@ -64,6 +83,32 @@ def parts_of(table: Table, width: int) -> Iterator[Table]:
             places = [first]
         places.append(k)
     yield _with_columns(table, places)
+
+
+def _shorter(table: Table, expendable: Sequence[str]) -> Iterator[Table]:
+    """Yield a table, then narrower ones: without expendable columns, its headings in more lines."""
+    yield table
+    yield _with_folded_headings(table)
+    for count in range(1, len(expendable) + 1):
+        left_out = expendable[:count]
+        places = [k for k, column in enumerate(table.columns) if column.header not in left_out]
+        yield _with_columns(table, places)
+
+
+def _with_folded_headings(table: Table) -> Table:
+    """Return a table whose headings have a word a line where they are wider than their column."""
+    folded = _with_columns(table, range(len(table.columns)))
+    for column in folded.columns:
+        heading = str(column.header)
+        if cell_len(heading) > max((cell_len(str(cell)) for cell in column.cells), default=0):
+            words = UNBROKEN.sub(lambda part: part[0].replace(" ", NO_BREAK), heading).split(" ")
+            column.header = "\n".join(words).replace(NO_BREAK, " ")
+    return folded
+
+
+def _width(table: Table) -> int:
+    """Return the least width of a table in which nothing is cut."""
+    return _total(map(_least_width, table.columns))
 
 
 def _total(widths: Iterable[int]) -> int:
@@ -123,7 +168,7 @@ def waiting(console: Console, paths: Iterable[Path]) -> None:
     """Say which files are watched."""
     names = ", ".join(path.name for path in paths)
     console.print()
-    console.print(f"watching {names}; Ctrl-C ends", markup=False, style="dim")
+    paragraph(console, f"watching {names}; Ctrl-C ends", "dim")
 
 
 def again(console: Console, paths: Iterable[Path]) -> None:
@@ -142,7 +187,7 @@ def figure(console: Console, planned: "PlannedFigures", name: str) -> None:
     """Say which of the figures is written now, and what it shows."""
     width = max(map(cell_len, planned))
     line = f"  {set_cell_size(name, width)}  {planned[name].shows}"
-    console.print(line, markup=False, soft_wrap=True)
+    paragraph(console, line, indent=width + 4)
 
 
 def figures_of_fit(console: Console, name: str) -> None:
@@ -174,16 +219,33 @@ def percent(share: float) -> str:
 
 def remarks(console: Console, kind: str, texts: Iterable[str], style: str = "yellow") -> None:
     """Show sentences one below the other, each behind its kind; no figure leaves its unit."""
-    indent = " " * (len(kind) + 1)
+    indent = len(kind) + 1 if len(kind) < DEEPEST_INDENT else 2
     for text in filter(None, texts):
-        whole = UNBROKEN.sub(lambda part: part[0].replace(" ", NO_BREAK), text)
+        lines = wrapped(console, f"{kind.replace(' ', NO_BREAK)} {text}", indent)
+        sentence = Text(lines)
+        sentence.stylize(style, 0, len(kind))
+        console.print(sentence, soft_wrap=True)
+
+
+def paragraph(console: Console, text: str, style: str = "", indent: int = 0) -> None:
+    """Show a text, its further lines indented; no figure leaves its unit."""
+    console.print(Text(wrapped(console, text, indent), style), soft_wrap=True)
+
+
+def in_groups(groups: Iterable[str], between: str = "   ") -> str:
+    """Return groups of words as a text that is wrapped between the groups alone."""
+    return between.join(group.replace(" ", NO_BREAK) for group in groups)
+
+
+def wrapped(console: Console, text: str, indent: int) -> str:
+    """Return a text in lines that are as wide as the terminal, where sentences are wrapped."""
+    lines = text
+    if wraps(console):
         lines = textwrap.fill(
-            whole,
-            max(console.width, NARROW // 2) if wraps(console) else len(indent) + len(whole) + 1,
-            initial_indent=indent,
-            subsequent_indent=indent,
+            UNBROKEN.sub(lambda part: part[0].replace(" ", NO_BREAK), text),
+            max(console.width, NARROW // 2),
+            subsequent_indent=" " * indent,
             break_long_words=False,
             break_on_hyphens=False,
         )
-        sentence = lines.replace(NO_BREAK, " ").removeprefix(indent)
-        console.print(Text.assemble((kind, style), " ", sentence), soft_wrap=True)
+    return lines.replace(NO_BREAK, " ")

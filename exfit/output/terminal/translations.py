@@ -5,7 +5,14 @@ from collections.abc import Iterator
 from rich.console import Console
 from rich.table import Table
 
-from exfit.output.terminal.terminal import notes, number, plain_table, show_table
+from exfit.output.terminal.terminal import (
+    NO_BREAK,
+    notes,
+    number,
+    paragraph,
+    plain_table,
+    show_table,
+)
 from exfit.results.translation import LoopFigures, StepComparison, Translation
 
 LOOP_ROWS = (
@@ -21,7 +28,7 @@ LOOP_ROWS = (
 def translation(console: Console, result: Translation) -> None:
     """Show the verdict, the parameters with their origin, the errors in each step, what is lost."""
     style = "bold red" if result.poor else "bold"
-    console.print(result.verdict, style=style, markup=False)
+    paragraph(console, result.verdict, style)
     console.print()
     show_table(console, _parameters(result))
     console.print()
@@ -31,8 +38,8 @@ def translation(console: Console, result: Translation) -> None:
         show_table(console, _loops(result))
         console.print()
     if result.lost:
-        lost = ", ".join(f"{name} {value:g}" for name, value in result.lost.items())
-        console.print(f"no counterpart in {result.target}: {lost}", markup=False)
+        lost = ", ".join(f"{name}{NO_BREAK}{value:g}" for name, value in result.lost.items())
+        paragraph(console, f"no counterpart in {result.target}: {lost}")
     notes(console, result.notes)
 
 

@@ -8,9 +8,11 @@ from exfit.analysis.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.inference import ParameterEffect
 from exfit.output.terminal.terminal import (
+    NO_BREAK,
     error_of,
     notes,
     number,
+    paragraph,
     plain_table,
     show_table,
     unresolved,
@@ -47,9 +49,9 @@ def profiles(console: Console, result: Profiles) -> None:
 
 def design(console: Console, result: Design) -> None:
     """Show how well planned tests would determine each parameter: standard errors in percent."""
-    listed = ", ".join(f"{signal} {level:.2g}" for signal, level in result.noise.items())
-    console.print(f"expected standard errors, with noise (pu): {listed}")
-    console.print("of this test; of steps of 2, 5, 10 %; twice as long; with further signals")
+    listed = ", ".join(f"{signal}{NO_BREAK}{level:.2g}" for signal, level in result.noise.items())
+    paragraph(console, f"expected standard errors, with noise (pu): {listed}")
+    paragraph(console, "of this test; of steps of 2, 5, 10 %; twice as long; with further signals")
     console.print()
     heads = ["this test", *(plan.label for plan in result.plans)]
     table = plain_table("parameter", *heads, numbers=heads)
@@ -72,5 +74,5 @@ def effects(console: Console, ranked: Sequence[ParameterEffect]) -> None:
     for effect in ranked:
         changes = (f"{change:.2e}" for change in effect.rms.values())
         table.add_row(effect.parameter, *changes, number(effect.of_noise, 2))
-    console.print("change for 1 % of each parameter, rms over the test, the strongest first")
+    paragraph(console, "change for 1 % of each parameter, rms over the test, the strongest first")
     show_table(console, table)
