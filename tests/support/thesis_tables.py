@@ -164,9 +164,9 @@ def as_given(value: float) -> str:
     return f"{value:.8g}"
 
 
-def short(value: float) -> str:
-    """Return a value of a parameter with four significant digits."""
-    return f"{value:.4g}"
+def short(value: float | None) -> str:
+    """Return a value with four significant digits, a dash for the open side of an interval."""
+    return "-" if value is None else f"{value:.4g}"
 
 
 def sensitivity_table(name: str) -> str:
