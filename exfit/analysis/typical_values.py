@@ -20,11 +20,15 @@ Array = NDArray[np.float64]
 IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
 
 
+def parameters_of(case: Case) -> set[str]:
+    """Return the parameters that a response of any of the records depends on."""
+    views = (case, *(case.seen_from(recording) for recording in case.recordings))
+    return {name for view in views for name in parameters_used(system_of(view))}
+
+
 def typical_values_used(case: Case) -> dict[str, float]:
     """Return the typical values that a response of any of the records depends on."""
-    views = (case, *(case.seen_from(recording) for recording in case.recordings))
-    used = {name for view in views for name in parameters_used(system_of(view))}
-    values = case.values()
+    used, values = parameters_of(case), case.values()
     return {name: values[name] for name in case.typical() if name in used}
 
 

@@ -218,7 +218,7 @@ def section(results: Sequence[Outcome], seed: int) -> str:
     paragraphs = [
         f"`python tests/studies/verdict.py` draws {len(results)} cases with one fault each (seed "
         f"{seed}), over four units (AC1A, AC8B, ST1A with efd, AC1A with ifd), noise of 5e-5 to "
-        "3e-4 pu and sampling of 5 to 20 ms, and searches from 3 further starts. The right "
+        "3e-4 pu and sampling of 5 to 20 ms, and fits each by the default search. The right "
         "verdict and cause of each were set before these fits, in "
         "`tests/support/faulty_cases.py`; a response that deviates from the exact record by less "
         f"than {100 * VISIBLE:g} % of its range does not miss it, and one no better than a "

@@ -350,7 +350,6 @@ def content_of(unit: Unit, weights: Mapping[str, float], step: float) -> Content
         "test": {"vref": [{"at": AT, "step": step}]},
         "record": {"channels": {name: {"weight": weight} for name, weight in weights.items()}},
         "parameters": {"fixed": {**unit.fixed, **unit.free}},
-        "estimate": {"starts": 3},
     }
 
 

@@ -33,6 +33,9 @@ FEWEST_CLIPPED = 5  # samples at one extreme value: white noise has one, rounded
 CLIPPED_RATIO = 4.0  # times as many as have the next value: rounded noise has fewer at its extreme
 FARTHEST_OFFSET = 1.0  # pu
 TESTED_AT = 0.02  # pu: how far from rated voltage units are tested, for the most part
+CHECK_BASE = "check its base, unit and, of phases, connection"
+CHECK_ZERO = "check the zero of the recorder, or let the fit find it: offset: {start, min, max}"
+LEAVE_VT0_OUT = "leave vt0 out: it is then the mean of the record before the step"
 RARE = 5.0  # log-likelihood: vt has a wrong base less often than other things are wrong
 
 
@@ -40,16 +43,14 @@ def wrong_scale(evidence: Evidence) -> Iterator[Suspicion]:
     """Yield the channels that another factor would match: base, unit, connection or polarity."""
     for number, experiment in enumerate(evidence.residuals.experiments):
         for channel in experiment.channels:
-            if not _moved(experiment, channel, "scale"):
+            if not is_found(experiment, channel, "scale"):
                 yield from _other_scale(evidence, number, channel)
 
 
 def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[Suspicion]:
     record, signal = evidence.records[number], channel.signal
     levels = levels_at_rest(record, signal)
-    factor = 1.0
-    if signal != "vt" and levels is not None and min(map(abs, levels)) > 0.0:
-        factor = levels[1] / levels[0]
+    factor = 1.0 if signal == "vt" or levels is None else factor_between(levels)
     start = channel.scale * factor
     low, high = sorted((start / LARGEST_FACTOR, start * LARGEST_FACTOR))
     opened = [Opened(Nuisance("cause.scale", "scale", signal=signal), start, low, high)]
@@ -57,7 +58,9 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
         opened.append(_voltage(evidence, number))
     place, starts = f"{signal}{evidence.name_of(number)}", ""
     if levels is not None:
-        starts = f": it starts from {levels[0]:.4g} pu, the response from {levels[1]:.4g} pu"
+        starts = f": it starts from {levels[0]:.4g} pu"
+        if abs(factor_between(levels) - 1.0) > LEAST_CHANGE:
+            starts += f", the response from {levels[1]:.4g} pu"
 
     def cause(trial: Trial) -> Cause | None:
         scale = trial.values["cause.scale"] / channel.scale
@@ -68,9 +71,11 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
             )
         if signal == "vt" and abs(scale - 1.0) < LEAST_CHANGE:
             return None
+        if len(opened) > 1 and not _nearer_to_rated(levels, trial):
+            return None
         return Cause(
             f"the base of {place}{starts}; times {scale:.4g} it would match",
-            f"check base, unit and, of phases, connection of {signal}",
+            CHECK_BASE,
         )
 
     def prior(trial: Trial) -> float:
@@ -83,6 +88,17 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
     yield from tried(evidence, residuals, len(opened), cause, prior)
 
 
+def factor_between(levels: tuple[float, float]) -> float:
+    """Return by which factor a measured level comes to the simulated one; 1 where one is zero."""
+    measured, simulated = levels
+    return simulated / measured if measured and simulated else 1.0
+
+
+def _nearer_to_rated(levels: tuple[float, float] | None, trial: Trial) -> bool:
+    """Return whether another base brings vt before the step nearer to 1 pu, as units are tested."""
+    return levels is not None and abs(trial.values["cause.vt0"] - 1.0) < abs(levels[0] - 1.0)
+
+
 def _voltage(evidence: Evidence, number: int) -> Opened:
     """Return what leaves the voltage before the first step open."""
     vt0 = evidence.residuals.experiments[number].own.get(VT0, 1.0)
@@ -93,7 +109,7 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
     """Yield the channels beside vt that an offset would match."""
     for number, experiment in enumerate(evidence.residuals.experiments):
         for channel in experiment.channels:
-            if channel.signal == "vt" or _moved(experiment, channel, "offset"):
+            if channel.signal == "vt" or is_found(experiment, channel, "offset"):
                 continue
             levels = levels_at_rest(evidence.records[number], channel.signal)
             start = channel.offset + (0.0 if levels is None else levels[1] - levels[0])
@@ -109,15 +125,14 @@ def wrong_offset(evidence: Evidence) -> Iterator[Suspicion]:
                 offset = trial.values["cause.offset"] - channel.offset
                 return Cause(
                     f"an offset of {place}: {offset:+.3g} pu more would match",
-                    "check the zero of the recorder, or let the fit find it: "
-                    "offset: {start, min, max}",
+                    CHECK_ZERO,
                 )
 
             residuals = with_opened(evidence.residuals, number, [opened])
             yield from tried(evidence, residuals, 1, cause)
 
 
-def _moved(experiment: Experiment, channel: Channel, kind: str) -> bool:
+def is_found(experiment: Experiment, channel: Channel, kind: str) -> bool:
     """Return whether a fit finds this about a channel already."""
     return any(
         nuisance.kind == kind and nuisance.signal == channel.signal
@@ -148,7 +163,7 @@ def wrong_start(evidence: Evidence) -> Iterator[Suspicion]:
             return Cause(
                 f"vt0 is {given:.5g} pu, but the record{evidence.name_of(number)} starts from "
                 f"{trial.values['cause.vt0']:.5g} pu",
-                "leave vt0 out: it is then the mean of the record before the step",
+                LEAVE_VT0_OUT,
             )
 
         residuals = with_opened(evidence.residuals, number, [_voltage(evidence, number)])

@@ -10,6 +10,7 @@ from exfit.errors import SimulationError
 from exfit.fitting.uncertainty import slices
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 DEPENDENT = 1e-9  # of the longest column: a column that is shorter without the others is none
 
@@ -27,10 +28,13 @@ class LinearFit(NamedTuple):
     errors: Array
     basis: Array
 
+    def beyond(self, columns: Array) -> Array:
+        """Return what of columns (M, ...) the parameters cannot do."""
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns), dtype=np.float64)
+
     def with_columns(self, columns: Array) -> Explained:
         """Return what is left when columns (M, C) are fitted too, beside the parameters."""
-        own = columns - self.basis @ (self.basis.T @ columns)
-        errors = self.errors - self.basis @ (self.basis.T @ self.errors)
+        own, errors = self.beyond(columns), self.beyond(self.errors)
         coefficients, *_ = np.linalg.lstsq(own, errors, rcond=DEPENDENT)
         left = errors - own @ coefficients
         return Explained(0.5 * float(left @ left), np.asarray(-coefficients, dtype=np.float64))
@@ -47,9 +51,18 @@ def linear_fit(evidence: Evidence) -> LinearFit | None:
         return None
     if not np.isfinite(slopes).all():
         return None
+    return linear_model(errors, slopes[:, moving(evidence)])
+
+
+def moving(evidence: Evidence) -> Mask:
+    """Return which free parameters are not on a bound."""
     low, high = evidence.residuals.bounds
-    moving = (evidence.solution.x > low) & (evidence.solution.x < high)
-    basis, triangle = np.linalg.qr(slopes[:, moving])
+    return np.asarray((evidence.solution.x > low) & (evidence.solution.x < high))
+
+
+def linear_model(errors: Array, slopes: Array) -> LinearFit:
+    """Return the linear model of errors (M,) by their derivatives (M, N)."""
+    basis, triangle = np.linalg.qr(slopes)
     sizes = np.abs(np.diag(triangle))
     return LinearFit(errors, basis[:, sizes > DEPENDENT * np.max(sizes, initial=0.0)])
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.causes.evidence import Evidence
-from exfit.analysis.causes.linear import LinearFit, blocks, linear_fit
-from exfit.analysis.causes.suspicion import CERTAIN, Suspicion, suspected
+from exfit.analysis.causes.linear import Explained, LinearFit, blocks, linear_fit
+from exfit.analysis.causes.suspicion import CERTAIN, LAST, Suspicion, suspected
 from exfit.analysis.causes.trials import Opened, Trial, tried, with_experiment, with_opened
 from exfit.dsp.filtering import Filtering, MovingAverage
 from exfit.dsp.noise import NEIGHBOURS, noise
@@ -92,14 +92,20 @@ def _line(own: ChannelErrors, linear: LinearFit) -> float | None:
 
 
 def drift(evidence: Evidence) -> Iterator[Suspicion]:
-    """Yield the channels that drift all along the record."""
+    """Yield the channels that drift all along the record.
+
+    One that a record does not show at rest may as well be slow parts of a response.
+    """
     linear = linear_fit(evidence)
     if linear is None:
         return
     for own in errors_of_channels(evidence):
-        way = (own.time - own.time[0]) / (own.time[-1] - own.time[0])
-        columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
-        explained = linear.with_columns(columns)
+        rest_until = evidence.records[own.number].steady_until
+        explained = _explained_by_ramp(linear, own, own.time[0])
+        looks_like_a_response = (
+            rest_until is not None
+            and _explained_by_ramp(linear, own, rest_until).cost <= explained.cost
+        )
         rate = 1.0 / float(median(np.diff(own.time)))
         folds = any(
             abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5
@@ -111,7 +117,15 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
             f"{-explained.coefficients[0]:+.1e} pu from start to end",
             "check the recorder, and whether speed and voltage were steady; use a shorter window",
         )
-        yield from suspected(evidence, explained.cost, 2, cause)
+        prior = LAST if looks_like_a_response else 0.0
+        yield from suspected(evidence, explained.cost, 2, cause, prior)
+
+
+def _explained_by_ramp(linear: LinearFit, own: ChannelErrors, begin: float) -> Explained:
+    """Return what a ramp and an offset of a channel explain; it begins at an instant (s)."""
+    way = np.clip(own.time - begin, 0.0, None) / (own.time[-1] - own.time[0])
+    columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
+    return linear.with_columns(columns)
 
 
 def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:

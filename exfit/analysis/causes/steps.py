@@ -31,6 +31,8 @@ LEAST_CHANGE = 0.02  # of the size of a step: no one errs by less
 USUAL_CHANGE = 0.05  # errors of a step's size are rarely less
 RARE = 5.0  # log-likelihood of what is rare
 FARTHEST_DELAY = 2.0  # s
+CORRECT_STEP = "correct step, or let the fit find it: step: {start, min, max}"
+CORRECT_INSTANT = "correct at, or let the fit find it: at: {start: auto}; or give delay"
 INSTANTS = 60  # at which a further step is looked for
 LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 
@@ -87,7 +89,7 @@ def wrong_size(evidence: Evidence) -> Iterator[Suspicion]:
             return Cause(
                 f"the size of the step{evidence.name_of(number)}: {sizes} pu would match, the case "
                 f"has {given} pu",
-                "correct step, or let the fit find it: step: {start, min, max}",
+                CORRECT_STEP,
             )
 
         residuals = with_opened(evidence.residuals, number, opened)
@@ -122,7 +124,7 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
                 f"the instant of the step{evidence.name_of(number)}, or a delay of the recorder: "
                 f"the record is {1e3 * abs(late):.3g} ms {'later' if late > 0.0 else 'earlier'} "
                 "than the case",
-                "correct at, or let the fit find it: at: {start: auto}; or give delay",
+                CORRECT_INSTANT,
             )
 
         residuals = with_opened(evidence.residuals, number, [opened])

@@ -84,14 +84,13 @@ def _most_explaining(evidence: Evidence, names: list[str]) -> list[str]:
 def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> Iterator[Suspicion]:
     fixed = evidence.residuals.fixed
     freed = [freed_within(name, fixed[name], LARGEST_FACTOR) for name in names]
-    part = "machine data" if names[0].startswith(MACHINE) else "fixed values"
+    part = "machine data" if of_machine(names) else "fixed values"
 
     def cause(trial: Trial) -> Cause:
         pairs = [f"{name} {trial.values[name]:.3g} (given {fixed[name]:g})" for name in names]
-        sources = "nameplate and test reports" if part == "machine data" else "the data sheet"
         return Cause(
             f"the {part}: {listed(pairs)} would match",
-            f"check {sources}, or free {listed(names)}",
+            remedy_of(names),
         )
 
     def prior(trial: Trial) -> float:
@@ -99,6 +98,17 @@ def _other_values(evidence: Evidence, names: list[str], rare: float = 0.0) -> It
         return -0.5 * sum((ratio / USUAL_ERROR) ** 2 for ratio in ratios) - rare
 
     yield from tried(evidence, with_freed(evidence.residuals, freed), len(names), cause, prior)
+
+
+def of_machine(names: Sequence[str]) -> bool:
+    """Return whether values are data of the machine."""
+    return names[0].startswith(MACHINE)
+
+
+def remedy_of(names: Sequence[str]) -> str:
+    """Return what to do about values that may be wrong."""
+    sources = "nameplate and test reports" if of_machine(names) else "the data sheet"
+    return f"check {sources}, or free {listed(names)}"
 
 
 def wrong_limit(evidence: Evidence) -> Iterator[Suspicion]:

@@ -7,6 +7,8 @@ import numpy as np
 from exfit.analysis.causes import Evidence, causes_of
 from exfit.analysis.diagnostics import NEAR_MINIMUM, distance_from_minimum
 from exfit.analysis.verdict.residual_tests import residual_tests
+from exfit.analysis.verdict.score_tests import contradictions
+from exfit.estimate import Stop
 from exfit.inference.wording import digits, listed
 from exfit.results.comparisons import Comparison, Overlay
 from exfit.results.typical_values import first_of
@@ -14,6 +16,7 @@ from exfit.results.verdict import (
     GOOD,
     MATCHES,
     MISSES,
+    NEGLIGIBLE,
     NO_MATCH,
     NOT_CONVERGED,
     Cause,
@@ -30,8 +33,12 @@ def verdict_of(evidence: Evidence) -> Verdict:
     """Return what a fit comes to, why, and the likeliest causes."""
     tests = residual_tests(evidence)
     words, reason = _judged(evidence, tests)
+    exact = words == GOOD and not any(test.carried > NEGLIGIBLE for test in tests)
+    contradicted = contradictions(evidence) if exact else []
+    if contradicted:
+        words, reason = MATCHES, contradicted[0].reason
     matched = words in (GOOD, MATCHES) and all(test.are_noise for test in tests)
-    causes = causes_of(evidence, matched)
+    causes = (*(each.cause for each in contradicted), *causes_of(evidence, matched))
     if words == MATCHES:
         causes = (*causes, *_undetermined(evidence))
     return Verdict(words, reason, causes[:MOST_CAUSES], tests)
@@ -44,9 +51,9 @@ def _judged(evidence: Evidence, tests: Sequence[ResidualTests]) -> tuple[Verdict
     no_match = next(_no_match(evidence, tests), None)
     if no_match is not None:
         return NO_MATCH, no_match
-    if not solution.success:
-        return NOT_CONVERGED, solution.message
     seen = [test for test in tests if test.are_seen]
+    if not solution.success and not (seen and solution.stop is Stop.STALLED):
+        return NOT_CONVERGED, solution.message
     if seen:
         return MISSES, _missed(max(seen, key=lambda test: test.share), evidence)
     doubts = [*_doubts(evidence, tests)]

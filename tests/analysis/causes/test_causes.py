@@ -2,6 +2,7 @@
 
 import pytest
 from faulty_cases import KINDS, WORDS, cause_rank, drawn
+from records import TEST, TIME, case_of, one, synthetic
 
 from exfit.errors import RecordError
 from exfit.records.record import Record
@@ -33,6 +34,15 @@ def test_a_case_without_a_fault_has_no_cause():
     verdict = fit(drawn("ripple", STATIC).sound, search="local").verdict
     assert verdict.verdict == "good"
     assert verdict.causes == ()
+
+
+def test_no_base_is_suspected_that_would_bring_vt_farther_from_rated(tmp_path):
+    """Of a step that the case has a fifth too small, from 1 pu: it looks like another base."""
+    synthetic(tmp_path, TEST, TIME)
+    case = case_of(one({"vref": [{"at": 1.0, "step": 0.04}]}, free=["KA", "TE"]), tmp_path)
+    causes = [each.cause for each in fit(case, search="local").verdict.causes]
+    assert any("size of the step" in cause for cause in causes)
+    assert not any("base of vt" in cause for cause in causes)
 
 
 def test_every_cause_of_the_study_has_its_words():

@@ -1,9 +1,13 @@
 """The verdict on a fit: what the record shows decides, and nothing is called better than it is."""
 
+from dataclasses import replace
+
 import pytest
 from records import TEST, TIME, UNIT, case_of, config, one, synthetic, write
 
 from exfit import workflows
+from exfit.analysis.verdict import rule
+from exfit.estimate import Stop
 from exfit.results.verdict import GOOD, MATCHES, MISSES, NO_MATCH, NOT_CONVERGED
 
 FREE = ["KA", "TE", "TA"]
@@ -33,6 +37,7 @@ def test_another_model_misses_the_record(tmp_path):
     found = verdict(sexs_on_ac8b(), tmp_path)
     assert found.verdict == MISSES
     assert not found.matches
+    assert found.causes[0].cause.startswith("the model")
     (tests,) = found.residuals
     assert tests.times > 1.5
     assert tests.are_seen
@@ -135,6 +140,25 @@ def test_a_search_that_is_cut_short_is_not_converged(tmp_path):
     content["parameters"]["free"]["KA"]["start"] = 0.3 * UNIT["KA"]
     found = verdict({**content, "estimate": {"iterations": 2}}, tmp_path)
     assert found.verdict == NOT_CONVERGED
+
+
+@pytest.mark.parametrize(
+    ("stop", "verdict_of_it"),
+    [(Stop.STALLED, MISSES), (Stop.ITERATIONS, NOT_CONVERGED), (Stop.LOST, NOT_CONVERGED)],
+)
+def test_a_search_that_stalled_where_a_misfit_is_seen_misses(
+    tmp_path, monkeypatch, stop, verdict_of_it
+):
+    def ended_by(evidence):
+        solution = replace(evidence.solution, stop=stop, success=False, message=stop.value)
+        return replace(evidence, solution=solution)
+
+    judged = rule._judged
+    monkeypatch.setattr(rule, "_judged", lambda evidence, tests: judged(ended_by(evidence), tests))
+    synthetic(tmp_path, TEST, TIME, seed=1)
+    wrong = {**TEST, "vref": [{"at": 1.0, "step": 0.04}]}
+    assert verdict(one(wrong, free=["TE"]), tmp_path).verdict == verdict_of_it
+    assert verdict(one(TEST, free=["TE"]), tmp_path).verdict == NOT_CONVERGED
 
 
 def test_what_drives_carries_its_noise_into_the_response(tmp_path):

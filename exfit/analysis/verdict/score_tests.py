@@ -1,0 +1,229 @@
+"""Whether a record contradicts what its case holds fixed: a score test of each such value."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import erfc, exp, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.analysis.causes import Evidence
+from exfit.analysis.causes.channels import CHECK_BASE, CHECK_ZERO, LEAVE_VT0_OUT, is_found
+from exfit.analysis.causes.linear import LinearFit, blocks, linear_model, moving
+from exfit.analysis.causes.steps import CORRECT_INSTANT, CORRECT_STEP
+from exfit.analysis.causes.trials import Opened, freed_within, with_freed, with_opened
+from exfit.analysis.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
+from exfit.analysis.typical_values import parameters_of
+from exfit.errors import SimulationError
+from exfit.fitting.experiment import Nuisance, NuisanceKind
+from exfit.fitting.residuals import LEAST_NOISE
+from exfit.fitting.uncertainty import slopes_of
+from exfit.inference.wording import digits, listed
+from exfit.plants import VT0
+from exfit.results.verdict import REJECTED, Cause
+
+Array = NDArray[np.float64]
+
+SAME = 1e-6  # of a direction: what other parameters leave of it is rounding below
+LEAST_SHARE = 0.5  # of the largest chi-square: what has less is explained by that
+SMALL = 0.1  # change of a logarithm that is given in per cent
+LARGEST_CHANGE = log(LARGEST_FACTOR)  # of a logarithm: no given value is farther off
+
+
+@dataclass(frozen=True)
+class Held:
+    """A value that a case holds fixed, or one that it takes from the record (``words`` empty).
+
+    ``size`` is by how much it is changed for a derivative; without ``unit`` that is its own size.
+    ``rare`` is by how much (log-likelihood) it is less often wrong than other values.
+    """
+
+    words: str = ""
+    remedy: str = ""
+    size: float = 1.0
+    unit: str = ""
+    rare: float = 0.0
+
+    def better(self, change: float) -> str:
+        """Return which change would match better."""
+        if self.unit == "s":
+            return f"{1e3 * abs(change):.2g} ms {'later' if change > 0.0 else 'earlier'}"
+        if self.unit:
+            return f"{change:+.2g} {self.unit}"
+        if abs(change) < SMALL:
+            return f"{digits(100.0 * abs(change))} % {'more' if change > 0.0 else 'less'}"
+        return f"{exp(change):.2g} times"
+
+
+class Contradiction(NamedTuple):
+    """A value that the record contradicts: chi-square, and which change would match better."""
+
+    chi_square: float
+    held: Held
+    change: float
+
+    @property
+    def reason(self) -> str:
+        """What the record contradicts, and how much."""
+        return f"the record contradicts {self.held.words} (chi-square {digits(self.chi_square)})"
+
+    @property
+    def cause(self) -> Cause:
+        """What would match better, and what to do."""
+        better = self.held.better(self.change)
+        return Cause(f"{self.held.words}: {better} would match better", self.held.remedy)
+
+    @property
+    def likelihood(self) -> float:
+        """How likely it is that this value is wrong: by the record, and beforehand."""
+        return 0.5 * self.chi_square - self.held.rare
+
+
+def contradictions(evidence: Evidence) -> list[Contradiction]:
+    """Return what the record contradicts of what its case holds fixed, the likeliest first.
+
+    The residuals are projected on what a value does that the free parameters cannot do, in their
+    own variances: chi-square of one degree of freedom, if the value is right. It may be exceeded
+    with 1 %, divided by the number of values (Bonferroni).
+
+    Source: Rao 1948, the score test (Proc. Camb. Phil. Soc. 44, 50-57).
+    """
+    if evidence.uncertainty is None:
+        return []
+    try:
+        linear, directions = _linearised(evidence)
+    except SimulationError:
+        return []
+    spread = _spread(evidence)
+    scores = [
+        score
+        for held, direction in directions
+        if (score := _score(held, direction, linear, spread)) is not None
+    ]
+    rejected = [each for each in scores if _tail(each.chi_square) * len(scores) < REJECTED]
+    largest = max((each.chi_square for each in rejected), default=0.0)
+    rejected = [each for each in rejected if each.chi_square > LEAST_SHARE * largest]
+    return sorted(rejected, key=lambda each: -each.likelihood)
+
+
+def _tail(chi_square: float) -> float:
+    return erfc(sqrt(0.5 * chi_square))
+
+
+def _spread(evidence: Evidence) -> Array:
+    """Return the standard deviation (M,) of the weighted errors, widened if they are not white."""
+    noises = evidence.uncertainty.confidence.noise if evidence.uncertainty else ()
+    spreads = [
+        max(noise.estimated, LEAST_NOISE * channel.weight) * sqrt(noise.inflation)
+        for noise, channel in zip(noises, evidence.residuals.channels, strict=True)
+    ]
+    return np.repeat(spreads, evidence.residuals.sizes)
+
+
+def _score(held: Held, direction: Array, linear: LinearFit, spread: Array) -> Contradiction | None:
+    """Return the test of a value; None where it does nothing, or only an unlikely change would."""
+    own = linear.beyond(direction)
+    square = float(own @ own)
+    if not square > (SAME**2) * float(direction @ direction):
+        return None
+    error = float(np.linalg.norm(spread * own)) / square
+    change = -float(own @ linear.errors) / square
+    if not held.unit and max(error, abs(change)) > LARGEST_CHANGE:
+        return None
+    return Contradiction((change / error) ** 2, held, change)
+
+
+def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]]:
+    """Return the linear model, and what each value that the case holds fixed does to the errors.
+
+    All derivatives are taken at once. A voltage that the test takes from the record is as uncertain
+    as a parameter.
+    """
+    extended, of_test = evidence.residuals, list[Held]()
+    for number in range(len(evidence.records)):
+        for held, opened in _of_test(evidence, number):
+            extended = with_opened(extended, number, [opened])
+            of_test.append(held)
+    fixed = _acting(evidence)
+    freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
+    extended = with_freed(extended, freed)
+    added = extended.free[len(evidence.solution.x) :]
+    theta = np.array([*evidence.solution.x, *(free.scaled(free.start) for free in added)])
+    errors, slopes = extended.errors(theta)
+    own, others = np.split(slopes / slopes_of(extended, theta), [len(evidence.solution.x)], axis=1)
+    column = {free.name: each for free, each in zip(added, others.T, strict=True)}
+    directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
+    directions += [
+        (_held_value(fixed, names), np.sum([fixed[name] * column[name] for name in names], axis=0))
+        for names in _together([*fixed])
+    ]
+    directions = [each for each in directions if np.isfinite(each[1]).all()]
+    from_record = [direction for held, direction in directions if not held.words]
+    known = np.column_stack([own[:, moving(evidence)], *from_record])
+    influence, _ = evidence.residuals.influence(errors)
+    tested = [each for each in directions if each[0].words]
+    return linear_model(influence, known), [*tested, *_of_channels(evidence, errors)]
+
+
+def _acting(evidence: Evidence) -> dict[str, float]:
+    """Return the fixed values of the unit that its responses depend on, but for zeros."""
+    rows, used = evidence.case.rows(), parameters_of(evidence.case)
+    return {
+        name: value
+        for name, value in evidence.residuals.fixed.items()
+        if value and name in rows and name in used
+    }
+
+
+def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """Yield names, those of a saturation as one: they come from the same curve."""
+    saturation = tuple(name for name in SATURATION if name in names)
+    if saturation:
+        yield saturation
+    yield from ((name,) for name in names if name not in saturation)
+
+
+def _held_value(fixed: Mapping[str, float], names: Sequence[str]) -> Held:
+    words = listed([f"{name} = {fixed[name]:.4g}" for name in names])
+    return Held(words, remedy_of(names), rare=0.0 if of_machine(names) else RARE)
+
+
+def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
+    """Yield the steps of a test, their delay, and the voltage that it starts from."""
+    experiment, of_record = evidence.residuals.experiments[number], evidence.name_of(number)
+    found = {(nuisance.kind, nuisance.step) for nuisance in experiment.nuisances}
+    kinds = {kind for kind, _ in found}
+
+    def opened(kind: NuisanceKind, value: float, step: int = 0) -> Opened:
+        nuisance = Nuisance(f"held{number}.{kind}{step}", kind, step)
+        return Opened(nuisance, value, value - 1.0, value + 1.0)
+
+    for place, step in enumerate(experiment.simulator.inputs.steps):
+        if step.step and ("step", place) not in found:
+            words = f"the step of {step.step:+g} pu{of_record}"
+            yield Held(words, CORRECT_STEP, step.step), opened("step", step.step, place)
+    if not kinds & {"at", "shift", "delay"} and experiment.simulator.inputs.steps:
+        held = Held(f"the instant of the step{of_record}", CORRECT_INSTANT, unit="s")
+        yield held, opened("delay", experiment.simulator.delay)
+    if VT0 in experiment.own and "vt0" not in kinds:
+        given = evidence.records[number].given_vt0
+        voltage = Held(f"vt0 = {given:g}{of_record}", LEAVE_VT0_OUT, unit="pu") if given else Held()
+        yield voltage, opened("vt0", experiment.own[VT0])
+
+
+def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Array]]:
+    """Yield scale and offset of each channel, by what is simulated: a record has noise."""
+    for number, places in enumerate(blocks(evidence)):
+        experiment = evidence.residuals.experiments[number]
+        for channel, rows in zip(experiment.channels, places, strict=True):
+            place = f"{channel.signal}{evidence.name_of(number)}"
+            measured = experiment.measured(channel, evidence.values)
+            simulated, constant = np.zeros(len(errors)), np.zeros(len(errors))
+            simulated[rows] = -errors[rows] - channel.weight * channel.filtered(measured)
+            constant[rows] = -channel.weight
+            if not is_found(experiment, channel, "scale"):
+                rare = RARE if channel.signal == "vt" else 0.0
+                yield Held(f"the base of {place}", CHECK_BASE, rare=rare), simulated
+            if channel.signal != "vt" and not is_found(experiment, channel, "offset"):
+                yield Held(f"the zero of {place}", CHECK_ZERO, unit="pu"), constant
