@@ -71,7 +71,7 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
             )
         if signal == "vt" and abs(scale - 1.0) < LEAST_CHANGE:
             return None
-        if len(opened) > 1 and not _nearer_to_rated(levels, trial):
+        if len(opened) > 1 and not nearer_to_rated(levels, trial):
             return None
         return Cause(
             f"the base of {place}{starts}; times {scale:.4g} it would match",
@@ -94,7 +94,7 @@ def factor_between(levels: tuple[float, float]) -> float:
     return simulated / measured if measured and simulated else 1.0
 
 
-def _nearer_to_rated(levels: tuple[float, float] | None, trial: Trial) -> bool:
+def nearer_to_rated(levels: tuple[float, float] | None, trial: Trial) -> bool:
     """Return whether another base brings vt before the step nearer to 1 pu, as units are tested."""
     return levels is not None and abs(trial.values["cause.vt0"] - 1.0) < abs(levels[0] - 1.0)
 

@@ -2,8 +2,9 @@
 
 import pytest
 from faulty_cases import KINDS, WORDS, cause_rank, drawn
-from records import TEST, TIME, case_of, one, synthetic
 
+from exfit.analysis.causes import channels
+from exfit.analysis.causes.trials import Trial
 from exfit.errors import RecordError
 from exfit.records.record import Record
 from exfit.workflows import fit
@@ -36,13 +37,13 @@ def test_a_case_without_a_fault_has_no_cause():
     assert verdict.causes == ()
 
 
-def test_no_base_is_suspected_that_would_bring_vt_farther_from_rated(tmp_path):
-    """Of a step that the case has a fifth too small, from 1 pu: it looks like another base."""
-    synthetic(tmp_path, TEST, TIME)
-    case = case_of(one({"vref": [{"at": 1.0, "step": 0.04}]}, free=["KA", "TE"]), tmp_path)
-    causes = [each.cause for each in fit(case, search="local").verdict.causes]
-    assert any("size of the step" in cause for cause in causes)
-    assert not any("base of vt" in cause for cause in causes)
+@pytest.mark.parametrize(
+    ("measured", "matched", "suspected"),
+    [(1.0, 0.9565, False), (0.99, 1.02, False), (0.92, 1.0, True), (1.732, 1.01, True)],
+)
+def test_a_base_is_suspected_only_if_it_brings_vt_nearer_to_rated(measured, matched, suspected):
+    trial = Trial(0.0, {"cause.vt0": matched})
+    assert channels.nearer_to_rated((measured, measured), trial) == suspected
 
 
 def test_every_cause_of_the_study_has_its_words():
