@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.causes.evidence import Evidence
-from exfit.analysis.causes.linear import Explained, LinearFit, blocks, linear_fit
+from exfit.analysis.causes.linear import LinearFit, blocks, linear_fit
 from exfit.analysis.causes.suspicion import CERTAIN, LAST, Suspicion, suspected
 from exfit.analysis.causes.trials import Opened, Trial, tried, with_experiment, with_opened
 from exfit.dsp.filtering import Filtering, MovingAverage
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 FEWEST_PERIODS = 10.0  # of a ripple in a record: fewer may be a response
+FEWEST_AT_REST = 20  # samples from which a drift at rest is taken
 FINER = 8  # points of the spectrum for each of a transform without padding
 FOLDED = 0.02  # of the mains: a rate this near to it, or to a fraction of it, folds it to a drift
 MOST_SPIKES = 0.05  # of the samples: more are no spikes
@@ -100,12 +101,10 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
     if linear is None:
         return
     for own in errors_of_channels(evidence):
-        rest_until = evidence.records[own.number].steady_until
-        explained = _explained_by_ramp(linear, own, own.time[0])
-        looks_like_a_response = (
-            rest_until is not None
-            and _explained_by_ramp(linear, own, rest_until).cost <= explained.cost
-        )
+        way = (own.time - own.time[0]) / (own.time[-1] - own.time[0])
+        columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
+        explained = linear.with_columns(columns)
+        change = float(explained.coefficients[0])
         rate = 1.0 / float(median(np.diff(own.time)))
         folds = any(
             abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5
@@ -114,18 +113,26 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
         folding = ", or ripple of the mains that its sampling folds," if folds else ""
         cause = Cause(
             f"a drift{folding} of {own.channel.signal}{evidence.name_of(own.number)}: "
-            f"{-explained.coefficients[0]:+.1e} pu from start to end",
+            f"{change:+.1e} pu from start to end",
             "check the recorder, and whether speed and voltage were steady; use a shorter window",
         )
-        prior = LAST if looks_like_a_response else 0.0
+        errors = linear.errors[own.rows]
+        prior = 0.0 if _shows_at_rest(evidence, own, errors, change) else LAST
         yield from suspected(evidence, explained.cost, 2, cause, prior)
 
 
-def _explained_by_ramp(linear: LinearFit, own: ChannelErrors, begin: float) -> Explained:
-    """Return what a ramp and an offset of a channel explain; it begins at an instant (s)."""
-    way = np.clip(own.time - begin, 0.0, None) / (own.time[-1] - own.time[0])
-    columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
-    return linear.with_columns(columns)
+def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change: float) -> bool:
+    """Return whether a record drifts before its step, rather so than not at all.
+
+    ``errors`` (M,) are those of its channel, ``change`` is that of all the record, pu. It is so
+    where the record does not begin at rest.
+    """
+    until = evidence.records[own.number].steady_until
+    at_rest = own.time < (-np.inf if until is None else until)
+    if np.count_nonzero(at_rest) < FEWEST_AT_REST:
+        return True
+    slope = np.polyfit(own.time[at_rest], -errors[at_rest] / own.channel.weight, 1)[0]
+    return bool(slope * (own.time[-1] - own.time[0]) / change > 0.5)
 
 
 def spiky_channel(evidence: Evidence) -> Iterator[Suspicion]:

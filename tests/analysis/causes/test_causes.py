@@ -58,3 +58,9 @@ def test_a_time_column_in_another_unit_is_asked_for(factor):
     other = Record.from_arrays(factor * record.time, record.signals)
     with pytest.raises(RecordError, match=r"is the time column in another unit\?"):
         fit(case.with_record(other))
+
+
+def test_a_drift_is_named_with_its_sign():
+    fault = drawn("drift", (2026, 16, 7))  # -1.0e-3 pu, ten times the noise
+    first = fit(fault.faulty, search="local").verdict.causes[0].cause
+    assert first.startswith("a drift of vt: -")
