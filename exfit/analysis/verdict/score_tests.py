@@ -17,7 +17,7 @@ from exfit.analysis.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_mach
 from exfit.analysis.typical_values import parameters_of
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Nuisance, NuisanceKind
-from exfit.fitting.residuals import LEAST_NOISE
+from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.uncertainty import slopes_of
 from exfit.inference.wording import digits, listed
 from exfit.plants import VT0
@@ -140,6 +140,27 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     All derivatives are taken at once. A voltage that the test takes from the record is as uncertain
     as a parameter.
     """
+    extended, of_test, fixed = _left_open(evidence)
+    count = len(evidence.solution.x)
+    added = extended.free[count:]
+    theta = np.array([*evidence.solution.x, *(free.scaled(free.start) for free in added)])
+    errors, slopes = extended.errors(theta)
+    own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
+    column = {free.name: each for free, each in zip(added, others.T, strict=True)}
+    directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
+    for names in _together([*fixed]):
+        direction = np.sum([fixed[name] * column[name] for name in names], axis=0)
+        directions.append((_held_value(fixed, names), direction))
+    directions = [each for each in directions if np.isfinite(each[1]).all()]
+    from_record = [direction for held, direction in directions if not held.words]
+    known = np.column_stack([own[:, moving(evidence)], *from_record])
+    influence, _ = evidence.residuals.influence(errors)
+    tested = [each for each in directions if each[0].words]
+    return linear_model(influence, known), [*tested, *_of_channels(evidence, errors)]
+
+
+def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, float]]:
+    """Return residuals that leave open what is tested: that of the tests first, fixed values."""
     extended, of_test = evidence.residuals, list[Held]()
     for number in range(len(evidence.records)):
         for held, opened in _of_test(evidence, number):
@@ -147,23 +168,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
             of_test.append(held)
     fixed = _acting(evidence)
     freed = [freed_within(name, value, LARGEST_FACTOR) for name, value in fixed.items()]
-    extended = with_freed(extended, freed)
-    added = extended.free[len(evidence.solution.x) :]
-    theta = np.array([*evidence.solution.x, *(free.scaled(free.start) for free in added)])
-    errors, slopes = extended.errors(theta)
-    own, others = np.split(slopes / slopes_of(extended, theta), [len(evidence.solution.x)], axis=1)
-    column = {free.name: each for free, each in zip(added, others.T, strict=True)}
-    directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
-    directions += [
-        (_held_value(fixed, names), np.sum([fixed[name] * column[name] for name in names], axis=0))
-        for names in _together([*fixed])
-    ]
-    directions = [each for each in directions if np.isfinite(each[1]).all()]
-    from_record = [direction for held, direction in directions if not held.words]
-    known = np.column_stack([own[:, moving(evidence)], *from_record])
-    influence, _ = evidence.residuals.influence(errors)
-    tested = [each for each in directions if each[0].words]
-    return linear_model(influence, known), [*tested, *_of_channels(evidence, errors)]
+    return with_freed(extended, freed), of_test, fixed
 
 
 def _acting(evidence: Evidence) -> dict[str, float]:
