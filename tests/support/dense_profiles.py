@@ -15,7 +15,7 @@ from exfit.fitting.residuals import SideBySide
 
 CHI_SQUARE = 3.841  # of one degree of freedom, 95 %
 OVER_BOUNDS, NEAR = 9, 15  # values
-REACH = 4.0  # standard errors about the fit and about the truth
+REACH = 4.0  # standard errors about the fit, the truth and the other minima
 LIKELY = 20.0  # times the rise: minima higher than that are not followed
 
 
@@ -26,10 +26,11 @@ def dense_intervals(name, problem, search):
     minima = [] if search.minima is None else [*search.minima.minima]
     highest = search.best.cost + LIKELY * max(rises)
     starts = [search.best.x, truth, *(m.x for m in minima if m.cost < highest)]
+    likely = np.array(starts)
     low, high = residuals.bounds
     functions, descents, places = SideBySide(residuals), [], []
     for k in range(len(truth)):
-        for value in values_of(k, search.best.x[k], truth[k], errors[k], low[k], high[k]):
+        for value in values_of(likely[:, k], errors[k], low[k], high[k]):
             at_low, at_high = low.copy(), high.copy()
             at_low[k] = at_high[k] = value
             leg = Descent(
@@ -60,11 +61,15 @@ def dense_intervals(name, problem, search):
     }
 
 
-def values_of(k, fitted, truth, error, low, high):
-    """Return the values of a parameter, scaled, at which the others are fitted anew."""
-    middle, reach = [fitted, truth], REACH * error if np.isfinite(error) else high - low
-    near = np.linspace(min(middle) - reach, max(middle) + reach, NEAR)
-    every = [*np.linspace(low, high, OVER_BOUNDS), *near, fitted]
+def values_of(likely, error, low, high):
+    """Return the values of a parameter, scaled, at which the others are fitted anew.
+
+    Those of the fit, the truth and the other minima are among them: a minimum may be narrower than
+    the distance of the others.
+    """
+    reach = REACH * error if np.isfinite(error) else high - low
+    near = np.linspace(min(likely) - reach, max(likely) + reach, NEAR)
+    every = [*np.linspace(low, high, OVER_BOUNDS), *near, *likely]
     return np.unique(np.clip(every, low, high))
 
 
