@@ -15,7 +15,10 @@ from exfit.inference.wording import digits
 SURPRISING = 0.01  # of tests of what is true reject it
 LAGS = 20  # the most that a test of whiteness takes (Box, Jenkins & Reinsel 1994, section 8.2.2)
 SAMPLES_PER_LAG = 5
-SEEN = 1e-6  # of the largest: what a channel sees less of a direction is rounding
+# of the largest: what a channel sees less of a direction, the others decide. With the scale of its
+# record free that may be its own noise, by which the record differs from the response
+SEEN = 0.01
+ROUNDING = 1e-6  # of the variance of a channel
 LEAST_P = 1e-10  # a probability below it is not worth its digits
 
 
@@ -145,7 +148,7 @@ def is_explained(factors: Factors, fit: OwnFit, place: int, noise: Sequence[Nois
     seen = fit.seen
     covariance = variance * (np.eye(len(seen)) - 2.0 * seen @ seen.T) + seen @ moves @ seen.T
     values, vectors = np.linalg.eigh(covariance)
-    some = values > SEEN * variance
+    some = values > ROUNDING * variance
     if not some.any():
         return True
     amounts = vectors[:, some].T @ fit.amounts

@@ -210,7 +210,9 @@ def test_ctrl_c_keeps_what_is_done_and_ends_with_3():
     assert "not run, interrupted: c-lm" in ran.stdout
     folder = Path("runs/fits")
     stored = json.loads((folder / "fits.json").read_text())
-    assert [entry["outcome"] for entry in stored["runs"]] == ["good", "interrupted"]
+    done, stopped = (entry["outcome"] for entry in stored["runs"])
+    assert done in (GOOD, MATCHES)
+    assert stopped == "interrupted"
     assert (stored["not_run"], stored["interrupted"]) == (["c-lm"], True)
     for entry in stored["runs"]:
         whole = json.loads((folder / entry["name"] / "result.json").read_text())

@@ -8,6 +8,7 @@ much the fault raises the lowest cost that a fit reaches. The table and the figu
 docs/verification.md and docs/img/verdict_faults.png. It takes some ten minutes of processor time.
 """
 
+import io
 import os
 import sys
 from collections import Counter
@@ -24,6 +25,7 @@ from matplotlib.figure import Figure
 from numpy.lib.stride_tricks import sliding_window_view
 from rich.progress import track
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from faulty_cases import (
@@ -37,6 +39,7 @@ from faulty_cases import (
     cause_rank,
     drawn,
 )
+from gallery import smaller
 from places import ROOT
 
 from exfit.errors import ExfitError
@@ -301,7 +304,9 @@ def main() -> None:
     print("\n".join(table(results)))
     if share == 1.0 and seed == SEED:
         write_page(section(results, seed))
-        figure(results).savefig(FIGURE, dpi=DPI, metadata={"Software": None})
+        picture = io.BytesIO()
+        figure(results).savefig(picture, format="png", dpi=DPI)
+        FIGURE.write_bytes(smaller(picture.getvalue()))
 
 
 if __name__ == "__main__":
