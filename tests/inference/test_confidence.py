@@ -566,3 +566,17 @@ def test_what_two_channels_contradict_each_other_in_is_noise_of_both():
     noise = np.random.default_rng(25).standard_normal((2, len(T))) * np.array([[0.01], [0.1]])
     known = confidence(two_channels(noise, conflict=0.2))
     assert known.noise[0].inflation > 20.0
+
+
+def test_a_channel_keeps_its_noise_although_the_scale_of_its_record_moves_it():
+    """A record that is scaled, less what the parameters make up for, is noise beside a rest."""
+    noise = 0.01 * np.random.default_rng(26).standard_normal((2, len(T)))
+    once = two_channels(noise)
+    rest = np.sin(9.0 * T)
+    little = noise[1] / np.linalg.norm(noise[1]) + rest / np.linalg.norm(rest)
+    jacobian = np.column_stack([once.jacobian, np.append(np.cos(9.0 * T), 1e-3 * little)])
+    channels = once.channels
+    known = confidence(linearised([*once.values, 1.0], once.errors, jacobian, channels=channels))
+    for channel in known.noise:
+        assert channel.inflation == 1.0
+        assert channel.std == pytest.approx(0.01, rel=0.2)
