@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.case.schema import Estimate
+from exfit.fitting.descents import minimum_near
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.global_search import SearchResult
-from exfit.fitting.parameters import UNIT
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -84,7 +84,7 @@ def balanced(
     before = _movements(problem.residuals) if deviations is None else deviations
     problem = with_deviations(problem, before, of_residuals=deviations is not None)
     for _ in range(MOST_REWEIGHTINGS):
-        theta = _minimum_near(problem.compressed.counted_by(counter), theta)
+        theta = minimum_near(problem.compressed.counted_by(counter), theta)
         after = residual_deviations(problem.compressed, theta)
         problem = with_deviations(problem, after)
         if _agree(before, after, WEIGHT_TOLERANCE):
@@ -147,19 +147,6 @@ def _agree(before: Array, after: Array, tolerance: float) -> bool:
     """Return whether two sets of deviations give the same weights."""
     changes = np.log(after / before)
     return float(np.ptp(changes)) <= tolerance
-
-
-def _minimum_near(residuals: Residuals, theta: Array) -> Array:
-    """Return the end (N,) of a descent from theta (N,)."""
-    descent = estimate.Descent(
-        functions=estimate.OneByOne(residuals, residuals.exact),
-        bounds=residuals.bounds,
-        x_scale=UNIT,
-    )
-    end = descent.run(theta)
-    if end.stop is estimate.Stop.INTERRUPTED:
-        raise KeyboardInterrupt
-    return end.x
 
 
 def as_fitted(

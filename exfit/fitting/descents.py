@@ -9,10 +9,13 @@ from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from exfit.estimate import STATUS, Result, SolverIteration, Stop
+from exfit.estimate import STATUS, Descent, OneByOne, Result, SolverIteration, Stop
+from exfit.fitting.parameters import UNIT
+from exfit.fitting.residuals import Residuals
 
+Array = NDArray[np.float64]
 Announce = Callable[[SolverIteration], None]
 Doubt = Callable[[Result], str]  # why an end may not be the one looked for; "" where it is
 
@@ -157,3 +160,17 @@ def notes_of(doubts: Sequence[str], best: Result, like: int, costs: ArrayLike) -
             f"{last}; {like} of {count} descents led to this minimum or to one like it, and none "
             "lower"
         )
+
+
+def minimum_near(residuals: Residuals, theta: Array) -> Array:
+    """Return the end (N,) of one descent from scaled parameters theta (N,), without announcements.
+
+    Raises KeyboardInterrupt at an interruption.
+    """
+    descent = Descent(
+        functions=OneByOne(residuals, residuals.exact), bounds=residuals.bounds, x_scale=UNIT
+    )
+    end = descent.run(theta)
+    if end.stop is Stop.INTERRUPTED:
+        raise KeyboardInterrupt
+    return end.x

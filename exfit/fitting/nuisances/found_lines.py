@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit import estimate
 from exfit.dsp.lines import Line, largest_line
+from exfit.fitting.descents import minimum_near
 from exfit.fitting.experiment import Channel
 from exfit.fitting.nuisances.parameters import prefix_from
 from exfit.fitting.nuisances.sine_parameters import with_line
-from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import slices
@@ -113,28 +112,12 @@ def _coloured(
     experiments = [setup.experiment for setup in setups]
     disturbed = replace(residuals, experiments=experiments, free=(*residuals.free, *new))
     start = np.append(theta, [parameter.scaled(parameter.start) for parameter in new])
-    errors = _errors_at_minimum(disturbed, start)
+    errors = disturbed.errors(minimum_near(disturbed, start))[0]
     places = [Place(setup.name, channel.signal) for setup in setups for channel in setup.channels]
     for place, block in zip(places, slices(disturbed.sizes), strict=True):
         p_value = whiteness(errors[block])
         if p_value is not None and p_value < SURPRISING:
             yield place
-
-
-def _errors_at_minimum(disturbed: Residuals, start: Array) -> Array:
-    """Return the weighted errors where a descent from scaled parameters ends.
-
-    Raises KeyboardInterrupt at an interruption.
-    """
-    descent = estimate.Descent(
-        functions=estimate.OneByOne(disturbed, disturbed.exact),
-        bounds=disturbed.bounds,
-        x_scale=UNIT,
-    )
-    end = descent.run(start)
-    if end.stop is estimate.Stop.INTERRUPTED:
-        raise KeyboardInterrupt
-    return disturbed.errors(end.x)[0]
 
 
 def _disturbed(setups: Sequence[ExperimentSetup], lines: Lines) -> tuple[ExperimentSetup, ...]:
