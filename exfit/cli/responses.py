@@ -32,9 +32,9 @@ def simulate(
 ) -> None:
     """Simulate CASE at its start values.
 
-    Writes response.csv (t, vref, vt, efd, ifd and the states) and figures to runs/CASE-simulate, or
-    to DIR. --set overrides --parameters, and both override the case; a parameter of the machine
-    is named as in --set machine.Tpd0=6.
+    Writes response.csv (every sample of t, vref, vt, efd, ifd and the states) and figures to
+    runs/CASE-simulate, or to DIR. --set overrides --parameters, and both override the case; a
+    parameter of the machine is named as in --set machine.Tpd0=6.
     """
     from exfit import workflows
     from exfit.fitting.overrides import changed_values, fitted_model_hash, read_parameters

@@ -28,6 +28,7 @@ from exfit.results.tables import (
     parameter_file,
     phase_end_file,
     table,
+    whole_table,
 )
 from exfit.util.cache import cache_folder
 from exfit.util.files import write, write_together
@@ -270,7 +271,7 @@ def write_simulation(simulation: "SimulationResult", name: str, folder: Path) ->
     """Write a response; return its figures."""
     response = simulation.response
     header = ["t", *response.signals]
-    numbers = {RESPONSE: table(header, [response.time, *response.signals.values()])}
+    numbers = {RESPONSE: whole_table(header, [response.time, *response.signals.values()])}
     write_together(folder, numbers, ["response.png", "overlay.png"])
     drawings = partial(run_figures.of_simulation, simulation, name)
     return FigureFiles.beside(folder / RESPONSE, drawings)

@@ -19,6 +19,7 @@ from exfit.util.text import yaml_number
 Array = NDArray[np.float64]
 
 MOST_ROWS = 100_000  # of a table of samples: of more, those of all extremes
+ROWS_AT_ONCE = 20_000  # of a table, as text: more at a time need much memory
 DIGITS = 9  # significant digits of a number in a table of samples
 MOST_DIGITS = 17  # of a double
 
@@ -27,15 +28,26 @@ def table(header: Sequence[str], columns: Sequence[Array]) -> str:
     """Return samples as CSV, one column after the other, the time first.
 
     Of more than MOST_ROWS those stay that hold the least and greatest of each column in each of
-    many segments. The time has as many digits as its instants need to stay apart.
+    many segments.
+    """
+    signals = columns[1:]
+    rows = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
+    return whole_table(header, [column[rows] for column in columns])
+
+
+def whole_table(header: Sequence[str], columns: Sequence[Array]) -> str:
+    """Return all samples as CSV, one column after the other, the time first.
+
+    The time has as many digits as its instants need to stay apart.
     """
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerow(header)
-    signals = columns[1:]
-    rows = kept_rows(signals, max(1, MOST_ROWS // (2 * len(signals))))
-    numbers = np.column_stack([column[rows] for column in columns])
-    line = ",".join([f"%.{clock_digits(columns[0], DIGITS)}g", *[f"%.{DIGITS}g"] * len(signals)])
-    return out.getvalue() + f"{line}\n" * len(numbers) % tuple(numbers.ravel().tolist())
+    clock = f"%.{clock_digits(columns[0], DIGITS)}g"
+    line = ",".join([clock, *[f"%.{DIGITS}g"] * (len(columns) - 1)]) + "\n"
+    for first in range(0, len(columns[0]), ROWS_AT_ONCE):
+        rows = np.column_stack([column[first : first + ROWS_AT_ONCE] for column in columns])
+        out.write(line * len(rows) % tuple(rows.ravel().tolist()))
+    return out.getvalue()
 
 
 def clock_digits(time: Array, digits: int) -> int:

@@ -106,6 +106,28 @@ def test_the_response_holds_measured_start_fitted_and_residual_on_the_record_s_c
     assert cost == pytest.approx(fitted.comparison.cost, rel=1e-4)
 
 
+def test_a_simulation_leaves_every_sample_that_was_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr("exfit.results.tables.MOST_ROWS", 100)  # of the tables of a fit
+    monkeypatch.setattr("exfit.results.tables.ROWS_AT_ONCE", 300)
+    content = {
+        **yaml.safe_load((ROOT / "configs" / "models" / "sexs.yaml").read_text("utf-8")),
+        "simulation": {"output_step": 0.01},
+    }
+    case = tmp_path / "case.yaml"
+    case.write_text(yaml.safe_dump(content))
+    simulation = workflows.simulate(load_case(case))
+    run_folder.write_simulation(simulation, "case", tmp_path)
+    response = columns(tmp_path / "response.csv")
+    time = np.array(response["t"], float)
+    np.testing.assert_allclose(np.diff(time), 0.01, rtol=1e-6)  # of the digits that are printed
+    assert time[-1] == content["test"]["duration"]
+    np.testing.assert_allclose(
+        np.array(response["vt"], float),
+        simulation.response.signals["vt"],
+        rtol=10.0 ** (1 - DIGITS),
+    )
+
+
 def test_parameters_read_back_are_exactly_those_found(fitted, folder):
     assert read_parameters(load_case(CASE), folder / "parameters.yaml") == fitted.values
 
