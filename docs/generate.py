@@ -87,9 +87,9 @@ def _inner(value: Any, sections: Mapping[str, Schema]) -> list[str]:
 
 
 def _kind(section: Schema) -> str:
-    """Return what distinguishes a section from others in its place: its type, or its first key."""
-    kind = section["properties"].get("type", {}).get("const")
-    return str(kind or section["required"][0])
+    """Return what distinguishes a section from others: its type or kind, or its first key."""
+    words = (section["properties"].get(key, {}).get("const") for key in ("type", "kind"))
+    return str(next(filter(None, words), section["required"][0]))
 
 
 def _section(name: str, headings: Mapping[str, str], sections: Mapping[str, Schema]) -> str:

@@ -15,6 +15,8 @@ from exfit.case.ties import Ties
 from exfit.case.yaml import Fault
 from exfit.util.text import Place
 
+PROGRAMME = "makes this a programme of several tests, not a case: exfit run runs it"
+
 
 @dataclass(frozen=True)
 class CheckedContent:
@@ -33,9 +35,12 @@ def check_content(
     The files that it names are relative to ``folder``; ``faults`` holds those found before. A
     user's own model is run only if its file has the hash given, where one is.
     """
+    if "tests" in content:
+        faults.append(Fault(("tests",), PROGRAMME))
+        return None
     parts = parts_of(content, folder, faults, model_sha256)
     ties = ties_of(content, parts, faults)
-    document = _validated(content, faults)
+    document = validated_document(content, faults)
     places = {fault.place for fault in faults}
     faults += [fault for fault in contradictions(content, parts, ties) if fault.place not in places]
     if faults or document is None:
@@ -43,7 +48,7 @@ def check_content(
     return CheckedContent(document, parts, ties)
 
 
-def _validated(content: dict[str, Any], faults: list[Fault]) -> CaseDocument | None:
+def validated_document(content: dict[str, Any], faults: list[Fault]) -> CaseDocument | None:
     """Return the sections if all have the right form; add a fault for each that has not."""
     try:
         return CaseDocument.model_validate(content)

@@ -90,6 +90,7 @@ class Case:
     def of(cls, checked: CheckedContent, path: Path, from_file: bool = True) -> "Case":
         """Return the case of checked content that is, or would be, in the file ``path``."""
         sections: dict[str, Any] = dict(checked.document)
+        del sections["programme"]  # of one that is a programme there is a case for each fit
         return cls(
             path=path, from_file=from_file, parts=checked.parts, ties=checked.ties, **sections
         )

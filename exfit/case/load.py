@@ -4,7 +4,7 @@ from pathlib import Path
 
 from exfit.case.assembly import check_content
 from exfit.case.case import Case
-from exfit.case.yaml import read_text, read_yaml
+from exfit.case.yaml import Fault, YamlNode, read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.util.text import dotted
 
@@ -25,9 +25,14 @@ def parse_case(text: str, path: Path, model_sha256: str = "") -> Case:
     top, faults = read_yaml(text, path)
     checked = check_content(top.value, path.parent, faults, model_sha256)
     if checked is None:
-        lines = [(fault.line or top.line_of(fault.place), fault) for fault in faults]
-        raise CaseError(
-            f"{path}:{line}: {dotted(fault.place)}: {fault.text}"
-            for line, fault in sorted(lines, key=lambda pair: pair[0])
-        )
+        raise faults_with_lines(faults, top, path)
     return Case.of(checked, path)
+
+
+def faults_with_lines(faults: list[Fault], top: YamlNode, path: Path) -> CaseError:
+    """Return the faults of a file as an error, in the order of their lines."""
+    lines = [(fault.line or top.line_of(fault.place), fault) for fault in faults]
+    return CaseError(
+        f"{path}:{line}: {dotted(fault.place)}: {fault.text}"
+        for line, fault in sorted(lines, key=lambda pair: pair[0])
+    )

@@ -1,5 +1,6 @@
 """Messages about the form of a case file: place, value and limit."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -10,6 +11,7 @@ Data = Mapping[str, Any]
 
 FILL_IN = "'?'"  # what a new case has in place of a missing value, as it is shown
 FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+KIND_OF_TEST = "_kind_of_test"  # the function by which the schema distinguishes tests
 PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
 
@@ -76,7 +78,8 @@ def _fault(detail: Data, schema: Data) -> Fault:
     if kind == "union_tag_not_found":
         return Fault((*place, "type"), "is missing")
     if kind == "union_tag_invalid":
-        return _wrong_choice((*place, "type"), str(limits["tag"]), limits["expected_tags"])
+        key = "kind" if KIND_OF_TEST in limits["discriminator"] else "type"
+        return _wrong_choice((*place, key), str(limits["tag"]), limits["expected_tags"])
     if kind == "literal_error":
         return _wrong_choice(place, detail["input"], limits["expected"])
     words = WORDS.get(kind)
@@ -95,7 +98,9 @@ def _unknown(key: str, keys: list[str]) -> str:
 
 def _wrong_choice(place: Place, value: Any, expected: str) -> Fault:
     """Return the fault of a value outside a list of words, given as ``'a', 'b' or 'c'``."""
-    words = expected.replace("'", "").replace(" or ", ", ").split(", ")
+    words = re.sub(r"['\[\]]", "", expected).replace(" or ", ", ").split(", ")
+    if isinstance(value, str):
+        value = value.strip("[]")
     return Fault(place, f"{show_value(value)} is not possible; {near(str(value), words)}")
 
 

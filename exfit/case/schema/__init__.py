@@ -7,6 +7,7 @@ from exfit.case.schema.columns import Filter, MedianSection, Time, TimeColumn
 from exfit.case.schema.document import CaseDocument
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
 from exfit.case.schema.plants import InfiniteBus, OpenCircuit, Plant, SaturationName, Stabiliser
+from exfit.case.schema.programme import RecordedBump, RecordedRejection, TestOfProgramme
 from exfit.case.schema.records import (
     SINGLE,
     ChannelSection,
@@ -45,6 +46,8 @@ __all__ = [
     "PhasesSection",
     "Plant",
     "RecordFile",
+    "RecordedBump",
+    "RecordedRejection",
     "Recording",
     "Reference",
     "ReferenceFile",
@@ -55,6 +58,7 @@ __all__ = [
     "Stabiliser",
     "StepSection",
     "Switch",
+    "TestOfProgramme",
     "Time",
     "TimeColumn",
     "Unknown",

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
 from exfit.case.schema.plants import Plant, SaturationName, Stabiliser
+from exfit.case.schema.programme import TestOfProgramme
 from exfit.case.schema.records import RecordFile, Recording
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Fact, Frozen, Section, Text, nothing
@@ -48,6 +49,13 @@ class CaseDocument(Section):
         default=(),
         min_length=1,
         description="In place of test and record: several tests with their records, in one fit.",
+    )
+    programme: tuple[TestOfProgramme, ...] = Field(
+        default=(),
+        alias="tests",
+        min_length=1,
+        description="In place of test, record, records and validate: the tests of a programme, "
+        "of which each feeds the later ones.",
     )
     parameters: Parameters = Field(
         default_factory=Parameters, description="Fixed and free parameters of the exciter."
