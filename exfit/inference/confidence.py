@@ -96,8 +96,12 @@ class Confidence:
         return float(np.average(squares, weights=samples))
 
 
-def confidence(lin: Linearisation) -> Confidence:
+def confidence(
+    lin: Linearisation, data: str = "the record", hint: str = "; see `exfit profile`"
+) -> Confidence:
     """Return standard errors and 95 % intervals of the parameters of a fit, by linear theory.
+
+    Reasons for having none name the ``data``, with a ``hint`` where a profile could help.
 
     The covariance is that of `Factors.covariance`, the noise that of `noise_of`. Parameters on a
     bound are held there: what is said of the others holds for that value. Intervals are those of
@@ -121,7 +125,13 @@ def confidence(lin: Linearisation) -> Confidence:
         level=LEVEL,
         dof=dof,
         parameters={
-            name: uncertainty(factors, k, float(errors[k]), float(quantiles[k]))
+            name: uncertainty(
+                factors,
+                k,
+                float(errors[k]),
+                float(quantiles[k]),
+                reason(factors, k, float(errors[k]), data, hint),
+            )
             for k, name in enumerate(lin.names)
         },
         correlation=Correlation(lin.names, correlation),
@@ -210,13 +220,13 @@ def degrees_of_freedom(factors: Factors, noise: tuple[Noise, ...]) -> float:
     return max(sum(channel_noise.effective for channel_noise in noise) - factors.leverage, 1.0)
 
 
-def uncertainty(factors: Factors, k: int, share: float, t: float) -> Uncertainty:
+def uncertainty(factors: Factors, k: int, share: float, t: float, why: str | None) -> Uncertainty:
     """Return what is known of parameter k.
 
-    ``share``: its standard error, of 100 %; ``t``: half of its interval in standard errors.
+    ``share``: its standard error, of 100 %; ``t``: half of its interval in standard errors;
+    ``why`` it has no interval.
     """
     lin = factors.lin
-    why = reason(factors, k, share)
     if not isfinite(share):
         return Uncertainty(None, None, None, why)
     value, std = float(lin.values[k]), share * float(lin.size[k])
@@ -230,20 +240,20 @@ def uncertainty(factors: Factors, k: int, share: float, t: float) -> Uncertainty
     return Uncertainty(std, relative, interval, None, "linear")
 
 
-def reason(factors: Factors, k: int, share: float) -> str | None:
+def reason(factors: Factors, k: int, share: float, data: str, hint: str) -> str | None:
     """Return why a parameter has no interval."""
     lin = factors.lin
     if lin.held[k] is not None:
-        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: the bound decides, not the record"
+        return f"lies on its {lin.held[k]} {lin.values[k]:.3g}: the bound decides, not {data}"
     if not factors.has_effect[k]:
-        return "has no effect on the record"
+        return f"has no effect on {data}"
     if not factors.determined[k]:
         return f"cannot be distinguished from {listed(factors.others(k))}"
     if not isfinite(share):
-        return "the record has no more samples than the fit has parameters"
+        return "cannot be determined: there are no more samples than free parameters"
     relative = share * float(lin.size[k] / lin.own_size[k])
     if relative > UNDETERMINED:
         by_value = lin.own_size[k] == abs(lin.values[k])
         words = f"{digits(100.0 * relative)} %" if by_value else error(lin, k, share)
-        return f"is not determined by the record: standard error {words}; see `exfit profile`"
+        return f"is not determined by {data}: standard error {words}{hint}"
     return None

@@ -101,6 +101,21 @@ def rotor_frame(vt: Signal, at: Flow, machine: Machine, p: Names) -> Stator:
     )
 
 
+class LoadedMachine(NamedTuple):
+    """A machine at rest on load: its terminals, the states that hold them, its field current."""
+
+    stator: Stator
+    fluxes: Names
+    ifd: Signal
+
+
+def loaded_at_rest(vt: Signal, at: Flow, machine: Machine, p: Names) -> LoadedMachine:
+    """Return the machine that holds vt and a current at rest; efd is then its field current."""
+    stator, fluxes = rotor_frame(vt, at, machine, p), Names()
+    machine.rest(stator.v, stator.i, p, fluxes)
+    return LoadedMachine(stator, fluxes, machine.field(fluxes, stator.i, p))
+
+
 def current(at: Source, E: Signal, R: Signal, X: Signal, delta: Signal) -> Axes:
     """Return the current that a machine drives into E behind R + jX."""
     drop_d, drop_q = at.voltage.d - E * sin(delta), at.voltage.q - E * cos(delta)
@@ -166,10 +181,7 @@ def infinite_bus(
         of_machine = named_parameters(p, MACHINE, machine.sheet)
         n, vt = named_parameters(p, NETWORK, network), p[VT0]
         at = flow(vt, n, given)
-        stator = rotor_frame(vt, at, machine, of_machine)
-        fluxes = Names()
-        machine.rest(stator.v, stator.i, of_machine, fluxes)
-        ifd = machine.field(fluxes, stator.i, of_machine)
+        stator, fluxes, ifd = loaded_at_rest(vt, at, machine, of_machine)
         vc1 = compensated(stator.v, stator.i, n)
         u = exciter_inputs(vt=vt, vc1=vc1, ifd=ifd, p=n.P, q=vt * at.i_q)
         exciter = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))

@@ -410,7 +410,7 @@ def test_a_fit_without_any_error_is_certain():
 def test_as_many_samples_as_parameters_leave_nothing_to_judge_by():
     rows = LINE[[0, 100]]
     known = confidence(linearised(TRUTH, np.zeros(2), rows))
-    why = "the record has no more samples than the fit has parameters"
+    why = "cannot be determined: there are no more samples than free parameters"
     assert {one.why for one in known.parameters.values()} == {why}
 
 

@@ -16,6 +16,7 @@ from exfit.case.schema.records import (
     Recording,
     SineSection,
 )
+from exfit.case.schema.steady_tests import PointColumn, SteadyTest
 from exfit.case.schema.tests import (
     MOST_ROWS,
     BumpTest,
@@ -45,6 +46,7 @@ __all__ = [
     "Parameters",
     "PhasesSection",
     "Plant",
+    "PointColumn",
     "RecordFile",
     "RecordedBump",
     "RecordedRejection",
@@ -56,6 +58,7 @@ __all__ = [
     "SimulationSection",
     "SineSection",
     "Stabiliser",
+    "SteadyTest",
     "StepSection",
     "Switch",
     "TestOfProgramme",

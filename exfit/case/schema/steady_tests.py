@@ -1,0 +1,99 @@
+"""The sections of a programme about tests at rest: points that were read from instruments."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, WrapSerializer
+
+from exfit.case.messages import FILE_NAME
+from exfit.case.schema.estimate import Limit
+from exfit.case.schema.values import (
+    Findable,
+    FreeSection,
+    Frozen,
+    Number,
+    Positive,
+    Section,
+    Text,
+    nothing,
+    thawed,
+)
+
+MOST_POINTS = 1000  # of a table; a longer one is a file
+
+if TYPE_CHECKING:
+    PointSignal = str
+else:
+    PointSignal = Literal["p", "q", "vt", "ifd", "efd"]
+
+
+def _column(value: Any) -> Any:
+    return {"column": value} if isinstance(value, str) else value
+
+
+class PointColumn(Section):
+    """A column of points and its conversion to per unit: column / base * scale."""
+
+    column: Text = Field(description="Name of the column.")
+    unit: Text | None = Field(
+        default=None, description="Unit of the column, such as MW, Mvar, kV, A, V, pu or %."
+    )
+    base: Findable | None = Field(
+        default=None,
+        description="Value of 1 pu in that unit: of p and q the rated MVA of the machine; of ifd "
+        "and efd what gives 1 pu of voltage on the air-gap line, or {start, min, max} to fit it.",
+    )
+    scale: Number = Field(default=1.0, description="Factor, such as -1; not zero.")
+    noise: Positive | None = Field(
+        default=None,
+        description="Standard deviation of the readings of ifd or efd, pu; default: that of the "
+        "residuals.",
+    )
+
+
+PointTable = Annotated[
+    tuple[tuple[Text | Number, ...], ...], Field(min_length=2, max_length=MOST_POINTS)
+]
+
+
+class SteadyTest(Section):
+    """Points of the V-curves: field current, or voltage, of the machine at rest on load."""
+
+    kind: Literal["steady"] = Field(description="Kind of test.")
+    name: str = Field(
+        pattern=FILE_NAME,
+        max_length=100,
+        description="Name of letters, digits, - _ and .; files are named after it.",
+    )
+    file: Text | None = Field(
+        default=None, description="File of the points, in any format of a record."
+    )
+    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    table: PointTable | None = Field(
+        default=None,
+        description="In place of a file: rows of the points, the first with names of the columns.",
+    )
+    columns: Annotated[
+        Mapping[
+            PointSignal,
+            Annotated[
+                PointColumn, BeforeValidator(_column, json_schema_input_type=Text | PointColumn)
+            ],
+        ],
+        AfterValidator(MappingProxyType),
+        WrapSerializer(thawed),
+    ] = Field(
+        description="Columns of p, q, vt and of ifd, efd or both: a name, or a mapping. p and q "
+        "are positive where the machine gives power and is overexcited."
+    )
+    free: Frozen[FreeSection] = Field(
+        default_factory=nothing,
+        description="Machine data that the points are fitted for: Xd, Xq, S10, S12, Xl, as under "
+        "parameters.free.",
+    )
+    accept: Limit | None = Field(
+        default=None,
+        description="Limit of the rms difference of each field signal, pu; beyond it the points "
+        "are not matched. Default: 2 % of its rms, or 3 times its noise where that is larger.",
+    )
