@@ -9,7 +9,7 @@ the stator's voltages.
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from exfit.engine.trace import Signal
 from exfit.models.sheet import DynamicsRecord, Row, Sheet
@@ -41,7 +41,8 @@ class Machine:
     functions ``slopes(s, efd, ifd, i, p, d)`` and ``q_slopes(s, i, p, d)`` write slopes into ``d``;
     ``rest(v, i, p, x)`` writes the states that hold v and i; ``quadrature(vt, i_p, i_q, p)`` is the
     reactance behind which, at rest, the voltage lies on the q axis, where the current seen from vt
-    is i_p - j i_q; ``faults(values)`` yields (symbol, text) for data that contradict each other.
+    is i_p - j i_q; ``faults(values)`` yields (symbol, text) for data that contradict each other;
+    ``saturation`` is the form of the curve through S10 and S12.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Machine:
     quadrature: Callable[..., Signal]
     faults: Callable[[Mapping[str, float]], Faults]
     records: tuple[DynamicsRecord, ...] = ()
+    saturation: Literal["quadratic", "exponential"] = "quadratic"
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Literal
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import lag
@@ -89,7 +90,10 @@ def faults(order: Callable[..., Faults], values: Mapping[str, float]) -> Faults:
 
 
 def machine(
-    name: str, shape: str, form: Callable[..., Signal], order: Callable[..., Faults]
+    name: str,
+    shape: Literal["quadratic", "exponential"],
+    form: Callable[..., Signal],
+    order: Callable[..., Faults],
 ) -> Machine:
     """Return a round-rotor machine with one form of saturation."""
     return Machine(
@@ -106,6 +110,7 @@ def machine(
         quadrature=partial(quadrature, form),
         faults=partial(faults, order),
         records=(record(name, CONS),),
+        saturation=shape,
     )
 
 

@@ -130,4 +130,5 @@ GENSAE = Machine(
     quadrature=partial(quadrature, power_curve),
     faults=gensae_faults,
     records=(record("GENSAE", CONS),),
+    saturation="exponential",
 )

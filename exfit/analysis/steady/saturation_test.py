@@ -1,0 +1,91 @@
+"""A saturation test of a programme: its points read, its curve, and what it gives the machine."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from exfit.analysis.steady.saturation import FieldWinding, saturation_curve
+from exfit.case.schema.saturation_tests import CURVE_SIGNALS, SaturationTest
+from exfit.errors import RecordError
+from exfit.models.machines import Machine
+from exfit.records.points import Points, read_points
+from exfit.records.units import needs_base
+from exfit.results.saturation import MeasuredValue, SaturationResult
+
+DEFAULT_UNITS = MappingProxyType({"vt": "pu", "ifd": "A", "efd": "V"})
+
+
+def curve_points(test: SaturationTest, folder: Path) -> Points:
+    """Return the points of a test, by signal; its file lies in a folder. Raises RecordError."""
+    if test.file is None:
+        columns = zip(*(test.points or ()), strict=True)
+        numbers = dict(zip(CURVE_SIGNALS, map(np.array, columns), strict=False))
+        digest = hashlib.sha256(json.dumps(test.points).encode()).hexdigest()
+        return Points(numbers, {}, Path(test.name), digest)
+    names = {signal: column.column or signal for signal, column in test.columns.items()}
+    units = {names[signal]: column.unit for signal, column in test.columns.items()}
+    read = read_points(folder / test.file, units, test.sheet)
+    return Points(
+        {signal: read.columns[name] for signal, name in names.items()},
+        {signal: read.units[name] for signal, name in names.items() if name in read.units},
+        read.source,
+        read.sha256,
+    )
+
+
+def saturation(test: SaturationTest, points: Points, machine: Machine | None) -> SaturationResult:
+    """Return what a saturation test shows of a machine, whose model decides which form is used.
+
+    Raises ExfitError for input that cannot be used.
+    """
+    units = {signal: _unit(test, points, signal) for signal in CURVE_SIGNALS}
+    vt = points.columns["vt"]
+    section = test.columns.get("vt")
+    base = None if section is None else section.base
+    if base is None and needs_base(units["vt"]):
+        text = f"columns.vt.base: is missing: what is 1 pu in {units['vt']}, the unit of the file?"
+        raise RecordError(f"{points.source}: {text}")
+    winding = test.winding
+    return saturation_curve(
+        vt if base is None else vt / base,
+        points.columns["ifd"],
+        test.form or (machine.saturation if machine else "quadratic"),
+        unit=units["ifd"],
+        efd=points.columns.get("efd"),
+        efd_unit=units["efd"],
+        winding=FieldWinding(winding.resistance, winding.temperature, winding.hot),
+        exciter=test.brushless,
+    )
+
+
+def machine_values(result: SaturationResult) -> Mapping[str, MeasuredValue]:
+    """Return what the test gives the machine's section: S10 and S12, nothing of a brushless unit.
+
+    They enter it with ``sources: measured``.
+    """
+    if result.exciter:
+        return {}
+    return {"S10": result.curve.S10, "S12": result.curve.S12}
+
+
+def channel_bases(result: SaturationResult) -> Mapping[str, tuple[MeasuredValue, str]]:
+    """Return what 1 pu is of ifd and, where it is known, of efd, each with its unit.
+
+    It is the base of channels of later records that are in that unit and give none.
+    """
+    if result.exciter:
+        return {}
+    bases = {"ifd": (result.curve.ifd_base, result.unit)}
+    if result.efd_base is not None:
+        bases["efd"] = (result.efd_base, result.efd_unit)
+    return bases
+
+
+def _unit(test: SaturationTest, points: Points, signal: str) -> str:
+    section = test.columns.get(signal)
+    given = None if section is None else section.unit
+    return given or points.units.get(signal) or DEFAULT_UNITS[signal]

@@ -1,0 +1,117 @@
+"""The result of an open-circuit saturation test: the curve's numbers, each with its interval."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.inference.confidence import Interval
+from exfit.util.typed import IN_FILE
+
+Array = NDArray[np.float64]
+SaturationForm = Literal["quadratic", "exponential", "exponential-se"]
+
+
+@dataclass(frozen=True)
+class MeasuredValue:
+    """A value that a test at rest gives.
+
+    std_error  in its own unit, by linear theory; None where nothing determines it
+    interval   95 %; a side without a limit is None
+    why        what limits what is known of it, "" where nothing needs to be said
+    """
+
+    value: float
+    std_error: float | None
+    interval: Interval
+    why: str = ""
+
+    @property
+    def determined(self) -> bool:
+        """Whether the points limit the value on both sides."""
+        return None not in self.interval
+
+    def times(self, factor: float) -> "MeasuredValue":
+        """Return the value in another unit, which is 1 / ``factor`` of its own; factor > 0."""
+        low, high = (None if end is None else factor * end for end in self.interval)
+        error = None if self.std_error is None else factor * self.std_error
+        return MeasuredValue(factor * self.value, error, (low, high), self.why)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCurve:
+    """The curve that fits the points in one form: ifd / base = vt + vt S(vt) + offset.
+
+    ifd_base   field current that gives 1 pu on the air-gap line, in the unit of the points
+    S10, S12   saturation at 1.0 and 1.2 pu: excess of the field current over the air-gap line
+    offset     field current by which the points lie beside a line through zero, pu: the mean of
+               the branches
+    hysteresis  field current of the rising less that of the falling branch, pu; None with one
+    rms        of the residuals, pu of ifd_base
+    refuted    whether another form fits so much better that this one is none of the curve's
+    vt, ifd    the mean curve (K,), pu; low and high its 95 % band
+    """
+
+    form: SaturationForm
+    ifd_base: MeasuredValue
+    S10: MeasuredValue
+    S12: MeasuredValue
+    offset: MeasuredValue
+    hysteresis: MeasuredValue | None
+    rms: float
+    refuted: bool
+    vt: Array = field(metadata=IN_FILE)
+    ifd: Array = field(metadata=IN_FILE)
+    low: Array = field(metadata=IN_FILE)
+    high: Array = field(metadata=IN_FILE)
+
+
+@dataclass(frozen=True, eq=False)
+class SaturationResult:
+    """An open-circuit saturation test.
+
+    form         the form that is used
+    curves       the curve in each form, the best match first
+    vt, ifd      the points (M,) in the order in which they were taken: pu, and ``unit``
+    direction    (M,) 1 for a point reached with rising voltage, -1 with falling voltage
+    left_out     points without field current, by their positions from 0: not part of the fit
+    residual     terminal voltage without field current, pu; None without such a point
+    exciter      whether the field current is that of a brushless exciter
+    efd_base     field voltage that gives 1 pu on the air-gap line, hot, in ``efd_unit``
+    resistance   of the hot field winding, efd_unit / unit
+    notes        what limits these numbers, in sentences
+    """
+
+    form: SaturationForm
+    curves: tuple[FittedCurve, ...]
+    unit: str
+    exciter: bool
+    left_out: tuple[int, ...]
+    residual: float | None
+    efd_base: MeasuredValue | None
+    resistance: MeasuredValue | None
+    efd_unit: str
+    notes: tuple[str, ...]
+    vt: Array = field(metadata=IN_FILE)
+    ifd: Array = field(metadata=IN_FILE)
+    direction: Array = field(metadata=IN_FILE)
+
+    @property
+    def curve(self) -> FittedCurve:
+        """The curve in the form that is used."""
+        return next(curve for curve in self.curves if curve.form == self.form)
+
+    @property
+    def residuals(self) -> Array:
+        """The points' field current less that of their branch (M,), pu; nan where left out."""
+        curve = self.curve
+        loop = 0.0 if curve.hysteresis is None else 0.5 * curve.hysteresis.value * self.direction
+        errors = self.ifd / curve.ifd_base.value - np.interp(self.vt, curve.vt, curve.ifd) - loop
+        errors[list(self.left_out)] = np.nan
+        return np.asarray(errors)
+
+    @property
+    def highest(self) -> float:
+        """The highest voltage of the points, pu."""
+        return float(self.vt.max())

@@ -1,0 +1,139 @@
+"""The saturation test: what curves with known numbers give, and what is said of their limits."""
+
+import numpy as np
+import pytest
+
+from exfit.analysis.steady.saturation import FieldWinding, directions, saturation_curve
+from exfit.analysis.steady.saturation_forms import EXCESS
+from exfit.errors import ExfitError
+from exfit.results.saturation import SaturationResult
+from exfit.util.typed import Reader, plain
+
+FORMS = tuple(EXCESS)
+BASE, S10, S12 = 850.0, 0.12, 0.42
+UP, DOWN = np.linspace(0.2, 1.2, 9), np.linspace(1.1, 0.2, 7)
+NOISE = 2e-3
+
+
+def curve(form, vt, direction=0.0, loop=0.02):
+    """Return the field current of a machine with a loop of constant width."""
+    return BASE * (vt + EXCESS[form](vt, S10, S12) + 0.5 * loop * direction)
+
+
+def noisy_loop(form="quadratic", top=1.2, seed=0):
+    """Return vt and ifd of points on both branches, each reading with noise."""
+    random = np.random.default_rng(seed)
+    up, down = UP[UP < top + 0.01], DOWN[DOWN < top - 0.01]
+    vt = np.concatenate([up, down])
+    direction = np.repeat([1.0, -1.0], [len(up), len(down)])
+    ifd = curve(form, vt, direction) + BASE * NOISE * random.standard_normal(len(vt))
+    return vt + NOISE * random.standard_normal(len(vt)), ifd
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_points_without_noise_give_back_the_curve_that_they_are_on(form):
+    vt = np.concatenate([UP, DOWN])
+    direction = np.repeat([1.0, -1.0], [len(UP), len(DOWN)])
+    result = saturation_curve(vt, curve(form, vt, direction), form)
+    fitted = result.curve
+    assert result.curves[0] is fitted
+    assert [other.refuted for other in result.curves] == [False, True, True]
+    values = (fitted.ifd_base.value, fitted.S10.value, fitted.S12.value, fitted.hysteresis.value)
+    # the search ends where the cost is rounding: 1e-6 is a thousand times farther
+    assert values == pytest.approx((BASE, S10, S12, 0.02), rel=1e-6)
+    assert fitted.offset.value == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_band_holds_the_curve_and_the_intervals_the_numbers_of_a_noisy_loop():
+    result = saturation_curve(*noisy_loop())
+    fitted = result.curve
+    for value, truth in ((fitted.ifd_base, BASE), (fitted.S10, S10), (fitted.S12, S12)):
+        low, high = value.interval
+        assert low < truth < high
+    truth = curve("quadratic", fitted.vt) / fitted.ifd_base.value
+    assert np.all((fitted.low < truth) & (truth < fitted.high))
+    assert result.form == "quadratic"
+    assert result.notes == ()
+
+
+def test_one_branch_shows_no_hysteresis_and_says_so():
+    vt, ifd = noisy_loop()
+    result = saturation_curve(vt[: len(UP)], ifd[: len(UP)])
+    assert result.curve.hysteresis is None
+    assert any("rising voltage" in note for note in result.notes)
+
+
+def test_saturation_beyond_the_points_holds_what_the_other_forms_have_there():
+    result = saturation_curve(*noisy_loop(top=1.0))
+    fitting = [fitted for fitted in result.curves if not fitted.refuted]
+    assert len(fitting) > 1
+    low, high = result.curve.S12.interval
+    assert all(low <= fitted.S12.value <= high for fitted in fitting)
+    assert "extrapolated" in result.curve.S12.why
+    assert any("S(1.2) is extrapolated" in note for note in result.notes)
+
+
+def test_points_without_field_current_are_the_residual_voltage():
+    vt, ifd = noisy_loop()
+    with_zero = saturation_curve(np.append(vt, 0.015), np.append(ifd, 0.0))
+    assert with_zero.residual == pytest.approx(0.015)
+    assert with_zero.left_out == (len(vt),)
+    assert with_zero.curve.S10 == saturation_curve(vt, ifd).curve.S10
+
+
+def test_the_voltage_turns_where_it_goes_back_by_more_than_a_reading_scatters():
+    rising = [0.2, 0.5, 0.498, 0.8, 1.1, 1.105, 1.1]
+    assert directions(np.array([*rising, 0.9, 0.4])).tolist() == [1.0] * 7 + [-1.0] * 2
+    assert directions(np.array([1.2, 0.9, 0.4])).tolist() == [-1.0] * 3
+    assert directions(np.array([0.3, 0.9, 0.4, 0.8])).tolist() == [1.0, 1.0, -1.0, 1.0]
+
+
+def test_the_base_of_efd_is_the_hot_resistance_times_the_base_of_ifd():
+    vt, ifd = noisy_loop()
+    measured = saturation_curve(vt, ifd, efd=0.2 * ifd + 2.0)  # 2 V at the brushes
+    assert measured.resistance.value == pytest.approx(0.2, rel=1e-9)
+    assert measured.efd_base.value == pytest.approx(0.2 * measured.curve.ifd_base.value)
+    winding = FieldWinding(resistance=0.2, temperature=20.0, hot=100.0)
+    given = saturation_curve(vt, ifd, winding=winding)
+    assert given.resistance.value == pytest.approx(0.2 * 334.5 / 254.5)
+    low, high = given.efd_base.interval
+    assert low < 0.2 * 334.5 / 254.5 * BASE < high
+
+
+def test_a_brushless_exciter_gives_no_base_of_efd():
+    vt, ifd = noisy_loop()
+    result = saturation_curve(vt, ifd, winding=FieldWinding(resistance=0.2), exciter=True)
+    assert result.efd_base is None
+    assert any("brushless" in note for note in result.notes)
+
+
+def test_points_on_no_curve_of_the_form_that_is_used_are_named():
+    result = saturation_curve(*noisy_loop("quadratic"), "exponential-se")
+    assert result.curve.refuted
+    assert any("not on a curve of form exponential-se" in note for note in result.notes)
+
+
+def test_a_misread_point_is_named():
+    vt, ifd = noisy_loop()
+    ifd[3] += 0.1 * BASE
+    assert any("point 4" in note for note in saturation_curve(vt, ifd).notes)
+
+
+def test_a_result_is_read_back_from_its_file():
+    result = saturation_curve(*noisy_loop())
+    stored = plain(result, whole=True)
+    assert plain(Reader().read(SaturationResult, stored), whole=True) == stored
+
+
+@pytest.mark.parametrize(
+    ("vt", "ifd", "text"),
+    [
+        ([0.5, 1.0], [500.0, 1100.0], "2 points with field current; at least 6"),
+        (15.0 * UP, BASE * UP, "are unit and base of vt right?"),
+        (-UP, BASE * UP, "point 1: vt -0.2"),
+        (UP[1:], BASE * UP, "8 voltages, but 9 field currents"),
+    ],
+)
+def test_points_that_are_no_curve_are_refused(vt, ifd, text):
+    with pytest.raises(ExfitError, match=text.replace("?", r"\?")):
+        saturation_curve(np.asarray(vt), np.asarray(ifd))
