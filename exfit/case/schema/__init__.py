@@ -16,6 +16,7 @@ from exfit.case.schema.records import (
     Recording,
     SineSection,
 )
+from exfit.case.schema.saturation_tests import CurveColumn, SaturationTest
 from exfit.case.schema.steady_tests import PointColumn, SteadyTest
 from exfit.case.schema.tests import (
     MOST_ROWS,
@@ -35,6 +36,7 @@ __all__ = [
     "BumpTest",
     "CaseDocument",
     "ChannelSection",
+    "CurveColumn",
     "Estimate",
     "Filter",
     "FindableStep",
@@ -55,6 +57,7 @@ __all__ = [
     "ReferenceFile",
     "ReferenceTable",
     "SaturationName",
+    "SaturationTest",
     "SimulationSection",
     "SineSection",
     "Stabiliser",
