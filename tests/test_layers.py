@@ -48,6 +48,7 @@ ONLY_IN = {  # where a library may be imported, inside functions too
     "matplotlib": {"output"},
     "rich": {"output", "cli"},
     "jinja2": {"output"},
+    "weasyprint": {"output"},
     "click": {"cli"},
     "llvmlite": {"engine"},
 }

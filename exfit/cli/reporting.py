@@ -14,15 +14,17 @@ from exfit.cli.options import force_option
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="File to write (default: report.html beside the result).",
+    help="File to write (default: report.html beside the result, or report.pdf).",
 )
+@click.option("--pdf", is_flag=True, help="Make a PDF, with bookmarks and page numbers.")
 @force_option
-def report(result: Path, output: Path | None, force: bool) -> None:
+def report(result: Path, output: Path | None, pdf: bool, force: bool) -> None:
     """Make a verification report of RESULT: one HTML file, to be read, printed and handed in.
 
     RESULT is the result.json of a fit, or the folder that holds it: nothing else is read, and
-    nothing is run. A former report is replaced, another file only with --force.
+    nothing is run. A former report is replaced, another file only with --force. With --pdf it is
+    a PDF, which needs the package WeasyPrint: pip install 'exfit[pdf]'.
     """
     from exfit.output.report import write_report
 
-    click.echo(f"written to {write_report(result, output, force)}")
+    click.echo(f"written to {write_report(result, output, force, pdf)}")

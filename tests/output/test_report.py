@@ -3,6 +3,9 @@
 import json
 import re
 import shutil
+import sys
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -235,7 +238,19 @@ def test_a_page_is_whole_self_contained_and_small(pages, name):
     assert page.size < MOST
     heads = "Unit and test, Model, Parameters, Search, Flat run, Small-signal view, Reproduction"
     for head in heads.split(", "):
-        assert head in page.words
+        assert page.text.count(head) >= 2  # among the contents, and above its section
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_figure_and_table_has_its_number_and_every_section_is_among_the_contents(pages, name):
+    page = pages(name)
+    hidden = sum(tag == "figcaption" and "class" in attrs for tag, attrs in page.tags)
+    for kind, tag in (("Table", "caption"), ("Figure", "figcaption")):
+        count = page.count(tag) - (hidden if tag == "figcaption" else 0)
+        assert page.numbers[kind] == [*range(1, count + 1)]
+    linked = [attrs["href"] for tag, attrs in page.tags if tag == "a"]
+    labels = [attrs["aria-labelledby"] for tag, attrs in page.tags if tag == "section"]
+    assert linked[: len(labels)] == [f"#{label}" for label in labels]
 
 
 def test_what_identifies_unit_and_test_is_reported(pages):
@@ -560,3 +575,79 @@ def test_a_drawing_has_no_number_that_is_none():
         paths = [mark.path for panel in drawn.panels for mark in panel.marks]
         assert not any("nan" in path or "inf" in path for path in paths)
         assert all(panel.y_ticks for panel in drawn.panels if panel.title != "nothing")
+
+
+@pytest.fixture(scope="module")
+def printed(fits):
+    """A report as PDF, which its maker reads."""
+    try:
+        import weasyprint  # noqa: F401
+    except (ImportError, OSError) as fault:
+        pytest.skip(f"WeasyPrint cannot be imported: {fault}")
+    from pypdf import PdfReader
+
+    place = write_report(fits("several"), pdf=True)
+    assert place.name == "report.pdf"
+    return PdfReader(place)
+
+
+def titles(outline):
+    """Return the titles of the bookmarks of the first level."""
+    return [entry.title for entry in outline if not isinstance(entry, list)]
+
+
+def test_a_pdf_has_a_bookmark_for_each_section_and_its_number_on_each_page(printed, pages):
+    page = pages("several")
+    labels = [attrs["aria-labelledby"] for tag, attrs in page.tags if tag == "section"]
+    assert [title.split()[0] for title in titles(printed.outline)] == [
+        str(number) for number in range(1, len(labels) + 1)
+    ]
+    texts = [sheet.extract_text() for sheet in printed.pages]
+    for number, text in enumerate(texts, start=1):
+        assert f"{number} / {len(texts)}" in text
+    assert len(texts) <= 20
+
+
+FOOT = 51.0  # points: the margin below the text
+
+
+def lines_of(sheet):
+    """Return the lines of a page above its foot, from the highest to the lowest."""
+    pieces = []
+
+    def visit(text, cm, tm, *_):
+        x, y = tm[4:6]
+        height = x * cm[1] + y * cm[3] + cm[5]
+        if text.strip() and height > FOOT:
+            pieces.append((-round(height), x, text.strip()))
+
+    sheet.extract_text(visitor_text=visit)
+    pieces.sort(key=lambda piece: piece[:2])
+    return [" ".join(piece[2] for piece in line) for _, line in groupby(pieces, itemgetter(0))]
+
+
+def test_a_heading_is_on_the_page_of_what_follows_it(fits, printed, pages):
+    """No heading is the last line of its page, and a record's is on that of its first figure."""
+    headings = {" ".join(words.split()) for words in pages("several").headings}
+    sheets = [lines_of(sheet) for sheet in printed.pages]
+    assert sum(line in headings for lines in sheets for line in lines) > 12
+    for lines in sheets:
+        assert lines[-1] not in headings
+    for record in saved_of(fits("several"))["records"]:
+        title = f"{record['name']}: terminal voltage vt"
+        lines = next(lines for lines in sheets if any(title in line for line in lines))
+        assert record["name"] in lines
+
+
+def test_a_pdf_is_replaced_and_another_file_is_not(fits, printed, tmp_path):
+    assert write_report(fits("several"), pdf=True).name == "report.pdf"
+    other = tmp_path / "letter.pdf"
+    other.write_bytes(b"%PDF-1.7")
+    with pytest.raises(ExfitError, match="is no report"):
+        write_report(fits("several"), other, pdf=True)
+
+
+def test_what_a_pdf_needs_and_is_missing_is_named(fits, monkeypatch):
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    with pytest.raises(ExfitError, match=r"pip install 'exfit\[pdf\]'"):
+        write_report(fits("first order"), pdf=True)

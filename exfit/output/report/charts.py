@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Range = tuple[float, float]
 
 LEFT, RIGHT, TOP, BOTTOM = 74.0, 16.0, 30.0, 48.0  # room around the panels for their labels
-WIDE, SMALL = 720.0, 300.0  # units of a drawing; the page scales it
+WIDE, SMALL = 560.0, 300.0  # units of a drawing: few, so that its text is read on a telephone
 ROOM = 0.06  # of the range, above and below the lines
 NARROW = 0.05  # of its level: the range of a signal that rests
 RESTS = 1e-6  # of its level: a signal that moves by less would fill its axis with rounding errors
@@ -226,7 +226,7 @@ def _label(rule: Rule, across: Axis, upward: Axis) -> Label:
         level = upward.length - upward.place(rule.at)
         return Label(across.length - 4.0, level - 4.0, rule.label, True)
     x = across.place(rule.at)
-    end = x > 0.6 * across.length
+    end = x > 0.5 * across.length
     return Label(x - 5.0 if end else x + 5.0, upward.length - 7.0, rule.label, end)
 
 

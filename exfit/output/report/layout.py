@@ -3,7 +3,7 @@
 from exfit.output.report.charts import Rule
 
 MILLI = 1e3
-TALL, HALF, LOW = 220.0, 150.0, 90.0  # of panels: of signals, of gain and phase, of errors
+TALL, HALF, LOW = 170.0, 120.0, 72.0  # of panels: of signals, of gain and phase, of errors
 BINS = 600  # segments of a line: about as many as a print or a screen shows
 TIME = "time (s)"
 LEVEL = Rule(0.0, style="level")

@@ -1,7 +1,10 @@
 """The page of a report: one HTML file that needs nothing beside it."""
 
+import re
 import shlex
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from math import isfinite
@@ -12,9 +15,9 @@ from exfit import __version__
 from exfit.dsp.features import LABELS
 from exfit.errors import ExfitError
 from exfit.output.report.charts import drawing
-from exfit.output.report.sections import SECTIONS
+from exfit.output.report.sections import SECTIONS, ReportSection
 from exfit.output.report.sections.matches import MatchView, OverlayChart, live_data
-from exfit.output.report.verdict import headline
+from exfit.output.report.verdict import Headline, headline
 from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
 from exfit.util.text import rounded
@@ -23,29 +26,70 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 TEMPLATES = Path(__file__).parent / "templates"
+CHART_STYLE = TEMPLATES / "chart.css"
+CAPTIONS = {"caption": "Table", "figcaption": "Figure"}  # what each kind of caption counts
+CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have a class
 LIBRARY = ("bokeh.min.js", "bokeh-api.min.js")
 LONG = 12  # lines of a history that a reader sees without asking for more
 GENERATOR = '<meta name="generator" content="exfit '
 HEAD = 2000  # characters at the beginning of a page, among which it says what made it
 
 
+@dataclass(frozen=True)
+class Page:
+    """What a page shows: its title, what it comes to, its sections with their content.
+
+    ``folder`` is where the results lie, for the commands on the page.
+    """
+
+    title: str
+    headline: Headline
+    sections: Sequence[tuple[ReportSection, Any]]
+    folder: Path
+
+
 def html(result: FitResult, folder: Path) -> str:
     """Return the page of a fit; ``folder`` is where the fit lies, for the commands on the page."""
+    return page_html(fit_page(result, folder))
+
+
+def fit_page(result: FitResult, folder: Path) -> Page:
+    """Return what the page of a fit shows."""
     sections = [(section, section.content(result)) for section in SECTIONS]
-    page: str = (
+    return Page(f"{result.model}: {result.name}", headline(result), sections, folder)
+
+
+def page_html(page: Page, interactive: bool = True) -> str:
+    """Return a page as HTML; without scripts, for a print, where it is not ``interactive``."""
+    style, script = (TEMPLATES / "report.css", TEMPLATES / "report.js")
+    scripts = [*library(), script.read_text(encoding="utf-8")] if interactive else []
+    overlays = _overlays(content for _, content in page.sections) if interactive else []
+    text: str = (
         _environment()
         .get_template("report.html.jinja")
         .render(
-            title=f"{result.model}: {result.name}",
-            headline=headline(result),
-            sections=sections,
-            folder=str(folder),
-            data=list(live_data(_overlays(content for _, content in sections))),
-            css=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
-            scripts=[*library(), (TEMPLATES / "report.js").read_text(encoding="utf-8")],
+            title=page.title,
+            headline=page.headline,
+            sections=page.sections,
+            folder=str(page.folder),
+            data=list(live_data(overlays)),
+            css=CHART_STYLE.read_text(encoding="utf-8") + style.read_text(encoding="utf-8"),
+            scripts=scripts,
         )
     )
-    return page
+    return _numbered(text)
+
+
+def _numbered(page: str) -> str:
+    """Return a page whose figures and tables are numbered, in the order in which they stand."""
+    counts = Counter[str]()
+
+    def with_number(caption: re.Match[str]) -> str:
+        kind = CAPTIONS[caption[1]]
+        counts[kind] += 1
+        return f'{caption[0]}<span class="number">{kind} {counts[kind]}.</span> '
+
+    return CAPTION.sub(with_number, page)
 
 
 def is_page(path: Path) -> bool:
