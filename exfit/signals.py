@@ -96,12 +96,16 @@ ROWS = (
         ),
     ),
     SignalRow("delta", "rotor angle", "rad"),
-    SignalRow("speed", "speed"),
+    SignalRow(
+        "speed", "speed", noise=1e-4, positive=True, turn=9, base="rated speed",
+        words=("speed", "rotor speed", "shaft speed", "turbine speed", "drehzahl", "rpm"),
+    ),
     SignalRow(
         "vs", "stabiliser signal", turn=8,
         words=("vpss", "upss", "pss output", "pss", "stabiliser", "stabilizer", "vs"),
     ),
     SignalRow("vc1", "measured voltage"),
+    SignalRow("breaker", "breaker open", ""),
     SignalRow("E", "source voltage"),
     SignalRow("R", "resistance to the source"),
     SignalRow("X", "reactance to the source"),

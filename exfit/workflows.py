@@ -289,13 +289,14 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         response = setup.response(values)
         comparison = compare_with_record(setup, "record", values) if setup.channels else None
         notes = [] if comparison is None else rest_notes(setup, comparison)
-        return SimulationResult(
-            response, comparison, (*simulation_notes(case, values, response), *notes)
-        )
+        own, inputs = setup.experiment.parameters(values), setup.experiment.simulator.inputs
+        simulated = simulation_notes(case, {**values, **own}, response, inputs)
+        return SimulationResult(response, comparison, (*simulated, *notes))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     response = with_enough_substeps(simulator, at, case.path).response(at)
-    return SimulationResult(response, None, tuple(simulation_notes(case, values, response)))
+    notes = simulation_notes(case, values, response, simulator.inputs)
+    return SimulationResult(response, None, tuple(notes))
 
 
 def validate(

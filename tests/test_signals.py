@@ -11,7 +11,17 @@ from exfit.case.schema import RecordFile
 from exfit.cli.completion import noises
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
-from exfit.plants import DRIVING, SATURATION, alone, machine_playback, open_circuit, playback
+from exfit.plants import (
+    BREAKER,
+    DRIVING,
+    SATURATION,
+    SPEED,
+    alone,
+    machine_on_load,
+    machine_playback,
+    open_circuit,
+    playback,
+)
 from exfit.records.channel_recognition import guess_signals
 from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
 
@@ -19,6 +29,7 @@ MACHINE, EXCITER, QUADRATIC = MACHINES["GENROU"], MODELS["AC8B"], SATURATION["qu
 SYSTEMS = {
     "infinite-bus": system(MACHINE, inputs=ALL_INPUTS),
     "open-circuit": open_circuit(EXCITER, MACHINE, QUADRATIC, ("vref", "vs")),
+    "machine-on-load": machine_on_load(MACHINE, (BREAKER, "efd", SPEED)),
     "playback": playback(EXCITER, QUADRATIC, DRIVING),
     "machine-playback": machine_playback(MACHINE),
     "none": alone(MODELS["FIRST_ORDER"]),

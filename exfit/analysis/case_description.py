@@ -14,8 +14,9 @@ from exfit.case.schema import (
     ReferenceTable,
     Unknown,
 )
-from exfit.fitting.nuisances.parameters import prefix_of
+from exfit.fitting.nuisances.parameters import OPENING, prefix_of
 from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.system import driving_after_opening
 from exfit.inference import Interval
 from exfit.plants import NETWORK, REFERENCES
 from exfit.records.reading import file_hash
@@ -123,7 +124,7 @@ def tests_of(
             role=role,
             file=recording.record.file,
             plant=view.kind.title,
-            done="; ".join(_events(recording, identified)) or "no step of its own",
+            done="; ".join(_events(view, recording, identified)) or "no step of its own",
             channels="; ".join(_channel(*entry) for entry in recording.record.channels.items()),
             samples=len(time),
             first=float(time[0]),
@@ -145,7 +146,7 @@ def _network(view: Case) -> dict[str, NetworkParameter]:
     }
 
 
-def _events(recording: Recording, identified: Identified) -> Iterator[str]:
+def _events(case: Case, recording: Recording, identified: Identified) -> Iterator[str]:
     """Yield what was done to the unit, in words."""
     test, prefix = recording.test, prefix_of(recording)
     if test.vt0 is not None:
@@ -158,6 +159,11 @@ def _events(recording: Recording, identified: Identified) -> Iterator[str]:
         values = {name: getattr(switch, name) for name in ("R", "X", "E")}
         changes = (f"{name} {value:g} pu" for name, value in values.items() if value is not None)
         yield f"network switched at {switch.at:g} s: {', '.join(changes)}"
+    if test.breaker is not None:
+        opens = _given(test.breaker.opens, "g", "s", identified.get(f"{prefix}{OPENING}"))
+        drivers = driving_after_opening(case, recording)
+        follows = f", then driven by the recorded {' and '.join(drivers)}" if drivers else ""
+        yield f"breaker opens at {opens}{follows}"
 
 
 def _reference(signal: str, given: Reference, prefix: str, identified: Identified) -> Iterator[str]:

@@ -19,13 +19,15 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
-from exfit.plants import REFERENCES
+from exfit.plants import BREAKER, NETWORK, REFERENCES, SPEED
 from exfit.results.comparisons import Comparison
+from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Response
 
 Array = NDArray[np.float64]
 
 COARSE = 0.2  # of the error of the fit: what halving the step may move
+GOVERNOR_ACTS = 0.2  # s after a load rejection: until then the mechanical power stays
 NEAR_MINIMUM = 0.1  # standard errors: what errors and intervals in two digits do not show
 
 
@@ -160,10 +162,31 @@ def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
         yield f"{case.parts.stabiliser.name} does not act: the breaker is open"
 
 
-def simulation_notes(case: Case, values: Mapping[str, float], response: Response) -> Iterator[str]:
-    """Yield which values are typical or not physical, and whether the machine falls out of step."""
+def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str]:
+    """Yield how long a simulated speed holds for which a breaker has opened under power."""
+    opened = [step.at for step in inputs.steps if step.signal == BREAKER]
+    power = parameters.get(f"{NETWORK}P", 0.0)
+    if not opened or power == 0.0 or SPEED in inputs.recorded:
+        return
+    until = opened[0] + GOVERNOR_ACTS
+    if inputs.end > until:
+        yield (
+            f"from {opened[0]:.6g} s on the speed, and vt with it, is that of constant mechanical "
+            f"power, {power:g} pu, which holds for some {GOVERNOR_ACTS:g} s: record the speed, or "
+            f"end the window at {until:.4g} s"
+        )
+
+
+def simulation_notes(
+    case: Case, values: Mapping[str, float], response: Response, inputs: Inputs
+) -> Iterator[str]:
+    """Yield which values are typical or not physical, and whether the machine falls out of step.
+
+    ``values`` are those of the case, and of what the test has of its own.
+    """
     yield from typical_notes(case, values)
     yield from unphysical_notes(case, values)
+    yield from speed_notes(inputs, values)
     delta = response.signals.get("delta")
     if delta is not None and np.max(np.abs(delta)) > np.pi:
         at = float(response.time[np.argmax(np.abs(delta) > np.pi)])

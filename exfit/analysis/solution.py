@@ -13,6 +13,7 @@ from exfit.analysis.diagnostics import (
     notes,
     outlier_notes,
     reference_notes,
+    speed_notes,
     tolerance_notes,
 )
 from exfit.analysis.given_values import given_value_notes
@@ -200,6 +201,10 @@ def fit_notes(
     for recording, setup in zip(case.recordings, setups, strict=True):
         yield from outlier_notes(setup.record.source.name, setup.channels)
         yield from reference_notes(recording.test, setup)
+        experiment = setup.experiment
+        yield from speed_notes(
+            experiment.simulator.inputs, experiment.parameters(residuals.values(best.x))
+        )
     yield from skipped_response_notes(comparisons)
     if analysis.unfinished:
         yield INTERRUPTED_AFTERWARDS

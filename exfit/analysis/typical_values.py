@@ -22,8 +22,8 @@ IN_STANDARD_ERRORS = 2.0  # half of a 95 % interval, where none is known
 
 def parameters_of(case: Case) -> set[str]:
     """Return the parameters that a response of any of the records depends on."""
-    views = (case, *(case.seen_from(recording) for recording in case.recordings))
-    return {name for view in views for name in parameters_used(system_of(view))}
+    own = [system_of(case.seen_from(recording), recording) for recording in case.recordings]
+    return {name for system in own or [system_of(case)] for name in parameters_used(system)}
 
 
 def typical_values_used(case: Case) -> dict[str, float]:

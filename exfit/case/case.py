@@ -9,15 +9,13 @@ from typing import Any, NamedTuple
 from exfit.case.assembly import CheckedContent, check_content, plain_content
 from exfit.case.bounds import is_held
 from exfit.case.given_records import with_record_sections
-from exfit.case.parts import Part, Parts, with_network
+from exfit.case.parts import Part, Parts, in_plant
 from exfit.case.schema import (
     SINGLE,
     BumpTest,
     Estimate,
     FreeSection,
-    InfiniteBus,
     Limit,
-    OpenCircuit,
     Parameters,
     Plant,
     RecordFile,
@@ -233,13 +231,11 @@ class Case:
         if plant is None or not self.kind.closed_loop:
             return self
         own = {key: getattr(self.plant, key) for key in ("machine", "parameters", "free")}
-        on_load = KINDS[plant.type].on_load
-        section = InfiniteBus if on_load else OpenCircuit
         sources = {**_at(self.plant, ("sources",)), **dict(plant).get("sources", {})}
         return replace(
             self,
-            plant=section(**{**own, **dict(plant), "sources": sources}),
-            parts=with_network(self.parts, plant.given if on_load else None),
+            plant=plant.whole(**{**own, **dict(plant), "sources": sources}),
+            parts=in_plant(self.parts, KINDS[plant.type], plant.given),
             given_values={
                 name: given
                 for name, given in self.given_values.items()

@@ -23,7 +23,6 @@ from exfit.plants import (
     OPEN_CIRCUIT,
     STABILISER,
     PlantKind,
-    flow_sheet,
 )
 from exfit.signals import RECORDED
 from exfit.util.text import Place, near
@@ -95,7 +94,7 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
         kinds = (kind, *map(kind_of, plants_of_records(data).values()))
         parts.append(machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
     if kind.on_load:
-        parts.append(network_part(_mapping(plant.get("network"))))
+        parts.append(network_part(_mapping(plant.get("network")), kind))
     if stabiliser is not None:
         parts.append(stabiliser_part(stabiliser))
     return Parts(exciter, machine, stabiliser, tuple(parts))
@@ -106,11 +105,13 @@ def kind_of(plant: Data) -> PlantKind:
     return KINDS.get(str(plant.get("type")), ANY_PLANT)
 
 
-def with_network(parts: Parts, given: Data | None) -> Parts:
-    """Return the parts with another network, or with none where the breaker is open."""
-    others = tuple(part for part in parts.all if part.kind != "network")
-    network = () if given is None else (network_part(given),)
-    return replace(parts, all=(*others, *network))
+def in_plant(parts: Parts, kind: PlantKind, given: Data) -> Parts:
+    """Return the parts in a plant of another kind, of whose network some values are given."""
+    absent = ("network",) if kind.has_exciter else ("network", "exciter", "stabiliser")
+    others = tuple(part for part in parts.all if part.kind not in absent)
+    network = (network_part(given, kind),) if kind.on_load else ()
+    changed = replace(parts, all=(*others, *network))
+    return changed if kind.has_exciter else replace(changed, exciter=None, stabiliser=None)
 
 
 def plants_of_records(data: Data) -> dict[Place, Data]:
@@ -234,23 +235,25 @@ def stabiliser_part(model: Model) -> Part:
     )
 
 
-def network_part(given: Data, place: Place = ("plant", "network")) -> Part:
-    """Return the part of a network, whose start is given by E where the file has E."""
+def network_part(given: Data, kind: PlantKind, place: Place = ("plant", "network")) -> Part:
+    """Return the part of a network in a plant of some kind, which needs these values given."""
+    sheet = kind.network(given)
+    symbols = [row.symbol for row in sheet]
 
     def check(values: Mapping[str, float]) -> Contradictions:
         for symbol in ("f0", "X", "P"):
-            if symbol not in given:
+            if symbol in symbols and symbol not in given:
                 yield symbol, "is missing"
         if "Q" not in given and "E" not in given:
-            yield "Q", "is missing: either Q or E, the voltage of the source, must be given with P"
+            either = "either Q or E, the voltage of the source, must be given with P"
+            yield "Q", f"is missing{f': {either}' if 'X' in symbols else ''}"
         if "Q" in given and "E" in given:
             yield "Q", "not allowed with E, from which it follows"
         if values.get("R") == values.get("X") == 0.0:
             yield "X", "0, and R = 0 as well: the machine needs an impedance to the source"
 
-    sheet = flow_sheet("E" if "E" in given else "Q")
     if "Q" in given and "E" in given:
-        sheet = (*sheet, *(row for row in flow_sheet("Q") if row.symbol == "Q"))
+        sheet = tuple(dict.fromkeys((*sheet, *kind.network(("Q",)))))
     sources = (*place[:-1], "sources")
     return Part("network", "the network", NETWORK, sheet, place, None, sources, check)
 

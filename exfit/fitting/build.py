@@ -21,7 +21,7 @@ from exfit.fitting.recordings import record_of
 from exfit.fitting.references import references_of, span_of
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.fitting.system import system_of
-from exfit.plants import NETWORK, VT0
+from exfit.plants import NETWORK, REFERENCES, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import MOST_STEPS, Inputs, RecordedInput
 from exfit.simulation.simulator import Simulator
@@ -36,7 +36,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     Raises RecordError where the record cannot be used, CaseError where a signal is not simulated.
     """
     view, file = case.seen_from(recording), recording.record
-    system = system_of(view)
+    system = system_of(view, recording)
     driving = [signal for signal in file.channels if signal in system.inputs]
     record = without_masked(record_of(case, recording), file, driving)
     references = references_of(case, recording.test, span_of(recording.test, record), record, file)
@@ -51,7 +51,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         steps = tuple(step._replace(smooth=False) for step in steps)
     delay = start_value(file.delay) or 0.0
     beyond = max(0.0, _earliest_reading(nuisances, free) - delay)
-    recorded = {**_played_back(view, test, record, driving), **references.recorded}
+    recorded = {**_driving(view, test, record, driving), **references.recorded}
     begin, end = span_of(test, record)
     inputs = Inputs(begin, end + beyond, steps, recorded)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
@@ -101,12 +101,12 @@ def _earliest_reading(nuisances: Sequence[Nuisance], free: Sequence[FreeParamete
     )
 
 
-def _played_back(
+def _driving(
     case: Case, test: BumpTest, record: Record, driving: Sequence[str]
 ) -> dict[str, RecordedInput]:
-    """Return the signals of a record that are played back in place of a plant."""
+    """Return the signals of a record that drive the simulation, but for recorded references."""
     if not case.kind.plays_back:
-        return {}
+        driving = [signal for signal in driving if signal not in REFERENCES]
     return {s: RecordedInput(record.time, deviation(test, record, s)) for s in driving}
 
 

@@ -16,6 +16,7 @@ from exfit.case.schema import (
     start_value,
 )
 from exfit.dsp.filtering import outliers
+from exfit.dsp.jump import largest_jump
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.nuisances.parameters import prefix_of
@@ -23,6 +24,7 @@ from exfit.plants import REFERENCES
 from exfit.records.record import Record
 from exfit.records.steps import INSTANT_WITHIN
 
+INSIDE_INTERVAL = 1e-6  # of it: a sample at its end would be on the other side of the jump
 SIZE_WITHIN = 0.5  # of the size that a record shows: how far the size may be from it
 
 
@@ -42,6 +44,10 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
         )
         _refuse_wrong_order(f"{place}.vref", steps)
         test = test.model_copy(update={"vref": steps})
+    if test.breaker is not None:
+        opens = _bounded_opening(f"{place}.breaker.opens", test.breaker.opens, record)
+        breaker = test.breaker.model_copy(update={"opens": opens})
+        test = test.model_copy(update={"breaker": breaker})
     return test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
 
 
@@ -58,11 +64,32 @@ def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | N
     """Return until when a record is at rest, s: until the earliest instant that it may show."""
     delay = _lowest(file.delay)
     events = (event for signal in REFERENCES for event in test.events(signal))
-    unknown = [event.at for event in events if isinstance(event.at, Unknown)]
+    opening = () if test.breaker is None else (test.breaker.opens,)
+    instants = (*(event.at for event in events), *opening)
+    unknown = [at for at in instants if isinstance(at, Unknown)]
     if test.steady_until is not None or not (unknown or delay < 0.0):
         return test.steady_until
     earliest = min([*test.instants, *map(_lowest, unknown)]) if test.instants else inf
     return max(earliest + min(delay, 0.0), float(record.time[1]))
+
+
+def _bounded_opening(place: str, opens: float | Unknown, record: Record) -> float | Unknown:
+    """Return when the breaker opens, where it says auto between the samples where vt jumps.
+
+    There nothing that is compared jumps with the instant: the cost is smooth in it.
+    """
+    if not isinstance(opens, Unknown) or opens.start != "auto":
+        return opens
+    recorded = np.isfinite(record.signals["vt"])
+    time, vt = record.time[recorded], record.signals["vt"][recorded]
+    try:
+        before = largest_jump(vt)
+    except ValueError as fault:
+        text = f"{record.source}: vt: {fault}; {place} has start: auto"
+        raise RecordError(f"{text}: give start, min and max") from fault
+    margin = INSIDE_INTERVAL * float(time[before + 1] - time[before])
+    low, high = float(time[before]) + margin, float(time[before + 1]) - margin
+    return Unknown(start=0.5 * (low + high), min=low, max=high)
 
 
 def _lowest(value: float | Unknown) -> float:

@@ -11,7 +11,7 @@ from exfit.case.schema import (
     start_value,
 )
 from exfit.errors import CaseError
-from exfit.plants import NETWORK, REFERENCES
+from exfit.plants import BREAKER, NETWORK, REFERENCES
 from exfit.simulation.inputs import InputStep
 
 Values = Mapping[str, float]
@@ -23,7 +23,7 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
     ``values`` are those of the network at the start. Raises CaseError where the source would lose
     its voltage.
     """
-    steps = [*_of_signals(test)]
+    steps = [*_of_signals(test), *_opening(test)]
     now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
     events: list[StepSection | Switch] = [*test.E, *test.network]
     for event in sorted(events, key=lambda event: event.at):
@@ -44,6 +44,13 @@ def _of_signals(test: BumpTest) -> Iterator[InputStep]:
         for event in test.events(signal):
             at, step = start_value(event.at) or 0.0, start_value(event.step) or 0.0
             yield InputStep(at, step, signal, isinstance(event.at, Unknown), event.ramp or 0.0)
+
+
+def _opening(test: BumpTest) -> Iterator[InputStep]:
+    """Yield the opening of the breaker."""
+    if test.breaker is not None:
+        opens = test.breaker.opens
+        yield InputStep(start_value(opens) or 0.0, 1.0, BREAKER, isinstance(opens, Unknown))
 
 
 def _step_of(event: StepSection | Switch, name: str, level: float | None) -> float | None:

@@ -6,14 +6,16 @@ from pathlib import Path
 from traceback import extract_tb
 
 from exfit.case.case import Case
-from exfit.case.schema import SINGLE, RecordFile
+from exfit.case.schema import SINGLE, RecordFile, Recording
 from exfit.case.ties import Ties
 from exfit.engine.system import System, trace
 from exfit.errors import CaseError, ModelError
 from exfit.models.sheet import Model
 from exfit.plants import (
+    BREAKER,
     DRIVING,
     SATURATION,
+    SPEED,
     Equipment,
     SaturationForm,
     Stabilised,
@@ -25,19 +27,20 @@ from exfit.simulation.kernels import parameters_used
 Values = Mapping[str, float]
 
 
-def system_of(case: Case) -> System:
-    """Return the exciter of a case in its plant.
+def system_of(case: Case, recording: Recording | None = None) -> System:
+    """Return the exciter of a case in its plant, or the machine alone.
 
-    Raises ModelError where the equations of a user's own model cannot be traced, CaseError where a
-    record lacks a signal that drives it.
+    Given the ``recording``, the breaker opens only if it does in its own test. Raises ModelError
+    where the equations of a user's own model cannot be traced, CaseError where a record lacks a
+    signal that drives it.
     """
-    system = _system_of(case)
+    system = _system_of(case, recording)
     if case.model is not None and case.model.endswith(".py"):
         _refuse_untraceable(system, (case.folder / case.model).absolute())
     return system
 
 
-def _system_of(case: Case) -> System:
+def _system_of(case: Case, recording: Recording | None) -> System:
     kind, parts = case.kind, case.parts
     if kind.has_exciter and parts.exciter is None:
         raise CaseError([f"{case.path}: model: missing"])
@@ -45,7 +48,7 @@ def _system_of(case: Case) -> System:
         exciter=parts.exciter,
         machine=parts.machine,
         saturation=SATURATION[case.saturation],
-        inputs=inputs_of(case),
+        inputs=inputs_of(case, recording),
         recorded=recorded_in_all(case),
         given=frozenset(case.plant.given),
         stabiliser=stabilised(case),
@@ -55,14 +58,36 @@ def _system_of(case: Case) -> System:
     return kind.build(equipment)
 
 
-def inputs_of(case: Case) -> tuple[str, ...]:
-    """Return the inputs that the tests of a case change; the reference always is one."""
+def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]:
+    """Return the inputs that the tests of a case change; the reference always is one.
+
+    The breaker is one where it opens: in the test of the ``recording``, or else in any.
+    """
     changed = {"vref"}
     for test in case.tests:
         changed |= {name for name in ("vs", "E") if getattr(test, name)}
         for switch in test.network:
             changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
-    return tuple(name for name in ("vref", "vs", "E", "R", "X") if name in changed)
+    opening = case.tests if recording is None else (recording.test,)
+    if any(test.breaker is not None for test in opening):
+        changed.add(BREAKER)
+    if recording is not None:
+        changed |= {*driving_after_opening(case, recording)}
+    inputs = ("vref", "vs", "E", "R", "X", BREAKER, "efd", SPEED)
+    return tuple(name for name in inputs if name in changed)
+
+
+def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:
+    """Return the channels of a record that drive the machine once its breaker is open.
+
+    These are efd where there is no exciter, and the speed unless it is to be simulated.
+    """
+    breaker, channels = recording.test.breaker, recording.record.channels
+    if breaker is None:
+        return ()
+    driving = () if case.kind.has_exciter else case.kind.driving
+    speed = () if breaker.speed == "simulated" else (SPEED,)
+    return tuple(signal for signal in (*driving, *speed) if signal in channels)
 
 
 def stabilised(case: Case) -> Stabilised | None:

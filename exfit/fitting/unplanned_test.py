@@ -100,10 +100,13 @@ def with_steps_of_record(
 def _stepped(case: Case, test: BumpTest) -> str | None:
     """Return the signal that is stepped, None with a plant whose tests have no steps.
 
-    Raises CaseError where the test of the case changes the network.
+    Raises CaseError where the test of the case changes the network, or opens the breaker.
     """
-    if test.E or test.network:
-        text = "changes the network: the steps of a record by hand are those of vref or vs"
+    if test.E or test.network or test.breaker:
+        text = (
+            "changes the network or opens the breaker: the steps of a record by hand are those of "
+            "vref or vs"
+        )
         raise CaseError([f"{case.path}: test: {text}; give the record under validate"])
     if not case.kind.events:
         return None

@@ -1,8 +1,10 @@
 """What surrounds the exciter: the plant makes it a closed system that can be simulated."""
 
 from exfit.plants.alone import alone
+from exfit.plants.breaker import BREAKER, SPEED
 from exfit.plants.infinite_bus import HEARD, INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
+from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
 from exfit.plants.parts import (
@@ -21,6 +23,7 @@ from exfit.plants.plant import REFERENCES, Equipment, PlantKind, Stabilised
 from exfit.plants.playback import DRIVING, initial, playback
 
 __all__ = [
+    "BREAKER",
     "DRIVING",
     "EVENTS",
     "HEARD",
@@ -32,6 +35,7 @@ __all__ = [
     "OPEN_CIRCUIT",
     "REFERENCES",
     "SATURATION",
+    "SPEED",
     "STABILISER",
     "VT0",
     "Equipment",
@@ -45,6 +49,7 @@ __all__ = [
     "flow_sheet",
     "infinite_bus",
     "initial",
+    "machine_on_load",
     "machine_playback",
     "open_circuit",
     "playback",

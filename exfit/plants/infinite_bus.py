@@ -9,6 +9,7 @@ from exfit.engine.trace import Signal, cos, sin, sqrt
 from exfit.models.machines import Axes, Machine, Source
 from exfit.models.phasors import angle, modulus
 from exfit.models.sheet import Model, Sheet, sheet
+from exfit.plants.breaker import BREAKER, breaker_of
 from exfit.plants.parts import (
     MACHINE,
     MEASURED,
@@ -167,7 +168,9 @@ def infinite_bus(
     2H dw/dt = (Pm - D dw) / (1 + dw) - Te, as in PSS/E. Parameters are the exciter's, those of
     machine, network and stabiliser under their prefixes (``network.X``), and the initial voltage
     ``vt0``. The inputs are changes: of the reference ``vref``, of ``vs`` beside the stabiliser, of
-    ``vc1``, the voltage that the exciter measures, and of ``E``, ``R`` and ``X``. All per unit on
+    ``vc1``, the voltage that the exciter measures, and of ``E``, ``R`` and ``X``. With the input
+    ``breaker`` a breaker opens where that is 1: p, q and it are zero from then on, delta stays, and
+    vt follows the speed, which is the simulated one, or 1 and the input ``speed``. All per unit on
     the machine's base; ``delta`` in rad, ``speed`` 1 when rated.
     """
     of_stabiliser = () if stabiliser is None else stabiliser.model.states
@@ -200,14 +203,18 @@ def infinite_bus(
         fluxes = values_named(x, machine.states)
         at = machine.source(fluxes, of_machine)
         E, R, X = r["source"] + changed.E, n.R + changed.R, n.X + changed.X
-        i = current(at, E, R, X, x["delta"])
-        v = Axes(at.voltage.d + at.xq * i.q, at.voltage.q - at.xd * i.d)
-        vt, it = modulus(v.d, v.q), modulus(i.d, i.q)
+        closed, dw, factor = current(at, E, R, X, x["delta"]), x["dw"], 1.0
+        i = closed
+        breaker = breaker_of(u, dw) if BREAKER in inputs else None
+        if breaker is not None:
+            i, dw, factor = breaker.current(closed), breaker.dw, breaker.factor
+        v = Axes(factor * (at.voltage.d + at.xq * i.q), factor * (at.voltage.q - at.xd * i.d))
+        vt, it = modulus(v.d, v.q), modulus(closed.d, closed.q)
         power, reactive = v.d * i.d + v.q * i.q, v.q * i.d - v.d * i.q
         ifd = machine.field(fluxes, i, of_machine)
         vs = changed.vs
         if stabiliser is not None:
-            heard = Names(speed=x["dw"], p=power, vt=vt)
+            heard = Names(speed=dw, p=power, vt=vt)
             vs = vs + stabilising(stabiliser, heard, p, x, d)
         vref = r["vref"] + u["vref"]
         vc1 = compensated(v, i, n)
@@ -223,10 +230,12 @@ def infinite_bus(
         speed = 1.0 + x["dw"]
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         d.dw = ((r["Pm"] - of_machine.D * x["dw"]) / speed - power) / (2.0 * of_machine.H)
+        if breaker is not None:
+            it, d.delta = breaker.until_open(it), breaker.until_open(d.delta)
         outputs = dict(
             zip(
                 OUTPUTS,
-                (vref, vt, efd, ifd, power, reactive, it, x["delta"], speed),
+                (vref, vt, efd, ifd, power, reactive, it, x["delta"], 1.0 + dw),
                 strict=True,
             )
         )
@@ -269,7 +278,8 @@ INFINITE_BUS = PlantKind(
     name="infinite-bus",
     title="on load, behind R + jX to a stiff source",
     needs=("exciter", "machine", "network"),
-    events=("vref", "vs", "E", "network"),
+    events=("vref", "vs", "E", "network", BREAKER),
     signals=compared(OUTPUTS),
+    network=lambda given: flow_sheet("E" if "E" in given else "Q"),
     build=_build,
 )

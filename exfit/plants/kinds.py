@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from exfit.plants.alone import ALONE
 from exfit.plants.infinite_bus import INFINITE_BUS
+from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.plants.machine_playback import MACHINE_PLAYBACK
 from exfit.plants.open_circuit import OPEN_CIRCUIT
 from exfit.plants.plant import PlantKind
@@ -14,6 +15,7 @@ KINDS: Mapping[str, PlantKind] = {
     for kind in (
         OPEN_CIRCUIT,
         INFINITE_BUS,
+        MACHINE_ON_LOAD,
         PLAYBACK,
         MACHINE_PLAYBACK,
         ALONE,

@@ -1,13 +1,13 @@
 """A kind of plant as data: what it needs, what acts on it, what it shows, and how it is built."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeVar
 
 from exfit.engine.system import System
 from exfit.errors import ModelError
 from exfit.models.machines import Machine
-from exfit.models.sheet import Model
+from exfit.models.sheet import Model, Sheet
 from exfit.plants.parts import SaturationForm
 from exfit.signals import COMPARED
 
@@ -39,6 +39,11 @@ class Equipment(NamedTuple):
     stabiliser: Stabilised | None = None
 
 
+def no_network(given: Collection[str]) -> Sheet:
+    """Return the data sheet of a plant without a network."""
+    return ()
+
+
 @dataclass(frozen=True)
 class PlantKind:
     """What surrounds an exciter; ``name`` as a case has it, ``title`` as a report has it.
@@ -46,8 +51,9 @@ class PlantKind:
     ``needs`` are the parts that a case gives, ``events`` what a test may change, ``signals`` what
     a record may hold. Of these ``driving`` drive the simulation in place of the plant: ``required``
     ones must be recorded, those ``required_if_used`` where the exciter uses them; ``levels`` are
-    recorded signals whose level at the start is a parameter. ``per_unit`` says that voltages are
-    those of a machine: per unit, and above zero at rest.
+    recorded signals whose level at the start is a parameter. ``network`` is the data sheet of the
+    network of which these values are given. ``per_unit`` says that voltages are those of a
+    machine: per unit, and above zero at rest.
     """
 
     name: str
@@ -60,6 +66,7 @@ class PlantKind:
     required: tuple[str, ...] = ()
     required_if_used: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
+    network: Callable[[Collection[str]], Sheet] = no_network
     per_unit: bool = True
 
     @property
@@ -85,7 +92,7 @@ class PlantKind:
     @property
     def plays_back(self) -> bool:
         """Whether a record drives the simulation, which cannot be without one."""
-        return bool(self.driving)
+        return bool(self.required)
 
     @property
     def recorded_inputs(self) -> tuple[str, ...]:

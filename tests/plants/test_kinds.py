@@ -49,7 +49,7 @@ def test_a_kind_is_built_of_what_it_needs_and_shows_its_signals(kind):
     equipment = EQUIPMENT._replace(
         exciter=EQUIPMENT.exciter if kind.has_exciter else None,
         machine=EQUIPMENT.machine if kind.has_machine else None,
-        inputs=tuple(event for event in kind.events if event in SIGNALS),
+        inputs=tuple(event for event in (*kind.events, *kind.driving) if event in SIGNALS),
     )
     system = kind.build(equipment)
     assert {*kind.compared} <= {*system.outputs}

@@ -336,9 +336,9 @@ NAMES = {
     "p": ["MW", "P", "Pe", "P_gen (MW)", "Active Power", "Wirkleistung in MW"],
     "q": ["Mvar", "Q", "Qgen [Mvar]", "Reactive power", "Blindleistung"],
     "vref": ["vref", "Vref", "U_ref", "Reference", "Sollwert", "Usoll (%)"],
+    "speed": ["Speed", "Drehzahl", "n (rpm)", "rotor speed (pu)"],
     None: [
         "Temp",
-        "Speed",
         "f (Hz)",
         "Exciter field current (A)",
         "If (kV)",

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.reference import moves_of, table_faults
 from exfit.case.yaml import Fault
-from exfit.plants import EVENTS, PlantKind
+from exfit.plants import BREAKER, EVENTS, PlantKind
 from exfit.util.text import show
 
 
@@ -18,6 +18,9 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
             yield from _place_faults(place, at, test.at("duration").number)
         if name in test and name not in kind.events:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
+    opens = test.at(BREAKER, "opens")
+    if opens.start is not None:
+        yield from _place_faults(opens, opens.start, test.at("duration").number)
     for switch in test.at("network").entries:
         if switch.at("E").number is not None and "E" not in network:
             text = "only where plant.network gives E; test.E changes it by steps"
@@ -39,6 +42,9 @@ def instants_of(test: ContentNode) -> Iterator[tuple[ContentNode, float]]:
             if at is not None:
                 yield event.at("at"), at
         yield from moves_of(test.at(name))
+    opens = test.at(BREAKER, "opens")
+    if opens.start is not None:
+        yield opens, opens.start
 
 
 def missing_without_record(test: ContentNode) -> Iterator[Fault]:

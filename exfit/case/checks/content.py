@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from exfit.case.checks.breaker import breaker_faults, driving_signals
 from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
 from exfit.case.checks.model import parameter_faults
 from exfit.case.checks.node import ContentNode
@@ -50,7 +51,8 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
         yield from _recording_faults(content, content, kind)
     for recording in several:
         yield from _recording_faults(recording, content, kind)
-    yield from noise_faults([content, *several], kind)
+    driven = [(recording, _driving(recording, kind)) for recording in (content, *several)]
+    yield from noise_faults(driven)
     if content.at("estimate").content.get("weights") == "balanced":
         yield from weight_faults([content, *content.at("records").entries])
     yield from repeated_names(several)
@@ -69,17 +71,30 @@ def _single_record_faults(content: ContentNode) -> Iterator[Fault]:
             yield content.at(key).fault("not allowed with records: each of them has its own")
 
 
+def _kind(recording: ContentNode, kind: PlantKind) -> PlantKind:
+    """Return the kind of plant of a record: its own, or else that of the case."""
+    plant = recording.at("plant")
+    return kind_of(plant.content) if "type" in plant else kind
+
+
+def _driving(recording: ContentNode, kind: PlantKind) -> tuple[str, ...]:
+    """Return the signals of a record that drive its simulation."""
+    kind = _kind(recording, kind)
+    after_opening = driving_signals(recording.at("test"), recording.at("record"), kind)
+    return (*kind.driving, *kind.recorded_inputs, *after_opening)
+
+
 def _recording_faults(
     recording: ContentNode, content: ContentNode, kind: PlantKind
 ) -> Iterator[Fault]:
     """Yield what contradicts itself in a test and its record; a single one is the whole content."""
-    plant = recording.at("plant")
-    kind = kind_of(plant.content) if "type" in plant else kind
+    plant, kind = recording.at("plant"), _kind(recording, kind)
     network = plant.at("network") if plant.at("network").content else content.at("plant", "network")
     test, record = recording.at("test"), recording.at("record")
     has_record = "record" in recording
     yield from bump_test_faults(test, network, kind)
     yield from nuisance_faults(test, record, kind, has_record)
+    yield from breaker_faults(test, record, kind)
     yield from recorded_reference_faults(test, record, kind, has_record)
     if has_record:
         yield from record_faults(test, record)

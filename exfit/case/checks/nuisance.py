@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
-from exfit.plants import PlantKind
+from exfit.plants import BREAKER, PlantKind
 from exfit.util.text import show
 
 AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
@@ -39,6 +39,7 @@ def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:
         for step in test.at(name).entries:
             yield step.at("at")
             yield step.at("step")
+    yield test.at(BREAKER, "opens")
     yield record.at("delay")
     for _, channel in record.at("channels").sections:
         yield channel.at("scale")
@@ -82,8 +83,9 @@ def _value_faults(value: ContentNode) -> Iterator[Fault]:
     """Yield the faults of one value that the fit shall find: its bounds and its start."""
     key = value.place[-1]
     automatic = value.at("start").text == "auto"
-    if automatic and not (key in AUTOMATIC and value.place[-3:-1] == ("vref", 0)):
-        text = "auto finds the first step of vref: its at and its step"
+    of_step = key in AUTOMATIC and value.place[-3:-1] == ("vref", 0)
+    if automatic and not (of_step or value.place[-2] == BREAKER):
+        text = "auto finds the first step of vref, its at and its step, or breaker.opens"
         yield value.at("start").fault(text)
     yield from _bound_faults(value, needed=not automatic)
     low, high = value.at("min").number, value.at("max").number

@@ -48,4 +48,5 @@ def plants_of_records_faults(content: ContentNode, kind: PlantKind) -> Iterator[
         if not kind.closed_loop:
             yield plant.fault(f"not allowed with plant {kind.name}")
         elif kind_of(plant.content).on_load and network.is_section:
-            yield from part_faults(content, network_part(network.content, network.place), {}, {})
+            part = network_part(network.content, kind_of(plant.content), network.place)
+            yield from part_faults(content, part, {}, {})

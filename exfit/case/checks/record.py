@@ -1,6 +1,6 @@
 """What contradicts itself in a record and its channels."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from exfit.case.checks.bump_test import instants_of
 from exfit.case.checks.node import ContentNode
@@ -87,7 +87,7 @@ def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
             signals = ", ".join((*kind.signals, *kind.recorded_inputs))
             yield channel.fault(f"not allowed with plant {kind.name}, which has {signals}")
         if signal in kind.driving:
-            yield from _driving_faults(channel)
+            yield from driving_faults(channel)
         yield from channel_faults(signal, channel, kind.per_unit)
     if not channels.content:
         return
@@ -106,7 +106,8 @@ def channel_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterato
     yield from _phase_faults(channel, signal)
 
 
-def _driving_faults(channel: ContentNode) -> Iterator[Fault]:
+def driving_faults(channel: ContentNode) -> Iterator[Fault]:
+    """Yield the keys of a channel that have no effect where it drives the simulation."""
     for key in ("weight", "noise", "filter", "outliers", "sine"):
         if key in channel:
             text = "has no effect: the signal drives the simulation and is not compared"
@@ -145,13 +146,16 @@ def _phase_faults(channel: ContentNode, signal: str) -> Iterator[Fault]:
         yield channel.at("averaged").fault("waveforms have a window of their own: cycles")
 
 
-def noise_faults(recordings: Sequence[ContentNode], kind: PlantKind) -> Iterator[Fault]:
-    """Yield channels without noise where another has it, and channels with weight and noise."""
+def noise_faults(recordings: Sequence[tuple[ContentNode, Collection[str]]]) -> Iterator[Fault]:
+    """Yield channels without noise where another has it, and channels with weight and noise.
+
+    Each of the ``recordings`` has with it the signals that drive its simulation.
+    """
     channels = [
         channel
-        for recording in recordings
+        for recording, driving in recordings
         for signal, channel in recording.at("record", "channels").sections
-        if signal not in (*kind.driving, *kind.recorded_inputs)
+        if signal not in driving
     ]
     for channel in channels:
         if "noise" in channel and "weight" in channel:

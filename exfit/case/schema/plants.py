@@ -1,7 +1,7 @@
 """The sections of the case file about what surrounds the exciter."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
@@ -72,6 +72,27 @@ class InfiniteBus(PlantSection):
         return self.network
 
 
+class MachineOnLoad(PlantSection):
+    """A machine alone that is at rest on load until its breaker opens.
+
+    Its field voltage stays, or is that of the record's channel efd.
+    """
+
+    type: Literal["machine-on-load"] = Field(description="Kind of plant; the case has no model.")
+    machine: Text = MACHINE
+    parameters: Frozen[Given] = MACHINE_DATA
+    free: Frozen[FreeSection] = MACHINE_FREE
+    network: Frozen[Number] = Field(
+        description="P and Q until the breaker opens, pu on the base of the machine."
+    )
+    sources: Sources = STATED
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values of the load."""
+        return self.network
+
+
 class Playback(PlantSection):
     """Recorded signals drive the exciter; efd is compared."""
 
@@ -103,7 +124,7 @@ class NoPlant(PlantSection):
     type: Literal["none"] = Field(description="Kind of plant.")
 
 
-Plant = OpenCircuit | InfiniteBus | Playback | MachinePlayback | NoPlant
+Plant = OpenCircuit | InfiniteBus | Playback | MachinePlayback | MachineOnLoad | NoPlant
 SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 
@@ -126,16 +147,21 @@ class Stabiliser(Section):
     sources: Sources = STATED
 
 
+WholePlant = type[OpenCircuit] | type[InfiniteBus] | type[MachineOnLoad]
+
+
 class OffLine(PlantSection):
     """The machine of the case with its breaker open."""
 
     type: Literal["open-circuit"] = Field(description="Kind of plant.")
+    whole: ClassVar[WholePlant] = OpenCircuit
 
 
 class OnLine(PlantSection):
     """The machine of the case behind R + jX to a source."""
 
     type: Literal["infinite-bus"] = Field(description="Kind of plant.")
+    whole: ClassVar[WholePlant] = InfiniteBus
     network: Frozen[Number] = Field(
         description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
     )
@@ -144,4 +170,20 @@ class OnLine(PlantSection):
     @property
     def given(self) -> Mapping[str, float]:
         """The values of the network."""
+        return self.network
+
+
+class AloneOnLoad(PlantSection):
+    """The machine of the case without its exciter, on load until its breaker opens."""
+
+    type: Literal["machine-on-load"] = Field(description="Kind of plant.")
+    whole: ClassVar[WholePlant] = MachineOnLoad
+    network: Frozen[Number] = Field(
+        description="P and Q until the breaker opens, pu on the base of the machine."
+    )
+    sources: Sources = STATED
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values of the load."""
         return self.network

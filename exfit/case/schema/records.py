@@ -15,7 +15,7 @@ from pydantic import (
 
 from exfit.case.messages import FILE_NAME
 from exfit.case.schema.columns import Filter, Time
-from exfit.case.schema.plants import OffLine, OnLine
+from exfit.case.schema.plants import AloneOnLoad, OffLine, OnLine
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Count, Findable, Number, Positive, Section, Text, thawed
 from exfit.signals import RECORDED
@@ -171,7 +171,7 @@ class Recording(Section):
         max_length=100,
         description="Name of letters, digits, - _ and .; files are named after it.",
     )
-    plant: Annotated[OffLine | OnLine, Field(discriminator="type")] | None = Field(
+    plant: Annotated[OffLine | OnLine | AloneOnLoad, Field(discriminator="type")] | None = Field(
         default=None, description="Plant of this record, if it differs from that of the case."
     )
     test: BumpTest = Field(description="The steps that were made.")

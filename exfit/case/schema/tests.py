@@ -108,6 +108,21 @@ class Switch(Section):
     )
 
 
+class BreakerSection(Section):
+    """The opening of the breaker of a unit on load: a load rejection, or a current interruption."""
+
+    opens: Findable = Field(
+        description="Time at which the stator current becomes zero, s; or {start: auto} to fit it "
+        "between the two samples between which vt jumps; or {start, min, max}."
+    )
+    speed: Literal["recorded", "simulated"] | None = Field(
+        default=None,
+        description="Speed that vt follows from then on. recorded: the channel speed of the "
+        "record; simulated: that of constant mechanical power, which holds for some 0.2 s, and "
+        "the channel is compared. Default: recorded where the record has the channel.",
+    )
+
+
 class BumpTest(Section):
     """The test: what was done to the unit."""
 
@@ -144,6 +159,10 @@ class BumpTest(Section):
     network: tuple[Switch, ...] = Field(
         default=(), min_length=1, description="Switchings of R, X and E; infinite-bus only."
     )
+    breaker: BreakerSection | None = Field(
+        default=None,
+        description="The breaker opens; infinite-bus and machine-on-load only.",
+    )
     duration: Positive | None = Field(
         default=None, description="Length of the simulation, s; only if there is no record."
     )
@@ -172,6 +191,8 @@ class BumpTest(Section):
         events = (event for signal in REFERENCES for event in self.events(signal))
         instants = {start_value(event.at) for event in events}
         instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
+        if self.breaker is not None:
+            instants.add(start_value(self.breaker.opens))
         return tuple(sorted(at for at in instants if at is not None))
 
     @property

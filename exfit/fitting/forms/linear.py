@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.residuals import Residuals
-from exfit.plants import REFERENCES
+from exfit.plants import BREAKER, REFERENCES
 from exfit.simulation.limit_hits import limits_at_rest
 
 Values = Mapping[str, float]
@@ -43,6 +43,8 @@ def _no_meaning(experiment: Experiment, values: Values) -> str | None:
     switched = [SWITCHED[step.signal] for step in inputs.steps if step.signal in SWITCHED]
     if switched:
         return f"the test switches the {switched[0]} of the network"
+    if any(step.signal == BREAKER for step in inputs.steps):
+        return "the test opens the breaker"
     driving = [signal for signal in inputs.recorded if signal not in REFERENCES]
     if driving:
         return f"recorded signals drive the simulation: {', '.join(driving)}"

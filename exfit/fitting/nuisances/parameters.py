@@ -7,9 +7,11 @@ from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
 from exfit.fitting.experiment import Nuisance
 from exfit.fitting.nuisances.sine import COSINE, FREQUENCY, SINE
 from exfit.fitting.parameters import FreeParameter
-from exfit.plants import REFERENCES
+from exfit.plants import BREAKER, REFERENCES
 from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
+
+OPENING = "breaker.opens"  # the name of the instant, as its place in a test
 
 
 def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> bool:
@@ -17,8 +19,11 @@ def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> boo
 
     That leaves the simulation as it is, and with it the steps at which limits are met; a smooth
     step that moves over the grid meets them now a step earlier, now later, and so gives the cost a
-    kink for each. It needs an only step from rest, and signals that do not jump with it.
+    kink for each. It needs an only step from rest, and signals that do not jump with it; or else,
+    as with a breaker that opens, bounds between two samples.
     """
+    if steps and steps[0].signal == BREAKER:
+        return True
     jumps = any(SIGNALS[signal].jumps for signal in file.channels)
     return len(steps) == 1 and test.begin is None and not jumps
 
@@ -38,6 +43,8 @@ def names_of(recording: Recording) -> tuple[str, ...]:
     test, file = recording.test, recording.record
     steps = [InputStep(0.0, 0.0, signal) for signal in REFERENCES for _ in test.events(signal)]
     prefix = prefix_of(recording)
+    if test.breaker is not None:
+        steps.append(InputStep(0.0, 1.0, BREAKER))
     nuisances = [*_of_steps(prefix, test, steps, shift=False), *_of_record(prefix, test, file)]
     return (*(nuisance.name for nuisance, _ in nuisances), *_sine_names(prefix, file))
 
@@ -76,6 +83,9 @@ def _of_steps(
                 yield Nuisance(f"{which}.at", "shift" if shift else "at", place), step.at
             if isinstance(step.step, Unknown):
                 yield Nuisance(f"{which}.step", "step", place), step.step
+    if test.breaker is not None and isinstance(test.breaker.opens, Unknown):
+        place = next(k for k, change in enumerate(steps) if change.signal == BREAKER)
+        yield Nuisance(f"{prefix}{OPENING}", "shift", place), test.breaker.opens
 
 
 def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[Nuisance, Unknown]]:

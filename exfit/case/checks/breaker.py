@@ -1,0 +1,64 @@
+"""What contradicts itself in the opening of a breaker."""
+
+from collections.abc import Iterator
+
+from exfit.case.checks.node import ContentNode
+from exfit.case.checks.record import driving_faults
+from exfit.case.yaml import Fault
+from exfit.plants import BREAKER, EVENTS, SPEED, PlantKind
+from exfit.util.text import show
+
+
+def breaker_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield the faults of a breaker that opens, beside the rest of its test and its record."""
+    breaker, channels = test.at(BREAKER), record.at("channels")
+    if not breaker.is_section:
+        return
+    driving = driving_signals(test, record, kind)
+    if breaker.at("speed").text == "recorded" and SPEED not in channels:
+        yield breaker.at("speed").fault("recorded needs the channel speed in the record")
+    if SPEED in driving:
+        yield from driving_faults(channels.at(SPEED))
+    for signal in driving:
+        for key in ("scale", "offset"):
+            if channels.at(signal, key).is_section:
+                text = "must be a number: the signal drives the simulation"
+                yield channels.at(signal, key).fault(text)
+    if driving and record.at("delay").value not in (None, 0, 0.0):
+        text = f"not allowed where the record's {' and '.join(driving)} drives the simulation"
+        yield record.at("delay").fault(text)
+    yield from _free_instant_faults(test, driving)
+    yield from _switching_faults(test, breaker.at("opens").start)
+
+
+def driving_signals(test: ContentNode, record: ContentNode, kind: PlantKind) -> tuple[str, ...]:
+    """Return the channels of a record that drive the machine from the opening of a breaker on."""
+    breaker, channels = test.at(BREAKER), record.at("channels")
+    if not breaker.is_section:
+        return ()
+    simulated = breaker.at("speed").text == "simulated"
+    possible = (*(() if kind.has_exciter else kind.driving), *(() if simulated else (SPEED,)))
+    return tuple(signal for signal in possible if signal in channels)
+
+
+def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterator[Fault]:
+    """Yield why the instant of the opening cannot be found: the whole response is shifted by it."""
+    opens = test.at(BREAKER, "opens")
+    if not opens.is_section:
+        return
+    others = [name for name in (*EVENTS, "begin") if name != BREAKER and name in test]
+    if others:
+        yield opens.fault(f"must be a number where the test has {' and '.join(others)} as well")
+    if driving:
+        text = f"must be a number: the record's {' and '.join(driving)} drives the simulation"
+        yield opens.fault(text)
+
+
+def _switching_faults(test: ContentNode, opens: float | None) -> Iterator[Fault]:
+    """Yield what is switched in a network from which the machine is already parted."""
+    for name in ("E", "network"):
+        for event in test.at(name).entries:
+            at = event.at("at").number
+            if opens is not None and at is not None and at >= opens:
+                text = f"{show(at)} s: no effect, as the breaker is open from {show(opens)} s on"
+                yield event.at("at").fault(text)

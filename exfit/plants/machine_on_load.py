@@ -1,0 +1,102 @@
+"""A machine alone on load until its breaker opens; its field voltage is constant, or recorded."""
+
+from functools import cache
+
+from exfit.engine.system import Motion, Rest, Signals, System
+from exfit.models.machines import Axes, Machine
+from exfit.models.phasors import modulus
+from exfit.models.sheet import Sheet, sheet
+from exfit.plants.breaker import BREAKER, SPEED, breaker_of
+from exfit.plants.infinite_bus import Flow, rotor_frame
+from exfit.plants.parts import (
+    MACHINE,
+    NETWORK,
+    VT0,
+    Names,
+    motion,
+    named_parameters,
+    seconds,
+    symbols,
+    values_named,
+    values_of,
+)
+from exfit.plants.plant import Equipment, PlantKind, present
+
+OUTPUTS = ("efd", "vt", "ifd", "p", "q", "it", "speed")
+LOAD: Sheet = sheet(
+    ("P", 0.0, "pu", (-10.0, 10.0), "active power until the breaker opens"),
+    ("Q", 0.0, "pu", (-10.0, 10.0), "reactive power until the breaker opens"),
+)
+
+
+@cache
+def machine_on_load(machine: Machine, inputs: tuple[str, ...] = (BREAKER,)) -> System:
+    """Return a machine at rest with P and Q until its breaker opens, at constant power Pm.
+
+    The inputs are ``breaker``, 1 from the opening on; ``efd``, the change of the field voltage from
+    the one that holds P, Q and the parameter ``vt0``; and ``speed``, the recorded change of the
+    speed, without which 2H dw/dt = (Pm - D dw) / (1 + dw). All per unit on the machine's base.
+    """
+
+    def rest(p: Signals) -> Rest:
+        values = named_parameters(p, MACHINE, machine.sheet)
+        n, vt = named_parameters(p, NETWORK, LOAD), p[VT0]
+        stator = rotor_frame(vt, Flow(n.P / vt, n.Q / vt, vt, 0.0), machine, values)
+        fluxes = Names()
+        machine.rest(stator.v, stator.i, values, fluxes)
+        setpoints = {"efd": machine.field(fluxes, stator.i, values), "Pm": n.P}
+        current = {"id": stator.i.d, "iq": stator.i.q}
+        return Rest({**values_of(fluxes, machine.states), "dw": 0.0}, {**setpoints, **current})
+
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+        values, slopes = named_parameters(p, MACHINE, machine.sheet), Names()
+        breaker, closed = breaker_of(u, x["dw"]), Axes(r["id"], r["iq"])
+        i, factor = breaker.current(closed), breaker.factor
+        fluxes = values_named(x, machine.states)
+        at = machine.source(fluxes, values)
+        v = Axes(factor * (at.voltage.d + at.xq * i.q), factor * (at.voltage.q - at.xd * i.d))
+        ifd, efd = machine.field(fluxes, i, values), r["efd"] + u.get("efd", 0.0)
+        machine.slopes(fluxes, efd, ifd, i, values, slopes)
+        machine.q_slopes(fluxes, i, values, slopes)
+        torque = (r["Pm"] - values.D * x["dw"]) / (1.0 + x["dw"])
+        slopes.dw = 0.0 if SPEED in inputs else torque / (2.0 * values.H)
+        # what is recorded until the breaker opens is noise: the machine rests
+        d = Names(**{name: breaker.once_open(slope) for name, slope in vars(slopes).items()})
+        outputs = {
+            "efd": efd,
+            "vt": modulus(v.d, v.q),
+            "ifd": ifd,
+            "p": v.d * i.d + v.q * i.q,
+            "q": v.q * i.d - v.d * i.q,
+            "it": breaker.until_open(modulus(closed.d, closed.q)),
+            "speed": 1.0 + breaker.dw,
+        }
+        return motion(d, (*machine.states, "dw"), {**x, **outputs})
+
+    return System(
+        parameters=(*symbols(MACHINE, machine.sheet), *symbols(NETWORK, LOAD), VT0),
+        setpoints=("efd", "Pm", "id", "iq"),
+        states=(*machine.states, "dw"),
+        inputs=inputs,
+        outputs=(*OUTPUTS, *machine.states, "dw"),
+        time_constants=tuple(seconds(MACHINE, machine.sheet)),
+        rest=rest,
+        motion=equations,
+    )
+
+
+def _build(equipment: Equipment) -> System:
+    inputs = tuple(name for name in (BREAKER, "efd", SPEED) if name in equipment.inputs)
+    return machine_on_load(present(equipment.machine), inputs)
+
+
+MACHINE_ON_LOAD = PlantKind(
+    name="machine-on-load",
+    title="the machine alone, on load until its breaker opens",
+    needs=("machine", "network"),
+    events=(BREAKER,),
+    signals=OUTPUTS,
+    driving=("efd",),
+    network=lambda given: LOAD,
+    build=_build,
+)
