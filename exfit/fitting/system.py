@@ -68,13 +68,16 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
         changed |= {name for name in ("vs", "E") if getattr(test, name)}
         for switch in test.network:
             changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
-    opening = case.tests if recording is None else (recording.test,)
-    if any(test.breaker is not None for test in opening):
-        changed.add(BREAKER)
-    if recording is not None:
-        changed |= {*driving_after_opening(case, recording)}
+    changed |= _inputs_of_breaker(case, recording)
     inputs = ("vref", "vs", "E", "R", "X", BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
+
+
+def _inputs_of_breaker(case: Case, recording: Recording | None) -> set[str]:
+    """Return the breaker where it opens, and what then drives the machine."""
+    if recording is None:
+        return {BREAKER} if any(test.breaker for test in case.tests) else set()
+    return {BREAKER, *driving_after_opening(case, recording)} if recording.test.breaker else set()
 
 
 def driving_after_opening(case: Case, recording: Recording) -> tuple[str, ...]:

@@ -336,7 +336,7 @@ NAMES = {
     "p": ["MW", "P", "Pe", "P_gen (MW)", "Active Power", "Wirkleistung in MW"],
     "q": ["Mvar", "Q", "Qgen [Mvar]", "Reactive power", "Blindleistung"],
     "vref": ["vref", "Vref", "U_ref", "Reference", "Sollwert", "Usoll (%)"],
-    "speed": ["Speed", "Drehzahl", "n (rpm)", "rotor speed (pu)"],
+    "speed": ["Speed", "Drehzahl", "rotor speed (pu)"],
     None: [
         "Temp",
         "f (Hz)",

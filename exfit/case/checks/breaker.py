@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from exfit.case.checks.bump_test import place_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import driving_faults
 from exfit.case.yaml import Fault
@@ -28,7 +29,10 @@ def breaker_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> I
         text = f"not allowed where the record's {' and '.join(driving)} drives the simulation"
         yield record.at("delay").fault(text)
     yield from _free_instant_faults(test, driving)
-    yield from _switching_faults(test, breaker.at("opens").start)
+    opens = breaker.at("opens")
+    if opens.start is not None:
+        yield from place_faults(opens, opens.start, test.at("duration").number)
+        yield from _switching_faults(test, opens.start)
 
 
 def driving_signals(test: ContentNode, record: ContentNode, kind: PlantKind) -> tuple[str, ...]:
@@ -54,11 +58,11 @@ def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterato
         yield opens.fault(text)
 
 
-def _switching_faults(test: ContentNode, opens: float | None) -> Iterator[Fault]:
+def _switching_faults(test: ContentNode, opens: float) -> Iterator[Fault]:
     """Yield what is switched in a network from which the machine is already parted."""
     for name in ("E", "network"):
         for event in test.at(name).entries:
             at = event.at("at").number
-            if opens is not None and at is not None and at >= opens:
+            if at is not None and at >= opens:
                 text = f"{show(at)} s: no effect, as the breaker is open from {show(opens)} s on"
                 yield event.at("at").fault(text)

@@ -15,12 +15,9 @@ def bump_test_faults(test: ContentNode, network: ContentNode, kind: PlantKind) -
         yield from _step_faults(test, name)
         yield from table_faults(test.at(name), test.at("duration").number)
         for place, at in moves_of(test.at(name)):
-            yield from _place_faults(place, at, test.at("duration").number)
+            yield from place_faults(place, at, test.at("duration").number)
         if name in test and name not in kind.events:
             yield test.at(name).fault(f"not allowed with plant {kind.name}")
-    opens = test.at(BREAKER, "opens")
-    if opens.start is not None:
-        yield from _place_faults(opens, opens.start, test.at("duration").number)
     for switch in test.at("network").entries:
         if switch.at("E").number is not None and "E" not in network:
             text = "only where plant.network gives E; test.E changes it by steps"
@@ -98,7 +95,7 @@ def _step_faults(test: ContentNode, name: str) -> Iterator[Fault]:
         at = step.at("at").start
         if at is not None:
             yield from _order_faults(step.at("at"), at, before)
-            yield from _place_faults(step.at("at"), at, test.at("duration").number)
+            yield from place_faults(step.at("at"), at, test.at("duration").number)
         before = step
 
 
@@ -113,6 +110,7 @@ def _order_faults(place: ContentNode, at: float, before: ContentNode | None) -> 
         yield place.fault(text)
 
 
-def _place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[Fault]:
+def place_faults(place: ContentNode, at: float, end: float | None) -> Iterator[Fault]:
+    """Yield an instant outside a test that begins at 0 and has a known end."""
     if end is not None and not 0 <= at < end:
         yield place.fault(f"{show(at)} s lies outside 0 ... {show(end)} s, the duration")

@@ -84,8 +84,8 @@ def _of_steps(
             if isinstance(step.step, Unknown):
                 yield Nuisance(f"{which}.step", "step", place), step.step
     if test.breaker is not None and isinstance(test.breaker.opens, Unknown):
-        place = next(k for k, change in enumerate(steps) if change.signal == BREAKER)
-        yield Nuisance(f"{prefix}{OPENING}", "shift", place), test.breaker.opens
+        # the only step of its test
+        yield Nuisance(f"{prefix}{OPENING}", "shift"), test.breaker.opens
 
 
 def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[Nuisance, Unknown]]:
