@@ -3,12 +3,13 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.fitting.parameters import UNIT, FreeParameter
+from exfit.fitting.parameters import UNIT, FreeParameter, Prior
 from exfit.fitting.uncertainty import shared_reason
 from exfit.inference import (
     Confidence,
@@ -29,6 +30,7 @@ DIFFERENCE = 6e-6  # of a scaled parameter: where the error of a central differe
 DIFFERENCE_ERROR = 1e-9  # of the Jacobian, as a share of its largest singular value
 POINTS_OF_PROFILE = 3  # of a side: only its end is asked for
 STRATEGY = "lm-then-dgn"
+MOST_DESCENTS = 4  # each to a lower minimum than the one before
 ENDS = {
     estimate.ProfileEnd.FAILED: "the machine has no rest beyond",
     estimate.ProfileEnd.FLAT: "the residuals hardly change",
@@ -43,26 +45,31 @@ class PointProblem:
     ``errors(values)`` gives the weighted errors (M,), simulated less measured, nan for values that
     contradict each other; ``given`` are the values of all that is not free; ``blocks`` say which
     errors belong to which signal. An error of 1 is as large as its noise, as far as that is known.
+    ``priors`` are those of values by name; ``following`` adds the values that follow from the free
+    ones.
     """
 
     errors: Callable[[Values], Array]
     given: Values
     free: tuple[FreeParameter, ...]
     blocks: tuple[ResidualBlock, ...]
+    priors: Mapping[str, Prior]
+    following: Callable[[dict[str, float]], dict[str, float]] = dict
 
     def values(self, theta: Array) -> dict[str, float]:
         """Return all values at scaled parameters (N,)."""
         pairs = zip(self.free, theta, strict=True)
-        return {**self.given, **{each.name: each.value(float(x)) for each, x in pairs}}
+        free = {each.name: each.value(float(x)) for each, x in pairs}
+        return self.following({**self.given, **free})
+
+    def theta(self, values: Values) -> Array:
+        """Return the scaled parameters (N,) of some values."""
+        return np.array([each.scaled(values[each.name]) for each in self.free])
 
     def residuals(self, theta: Array) -> Array:
         """Return the weighted errors, then what priors add, (M + P,)."""
         values = self.values(theta)
-        priors = [
-            (values[each.name] - each.prior.mean) / each.prior.std
-            for each in self.free
-            if each.prior is not None
-        ]
+        priors = [(values[name] - prior.mean) / prior.std for name, prior in self.priors.items()]
         return np.concatenate([self.errors(values), priors])
 
     def jacobian(self, theta: Array) -> Array:
@@ -101,6 +108,12 @@ class FittedPoints:
         """Return the standard deviation of a signal's weighted errors, less what was fitted."""
         return next(noise.estimated for noise in self.confidence.noise if noise.label == signal)
 
+    def explained(self, name: str, why: str) -> Self:
+        """Return the same fit with another reason for an interval that is open."""
+        parameters = self.confidence.parameters
+        parameters = {**parameters, name: replace(parameters[name], why=why)}
+        return replace(self, confidence=replace(self.confidence, parameters=parameters))
+
     @property
     def undetermined(self) -> tuple[str, ...]:
         """What the points do not determine, in words."""
@@ -117,38 +130,68 @@ class FittedPoints:
         return self.confidence.sentences
 
 
-def fit_points(problem: PointProblem) -> FittedPoints:
+def fit_points(problem: PointProblem, search: PointProblem) -> FittedPoints:
     """Return the fit of some points, with the intervals of profiles where these can be made.
+
+    ``search`` is the same problem, perhaps with other free parameters in place of some, over which
+    the errors are smooth where they are not over these: it descends, and profiles all others.
 
     Raises ValueError where the errors at the start are not finite.
     """
-    functions = estimate.OneByOne(problem.residuals, problem.jacobian)
-    result = descended(problem, np.array([each.scaled(each.start) for each in problem.free]))
-    linear = linearisation(problem, result.x)
-    intervals = confidence(linear, data="the points", hint="")
+    theta = np.array([each.scaled(each.start) for each in search.free])
+    for _ in range(MOST_DESCENTS):
+        result = descended(search, theta)
+        values = search.values(result.x)
+        linear = linearisation(problem, values)
+        intervals = confidence(linear, data="the points", hint="")
+        profiles = profiled(problem, search, values, linear, intervals) if result.success else {}
+        lower = [each for each in profiles.values() if each.profile.moved]
+        if not lower:
+            break
+        lowest = min(lower, key=lambda each: each.profile.cost)
+        theta = search.theta(lowest.problem.values(lowest.profile.x))
+    known = {name: by_profile(intervals.parameters[name], each) for name, each in profiles.items()}
+    intervals = replace(intervals, parameters={**intervals.parameters, **known})
+    return FittedPoints(values, result, intervals, identifiability(linear, intervals))
+
+
+class PointProfile(NamedTuple):
+    """The profile of a parameter, and the problem in which it was made."""
+
+    problem: PointProblem
+    profile: estimate.CostProfile
+
+
+def profiled(
+    problem: PointProblem,
+    search: PointProblem,
+    values: Values,
+    linear: Linearisation,
+    intervals: Confidence,
+) -> dict[str, PointProfile]:
+    """Return the profiles of parameters about some values, by name."""
     limits = {
-        k: rise
-        for k, rise in enumerate(rises(linear, intervals).values())
+        name: rise
+        for name, rise in rises(linear, intervals).items()
         if isfinite(rise) and rise > 0.0
     }
-    if limits and result.success:
-        profiles = estimate.profiles(
-            functions,
-            result.x,
-            limits,
-            problem.bounds,
+    of_search = {each.name for each in search.free}
+    profiles = {}
+    for form, names in ((search, limits.keys() & of_search), (problem, limits.keys() - of_search)):
+        index_of = {each.name: k for k, each in enumerate(form.free) if each.name in names}
+        if not index_of:
+            continue
+        made = estimate.profiles(
+            estimate.OneByOne(form.residuals, form.jacobian),
+            form.theta(values),
+            {index: limits[name] for name, index in index_of.items()},
+            form.bounds,
             points=POINTS_OF_PROFILE,
             workers=1,
             x_scale=UNIT,
         )
-        if profiles[0].moved:
-            result = descended(problem, profiles[0].x)
-            linear = linearisation(problem, result.x)
-            intervals = confidence(linear, data="the points", hint="")
-        intervals = with_profiles(intervals, problem, profiles)
-    return FittedPoints(
-        problem.values(result.x), result, intervals, identifiability(linear, intervals)
-    )
+        profiles |= {form.free[each.index].name: PointProfile(form, each) for each in made}
+    return profiles
 
 
 def descended(problem: PointProblem, theta: Array) -> estimate.Result:
@@ -164,9 +207,9 @@ def descended(problem: PointProblem, theta: Array) -> estimate.Result:
     )
 
 
-def linearisation(problem: PointProblem, theta: Array) -> Linearisation:
-    """Return the errors of a fit of points and their derivatives at scaled parameters (N,)."""
-    values, free = problem.values(theta), problem.free
+def linearisation(problem: PointProblem, values: Values) -> Linearisation:
+    """Return the errors of a fit of points and their derivatives at some values."""
+    free, theta = problem.free, problem.theta(values)
     errors = problem.errors(values)
     slopes = np.array([each.slope(float(x)) for each, x in zip(free, theta, strict=True)])
     return Linearisation(
@@ -182,29 +225,18 @@ def linearisation(problem: PointProblem, theta: Array) -> Linearisation:
         curvature=np.ones(len(errors)),
         channels=problem.blocks,
         priors=tuple(
-            PriorRow(k, each.prior.mean, each.prior.std, 1.0)
+            PriorRow(k, problem.priors[each.name].mean, problem.priors[each.name].std, 1.0)
             for k, each in enumerate(free)
-            if each.prior is not None
+            if each.name in problem.priors
         ),
         through_zero=tuple(each.low < 0.0 < each.high for each in free),
     )
 
 
-def with_profiles(
-    intervals: Confidence, problem: PointProblem, profiles: tuple[estimate.CostProfile, ...]
-) -> Confidence:
-    """Return what is known of the parameters, with the intervals of their profiles."""
-    parameters = dict(intervals.parameters)
-    for profile in profiles:
-        parameter = problem.free[profile.index]
-        parameters[parameter.name] = by_profile(parameters[parameter.name], parameter, profile)
-    return replace(intervals, parameters=parameters)
-
-
-def by_profile(
-    known: Uncertainty, parameter: FreeParameter, profile: estimate.CostProfile
-) -> Uncertainty:
+def by_profile(known: Uncertainty, made: PointProfile) -> Uncertainty:
     """Return what is known of a parameter by its profile."""
+    profile = made.profile
+    parameter = made.problem.free[profile.index]
     limits = [None if end is None else parameter.value(end) for end in (profile.low, profile.high)]
     interval = None if limits == [None, None] else (limits[0], limits[1])
     why = " and ".join(open_sides(parameter, profile))

@@ -1,7 +1,8 @@
 """V-curves: the field current that holds points on load, measured beside the machine's model."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,8 @@ FIELD_SIGNALS = ("ifd", "efd")
 LARGEST_SHARE = 0.02  # of the rms of a field signal: what instruments and model may leave
 LARGEST_NOISES = 3.0  # times the noise that is given
 LEVEL_GAP = 0.04  # pu of power, between points of one level and those of the next
+SALIENCY = "saliency"  # (1 - Xq / Xd)^2, in which the field current is smooth up to Xq = Xd
+UP_TO_XD = "has no upper limit: the points do not exclude Xq = Xd"
 CURVE_POINTS = 101  # of the model's curve of a level, odd: one lies at its middle
 WIDER = 0.1  # of the range of q: how far the model's curve goes beyond the points
 
@@ -78,7 +81,7 @@ def v_curve(
     _refuse_no_rest(machine, data, points)
     fields = FieldsOnLoad(machine, points)
     problem = fields.problem(data, free)
-    fit = fit_points(problem) if problem.free else None
+    fit = fields.fit(problem) if problem.free else None
     values = problem.given if fit is None else fit.values
     readings = {
         signal: _reading_of(signal, fields, values, fit, limit) for signal in points.readings
@@ -113,7 +116,43 @@ class FieldsOnLoad:
         readings = self.points.readings
         bases = {base_of(signal): reading.base for signal, reading in readings.items()}
         free_bases = [reading.free_base for reading in readings.values() if reading.free_base]
-        return PointProblem(self.errors, {**data, **bases}, (*free, *free_bases), self.blocks)
+        parameters = (*free, *free_bases)
+        priors = {each.name: each.prior for each in parameters if each.prior is not None}
+        return PointProblem(self.errors, {**data, **bases}, parameters, self.blocks, priors)
+
+    def fit(self, problem: PointProblem) -> FittedPoints:
+        """Return the fit of what is free."""
+        fit = fit_points(problem, self.search(problem))
+        known = fit.confidence.parameters.get("Xq")
+        if known is None or known.interval is None or known.interval[1] is not None:
+            return fit
+        quadrature = next(each for each in problem.free if each.name == "Xq")
+        if quadrature.high < fit.values["Xd"]:
+            return fit
+        return fit.explained("Xq", UP_TO_XD)
+
+    def search(self, problem: PointProblem) -> PointProblem:
+        """Return the same problem with SALIENCY free in place of Xq.
+
+        By Xq itself the field current is stationary where Xq = Xd: a descent that comes there finds
+        no way back, and beyond it the same field currents return.
+        """
+        quadrature = next((each for each in problem.free if each.name == "Xq"), None)
+        if quadrature is None:
+            return problem
+        start = {**problem.given, **{each.name: each.start for each in problem.free}}
+        share = min(quadrature.start / start["Xd"], 1.0)
+        saliency = FreeParameter(SALIENCY, (1.0 - share) ** 2, 0.0, 1.0, logarithmic=False)
+
+        def following(values: dict[str, float]) -> dict[str, float]:
+            xq = values["Xd"] * (1.0 - sqrt(values[SALIENCY]))
+            return values | {"Xq": min(max(xq, quadrature.low), quadrature.high)}
+
+        return replace(
+            problem,
+            free=tuple(saliency if each is quadrature else each for each in problem.free),
+            following=following,
+        )
 
     @property
     def blocks(self) -> tuple[ResidualBlock, ...]:
@@ -134,7 +173,7 @@ class FieldsOnLoad:
         readings = self.points.readings
         if any(True for _ in self.machine.faults(values)):
             return np.full(len(self.points.p) * len(readings), np.nan)
-        ifd = self.simulated(values)
+        ifd = self.simulated({**values, "Xq": min(values["Xq"], values["Xd"])})
         # in shares of the base at the start: the weights of the readings stay as they are
         errors = [
             weight_of(signal, reading)
