@@ -1,4 +1,4 @@
-"""Points that were read from instruments: columns of a file, or of a table in the case itself."""
+"""Points that were read from instruments: columns of a file, or numbers in the case itself."""
 
 import hashlib
 import json
@@ -9,13 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.errors import RecordError
 from exfit.records.formats import open_table
-from exfit.records.formats.table import Table, column_error, position
+from exfit.records.formats.table import Table, column_error
 from exfit.records.units import alike
 
 Array = NDArray[np.float64]
-Row = Sequence[str | float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,33 +44,11 @@ def read_points(path: Path, columns: Mapping[str, str | None], sheet: str | None
     return Points(numbers, units, path, table.sha256)
 
 
-def table_points(rows: Sequence[Row], columns: Mapping[str, str | None], place: Path) -> Points:
-    """Return columns of a table whose first row has their names.
-
-    Raises RecordError for a column that is missing, a row of another length than the first, or a
-    cell that is no number; ``place`` is what it begins with.
-    """
-    names, *points = rows
-    for number, row in enumerate(points, 2):
-        if len(row) != len(names):
-            raise RecordError(
-                f"{place}: table: row {number} has {len(row)} cells, the first one {len(names)}"
-            )
-    numbers = {
-        column: np.array([
-            _number(row[position(place, list(map(str, names)), column)], number, column, place)
-            for number, row in enumerate(points, 2)
-        ])
-        for column in columns
-    }  # fmt: skip
-    content = json.dumps([list(row) for row in rows])
-    return Points(numbers, {}, place, hashlib.sha256(content.encode()).hexdigest())
-
-
-def _number(cell: str | float, row: int, column: str, place: Path) -> float:
-    if isinstance(cell, str):
-        raise column_error(f"{place}: table: row {row}", column, f"{cell!r} is not a number")
-    return float(cell)
+def given_points(rows: Sequence[Sequence[float]], signals: Sequence[str], source: Path) -> Points:
+    """Return the columns of numbers that a case itself gives, by signal, in the order of a row."""
+    columns = dict(zip(signals, np.array(rows).T, strict=False))
+    digest = hashlib.sha256(json.dumps([list(row) for row in rows]).encode()).hexdigest()
+    return Points(columns, {}, source, digest)
 
 
 def _check_unit(table: Table, column: str, unit: str | None) -> None:

@@ -176,7 +176,7 @@ def profiled(
         if isfinite(rise) and rise > 0.0
     }
     of_search = {each.name for each in search.free}
-    profiles = {}
+    profiles: dict[str, PointProfile] = {}
     for form, names in ((search, limits.keys() & of_search), (problem, limits.keys() - of_search)):
         index_of = {each.name: k for k, each in enumerate(form.free) if each.name in names}
         if not index_of:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from exfit.analysis.steady.field_on_load import field_on_load
 from exfit.analysis.steady.v_curve import (
-    FIELD_SIGNALS,
     FieldMeasurement,
     PointsOnLoad,
     base_of,
@@ -17,11 +16,13 @@ from exfit.analysis.steady.v_curve import (
 )
 from exfit.case.bounds import search_bounds
 from exfit.case.schema import FreeSection, PointColumn, SteadyTest, Unknown
-from exfit.errors import CaseError
+from exfit.case.schema.steady_tests import FIELDS, POINT_SIGNALS, TERMINALS
+from exfit.errors import CaseError, RecordError
 from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.models.machines import Machine
 from exfit.models.sheet import Parameter
-from exfit.records.points import Points, read_points, table_points
+from exfit.records.points import Points, given_points, read_points
+from exfit.records.units import needs_base
 from exfit.results.v_curve import VCurve
 
 Array = NDArray[np.float64]
@@ -31,11 +32,18 @@ FARTHEST_BASE = 4.0  # times the base that fits best at the start: as far as one
 
 
 def points_of(test: SteadyTest, folder: Path) -> Points:
-    """Return the points of a test, whose file lies in a folder; raises RecordError."""
-    units = {column.column: column.unit for column in test.columns.values()}
-    if test.file is not None:
-        return read_points(folder / test.file, units, test.sheet)
-    return table_points(test.table or (), units, Path(test.name))
+    """Return the points of a test, by signal; its file lies in a folder. Raises RecordError."""
+    if test.file is None:
+        return given_points(test.points or (), POINT_SIGNALS, Path(test.name))
+    names = {signal: column.column or signal for signal, column in test.columns.items()}
+    units = {names[signal]: column.unit for signal, column in test.columns.items()}
+    read = read_points(folder / test.file, units, test.sheet)
+    return Points(
+        {signal: read.columns[name] for signal, name in names.items()},
+        {signal: read.units[name] for signal, name in names.items() if name in read.units},
+        read.source,
+        read.sha256,
+    )
 
 
 def steady(test: SteadyTest, points: Points, machine: Machine, data: Values) -> VCurve:
@@ -44,36 +52,46 @@ def steady(test: SteadyTest, points: Points, machine: Machine, data: Values) -> 
     ``data`` has a value for each symbol of the machine's sheet. Raises ExfitError for input that
     cannot be used.
     """
-    signals = {
-        signal: points.columns[column.column] * column.scale
-        for signal, column in test.columns.items()
-    }
-    p, q, vt = (signals[signal] / _given_base(test.columns[signal]) for signal in ("p", "q", "vt"))
+    columns = {signal: column_of(test, points, signal) for signal in points.columns}
+    numbers = {signal: points.columns[signal] * columns[signal].scale for signal in columns}
+    p, q, vt = (numbers[signal] / given_base(columns[signal]) for signal in TERMINALS)
     start = {**data, **{symbol: free.start for symbol, free in test.free.items()}}
     ifd = field_on_load(machine, start, p, q, vt)
-    readings = {
-        signal: reading_of(signal, test.columns[signal], signals[signal], ifd)
-        for signal in FIELD_SIGNALS
-        if signal in signals
+    measurements = {
+        signal: measurement_of(signal, columns[signal], numbers[signal], ifd)
+        for signal in FIELDS
+        if signal in numbers
     }
     rows = {row.symbol: row for row in machine.sheet}
     free = [free_parameter(symbol, free, rows[symbol]) for symbol, free in test.free.items()]
     limit = None if test.accept is None else test.accept.rmse
-    return v_curve(machine, data, PointsOnLoad(p, q, vt, readings), free, limit)
+    return v_curve(machine, data, PointsOnLoad(p, q, vt, measurements), free, limit)
 
 
-def _given_base(column: PointColumn) -> float:
+def given_base(column: PointColumn) -> float:
+    """Return what 1 pu is of a column, 1 where that is not given as a number."""
     return column.base if isinstance(column.base, float) else 1.0
 
 
-def reading_of(signal: str, column: PointColumn, measured: Array, ifd: Array) -> FieldMeasurement:
-    """Return readings of a field signal (M,), of which the model has ``ifd`` (M,) at the start.
+def column_of(test: SteadyTest, points: Points, signal: str) -> PointColumn:
+    """Return how a signal is converted to per unit; raises RecordError where it is not."""
+    column = test.columns.get(signal) or PointColumn()
+    unit = column.unit or points.units.get(signal) or "pu"
+    if column.base is None and column.scale == 1.0 and needs_base(unit):
+        raise RecordError(f"{points.source}: {signal}: base: is missing: what is 1 pu in {unit}?")
+    return column.model_copy(update={"unit": unit})
+
+
+def measurement_of(
+    signal: str, column: PointColumn, measured: Array, ifd: Array
+) -> FieldMeasurement:
+    """Return the readings of a field signal (M,), of which the model has ``ifd`` (M,) at the start.
 
     A base that is found starts from its own start or, with ``auto``, from the one that fits best.
     """
     unit, base = column.unit or "pu", column.base
     if not isinstance(base, Unknown):
-        return FieldMeasurement(measured, unit, base or 1.0, column.noise)
+        return FieldMeasurement(measured, unit, given_base(column), column.noise)
     start = float(ifd @ measured / (ifd @ ifd)) if base.start == "auto" else base.start
     if not (isfinite(start) and start > 0.0):
         raise CaseError([f"columns.{signal}.base: {start:g} {unit} fits best, which is no base"])

@@ -23,7 +23,6 @@ from exfit.util.text import show
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-FIELD_SIGNALS = ("ifd", "efd")
 LARGEST_SHARE = 0.02  # of the rms of a field signal: what instruments and model may leave
 LARGEST_NOISES = 3.0  # times the noise that is given
 LEVEL_GAP = 0.04  # pu of power, between points of one level and those of the next

@@ -20,12 +20,14 @@ from exfit.case.schema.values import (
     thawed,
 )
 
-MOST_POINTS = 1000  # of a table; a longer one is a file
+MOST_POINTS = 1000  # of a list; a longer one is a file
+POINT_SIGNALS = ("p", "q", "vt", "ifd", "efd")
+TERMINALS, FIELDS = POINT_SIGNALS[:3], POINT_SIGNALS[3:]
 
 if TYPE_CHECKING:
     PointSignal = str
 else:
-    PointSignal = Literal["p", "q", "vt", "ifd", "efd"]
+    PointSignal = Literal[POINT_SIGNALS]
 
 
 def _column(value: Any) -> Any:
@@ -35,14 +37,19 @@ def _column(value: Any) -> Any:
 class PointColumn(Section):
     """A column of points and its conversion to per unit: column / base * scale."""
 
-    column: Text = Field(description="Name of the column.")
+    column: Text | None = Field(
+        default=None, description="Name of the column; none with points in place of a file."
+    )
     unit: Text | None = Field(
-        default=None, description="Unit of the column, such as MW, Mvar, kV, A, V, pu or %."
+        default=None,
+        description="Unit of the column, such as MW, Mvar, kV, A, V, pu or %; default: that of the "
+        "file, else pu.",
     )
     base: Findable | None = Field(
         default=None,
         description="Value of 1 pu in that unit: of p and q the rated MVA of the machine; of ifd "
-        "and efd what gives 1 pu of voltage on the air-gap line, or {start, min, max} to fit it.",
+        "and efd what gives 1 pu of voltage on the air-gap line, or {start, min, max} to fit it, "
+        "where start: auto needs no bounds.",
     )
     scale: Number = Field(default=1.0, description="Factor, such as -1; not zero.")
     noise: Positive | None = Field(
@@ -50,11 +57,6 @@ class PointColumn(Section):
         description="Standard deviation of the readings of ifd or efd, pu; default: that of the "
         "residuals.",
     )
-
-
-PointTable = Annotated[
-    tuple[tuple[Text | Number, ...], ...], Field(min_length=2, max_length=MOST_POINTS)
-]
 
 
 class SteadyTest(Section):
@@ -70,9 +72,12 @@ class SteadyTest(Section):
         default=None, description="File of the points, in any format of a record."
     )
     sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
-    table: PointTable | None = Field(
+    points: (
+        Annotated[tuple[tuple[Number, ...], ...], Field(min_length=1, max_length=MOST_POINTS)]
+        | None
+    ) = Field(
         default=None,
-        description="In place of a file: rows of the points, the first with names of the columns.",
+        description="In place of a file: [p, q, vt, ifd] or [p, q, vt, ifd, efd] of each point.",
     )
     columns: Annotated[
         Mapping[
@@ -84,8 +89,9 @@ class SteadyTest(Section):
         AfterValidator(MappingProxyType),
         WrapSerializer(thawed),
     ] = Field(
+        default_factory=nothing,
         description="Columns of p, q, vt and of ifd, efd or both: a name, or a mapping. p and q "
-        "are positive where the machine gives power and is overexcited."
+        "are positive where the machine gives power and is overexcited.",
     )
     free: Frozen[FreeSection] = Field(
         default_factory=nothing,
