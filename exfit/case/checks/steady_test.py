@@ -73,17 +73,23 @@ def _column_faults(signal: str, column: ContentNode) -> Iterator[Fault]:
         yield base.fault(f"is missing: what is 1 pu in {unit}?")
     if column.at("scale").number == 0.0:
         yield column.at("scale").fault("must not be 0")
-    if base.is_section and signal not in FIELDS:
-        yield base.fault(f"must be a number: only that of {' or '.join(FIELDS)} can be fitted")
-    elif base.is_section:
-        yield from _free_base_faults(base)
-    elif base.number is not None and base.number <= 0.0:
+    if base.number is not None and base.number <= 0.0:
         yield base.fault(f"{show(base.number)} is not above 0")
-    if "noise" in column and signal not in FIELDS:
-        yield column.at("noise").fault(f"only allowed for {' or '.join(FIELDS)}")
+    yield from _free_base_faults(base) if signal in FIELDS else _terminal_faults(column)
+
+
+def _terminal_faults(column: ContentNode) -> Iterator[Fault]:
+    """Yield what only a column of the field may have."""
+    fields = " or ".join(FIELDS)
+    if column.at("base").is_section:
+        yield column.at("base").fault(f"must be a number: only that of {fields} can be fitted")
+    if "noise" in column:
+        yield column.at("noise").fault(f"only allowed for {fields}")
 
 
 def _free_base_faults(base: ContentNode) -> Iterator[Fault]:
+    if not base.is_section:
+        return
     yield from bound_faults(base)
     for key in ("start", "min"):
         number = base.at(key).number
