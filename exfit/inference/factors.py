@@ -63,11 +63,15 @@ class Factors:
     def _errors_seen(self, channel: ResidualBlock, noise: "Noise") -> Array:
         """Return (r, K) so that its square is what B has of a channel, in the directions left.
 
-        Where the recorder rounds coarsely C is the larger of the widened variance and that with the
-        covariance of the rounding, whose waves come last.
+        C is the larger of the widened variance and, where an autoregression describes the errors,
+        its covariance; where the recorder rounds coarsely, that with the covariance of the
+        rounding, whose waves come last.
         """
         own = np.asarray(self.left[channel.rows].T * np.sqrt(self.lin.mean_curvature(channel)))
         widened = np.asarray(noise.spread * own)
+        if noise.series is not None:
+            correlated = noise.std * noise.series.correlated(own)
+            return max(widened, correlated, key=lambda errors: float(np.sum(errors**2)))
         if channel.rounding is None:
             return widened
         waves = channel.rounding.waves

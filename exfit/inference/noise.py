@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from exfit.inference.autoregression import Autoregression, Described, described
 from exfit.inference.factors import Factors
 from exfit.inference.linear import Array, ResidualBlock
 from exfit.inference.quantiles import chi_square_tail
@@ -34,6 +35,8 @@ class Noise:
     effective  how many independent samples they are worth
     inflation  samples / effective: the factor on the variance
     rounding   step of a recorder that rounds more coarsely than its noise; 0 for any other
+    partial_autocorrelations  of the autoregression that describes the residuals; none where they
+               are white or where none does
     """
 
     label: str
@@ -46,11 +49,18 @@ class Noise:
     effective: Annotated[float, nan]
     inflation: Annotated[float, nan]
     rounding: float = 0.0
+    partial_autocorrelations: tuple[float, ...] = ()
 
     @property
     def spread(self) -> float:
         """The standard deviation, widened for what is not white."""
         return self.std * sqrt(self.inflation)
+
+    @property
+    def series(self) -> Autoregression | None:
+        """The autoregression that describes the residuals."""
+        partial = self.partial_autocorrelations
+        return Autoregression(partial) if partial else None
 
     def sentences(self, alone: bool) -> Iterator[str]:
         """Yield what is remarkable; ``alone``: there is no other channel."""
@@ -70,6 +80,14 @@ class Noise:
             finding = f"the residuals of {self.label} are not white (Ljung-Box {p})"
             if self.inflation == 1.0:
                 yield f"{finding}, but alternate: the intervals are no wider for it"
+                return
+            if self.partial_autocorrelations:
+                yield (
+                    f"{finding}, but an autoregression of order "
+                    f"{len(self.partial_autocorrelations)} describes them: for a slow change "
+                    f"{self.samples} samples count as {self.effective:.0f}, and the intervals "
+                    "allow for it"
+                )
                 return
             wider = "the intervals are" if alone else "its noise counts"
             more = " wider" if alone else ""
@@ -158,19 +176,26 @@ def is_explained(factors: Factors, fit: OwnFit, place: int, noise: Sequence[Nois
 
 def _noise(factors: Factors, channel: ResidualBlock, influence: Array, share: float) -> Noise:
     lin = factors.lin
-    samples = len(influence)
+    samples, curvature = len(influence), lin.mean_curvature(channel)
     # a share of the order of rounding: as many parameters as samples
     dof = samples * share if share > samples * np.finfo(float).eps else 0.0
     square = float(influence @ influence)
-    estimated = sqrt(square / dof) / lin.mean_curvature(channel) if dof else nan
+    estimated = sqrt(square / dof) / curvature if dof else nan
     p_value = whiteness(influence)
-    white = p_value is None or p_value >= SURPRISING
-    effective = float(samples) if white else effective_samples(influence)
+    correlation = None
+    effective = float(samples)
+    if not is_white(p_value):
+        effective = effective_samples(influence)
+        correlation = _correlation(factors, channel, influence)
+    scatter = estimated
+    if correlation is not None:
+        effective = min(effective, samples / correlation.series.inflation)
+        scatter = max(estimated, sqrt(correlation.variance) / curvature)
     accepted = agrees(estimated, channel.noise, dof * effective / samples)
     return Noise(
         label=channel.label,
         samples=samples,
-        std=_chosen(estimated, channel.noise, accepted),
+        std=_chosen(scatter, channel.noise, accepted),
         estimated=estimated,
         given=channel.noise,
         accepted=accepted,
@@ -178,7 +203,25 @@ def _noise(factors: Factors, channel: ResidualBlock, influence: Array, share: fl
         effective=effective,
         inflation=samples / effective,
         rounding=0.0 if channel.rounding is None else channel.rounding.step / channel.weight,
+        partial_autocorrelations=() if correlation is None else correlation.series.partial,
     )
+
+
+def is_white(p_value: float | None) -> bool:
+    """Return whether a test of whiteness does not reject it at 1 %."""
+    return p_value is None or p_value >= SURPRISING
+
+
+def _correlation(factors: Factors, channel: ResidualBlock, influence: Array) -> Described | None:
+    """Return the autoregression of the lowest order that leaves white noise; None without one.
+
+    It needs a row of the Jacobian for each error, and errors that no coarse recorder rounds.
+    """
+    slopes = factors.left[channel.rows]
+    if channel.rounding is not None or len(slopes) != len(influence):
+        return None
+    descriptions = described(influence, slopes)
+    return next((d for d in descriptions if is_white(whiteness(d.innovations))), None)
 
 
 def _chosen(estimated: float, given: float | None, accepted: bool | None) -> float:

@@ -13,6 +13,7 @@ from scipy.stats import t as student
 
 from exfit.dsp.rounding import noise_before_rounding, rounding_waves
 from exfit.inference import PriorRow, ResidualBlock, Rounding, confidence, partners_on_bounds, rises
+from exfit.inference.factors import factored
 from exfit.inference.noise import LAGS, effective_samples, whiteness
 from exfit.util import typed
 
@@ -44,10 +45,13 @@ def test_standard_errors_are_those_that_nist_certifies(name, logarithmic):
     case = CERTIFIED[name]
     x = np.array(case.minimum)
     scale = np.full(len(x), logarithmic)
-    known = confidence(linearised(x, case.fun(x), case.jac(x), logarithmic=scale))
+    lin = linearised(x, case.fun(x), case.jac(x), logarithmic=scale)
     # NIST takes all residuals for white; eleven digits of the minimum leave about five, and none
     # of Lanczos1, whose data have no noise
-    got = std_errors(known) / np.sqrt(known.noise[0].inflation)
+    factors = factored(lin, lin.free)
+    (noise,) = confidence(lin).noise
+    white = replace(noise, std=noise.estimated, inflation=1.0, partial_autocorrelations=())
+    got = np.sqrt(np.diag(factors.covariance((white,)))) * lin.size
     assert got == pytest.approx(case.deviations, rel=1e-5)
 
 
@@ -117,14 +121,25 @@ def test_a_logarithmic_interval_holds_the_truth_as_often():
 def test_intervals_are_widened_for_noise_that_is_not_white():
     noise = 0.3 * autoregressive(np.random.default_rng(4), 0.7, (PROBLEMS, 200))
     known = [confidence(lin) for lin in lines(noise)]
-    widened = np.mean([is_covered(one) for one in known], axis=0)
-    # the fit takes some of the slow noise for itself: the widening is a little too small
-    assert np.all((widened > 0.90) & (widened < LIKELY[1]))
-    plain = [is_covered(one, wider=one.noise[0].inflation ** -0.5) for one in known]
+    widened = np.mean([is_covered(intervals) for intervals in known], axis=0)
+    assert np.all((widened > LIKELY[0]) & (widened < LIKELY[1]))
+    plain = [
+        is_covered(intervals, wider=intervals.noise[0].inflation ** -0.5) for intervals in known
+    ]
     assert np.all(np.mean(plain, axis=0) < 0.75)
     text = known[0].sentences[0]
     assert text.startswith("the residuals of vt are not white (Ljung-Box p")
-    assert f"200 samples count as {known[0].noise[0].effective:.0f}, the intervals are" in text
+    effective = known[0].noise[0].effective
+    assert f"200 samples count as {effective:.0f}, and the intervals allow for it" in text
+
+
+def test_what_no_autoregression_describes_widens_by_one_factor():
+    hum = 0.3 * np.sin(np.linspace(0.0, 150.0, len(T)))
+    noise = 0.01 * np.random.default_rng(20).standard_normal(len(T))
+    (lin,) = lines([hum * np.linspace(1.0, 0.0, len(T)) ** 4 + noise])
+    (described,) = confidence(lin).noise
+    assert described.partial_autocorrelations == ()
+    assert described.effective == pytest.approx(effective_samples(lin.errors))
 
 
 def test_a_prior_that_is_right_narrows_the_interval_and_keeps_its_promise():
