@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import exfit
+from exfit.output.drawings import block_diagram, diagram_and_remarks
 
 DOCS = Path(__file__).parent
 CASES = DOCS.parent / "configs" / "models"
@@ -22,7 +23,6 @@ BEGIN, END = "<!-- keys -->", "<!-- /keys -->"
 
 # what a value of a JSON type is called in the tables
 TYPES = {"number": "number", "integer": "whole number", "string": "text"}
-DRAWN = "─►▲│◄▼"  # characters of a block diagram
 WIDTH, HEIGHT, DPI = 7.2, 2.2, 110  # of a figure and of each of its panels, inches
 LABELS = {"vt": "vt (pu)", "efd": "efd (pu)", "p": "p (pu)"}
 
@@ -201,12 +201,12 @@ def _response(case: str) -> Any:
 
 def _model_page(model: Any, caption: str, folder: Path) -> Path:
     title, source = _title_and_source(model.title)
-    diagram, remarks = _diagram_and_remarks(model.drawing)
+    _, remarks = diagram_and_remarks(model.drawing)
     parts = [
         f"# {model.name}",
         f"{title[:1].upper()}{title[1:]}.",
-        *([f"## Block diagram\n\n```text\n{diagram}\n```"] if diagram else []),
-        *remarks,
+        _diagram(model),
+        *map(_escaped, remarks),
         f"## Data sheet\n\n{_sheet(model.sheet)}",
         f"States: {', '.join(model.states)}.",
         f"## Response\n\n![response of {model.name}]({model.name}.png)\n\n{caption}",
@@ -221,6 +221,8 @@ def _machine_page(machine: Any, folder: Path) -> Path:
     parts = [
         f"# {machine.name}",
         f"Synchronous machine: {title[:1].lower()}{title[1:]}.",
+        _diagram(machine),
+        *map(_escaped, diagram_and_remarks(machine.drawing)[1]),
         f"## Data sheet\n\n{_sheet(machine.sheet)}",
         f"States: {', '.join(machine.d_axis)}.{q_axis if machine.q_axis else ''}",
         "## Response",
@@ -237,12 +239,11 @@ def _title_and_source(title: str) -> tuple[str, str]:
     return (match[1], match[2]) if match else (title, "")
 
 
-def _diagram_and_remarks(drawing: str) -> tuple[str, list[str]]:
-    """Return the block diagram of a docstring, and the paragraphs behind it, as Markdown."""
-    paragraphs = drawing.split("\n\n")
-    last = max((k for k, text in enumerate(paragraphs) if set(text) & set(DRAWN)), default=-1)
-    remarks = [_escaped(" ".join(text.split())) for text in paragraphs[last + 1 :]]
-    return "\n\n".join(paragraphs[: last + 1]), remarks
+def _diagram(model: Any) -> str:
+    """Return the block diagram of a model: SVG in the page, in the colours that a reader chose."""
+    diagram = block_diagram(model.drawing, model.name, model.title)
+    region = f'<div class="diagram-region" tabindex="0">\n{diagram}\n</div>'
+    return f"## Block diagram\n\n```{{raw}} html\n{region}\n```" if diagram else ""
 
 
 def _sheet(rows: Iterable[Any]) -> str:

@@ -95,13 +95,12 @@ def parts_of(case: Case) -> Iterator[PartDescription]:
     parts = case.parts
     models = {"exciter": parts.exciter, "stabiliser": parts.stabiliser}
     for part in parts.all:
-        model = models.get(part.kind)
-        machine = parts.machine if part.kind == "machine" else None
+        model = parts.machine if part.kind == "machine" else models.get(part.kind)
         yield PartDescription(
             kind=part.kind,
             name=part.name,
             prefix=part.prefix,
-            title=machine.title if machine else model.title if model else "",
+            title=model.title if model else "",
             drawing=model.drawing if model else "",
             sheet={row.symbol: SheetRow(row.unit, row.meaning) for row in part.sheet},
         )

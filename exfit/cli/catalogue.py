@@ -1,11 +1,18 @@
 """The commands models and schema."""
 
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from exfit.cli import completion
 from exfit.cli.options import print_json
+
+if TYPE_CHECKING:
+    from exfit.models.machines import Machine
+    from exfit.models.sheet import Model
 
 
 @click.command(short_help="List the models, or describe one.")
@@ -15,31 +22,35 @@ from exfit.cli.options import print_json
     "folder",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Write a page with a figure of every model.",
+    help="Write a page with the block diagram and a figure of NAME, or of every model.",
 )
 def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
-    from exfit.models import MODELS, STABILISERS, find
+    from exfit.models import MODELS, STABILISERS
     from exfit.models.machines import MACHINES
     from exfit.output import terminal
 
+    exciters, machines, stabilisers = MODELS.values(), MACHINES.values(), STABILISERS.values()
+    every: Iterable[Model | Machine] = chain(exciters, machines, stabilisers)
     if folder is not None:
         from exfit.output import run_folder
         from exfit.output.catalogue_page import write_overview
 
         run_folder.refuse_unwritable(folder)
-        write_overview(folder)
+        write_overview(folder, [_model(name)] if name else every)
         terminal.written(terminal.console(), folder)
     elif name is None:
-        terminal.catalogue(
-            terminal.console(), MODELS.values(), MACHINES.values(), STABILISERS.values()
-        )
-    elif name.upper() in STABILISERS:
-        terminal.model(terminal.console(), STABILISERS[name.upper()])
-    elif name.upper() in MACHINES:
-        terminal.machine(terminal.console(), MACHINES[name.upper()])
+        terminal.catalogue(terminal.console(), exciters, machines, stabilisers)
     else:
-        terminal.model(terminal.console(), find(name, Path()))
+        terminal.model(terminal.console(), _model(name))
+
+
+def _model(name: str) -> "Model | Machine":
+    """Return a model of the catalogue by its name, else the exciter in a file."""
+    from exfit.models import STABILISERS, find
+    from exfit.models.machines import MACHINES
+
+    return STABILISERS.get(name.upper()) or MACHINES.get(name.upper()) or find(name, Path())
 
 
 @click.command(short_help="Print the JSON Schema of a case file.")

@@ -1,14 +1,14 @@
-"""Every model of the catalogue on a page: its drawing, and a step of its typical data."""
+"""Models on a page: their block diagrams, and a step of the exciters' typical data."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from pathlib import Path
 
 import numpy as np
 
-from exfit.models import MODELS
-from exfit.models.machines import MACHINES
+from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, typical
+from exfit.output.drawings import block_diagram, diagram_and_remarks, document
 from exfit.plants import MACHINE, SATURATION, VT0, alone, open_circuit
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Response, Simulator
@@ -28,10 +28,14 @@ PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
 <title>exfit: the models</title>
 <style>
-body {{ font: 16px sans-serif; max-width: 60rem; margin: auto }}
+body {{ font: 16px sans-serif; max-width: 60rem; margin: auto; padding: 1rem }}
 img {{ max-width: 100% }}
+.diagram {{ display: block }}
+.wide {{ overflow-x: auto }}
+@media print {{ .diagram {{ max-width: 100%; height: auto }} }}
 </style>
 </head>
 <body>
@@ -42,8 +46,8 @@ img {{ max-width: 100% }}
 </html>
 """
 ABOUT = (
-    "Each with its typical data on open circuit (GENROU, T'd0 6 s, saturation 0.12 and 0.4), "
-    "from 1.0 pu, the reference stepped up by 0.05 pu at 1 s."
+    "Each exciter with its typical data on open circuit (GENROU, T'd0 6 s, saturation 0.12 and "
+    "0.4), from 1.0 pu, the reference stepped up by 0.05 pu at 1 s."
 )
 
 
@@ -61,17 +65,39 @@ def sample_response(model: Model) -> Response:
     return Simulator(system, inputs, times, GRID).with_enough_substeps(values).response(values)
 
 
-def write_overview(folder: Path) -> list[Path]:
-    """Write a figure of every model, and a page that shows them all; return what was written."""
-    from exfit.output import plots
-
+def write_overview(folder: Path, models: Iterable[Model | Machine]) -> list[Path]:
+    """Write the diagram of every model, a figure of every exciter, and a page that shows them."""
     written, sections = [], []
-    for model in MODELS.values():
-        title = f"{model.name}: {model.title}"
-        figure = plots.overview(title, model.drawing, sample_response(model))
-        written.append(folder / f"{model.name}.png")
-        write(written[-1], plots.png(figure))
-        sections.append(f'<p><img src="{model.name}.png" alt="{escape(title)}"></p>')
+    for model in models:
+        diagram = block_diagram(model.drawing, model.name, model.title)
+        files = dict(_files(model, diagram))
+        for name, content in files.items():
+            written.append(folder / name)
+            write(folder / name, content)
+        sections.append(_section(model, diagram, f"{model.name}.png" in files))
     page = PAGE.format(about=escape(ABOUT), models="\n".join(sections))
     write(folder / "index.html", page)
     return [*written, folder / "index.html"]
+
+
+def _files(model: Model | Machine, diagram: str) -> Iterator[tuple[str, str | bytes]]:
+    """Yield the files of a model: its diagram, and what an exciter does."""
+    from exfit.output import plots
+
+    if diagram:
+        yield f"{model.name}.svg", document(diagram)
+    if isinstance(model, Model) and not model.inputs:
+        figure = plots.overview(f"{model.name}: {model.title}", sample_response(model))
+        yield f"{model.name}.png", plots.png(figure)
+
+
+def _section(model: Model | Machine, diagram: str, has_figure: bool) -> str:
+    """Return what the page says of a model."""
+    _, remarks = diagram_and_remarks(model.drawing)
+    lines = [f"<h2>{escape(model.name)}: {escape(model.title)}</h2>"]
+    if diagram:
+        lines.append(f'<div class="wide" tabindex="0">{diagram}</div>')
+    lines += [f"<p>{escape(remark)}</p>" for remark in remarks]
+    if has_figure:
+        lines.append(f'<p><img src="{model.name}.png" alt="Response of {model.name}"></p>')
+    return "\n".join(lines)

@@ -1,10 +1,11 @@
-"""The page of all models: each has its figure, and settles where it should."""
+"""The page of models: each has its diagram and its figure, and settles where it should."""
 
 import numpy as np
 import pytest
 from oracle import WITHOUT_PLANT
 
-from exfit.models import MODELS
+from exfit.models import MODELS, STABILISERS
+from exfit.models.machines import MACHINES
 from exfit.output import catalogue_page, plots
 from exfit.output.catalogue_page import sample_response
 
@@ -12,14 +13,18 @@ from exfit.output.catalogue_page import sample_response
 @pytest.mark.parametrize(
     "names", [("FIRST_ORDER", "AC1A"), pytest.param(tuple(MODELS), marks=pytest.mark.long)]
 )
-def test_every_model_has_its_figure_and_the_page_shows_it(names, tmp_path, monkeypatch):
-    catalogue = {name: MODELS[name] for name in names}
-    monkeypatch.setattr(catalogue_page, "MODELS", catalogue)
-    folder, files = tmp_path, catalogue_page.write_overview(tmp_path)
+def test_every_model_has_its_figure_and_the_page_shows_it(names, tmp_path):
+    exciters = {name: MODELS[name] for name in names}
+    others = {name: model for shelf in (MACHINES, STABILISERS) for name, model in shelf.items()}
+    catalogue = {**exciters, **others}
+    folder, files = tmp_path, catalogue_page.write_overview(tmp_path, catalogue.values())
     page = (folder / "index.html").read_text(encoding="utf-8")
-    for name, model in catalogue.items():
+    for name in exciters:
         assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert f'src="{name}.png"' in page
+    for name, model in catalogue.items():
+        assert (folder / f"{name}.svg").read_text(encoding="utf-8").startswith("<svg")
+        assert f'<title id="diagram-{name}-title">' in page
         assert model.title.partition("(")[0].replace("'", "&#x27;") in page
     assert sorted(path.name for path in files) == sorted(path.name for path in folder.iterdir())
 
@@ -43,5 +48,5 @@ def test_typical_data_give_a_step_that_settles(exciter):
 @pytest.mark.parametrize("name", WITHOUT_PLANT)
 def test_a_model_without_a_plant_has_its_page_too(name):
     response = sample_response(MODELS[name])
-    figure = plots.overview(name, MODELS[name].drawing, response)
+    figure = plots.overview(name, response)
     assert plots.png(figure).startswith(b"\x89PNG")

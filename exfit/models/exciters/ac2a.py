@@ -1,17 +1,17 @@
 """AC2A: alternator exciter with high initial response (IEEE Std 421.5-2005, 6.2).
 
-                              VAMAX            UEL OEL   VRMAX
-vref + vs ──►(+)─►[1 + sTC]──►[  KA  ]──►(+)─►[KB]─►HV─►LV─►[clip]─┐
-           -▲   ▲-[1 + sTB]   [1+sTA]   -▲                  VRMIN  │ VR
-            │   │             VAMIN      │           VE <= VEMAX   ▼
-vc1 ►[  1  ]┘   │                        │   ┌─ VE ─┬─[  1  ]◄────(+)
-     [1+sTR]    │                        │   ▼      │ [ sTE ]     -▲
-                │                 efd ◄──┼──(x)     │ VE >= 0      │
-                │                        │   ▲      │              │
-                │                        │  FEX     └──► VFE ──────┤
-                │                        │   ▲                     │
-                │ [  sKF  ]              │  KC IFD / VE            │
-                └─[1 + sTF]◄──────┐      └─[KH]◄───────────────────┤
+                              VAMAX                UEL  OEL  VRMAX
+vref + vs ──►(+)─►[1 + sTC]──►[  KA  ]─►(+)─►[KB]─►HV──►LV─►[clip]─┐
+           -▲   ▲-[1 + sTB]   [1+sTA]  -▲                   VRMIN  │ VR
+            │   │             VAMIN     │            VE <= VEMAX   ▼
+vc1 ►[  1  ]┘   │                       │    ┌─ VE ─┬─[  1  ]◄────(+)
+     [1+sTR]    │                       │    ▼      │ [ sTE ]     -▲
+                │                efd ◄──┼───(x)     │ VE >= 0      │
+                │                       │    ▲      │              │
+                │                       │   FEX     └──► VFE ──────┤
+                │                       │    ▲                     │
+                │ [  sKF  ]             │   KC IFD / VE            │
+                └─[1 + sTF]◄──────┐     └─[KH]◄────────────────────┤
                                   └────────────────────────────────┘
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX,

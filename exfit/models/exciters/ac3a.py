@@ -1,12 +1,13 @@
 """AC3A: alternator exciter, its own supply (IEEE Std 421.5-2005, 6.3).
 
-                         UEL       VAMAX   KR efd      VE <= VEMAX
+                         UEL       VAMAX               VE <= VEMAX
 vref + vs ►(+)►[1 + sTC]─►HV─►(+)─►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─ VE ─►(x)─┬►efd
-          -▲   [1 + sTB]     -▲    [1+sTA]       -▲    [ sTE ] │        ▲  │
-           │                  │    VAMIN          │    VEMIN   │       FEX │
-vc1 ►[  1  ]┘                 │                   └─── VFE ◄───┘        ▲  │
-     [1+sTR]       [   s   ]  │                                KC IFD / VE │
-                   [1 + sTF]──┘◄── VN ◄─[ KF to EFDN, then KN ]◄───────────┘
+          -▲   [1 + sTB]     -▲    [1+sTA]    ▲  -▲    [ sTE ] │        ▲  │
+           │                  │    VAMIN      │   │    VEMIN   │       FEX │
+           │                  │            KR efd └─── VFE ◄───┘        ▲  │
+vc1►[  1  ]┘            ┌─────┘                                KC IFD / VE │
+    [1+sTR]             │  [   s   ]                                       │
+                        └──[1 + sTF]◄─ VN ─[ KF to EFDN, then KN ]◄────────┘
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. VN has
 the slope KF up to EFDN and KN beyond it. The exciter supplies its regulator, so

@@ -1,11 +1,11 @@
 """AC5A: simplified brushless exciter (IEEE Std 421.5-2005, 6.5).
 
-                       VRMAX             VE >= 0
-vref + vs ──►(+)─►(+)─►[  KA  ]─┬─ VR ─►(+)─►[  1  ]─┬─ VE = efd ─►
-           -▲    -▲    [1+sTA]  │       -▲   [ sTE ] │
-            │     │    VRMIN    │        └─── VFE ◄──┘
-vc1 ►[  1  ]┘     │             │
-     [1+sTR]      └─[  sKF   ]◄─[1 + sTF3]
+                       VRMAX                            VE >= 0
+vref + vs ──►(+)─►(+)─►[  KA  ]────────────┬─ VR ─►(+)─►[  1  ]─┬─► VE = efd
+           -▲    -▲    [1+sTA]             │       -▲   [ sTE ] │
+            │     │    VRMIN               │        └─── VFE ◄──┘
+vc1 ►[  1  ]┘     │                        │
+     [1+sTR]      └─[  sKF   ]◄─[1 + sTF3]◄┘
                     [1 + sTF1]  [1 + sTF2]
 
 VFE = KE VE + VX(VE): the curve is that of the loaded exciter; there is neither

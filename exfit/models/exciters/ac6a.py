@@ -1,15 +1,16 @@
 """AC6A: alternator exciter, field current limiter (IEEE Std 421.5-2005, 6.6).
 
-                               VAMAX          VT VRMAX      VE >= 0
-vref + vs ─►(+)─►[1 + sTK] KA─►[1 + sTC]─►(+)─►[clip]─►(+)─►[  1  ]─┬─►(x)─► efd
-           -▲    [1 + sTA]     [1 + sTB] -▲           -▲    [ sTE ] │   ▲
-            │                  VAMIN      │   VT VRMIN │         VE │  FEX
-vc1 ►[  1  ]┘                             │            │            │   ▲
-     [1+sTR]                              │            ├─── VFE ◄───┘   │
-                               [1 + sTJ]──┘  VHMAX     ▼          KC IFD / VE
-                               [1 + sTH]◄────[ KH ]◄──(+)
-                                             0        -▲
-                                                       └─── VFELIM
+                              VAMAX          VT VRMAX      VE >= 0
+vref + vs ─►(+)─►[KA(1+sTK)]─►[1 + sTC]─►(+)─►[clip]─►(+)─►[  1  ]─┬─►(x)─► efd
+           -▲    [ 1 + sTA ]  [1 + sTB] -▲           -▲    [ sTE ] │   ▲
+            │                 VAMIN      │   VT VRMIN │            │  FEX
+vc1 ►[  1  ]┘                            │            │            │   ▲
+     [1+sTR]                             │            ├─ VFE◄─ VE ─┘   │
+                       ┌─────────────────┘            │          KC IFD / VE
+                       │  [1 + sTJ]     VHMAX         ▼
+                       └──[1 + sTH]◄────[ KH ]◄───────(+)
+                                        0            -▲
+                                                      └─── VFELIM
 
 VFE = KE VE + VX(VE) + KD IFD. The field current limiter acts above VFELIM; at
 rest VA = VFE + KH (VFE - VFELIM) there. The limit of the second lead-lag is

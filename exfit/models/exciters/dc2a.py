@@ -3,7 +3,7 @@
                                   VT VRMAX       EFD >= 0
 vref + vs ─►(+)─►[1 + sTC]─►HV───►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
            -▲ ▲- [1 + sTB]  ▲     [1+sTA]   -▲   [ sTE ] │
-            │ │             │     VT VRMIN    │           │
+            │ │             │     VT VRMIN   │           │
 vc1 ►[  1  ]┘ │            VUEL              └── VFE ◄───┤
      [1+sTR]  └─────────[  sKF  ]◄───────────────────────┘
                         [1 + sTF]

@@ -2,8 +2,8 @@
 
                  VIMAX                       VRMAX - KC IFD
 vref + vs ─►(+)─►[clip]─►[1 + sTC]─►[  KA  ]─►[clip]─► efd
-           -▲    VIMIN   [1 + sTB]  [1+sTA]
-            │                                VRMIN - KC IFD
+           -▲    VIMIN   [1 + sTB]  [1+sTA]  VRMIN - KC IFD
+            │
 vc1 ►[  1  ]┘
      [1+sTR]
 

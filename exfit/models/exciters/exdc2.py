@@ -3,7 +3,7 @@
                             VT VRMAX
 vref + vs ─►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
            -▲ ▲- [1 + sTB]  [1+sTA]   -▲   [ sTE ] │
-            │ │             VT VRMIN    │           │
+            │ │             VT VRMIN   │           │
 vc1 ►[  1  ]┘ │                        └── VFE ◄───┤
      [1+sTR]  └──────[  sKF  ]◄────────────────────┘
                      [1 + sTF1]

@@ -1,6 +1,6 @@
 """ST5B: static exciter with two lead-lags in series (IEEE Std 421.5-2005, 7.5).
 
-             VUEL  VOEL       VRMAX/KR    VRMAX/KR        VRMAX
+              VUEL VOEL       VRMAX/KR    VRMAX/KR        VRMAX
 vref ─►(+)───►[gates]──►(+)─►[1 + sTC1]─►[1 + sTC2]─►[KR]─►[clip]─┐ VR
        -▲                ▲   [1 + sTB1]  [1 + sTB2]       VRMIN   │
         │                │    VRMIN/KR    VRMIN/KR                │

@@ -1,13 +1,13 @@
 """ST6B: static exciter, PID with a field voltage loop (IEEE Std 421.5-2005, 7.6).
 
-              VUEL        VAMAX                   VRMAX
+              VUEL        VAMAX                             VRMAX
 vref ─►(+)─►[HV gate]─►(+)─►[KPA + KIA/s   ]─┬─►[KFF]─►(+)─►[clip]─►[LV]─┐ VR
-       -▲               ▲   [+ sKDA/(1+sTDA)]│          ▲             ▲   │
-        │               vs  VAMIN            └─►(+)─►[KM]    VRMIN    │   ▼
-vc1 ►[  1  ]                                   -▲                     │  (x)◄ VT
-     [1+sTR]                                    └──[  KG  ]◄──────────│───┤
-                                                   [1 + sTG]          │   ▼
-                         KLR (KCI ILR - IFD), at least VRMIN ─────────┘  efd
+       -▲               ▲   [+ sKDA/(1+sTDA)]│          ▲   VRMIN    ▲   │
+        │               vs  VAMIN            └►(+)─►[KM]┘            │   ▼
+vc1 ►[  1  ]                                  -▲                     │  (x)◄ VT
+     [1+sTR]                                   └──[  KG  ]◄──────────┼───┤
+                                                  [1 + sTG]          │   ▼
+                         KLR (KCI ILR - IFD), at least VRMIN ────────┘  efd
 
 The integral is frozen while the PID is at its limit; the other limits are plain
 clamps. VR multiplies the terminal voltage VT: a supply from the terminals, as

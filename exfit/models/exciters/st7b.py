@@ -1,6 +1,7 @@
 """ST7B: static exciter, PI by a feedback of its output (IEEE Std 421.5-2005, 7.7).
 
-       VMAX         vs                                              VT VRMAX
+                    vs
+       VMAX         ▼                                               VT VRMAX
 vref ─►[clip]─────►(+)─►[KPA]─►[HV]─►[LV]─►[1 + sTC]─►(+)─►[gates]─►[clip]─┬►efd
        VMIN        -▲           ▲     ▲    [1 + sTB]   ▲  VUEL VOEL        │
                     │           │     │                │          VT VRMIN │

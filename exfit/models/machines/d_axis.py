@@ -11,6 +11,18 @@ from exfit.models.machines.machine import Axes
 from exfit.models.phasors import modulus
 
 D_AXIS = ("EQP", "PSID")
+D_AXIS_DRAWING = """\
+efd ─►(+)─►[   1   ]─┬─ EQP ─┬──────────────────►[Xppd - Xl]──►(+)─►(+)─► vq
+      -▲   [ sTpd0 ] │       │                   [Xpd - Xl ]    ▲   -▲
+       │             │       └►(+)─►[    1     ]─┬►[Xpd - Xppd]─┘    │
+       │             │         -▲   [1 + sTppd0] │ [ Xpd - Xl ]   Xppd id
+       └─── ifd ◄────┘          │                │
+             ▲           (Xpd - Xl) id           │
+             └──────────── PSID ─────────────────┘
+"""
+FIELD_CURRENT = """\
+ifd = EQP + (Xd - Xpd) (id + (Xpd - Xppd) / (Xpd - Xl)^2 (EQP - PSID - (Xpd - Xl) id)),
+to which saturation adds"""
 
 
 def damper_flux(s: Signal, p: Signal) -> Signal:

@@ -36,9 +36,10 @@ class Source(NamedTuple):
 class Machine:
     """A machine: its data sheet, its states and its functions.
 
-    Of the states ``d_axis`` move on open circuit too, ``q_axis`` on load only. ``source(s, p)`` is
-    what the states alone determine; ``field(s, i, p)`` is ifd at the stator current i; the
-    functions ``slopes(s, efd, ifd, i, p, d)`` and ``q_slopes(s, i, p, d)`` write slopes into ``d``;
+    ``drawing`` is a text: the block diagram of its axes, then remarks. Of the states ``d_axis``
+    move on open circuit too, ``q_axis`` on load only. ``source(s, p)`` is what the states alone
+    determine; ``field(s, i, p)`` is ifd at the stator current i; the functions
+    ``slopes(s, efd, ifd, i, p, d)`` and ``q_slopes(s, i, p, d)`` write slopes into ``d``;
     ``rest(v, i, p, x)`` writes the states that hold v and i; ``quadrature(vt, i_p, i_q, p)`` is the
     reactance behind which, at rest, the voltage lies on the q axis, where the current seen from vt
     is i_p - j i_q; ``faults(values)`` yields (symbol, text) for data that contradict each other;
@@ -47,6 +48,7 @@ class Machine:
 
     name: str
     title: str
+    drawing: str
     sheet: Sheet
     d_axis: tuple[str, ...]
     q_axis: tuple[str, ...]

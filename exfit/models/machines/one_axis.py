@@ -25,6 +25,18 @@ SHEET = sheet(
     *SATURATION,
 )
 
+DRAWING = """\
+efd ─►(+)─►[   1   ]─┬─ EQP ─►(+)─► vq
+      -▲   [ sTpd0 ] │        -▲
+       └─── ifd ◄────┘      Xpd id
+             ▲
+             id
+
+iq ─►[Xq]─► vd
+
+ifd = EQP + (Xd - Xpd) id, to which saturation adds its own, a function of E'q. On
+open circuit id and iq are 0."""
+
 
 def source(s: Signal, p: Signal) -> Source:
     """E'q behind X'd, nothing behind Xq."""
@@ -59,6 +71,7 @@ def faults(values: Mapping[str, float]) -> Faults:
 ONE_AXIS = Machine(
     name="ONE_AXIS",
     title="field winding alone, quadratic saturation by E'q",
+    drawing=DRAWING,
     sheet=SHEET,
     d_axis=("EQP",),
     q_axis=(),

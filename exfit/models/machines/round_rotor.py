@@ -8,6 +8,8 @@ from exfit.engine.trace import Signal
 from exfit.models.blocks import lag
 from exfit.models.machines.d_axis import (
     D_AXIS,
+    D_AXIS_DRAWING,
+    FIELD_CURRENT,
     along_axes,
     curve,
     d_rest,
@@ -46,6 +48,20 @@ SHEET = sheet(
     ("Xl", 0.2, "pu", (0.0, 10.0), "leakage reactance"),
     *SATURATION,
 )
+
+DRAWING = f"""\
+{D_AXIS_DRAWING}
+       ┌──►[  -1   ]─┬─ EDP ─┬──────────────────►[Xppd - Xl]──►(+)─►(+)─► vd
+       │   [ sTpq0 ] │       │                   [Xpq - Xl ]    ▲    ▲
+       │             │       └►(+)─►[    1     ]─┬►[Xpq - Xppd]─┘    │
+       │             │          ▲   [1 + sTppq0] │ [ Xpq - Xl ]   Xppd iq
+       └─── i1q ◄────┘          │                │
+             ▲           (Xpq - Xl) iq           │
+             └──────────── PSIQ ─────────────────┘
+
+{FIELD_CURRENT} its own, a function of the air-gap flux with the share
+of each axis. i1q is the same of the q axis, where nothing excites. On open circuit
+id and iq are 0, and the q axis rests."""
 
 CONS = "Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xl S10 S12"
 
@@ -99,6 +115,7 @@ def machine(
     return Machine(
         name=name,
         title=f"round rotor, {shape} saturation by the air-gap flux",
+        drawing=DRAWING,
         sheet=SHEET,
         d_axis=D_AXIS,
         q_axis=("EDP", "PSIQ"),

@@ -10,6 +10,8 @@ from exfit.engine.trace import Signal
 from exfit.models.blocks import lag
 from exfit.models.machines.d_axis import (
     D_AXIS,
+    D_AXIS_DRAWING,
+    FIELD_CURRENT,
     along_axes,
     curve,
     d_rest,
@@ -46,6 +48,26 @@ SHEET = sheet(
     ("Xl", 0.154, "pu", (0.0, 10.0), "leakage reactance"),
     *SATURATION,
 )
+
+GENSAL_DRAWING = f"""\
+{D_AXIS_DRAWING}
+iq ─┬─►[ Xq - Xppd ]─ PSIQ ─►(+)─► vd
+    │  [1 + sTppq0 ]          ▲
+    └─►[ Xppd ]───────────────┘
+
+{FIELD_CURRENT} its own, a function of E'q. On open circuit id
+and iq are 0, and the q axis rests."""
+GENSAE_DRAWING = f"""\
+{D_AXIS_DRAWING}
+                    VXQ
+                    -▼
+iq ─┬─►[Xq - Xppd]─►(+)─►[    1     ]─ PSIQ ─►(+)─► vd
+    │                    [1 + sTppq0]          ▲
+    └─►[ Xppd ]────────────────────────────────┘
+
+{FIELD_CURRENT} its own, a function of the air-gap flux with the share
+of the d axis; VXQ is the share of the q axis. On open circuit id and iq are 0, and
+the q axis rests."""
 
 CONS = "Tpd0 Tppd0 Tppq0 H D Xd Xq Xpd Xppd Xl S10 S12"
 
@@ -103,6 +125,7 @@ def gensae_faults(values: Mapping[str, float]) -> Faults:
 GENSAL = Machine(
     name="GENSAL",
     title="salient poles, quadratic saturation by E'q",
+    drawing=GENSAL_DRAWING,
     sheet=SHEET,
     d_axis=D_AXIS,
     q_axis=("PSIQ",),
@@ -119,6 +142,7 @@ GENSAL = Machine(
 GENSAE = Machine(
     name="GENSAE",
     title="salient poles, exponential saturation by the air-gap flux",
+    drawing=GENSAE_DRAWING,
     sheet=SHEET,
     d_axis=D_AXIS,
     q_axis=("PSIQ",),

@@ -5,10 +5,10 @@ vsi1 ─►[clip]─►[ sTW1 ]─►[ sTW2 ]─►[  1  ]─►(+)─►[ 1 + s
        VSI1MIN [1+sTW1]  [1+sTW2]  [1+sT6]   ▲   [(1+sT9)^M ]  -▲
                                              │                  │
                                             [KS3]               │
-      VSI2MAX                                │                  │
+      VSI2MAX                                ▲                  │
 vsi2 ─►[clip]─►[ sTW3 ]─►[ sTW4 ]─►[ KS2 ]───┴──────────────────┘
        VSI2MIN [1+sTW3]  [1+sTW4]  [1+sT7]
-                                                     VSTMAX
+                                              VSTMAX
 v ─►[KS1]─►[1 + sT1]─►[1 + sT3]─►[1 + sT10]─►[clip]─► vs
            [1 + sT2]  [1 + sT4]  [1 + sT11]   VSTMIN
 

@@ -57,24 +57,17 @@ def _voltages(axes: Axes, simulated: Response) -> None:
     tidy(axes)
 
 
-def overview(title: str, drawing: str, simulated: Response) -> Figure:
-    """Return a model on one page: its drawing, and what it does with its typical data."""
-    lines = drawing.count("\n") + 1
+def overview(title: str, simulated: Response) -> Figure:
+    """Return what a model does with its typical data: its voltages."""
     signals = [name for name in ("vt", "efd") if name in simulated.signals]
-    text_height, height = 0.5 + 0.165 * lines, 2.2 * len(signals)
-    figure = new_figure(text_height + height)
-    ratios = [text_height, *[2.2] * len(signals)]
-    page, *others = panels(figure, len(ratios), height_ratios=ratios)[:, 0]
-    page.axis("off")
-    page.text(
-        0.0, 1.0, drawing, family="monospace", fontsize=8.5, va="top", transform=page.transAxes
-    )
-    for axes, name in zip(others, signals, strict=True):
-        axes.sharex(others[-1])
-        axes.tick_params(labelbottom=axes is others[-1])
+    figure = new_figure(0.6 + 2.2 * len(signals))
+    rows = panels(figure, len(signals))[:, 0]
+    for axes, name in zip(rows, signals, strict=True):
+        axes.sharex(rows[-1])
+        axes.tick_params(labelbottom=axes is rows[-1])
         axes.plot(simulated.time, simulated.signals[name], color=SIMULATED, linewidth=1.4)
         axes.set_ylabel(label_of(name))
         tidy(axes)
-    others[-1].set_xlabel("time (s)")
+    rows[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=12)
     return figure

@@ -1,7 +1,7 @@
 """What the terminal shows: tables and lines, with rich."""
 
 from exfit.output.terminal.agreement import agreement
-from exfit.output.terminal.catalogue import catalogue, machine, model
+from exfit.output.terminal.catalogue import catalogue, model
 from exfit.output.terminal.checks import check
 from exfit.output.terminal.comparisons import comparisons, validation
 from exfit.output.terminal.fit_series import SeriesProgress, fit_series
@@ -37,7 +37,6 @@ __all__ = [
     "fit",
     "fit_series",
     "inspection",
-    "machine",
     "model",
     "notes",
     "profiles",

@@ -34,21 +34,11 @@ def catalogue(
     show_table(console, table)
 
 
-def model(console: Console, described: Model) -> None:
+def model(console: Console, described: Model | Machine) -> None:
     """Show a model's drawing, data sheet and states."""
-    _describe(console, described, described.drawing)
-
-
-def machine(console: Console, described: Machine) -> None:
-    """Show a machine's data sheet and states."""
-    _describe(console, described)
-
-
-def _describe(console: Console, described: Model | Machine, *drawing: str) -> None:
     remarks(console, f"{described.name}:", [described.title], "bold")
-    for text in drawing:
-        console.print()
-        console.print(text, markup=False, soft_wrap=True)
+    console.print()
+    console.print(described.drawing, markup=False, soft_wrap=True)
     console.print()
     show_table(console, data_sheet(described.sheet))
     console.print()

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import exp, log
 
+from exfit.output.drawings import block_diagram, diagram_and_remarks
 from exfit.results.description import PartDescription
 from exfit.results.model import FitResult
 
@@ -18,14 +19,28 @@ EXPONENTIAL: Mapping[str, tuple[str, Callable[[float, float], float]]] = {
 class ModelView:
     """The models that were fitted; ``saturation`` is a sentence, empty where there is none."""
 
-    parts: tuple[PartDescription, ...]
+    parts: tuple["PartView", ...]
     saturation: str
+
+
+@dataclass(frozen=True)
+class PartView:
+    """A model with its block diagram as SVG, empty where it has none, and what is said of it."""
+
+    part: PartDescription
+    diagram: str
+    remarks: tuple[str, ...]
 
 
 def model(result: FitResult) -> ModelView:
     """Return the models that were fitted; a network is none."""
-    parts = tuple(part for part in result.parts if part.kind != "network")
-    return ModelView(parts, saturation(result))
+    parts = (part for part in result.parts if part.kind != "network")
+    return ModelView(tuple(map(_view, parts)), saturation(result))
+
+
+def _view(part: PartDescription) -> PartView:
+    _, remarks = diagram_and_remarks(part.drawing)
+    return PartView(part, block_diagram(part.drawing, part.name, part.title), tuple(remarks))
 
 
 def saturation(result: FitResult) -> str:
