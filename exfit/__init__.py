@@ -21,6 +21,7 @@ from exfit.errors import (
 from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
+    from exfit.analysis.steady.saturation import saturation_curve
     from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
     from exfit.fleet.fits import fit_all
@@ -62,6 +63,7 @@ __all__ = [
     "profile",
     "rank",
     "read_record",
+    "saturation_curve",
     "simulate",
     "translate",
     "validate",
@@ -80,6 +82,7 @@ _MODULES = {
     "profile": "exfit.workflows",
     "rank": "exfit.fleet.ranking",
     "read_record": "exfit.workflows",
+    "saturation_curve": "exfit.analysis.steady.saturation",
     "simulate": "exfit.workflows",
     "translate": "exfit.analysis.translation.translate",
     "validate": "exfit.workflows",

@@ -50,6 +50,7 @@ class FittedCurve:
     hysteresis  field current of the rising less that of the falling branch, pu; None with one
     rms        of the residuals, pu of ifd_base
     refuted    whether another form fits so much better that this one is none of the curve's
+    extrapolated  the levels of S10 and S12 that lie beyond the highest point, pu
     vt, ifd    the mean curve (K,), pu; low and high its 95 % band
     """
 
@@ -61,6 +62,7 @@ class FittedCurve:
     hysteresis: MeasuredValue | None
     rms: float
     refuted: bool
+    extrapolated: tuple[float, ...]
     vt: Array = field(metadata=IN_FILE)
     ifd: Array = field(metadata=IN_FILE)
     low: Array = field(metadata=IN_FILE)

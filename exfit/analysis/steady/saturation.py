@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from exfit.analysis.steady.saturation_forms import (
     AT_10,
@@ -62,12 +63,12 @@ UNKNOWN_WINDING = FieldWinding()
 
 
 def saturation_curve(
-    vt: Array,
-    ifd: Array,
+    vt: ArrayLike,
+    ifd: ArrayLike,
     form: SaturationForm = "quadratic",
     *,
     unit: str = "A",
-    efd: Array | None = None,
+    efd: ArrayLike | None = None,
     efd_unit: str = "V",
     winding: FieldWinding = UNKNOWN_WINDING,
     exciter: bool = False,
@@ -87,7 +88,9 @@ def saturation_curve(
     Raises:
         ExfitError: too few points, or points that cannot be a saturation curve.
     """
-    check_points(vt, ifd)
+    vt, ifd = np.array(vt, np.float64), np.array(ifd, np.float64)
+    efd = None if efd is None else np.array(efd, np.float64)
+    check_points(vt, ifd, efd)
     direction = directions(vt)
     dead = ifd <= WITHOUT_CURRENT * ifd.max()
     points = CurvePoints(vt[~dead], ifd[~dead], direction[~dead])
@@ -95,7 +98,7 @@ def saturation_curve(
         points = points._replace(direction=np.ones_like(points.vt))
     fits = sorted((fitted(name, points) for name in EXCESS), key=lambda fit: fit.rms)
     curves = [curve_of(fit, refutes(fits[0], fit)) for fit in fits]
-    curves = [with_extrapolation(curve, curves, float(points.vt.max())) for curve in curves]
+    curves = [beside_others(curve, curves, float(points.vt.max())) for curve in curves]
     resistance = hot_resistance(ifd, efd, winding)
     base = next(curve.ifd_base for curve in curves if curve.form == form)
     result = SaturationResult(
@@ -116,8 +119,10 @@ def saturation_curve(
     return replace(result, notes=tuple(notes(result)))
 
 
-def check_points(vt: Array, ifd: Array) -> None:
+def check_points(vt: Array, ifd: Array, efd: Array | None) -> None:
     """Raise ExfitError for points that cannot be a saturation curve."""
+    if efd is not None and efd.shape != ifd.shape:
+        raise ExfitError(f"saturation: {len(efd)} field voltages, but {len(ifd)} field currents")
     if len(vt) != len(ifd):
         raise ExfitError(f"saturation: {len(vt)} voltages, but {len(ifd)} field currents")
     if not (np.isfinite(vt).all() and np.isfinite(ifd).all()):
@@ -182,6 +187,7 @@ def curve_of(fit: FormFit, refuted: bool) -> FittedCurve:
         hysteresis=loop,
         rms=fit.rms,
         refuted=refuted,
+        extrapolated=(),
         vt=grid,
         ifd=mean,
         low=mean - half,
@@ -189,30 +195,35 @@ def curve_of(fit: FormFit, refuted: bool) -> FittedCurve:
     )
 
 
-def with_extrapolation(
-    curve: FittedCurve, curves: Sequence[FittedCurve], highest: float
-) -> FittedCurve:
-    """Return a curve whose saturation beyond the highest point is no surer than the points are.
+def beside_others(curve: FittedCurve, curves: Sequence[FittedCurve], highest: float) -> FittedCurve:
+    """Return a curve that is no surer than the points are of their form, the best match first.
 
-    Its interval there holds what all forms have that the points do not refute.
+    The intervals of a form that the points refute hold what the best one has; those of the
+    saturation beyond the highest point what all have that the points do not refute.
     """
     fitting = [other for other in curves if not other.refuted]
-    S10, S12 = curve.S10, curve.S12
-    if highest < 1.0 - AT_LEVEL:
-        S10 = _extrapolated(S10, [other.S10.value for other in fitting], highest)
-    if highest < 1.2 - AT_LEVEL:
-        S12 = _extrapolated(S12, [other.S12.value for other in fitting], highest)
-    return replace(curve, S10=S10, S12=S12)
-
-
-def _extrapolated(own: MeasuredValue, others: Sequence[float], highest: float) -> MeasuredValue:
-    low, high = own.interval
-    interval = (
-        None if low is None else min(low, *others),
-        None if high is None else max(high, *others),
+    rivals = curves[:1] if curve.refuted else []
+    beyond = {1.0: highest < 1.0 - AT_LEVEL, 1.2: highest < 1.2 - AT_LEVEL}
+    return replace(
+        curve,
+        ifd_base=_widened(curve.ifd_base, [other.ifd_base for other in rivals]),
+        S10=_widened(curve.S10, [other.S10 for other in (fitting if beyond[1.0] else rivals)]),
+        S12=_widened(curve.S12, [other.S12 for other in (fitting if beyond[1.2] else rivals)]),
+        extrapolated=tuple(level for level, is_beyond in beyond.items() if is_beyond),
     )
-    why = f"extrapolated: the highest point is at {highest:.3g} pu"
-    return replace(own, interval=interval, why=why)
+
+
+def _widened(own: MeasuredValue, others: Sequence[MeasuredValue]) -> MeasuredValue:
+    """Return a value whose interval holds the values of others."""
+    low, high = own.interval
+    values = [other.value for other in others]
+    return replace(
+        own,
+        interval=(
+            None if low is None else min(low, *values, own.value),
+            None if high is None else max(high, *values, own.value),
+        ),
+    )
 
 
 def hot_resistance(ifd: Array, efd: Array | None, winding: FieldWinding) -> MeasuredValue | None:

@@ -35,7 +35,9 @@ BASE, AT_10, AT_12, OFFSET, HALF_LOOP = range(5)  # the parameters of a curve
 LEAST_S, MOST_S = 1e-6, 20.0  # pu
 BASES = (0.1, 10.0)  # of the steepest point's current per voltage
 MOST_OFFSET = 1.0  # pu
+REMANENCE = 0.015  # pu of field current: standard deviation of what it moves a curve by
 REWEIGHTED = 2  # times: what is left to a third is below a thousandth of a standard error
+PROFILE_POINTS = 2  # to the end of an interval: no figure is drawn of them
 LEAST_ERROR = 1e-6  # pu: no instrument reads so well
 DIFFERENCE = 1e-5  # pu, of S and of a voltage
 
@@ -59,7 +61,8 @@ class FormFit:
 
     The base, and the offsets, are in the unit of the points. Errors of a voltage and of a field
     current count alike, in pu: an error of a voltage shows by the slope of the curve, so a point
-    has the ``weight`` (M,) that the slope leaves to it ("effective variance").
+    has the ``weight`` (M,) that the slope leaves to it ("effective variance"). ``prior`` is the
+    weight of the offset itself, of which is known that remanence is small.
 
     Source: Orear 1982, Least squares when both variables have uncertainties.
     """
@@ -68,19 +71,24 @@ class FormFit:
     points: CurvePoints
     x: Array
     weight: Array
+    prior: float = 0.0
 
-    def residuals(self, x: Array) -> Array:
-        """Return the weighted errors (M,), nan where S(1.2) is not above S(1.0)."""
+    def errors(self, x: Array) -> Array:
+        """Return the weighted errors (M,) of the points, nan where S(1.2) is not above S(1.0)."""
         if not x[AT_12] > x[AT_10]:
             return np.full(len(self.weight), np.nan)
-        return np.asarray(self.weight * (self._mean(self.points.vt, x) - self.points.ifd)) + (
-            self.weight * (self._loop @ x[HALF_LOOP:])
-        )
+        simulated = self._mean(self.points.vt, x) + self._loop @ x[HALF_LOOP:]
+        return np.asarray(self.weight * (simulated - self.points.ifd))
+
+    def residuals(self, x: Array) -> Array:
+        """Return what is made small (M + 1,): the errors, and the offset by its prior."""
+        return np.append(self.errors(x), self.prior * x[OFFSET])
 
     def jacobian(self, x: Array) -> Array:
-        """Return the derivatives (M, N) of the weighted errors."""
+        """Return the derivatives (M + 1, N) of the residuals."""
         slopes = np.hstack([self.slopes_of_mean(self.points.vt, x), self._loop])
-        return np.asarray(self.weight[:, None] * slopes)
+        of_prior = self.prior * (np.arange(len(x)) == OFFSET)
+        return np.vstack([self.weight[:, None] * slopes, of_prior])
 
     def slopes_of_mean(self, vt: Array, x: Array) -> Array:
         """Return the derivatives (K, 4) of the mean curve by base, S10, S12 and offset."""
@@ -124,7 +132,7 @@ class FormFit:
     @cached_property
     def variance(self) -> float:
         """The variance of a weighted error, at least that of a reading's last digit."""
-        squares = 2.0 * half_square(self.residuals(self.x))
+        squares = 2.0 * half_square(self.errors(self.x))
         return max(squares / self.dof, (LEAST_ERROR * float(self.x[BASE])) ** 2)
 
     @property
@@ -140,7 +148,7 @@ class FormFit:
     @property
     def rms(self) -> float:
         """The root mean square of the unweighted errors, pu of the base."""
-        errors = self.residuals(self.x) / self.weight / self.x[BASE]
+        errors = self.errors(self.x) / self.weight / self.x[BASE]
         return float(np.sqrt(np.mean(errors**2)))
 
     @cached_property
@@ -156,15 +164,22 @@ class FormFit:
         return np.asarray(self.quantile * np.sqrt(np.maximum(variance, 0.0)))
 
     def values(self) -> tuple[MeasuredValue, ...]:
-        """Return the parameters with their intervals from the profiles of the cost."""
+        """Return the parameters with their intervals.
+
+        Those of base, S10 and S12 are from the profiles of the cost; in the others it is quadratic.
+        """
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         functions = OneByOne(self.residuals, self.jacobian)
-        rises = dict.fromkeys(range(len(self.x)), self.rise)
         bounds = bounds_of(self.points, len(self.x))
-        ends = profiles(functions, self.x, rises, bounds, workers=1)
+        rises = dict.fromkeys((BASE, AT_10, AT_12), self.rise)
+        curved = profiles(functions, self.x, rises, bounds, points=PROFILE_POINTS, workers=1)
+        half = self.quantile * errors[OFFSET:]
+        linear = zip(self.x[OFFSET:] - half, self.x[OFFSET:] + half, strict=True)
+        ends = [(profile.low, profile.high) for profile in curved]
+        ends += [(float(low), float(high)) for low, high in linear]
         return tuple(
-            MeasuredValue(float(x), float(error), (profile.low, profile.high))
-            for x, error, profile in zip(self.x, errors, ends, strict=True)
+            MeasuredValue(float(x), float(error), interval)
+            for x, error, interval in zip(self.x, errors, ends, strict=True)
         )
 
 
@@ -172,8 +187,15 @@ def fitted(form: SaturationForm, points: CurvePoints) -> FormFit:
     """Return a form at its best match to points, more than the parameters that it has."""
     fit = at_minimum(start_of(form, points))
     for _ in range(REWEIGHTED):
-        fit = at_minimum(replace(fit, weight=np.sqrt(2.0 / (1.0 + fit.steepness() ** 2))))
+        fit = at_minimum(weighted(fit))
     return fit
+
+
+def weighted(fit: FormFit) -> FormFit:
+    """Return the fit with the weights that its slopes and its errors give."""
+    remanence = REMANENCE * float(fit.x[BASE])
+    weight = np.sqrt(2.0 / (1.0 + fit.steepness() ** 2))
+    return replace(fit, weight=weight, prior=float(np.sqrt(fit.variance)) / remanence)
 
 
 def at_minimum(fit: FormFit) -> FormFit:

@@ -29,7 +29,7 @@ def notes(result: SaturationResult) -> Iterator[str]:
 
 def _of_hysteresis(result: SaturationResult) -> Iterator[str]:
     if result.curve.hysteresis is None:
-        going = "rising" if result.direction[-1] > 0.0 else "falling"
+        going = "rising" if np.delete(result.direction, result.left_out)[0] > 0.0 else "falling"
         yield (
             f"hysteresis cannot be seen: all points were taken with {going} voltage; the numbers "
             "are those of this branch, moved through zero"
@@ -47,11 +47,15 @@ def _of_line(result: SaturationResult) -> Iterator[str]:
 
 
 def _of_range(curve: FittedCurve, highest: float) -> Iterator[str]:
-    for name, value in (("S(1.0)", curve.S10), ("S(1.2)", curve.S12)):
-        if value.why:
-            yield f"{name} is {value.why}"
+    for level, value in ((1.0, curve.S10), (1.2, curve.S12)):
+        name, end = f"S({level:.1f})", f"the highest point is at {highest:.3g} pu"
         if not value.determined:
-            yield f"{name} is not limited by the points, which end at {highest:.3g} pu"
+            yield f"{name} is not determined: {end}"
+        elif level in curve.extrapolated:
+            yield (
+                f"{name} is extrapolated: {end}; the interval holds what all forms have there that "
+                "the points do not refute"
+            )
     if not curve.ifd_base.determined:
         yield "the air-gap line is not determined by the points"
 
@@ -60,8 +64,10 @@ def _of_forms(result: SaturationResult) -> Iterator[str]:
     used, best = result.curve, result.curves[0]
     if used.refuted:
         yield (
-            f"the points are not on a curve of form {used.form}: rms {used.rms:.2g} pu, "
-            f"{best.form} {best.rms:.2g} pu"
+            f"the points are not on a curve of form {used.form} (rms {used.rms:.2g} pu); "
+            f"{best.form} (rms {best.rms:.2g} pu) has S(1.0) {best.S10.value:.3g}, S(1.2) "
+            f"{best.S12.value:.3g} and a base of {best.ifd_base.value:.4g} {result.unit}, which "
+            "the intervals hold"
         )
         return
     others = [curve.form for curve in result.curves if curve is not used and not curve.refuted]

@@ -7,6 +7,7 @@ from exfit.output.plots.overlays import overlay
 from exfit.output.plots.ranking import ranking
 from exfit.output.plots.records import inspection
 from exfit.output.plots.responses import overview, response
+from exfit.output.plots.saturation import saturation
 from exfit.output.plots.search import convergence, trajectories, waterfall
 from exfit.output.plots.style import drawn, encoded, png
 from exfit.output.plots.translations import translation
@@ -27,6 +28,7 @@ __all__ = [
     "profiles",
     "ranking",
     "response",
+    "saturation",
     "sensitivity",
     "trajectories",
     "translation",
