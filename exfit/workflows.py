@@ -289,8 +289,8 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         response = setup.response(values)
         comparison = compare_with_record(setup, "record", values) if setup.channels else None
         notes = [] if comparison is None else rest_notes(setup, comparison)
-        own, inputs = setup.experiment.parameters(values), setup.experiment.simulator.inputs
-        simulated = simulation_notes(case, {**values, **own}, response, inputs)
+        at = setup.experiment.parameters(setup.with_start_values(values))
+        simulated = simulation_notes(case, at, response, setup.experiment.simulator.inputs)
         return SimulationResult(response, comparison, (*simulated, *notes))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}

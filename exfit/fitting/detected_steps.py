@@ -19,12 +19,14 @@ from exfit.dsp.filtering import outliers
 from exfit.dsp.jump import largest_jump
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.nuisances.parameters import prefix_of
+from exfit.fitting.levels import initial_voltage
+from exfit.fitting.nuisances.parameters import finds_level, prefix_of
 from exfit.plants import REFERENCES
 from exfit.records.record import Record
 from exfit.records.steps import INSTANT_WITHIN
 
 INSIDE_INTERVAL = 1e-6  # of it: a sample at its end would be on the other side of the jump
+LEVEL_WITHIN = 0.02  # of the mean of a record at rest: how far the voltage there may be from it
 SIZE_WITHIN = 0.5  # of the size that a record shows: how far the size may be from it
 
 
@@ -48,7 +50,12 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
         opens = _bounded_opening(f"{place}.breaker.opens", test.breaker.opens, record)
         breaker = test.breaker.model_copy(update={"opens": opens})
         test = test.model_copy(update={"breaker": breaker})
-    return test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
+    test = test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
+    if not finds_level(test, recording.record):
+        return test
+    level = initial_voltage(test, record)
+    bounds = sorted(((1 - LEVEL_WITHIN) * level, (1 + LEVEL_WITHIN) * level))
+    return test.model_copy(update={"vt0": Unknown(start=level, min=bounds[0], max=bounds[1])})
 
 
 def _refuse_wrong_order(place: str, steps: Sequence[FindableStep]) -> None:

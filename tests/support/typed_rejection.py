@@ -153,3 +153,17 @@ def rejection(name, data, load, time, exciter=None, after=None):
         "efd": solved.y[5] + np.array([0.0 if after is None else after(t) for t in time]),
         "speed": 1.0 + solved.y[4],
     }
+
+
+def recorded_rejection(name, data, load, opens, time, noise=0.0, seed=0):
+    """Return vt, ifd, efd and speed (M,) as a recorder shows a rejection at ``opens`` (s)."""
+    after = time > opens
+    signals = rejection(name, data, load, np.concatenate([[0.0], time[after] - opens]))
+    _, efd, _, _ = TypedMachine(name, data).start(load)
+    at_rest = {"vt": load.vt, "ifd": efd, "efd": efd, "speed": 1.0}
+    rng, shown = np.random.default_rng(seed), {}
+    for signal, samples in signals.items():
+        clean = np.full(len(time), at_rest[signal])
+        clean[after] = samples[1:]
+        shown[signal] = clean + noise * rng.standard_normal(len(time))
+    return shown

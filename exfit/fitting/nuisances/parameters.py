@@ -7,7 +7,7 @@ from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
 from exfit.fitting.experiment import Nuisance
 from exfit.fitting.nuisances.sine import COSINE, FREQUENCY, SINE
 from exfit.fitting.parameters import FreeParameter
-from exfit.plants import BREAKER, REFERENCES
+from exfit.plants import BREAKER, REFERENCES, VT0
 from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
 
@@ -28,6 +28,15 @@ def shifted(test: BumpTest, file: RecordFile, steps: Sequence[InputStep]) -> boo
     return len(steps) == 1 and test.begin is None and not jumps
 
 
+def finds_level(test: BumpTest, file: RecordFile) -> bool:
+    """Return whether a fit finds the voltage before the test though the case does not ask for it.
+
+    Where a breaker opens vt jumps from that level, and the jump is what shows X''d: the noise of
+    the level's mean is noise of the jump, which the intervals must include.
+    """
+    return test.breaker is not None and test.vt0 is None and "vt" in file.channels
+
+
 def prefix_of(recording: Recording) -> str:
     """Return how the names of all begin that a fit finds about a record."""
     return prefix_from(recording.name)
@@ -46,7 +55,8 @@ def names_of(recording: Recording) -> tuple[str, ...]:
     if test.breaker is not None:
         steps.append(InputStep(0.0, 1.0, BREAKER))
     nuisances = [*_of_steps(prefix, test, steps, shift=False), *_of_record(prefix, test, file)]
-    return (*(nuisance.name for nuisance, _ in nuisances), *_sine_names(prefix, file))
+    level = (f"{prefix}{VT0}",) if finds_level(test, file) else ()
+    return (*(nuisance.name for nuisance, _ in nuisances), *level, *_sine_names(prefix, file))
 
 
 def _sine_names(prefix: str, file: RecordFile) -> Iterator[str]:
@@ -90,7 +100,7 @@ def _of_steps(
 
 def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[Nuisance, Unknown]]:
     if isinstance(test.vt0, Unknown):
-        yield Nuisance(f"{prefix}vt0", "vt0"), test.vt0
+        yield Nuisance(f"{prefix}{VT0}", "vt0"), test.vt0
     if isinstance(file.delay, Unknown):
         yield Nuisance(f"{prefix}delay", "delay"), file.delay
     kinds: tuple[Literal["scale", "offset"], ...] = ("scale", "offset")
