@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from exfit import __version__, estimate
 from exfit.analysis.case_description import (
+    criteria_of,
     fixed_values,
     identified_values,
     input_hashes,
@@ -184,6 +185,8 @@ def fit(
         behaviour=analysis.behaviour,
         files=input_names(case, used),
         case_text=case_text,
+        as_found=analysis.as_found,
+        criteria=criteria_of(case),
     )
 
 

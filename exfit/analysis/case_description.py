@@ -29,6 +29,7 @@ from exfit.results.description import (
     SheetRow,
 )
 from exfit.results.model import FittedParameter
+from exfit.util.criteria import Criteria
 from exfit.util.text import rounded
 
 Estimated = tuple[float, float | None]  # a value, and half of its 95 % interval
@@ -69,6 +70,11 @@ def _records(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[tuple[st
     for label, setup in zip(labelled_records(case), setups, strict=True):
         yield label, setup.record
         yield from ((f"{label}.{signal}", file) for signal, file in setup.references.items())
+
+
+def criteria_of(case: Case) -> Criteria:
+    """Return the criteria by which the report of a case judges."""
+    return Criteria(**dict(case.report.criteria))
 
 
 def values_by_part(case: Case, values: Mapping[str, float]) -> dict[str, dict[str, float]]:

@@ -19,7 +19,7 @@ from exfit.analysis.diagnostics import (
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.intervals.determination import Determination
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
-from exfit.analysis.phase_ends import phase_ends
+from exfit.analysis.other_values import as_found_of, phase_ends
 from exfit.analysis.typical_values import influence_of_typical_values
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
@@ -35,7 +35,8 @@ from exfit.results.acceptance import judged
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour
-from exfit.results.model import FittedParameter, Iteration, PhaseEnd
+from exfit.results.model import FittedParameter, Iteration
+from exfit.results.other_values import AsFound, PhaseEnd
 from exfit.results.typical_values import TypicalValue, by_weight
 
 Array = NDArray[np.float64]
@@ -64,6 +65,7 @@ class Analysis(NamedTuple):
     interrupted: bool
     unfinished: bool
     typical_values: Mapping[str, TypicalValue]
+    as_found: AsFound | None
 
     @property
     def why(self) -> str:
@@ -91,11 +93,13 @@ def analysed(
     interrupted = unfinished or best.stop is estimate.Stop.INTERRUPTED
     uncertainty, behaviour, validation = determined.uncertainty, None, list[Comparison]()
     ends, typical = list[PhaseEnd](), dict[str, TypicalValue]()
+    as_found: AsFound | None = None
     try:
         ends += phase_ends(case, setups, problem.residuals, history)
         validated = [aligned(case, setup, values) for setup in unseen]
         validation += [validation_of(case, fitted, *pair) for pair in validated]
         behaviour = behaviour_of(setups, values, validated)
+        as_found = as_found_of(case, [*((setup, values) for setup in setups), *validated])
         if uncertainty is not None:
             typical = influence_of_typical_values(case, problem.compressed, best.x, uncertainty)
     except KeyboardInterrupt:  # what the search came to stays
@@ -108,6 +112,7 @@ def analysed(
         interrupted,
         unfinished,
         typical,
+        as_found,
     )
 
 

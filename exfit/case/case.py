@@ -12,6 +12,7 @@ from exfit.case.given_records import with_record_sections
 from exfit.case.parts import Part, Parts, in_plant
 from exfit.case.schema import (
     SINGLE,
+    AsFoundSection,
     BumpTest,
     Estimate,
     FreeSection,
@@ -20,6 +21,7 @@ from exfit.case.schema import (
     Plant,
     RecordFile,
     Recording,
+    ReportRequest,
     SaturationName,
     SimulationSection,
     Stabiliser,
@@ -73,6 +75,8 @@ class Case:
     simulation: SimulationSection
     validations: tuple[Recording, ...]
     accept: Limit | None
+    as_found: AsFoundSection | None
+    report: ReportRequest
     parts: Parts
     ties: Ties
     given_records: Mapping[str, Record] = field(default_factory=dict)

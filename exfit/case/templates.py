@@ -1,10 +1,12 @@
 """The lines of a case file that is made for a user to edit: values with their meanings."""
 
+import json
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from exfit.models.sheet import Parameter
 from exfit.util.sources import SOURCES
+from exfit.util.text import yaml_number
 
 MEANING_AT = 24  # column of the comments
 WIDTH = 80  # columns of a case
@@ -28,10 +30,25 @@ def source_lines(sources: Mapping[str, str], indent: str) -> Iterator[str]:
         return
     yield f"{indent}# each is from: {', '.join(SOURCES)}"
     yield f"{indent}sources:"
-    pairs = textwrap.wrap(
-        "{" + ", ".join(pair.replace(" ", NO_BREAK) for pair in stated) + "}",
+    yield from _flow_mapping(stated, f"{indent}  ")
+
+
+def as_found_lines(source: str, model: str, values: Mapping[str, float]) -> Iterator[str]:
+    """Yield the section that says what was in the planner's base, by the names of the system."""
+    yield "as_found:               # in the planner's base; a report compares the fit with it"
+    yield f"  source: {json.dumps(source, ensure_ascii=False)}"
+    yield f"  model: {model}"
+    yield "  parameters:"
+    pairs = [f"{name}: {yaml_number(value)}" for name, value in values.items()]
+    yield from _flow_mapping(pairs, "    ")
+
+
+def _flow_mapping(pairs: Iterable[str], indent: str) -> Iterator[str]:
+    """Yield the lines of a mapping in braces, none of its pairs broken."""
+    lines = textwrap.wrap(
+        "{" + ", ".join(pair.replace(" ", NO_BREAK) for pair in pairs) + "}",
         WIDTH,
-        initial_indent=f"{indent}  ",
-        subsequent_indent=f"{indent}   ",
+        initial_indent=indent,
+        subsequent_indent=f"{indent} ",
     )
-    yield from (line.replace(NO_BREAK, " ") for line in pairs)
+    yield from (line.replace(NO_BREAK, " ") for line in lines)

@@ -16,7 +16,7 @@ from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
 WHOLE_FIT = "result.json"
-VERSION = 5  # of the file; a file without a version is of the first
+VERSION = 6  # of the file; a file without a version is of the first
 
 
 def result_text(result: FitResult) -> str:

@@ -16,8 +16,10 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
+from exfit.results.other_values import AsFound, PhaseEnd
 from exfit.results.typical_values import TypicalValue
 from exfit.results.verdict import NO_MATCH, Verdict
+from exfit.util.criteria import Criteria
 from exfit.util.sources import NOT_STATED, TYPICAL
 from exfit.util.text import rounded
 from exfit.util.typed import IN_FILE, KEY, plain
@@ -167,22 +169,6 @@ class Minima:
         return int(np.count_nonzero(np.isinf(self.start_costs) & np.isnan(self.end_costs)))
 
 
-@dataclass(frozen=True, eq=False)
-class PhaseEnd:
-    """Where a phase of the descent from the start of the case handed over to the next.
-
-    ``iteration`` is its number in the history, ``values`` are those of the free parameters and of
-    all others of the exciter there, ``comparisons`` the response to them beside each record.
-    """
-
-    phase: str
-    next_phase: str
-    iteration: int
-    cost: Annotated[float, nan]
-    values: Mapping[str, float]
-    comparisons: tuple[Comparison, ...] = field(default=(), metadata={KEY: "records"})
-
-
 @dataclass(frozen=True, repr=False, eq=False)
 class FitResult:
     """A fit: what was found, how, and how well it matches.
@@ -197,8 +183,9 @@ class FitResult:
     ``cost`` is what the fit made small, ``comparisons`` are with each record,
     ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
     what identifies the unit and the test. ``inputs`` is the SHA-256 of every file by its label,
-    ``files`` its name. ``given_values`` are those in place of the case's. ``verdict`` and
-    ``behaviour`` are None in results of an earlier version.
+    ``files`` its name. ``given_values`` are those in place of the case's. ``as_found`` is
+    the model before the test, ``criteria`` are those by which a report judges. ``verdict``,
+    ``behaviour`` and ``as_found`` are None in results of an earlier version.
     """
 
     DERIVED: ClassVar = {
@@ -252,6 +239,8 @@ class FitResult:
     behaviour: Behaviour | None = field(default=None, metadata=IN_FILE)
     files: Mapping[str, str] = field(default_factory=dict, metadata=IN_FILE)
     case_text: str = field(default="", metadata=IN_FILE)
+    as_found: AsFound | None = field(default=None, metadata=IN_FILE)
+    criteria: Criteria = field(default_factory=Criteria, metadata=IN_FILE)
 
     @property
     def name(self) -> str:

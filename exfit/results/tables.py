@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from exfit.dsp.decimation import kept_rows
 from exfit.inference import ParameterEffect
 from exfit.results.comparisons import Comparison, IterationResponses
-from exfit.results.model import FitResult, PhaseEnd
+from exfit.results.model import FitResult
+from exfit.results.other_values import PhaseEnd
 from exfit.results.side_by_side import outcome_of
 from exfit.util.sources import NOT_STATED, SOURCES
 from exfit.util.text import yaml_number

@@ -11,6 +11,7 @@ from exfit.fitting.uncertainty import Sensitivity, UncertaintyAnalysis
 from exfit.results.comparisons import Comparison, IterationResponses, Overlay
 from exfit.results.description import Behaviour, SmallSignalView
 from exfit.results.model import FitResult
+from exfit.results.other_values import AsFound
 from exfit.results.tables import DIGITS, clock_digits
 from exfit.simulation.small_signal import Bode, SmallSignal
 from exfit.util.sorting import distinct
@@ -37,9 +38,14 @@ def thinned(result: FitResult) -> FitResult:
             replace(end, comparisons=tuple(_comparison(match, count) for match in end.comparisons))
             for end in result.phase_ends
         ),
+        as_found=None if result.as_found is None else _as_found(result.as_found, count),
         knowledge=None if result.knowledge is None else _knowledge(result.knowledge),
         behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
     )
+
+
+def _as_found(unit: AsFound, count: int) -> AsFound:
+    return replace(unit, comparisons=tuple(_comparison(match, count) for match in unit.comparisons))
 
 
 def drawn_responses(responses: IterationResponses, iterations: int) -> IterationResponses:

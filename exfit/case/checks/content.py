@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from exfit.case.checks.as_found import as_found_faults
 from exfit.case.checks.breaker import breaker_faults, driving_signals
 from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
 from exfit.case.checks.model import parameter_faults
@@ -58,6 +59,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from repeated_names(several)
     yield from _estimate_faults(content)
     yield from _starts_faults(content, parts)
+    yield from as_found_faults(content, parts)
 
 
 def _single_record_faults(content: ContentNode) -> Iterator[Fault]:

@@ -16,6 +16,7 @@ from exfit.case.schema.records import (
     Recording,
     SineSection,
 )
+from exfit.case.schema.report import AsFoundSection, CriteriaSection, ReportRequest
 from exfit.case.schema.saturation_tests import CurveColumn, SaturationTest
 from exfit.case.schema.steady_tests import PointColumn, SteadyTest
 from exfit.case.schema.tests import (
@@ -33,9 +34,11 @@ from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
 __all__ = [
     "MOST_ROWS",
     "SINGLE",
+    "AsFoundSection",
     "BumpTest",
     "CaseDocument",
     "ChannelSection",
+    "CriteriaSection",
     "CurveColumn",
     "Estimate",
     "Filter",
@@ -56,6 +59,7 @@ __all__ = [
     "Reference",
     "ReferenceFile",
     "ReferenceTable",
+    "ReportRequest",
     "SaturationName",
     "SaturationTest",
     "SimulationSection",

@@ -8,6 +8,7 @@ from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSe
 from exfit.case.schema.plants import Plant, SaturationName, Stabiliser
 from exfit.case.schema.programme import TestOfProgramme
 from exfit.case.schema.records import RecordFile, Recording
+from exfit.case.schema.report import AsFoundSection, ReportRequest
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Fact, Frozen, Section, Text, nothing
 
@@ -77,4 +78,11 @@ class CaseDocument(Section):
         "beyond it the exit code is 3. Default: such a record must be matched better than by a "
         "constant, with an rmse of at most 3 times that of the fit, or 3 times the noise of the "
         "record where that is larger.",
+    )
+    as_found: AsFoundSection | None = Field(
+        default=None,
+        description="The model in the planner's base before the test; default: the start values.",
+    )
+    report: ReportRequest = Field(
+        default_factory=ReportRequest, description="What the report judges by."
     )

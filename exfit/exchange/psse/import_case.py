@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from exfit.case.templates import commented, parameter_line, source_lines
+from exfit.case.templates import as_found_lines, commented, parameter_line, source_lines
 from exfit.errors import DynamicsError
 from exfit.exchange.psse.fields import text_of
 from exfit.exchange.psse.unit import Unit, UnitPart, read_unit
@@ -38,7 +38,26 @@ def case_text(unit: Unit, file: str) -> str:
     lines += [*TEST.splitlines(), "parameters:"]
     lines += [commented("  fixed:", "what a fit shall find goes under free")]
     lines += [*_values(unit.exciter, "    "), *_sources(unit.exciter)]
+    lines += _as_found(unit, file)
     return "\n".join(lines) + "\n"
+
+
+def _as_found(unit: Unit, file: str) -> Iterator[str]:
+    """Yield what the file holds of the unit, for the report to compare with."""
+    values = {
+        _prefix(part) + row.symbol: part.values[row.symbol]
+        for part in (unit.exciter, unit.machine, unit.stabiliser)
+        if part is not None
+        for row in part.definition.model.sheet
+        if row.symbol in part.definition.names
+    }
+    source = f"{_plain(file)}, bus {unit.bus}, machine {_plain(unit.id)}"
+    yield from as_found_lines(source, unit.exciter.definition.model.name, values)
+
+
+def _prefix(part: UnitPart) -> str:
+    """Return how the names of the parameters of a part begin in the system."""
+    return "" if part.definition.kind == "exciter" else f"{part.definition.kind}."
 
 
 def _heading(unit: Unit, file: str) -> Iterator[str]:

@@ -1,0 +1,147 @@
+"""Whether the responses of a fit match their records, by the limits of a report."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from exfit.dsp.features import LABELS, TIMES, Features
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FitResult
+from exfit.util.criteria import Criteria
+
+NAMES = {name: (label, unit) for label, name, unit in LABELS}
+NOT_REACHED = "the simulated response does not show it"
+
+
+@dataclass(frozen=True)
+class JudgedCriterion:
+    """A criterion on one record: the difference beside its limit, both in ``unit``.
+
+    ``met`` is None where the noise of the record leaves it open, which ``why`` says.
+    """
+
+    record: str
+    fitted: bool
+    label: str
+    difference: float | None
+    limit: float
+    unit: str
+    met: bool | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class CriteriaVerdict:
+    """All criteria of a report, and what they come to."""
+
+    criteria: tuple[JudgedCriterion, ...]
+
+    @property
+    def failed(self) -> tuple[JudgedCriterion, ...]:
+        """Those that are not met."""
+        return tuple(criterion for criterion in self.criteria if criterion.met is False)
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether none is missed; None where the noise leaves one open, or there is none at all."""
+        if self.failed:
+            return False
+        is_open = any(criterion.met is None for criterion in self.criteria)
+        return None if is_open or not self.criteria else True
+
+    @property
+    def sentence(self) -> str:
+        """What the criteria come to, in a sentence."""
+        count = len(self.criteria)
+        met = sum(criterion.met is True for criterion in self.criteria)
+        if not count:
+            return "no record could be judged by the criteria"
+        if self.failed:
+            missed = "; ".join(_missed(criterion) for criterion in self.failed)
+            return f"{len(self.failed)} of {count} criteria are not met: {missed}"
+        if met < count:
+            return f"{met} of {count} criteria are met, the noise of the records leaves the others"
+        return f"all {count} criteria are met"
+
+
+def judged_by_criteria(result: FitResult) -> CriteriaVerdict:
+    """Return how the responses of a fit, and of its validations, meet the criteria."""
+    every = [(match, True) for match in result.comparisons]
+    every += [(match, False) for match in result.validation]
+    return CriteriaVerdict(
+        tuple(
+            criterion
+            for match, fitted in every
+            for criterion in _judged(match, fitted, result.criteria)
+        )
+    )
+
+
+def _judged(match: Comparison, fitted: bool, criteria: Criteria) -> Iterator[JudgedCriterion]:
+    """Yield the criteria that a record can be judged by."""
+    measured, simulated = match.features.measured, match.features.simulated
+    change = _change(match, measured)
+    if not change > 0.0:
+        return
+    label = f"rms of the difference, {match.judged_by}"
+    rmse = 100.0 * match.rmse / change
+    met = bool(rmse <= criteria.rmse)
+    unit = "% of the change"
+    yield JudgedCriterion(match.name, fitted, label, rmse, criteria.rmse, unit, met)
+    if measured is None or simulated is None:
+        return
+    for name in ("final_value", "overshoot_percent", *TIMES):
+        limit = _limit(name, measured, change, criteria)
+        if limit is not None:
+            yield _feature(match.name, fitted, name, (measured, simulated), limit)
+
+
+def _change(match: Comparison, measured: Features | None) -> float:
+    """Return by how much a signal changed in its record: the step, else its range (pu)."""
+    if measured is not None and match.judged_by == "vt":
+        return abs(measured.final_value - measured.initial_value)
+    samples = match.overlays.get(match.judged_by)
+    if samples is None or not np.isfinite(samples.measured).any():
+        return 0.0
+    return float(np.nanmax(samples.measured) - np.nanmin(samples.measured))
+
+
+def _limit(name: str, measured: Features, change: float, criteria: Criteria) -> float | None:
+    """Return the limit on a feature in its unit; None where the record does not show it.
+
+    A peak that is no more than the limit of the overshoot has no time.
+    """
+    value = getattr(measured, name)
+    if value is None or not isfinite(value):
+        return None
+    if name == "final_value":
+        return 0.01 * criteria.final_value * change
+    if name == "overshoot_percent":
+        return criteria.overshoot
+    if name == "peak_time" and measured.overshoot_percent <= criteria.overshoot:
+        return None
+    return max(0.01 * float(getattr(criteria, name) * value), criteria.time)
+
+
+def _feature(
+    record: str, fitted: bool, name: str, features: tuple[Features, Features], limit: float
+) -> JudgedCriterion:
+    measured, simulated = features
+    label, unit = NAMES[name]
+    value, response = getattr(measured, name), getattr(simulated, name)
+    if response is None or not isfinite(response):
+        return JudgedCriterion(record, fitted, label, None, limit, unit, False, NOT_REACHED)
+    difference, half = response - value, measured.errors.get(name, 0.0)
+    if half > limit:
+        why = f"its noise leaves the recorded one ±{half:.2g} {unit}"
+        return JudgedCriterion(record, fitted, label, difference, limit, unit, None, why)
+    met = bool(abs(difference) <= limit)
+    return JudgedCriterion(record, fitted, label, difference, limit, unit, met)
+
+
+def _missed(criterion: JudgedCriterion) -> str:
+    by = "is not reached" if criterion.difference is None else f"{criterion.difference:+.2g}"
+    limit = f"the limit is {criterion.limit:.2g} {criterion.unit}"
+    return f"{criterion.label} of {criterion.record}: {by}, {limit}"
