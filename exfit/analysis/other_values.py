@@ -90,13 +90,13 @@ def as_found_of(case: Case, tests: Sequence[tuple[ExperimentSetup, Values]]) -> 
 
 def _case_before(case: Case, section: AsFoundSection) -> Case:
     """Return the case with the exciter of the planner's base."""
-    from exfit.case.other_model import with_exciter  # what `new` needs, a fit mostly does not
-
     if section.model is None:
         return case
     model = find(section.model, case.folder)
     if case.parts.exciter is not None and model.name == case.parts.exciter.name:
         return case
+    from exfit.case.other_model import with_exciter  # what `new` needs, a fit mostly does not
+
     return with_exciter(case, model.name, model)
 
 
