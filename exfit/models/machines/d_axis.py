@@ -21,8 +21,8 @@ efd ─►(+)─►[   1   ]─┬─ EQP ─┬──────────�
              └──────────── PSID ─────────────────┘
 """
 FIELD_CURRENT = """\
-ifd = EQP + (Xd - Xpd) (id + (Xpd - Xppd) / (Xpd - Xl)^2 (EQP - PSID - (Xpd - Xl) id)),
-to which saturation adds"""
+ifd = EQP + (Xd - Xpd) (id + k (EQP - PSID - (Xpd - Xl) id)) and saturation,
+with k = (Xpd - Xppd) / (Xpd - Xl)^2."""
 
 
 def damper_flux(s: Signal, p: Signal) -> Signal:

@@ -34,8 +34,8 @@ efd ─►(+)─►[   1   ]─┬─ EQP ─►(+)─► vq
 
 iq ─►[Xq]─► vd
 
-ifd = EQP + (Xd - Xpd) id, to which saturation adds its own, a function of E'q. On
-open circuit id and iq are 0."""
+ifd = EQP + (Xd - Xpd) id and saturation, which is a function of E'q. On open
+circuit id and iq are 0."""
 
 
 def source(s: Signal, p: Signal) -> Source:

@@ -59,9 +59,9 @@ DRAWING = f"""\
              ▲           (Xpq - Xl) iq           │
              └──────────── PSIQ ─────────────────┘
 
-{FIELD_CURRENT} its own, a function of the air-gap flux with the share
-of each axis. i1q is the same of the q axis, where nothing excites. On open circuit
-id and iq are 0, and the q axis rests."""
+{FIELD_CURRENT} Saturation is a function of the air-gap
+flux, with a share of each axis. i1q is the same of the q axis, where nothing
+excites. On open circuit id and iq are 0, and the q axis rests."""
 
 CONS = "Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xl S10 S12"
 

@@ -55,8 +55,8 @@ iq ─┬─►[ Xq - Xppd ]─ PSIQ ─►(+)─► vd
     │  [1 + sTppq0 ]          ▲
     └─►[ Xppd ]───────────────┘
 
-{FIELD_CURRENT} its own, a function of E'q. On open circuit id
-and iq are 0, and the q axis rests."""
+{FIELD_CURRENT} Saturation is a function of E'q. On
+open circuit id and iq are 0, and the q axis rests."""
 GENSAE_DRAWING = f"""\
 {D_AXIS_DRAWING}
                     VXQ
@@ -65,9 +65,9 @@ iq ─┬─►[Xq - Xppd]─►(+)─►[    1     ]─ PSIQ ─►(+)─► vd
     │                    [1 + sTppq0]          ▲
     └─►[ Xppd ]────────────────────────────────┘
 
-{FIELD_CURRENT} its own, a function of the air-gap flux with the share
-of the d axis; VXQ is the share of the q axis. On open circuit id and iq are 0, and
-the q axis rests."""
+{FIELD_CURRENT} Saturation is a function of the air-gap
+flux, with a share of each axis; VXQ is that of the q axis. On open circuit id
+and iq are 0, and the q axis rests."""
 
 CONS = "Tpd0 Tppd0 Tppq0 H D Xd Xq Xpd Xppd Xl S10 S12"
 
