@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from saturation_curves import drawn_curve, hits_of, shares
 
 from exfit.analysis.steady.saturation import FieldWinding, directions, saturation_curve
 from exfit.analysis.steady.saturation_forms import EXCESS
@@ -183,3 +184,11 @@ def test_two_points_and_the_line_give_the_ratios_of_field_currents():
         assert at_rated == pytest.approx(318.0)
         at_120 = 263.0 * (1.2 + EXCESS[form](np.array([1.2]), S10, 3.0 * S10))
         assert at_120 / (1.2 * 263.0) - 1.0 == pytest.approx(3.0 * S10)
+
+
+def test_intervals_hold_the_truth_about_as_often_as_they_say():
+    random = np.random.default_rng(2)
+    hits = [hits_of(drawn_curve(form, random)) for form in FORMS for _ in range(4)]
+    # 3 of 12 intervals of 95 % miss with a probability of 2 %; the study has 200 of each form
+    assert np.all(shares(hits) > 0.7)
+    assert np.all(np.isfinite([hit.widths for hit in hits]))
