@@ -177,7 +177,8 @@ class Side:
         before = self.spots[-2]
         risen = last.height - before.height
         longest = MOST_GROWTH * max(1.0, gain / share) * self.stride
-        steepness = last.slope or risen / abs(last.place - before.place)
+        way = abs(last.place - before.place)
+        steepness = last.slope or (risen / way if way else 0.0)
         if not steepness > 0.0:
             return longest
         straight = min(gain / steepness, longest)

@@ -94,8 +94,10 @@ def saturation_curve(
     direction = directions(vt)
     dead = ifd <= WITHOUT_CURRENT * ifd.max()
     points = CurvePoints(vt[~dead], ifd[~dead], direction[~dead])
-    if len(np.unique(points.direction)) > 1 and len(points.vt) == FEWEST_POINTS:
-        points = points._replace(direction=np.ones_like(points.vt))
+    least = FEWEST_POINTS - 1 + points.branches
+    if len(points.vt) < least:
+        what = f"{len(points.vt)} points on two branches; at least {least} are needed"
+        raise ExfitError(f"saturation: {what}")
     fits = sorted((fitted(name, points) for name in EXCESS), key=lambda fit: fit.rms)
     curves = [curve_of(fit, refutes(fits[0], fit)) for fit in fits]
     curves = [beside_others(curve, curves, float(points.vt.max())) for curve in curves]

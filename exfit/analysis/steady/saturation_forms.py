@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exfit.estimate import OneByOne, half_square, least_squares, profiles
-from exfit.inference.confidence import LEVEL
+from exfit.estimate import OneByOne, ProfileEnd, half_square, least_squares, profiles
+from exfit.inference.confidence import LEVEL, Interval
 from exfit.inference.quantiles import student_quantile
 from exfit.models.blocks import exponential_se
 from exfit.models.machines.d_axis import curve, power_curve
@@ -32,7 +32,9 @@ STARTS = tuple(
     for ratio in (1.5, 2.0, 3.0, 4.0, 6.0, 10.0)
 )
 BASE, AT_10, AT_12, OFFSET, HALF_LOOP = range(5)  # the parameters of a curve
-LEAST_S, MOST_S = 1e-6, 20.0  # pu
+LEAST_S = {AT_10: 1e-12, AT_12: 1e-6}  # pu: none
+MOST_S = 20.0  # pu
+SHARES = (1e-6, 1.0 / 1.2)  # of S10 in S12: a quadratic curve from zero has the largest
 BASES = (0.1, 10.0)  # of the steepest point's current per voltage
 MOST_OFFSET = 1.0  # pu
 REMANENCE = 0.015  # pu of field current: standard deviation of what it moves a curve by
@@ -74,9 +76,7 @@ class FormFit:
     prior: float = 0.0
 
     def errors(self, x: Array) -> Array:
-        """Return the weighted errors (M,) of the points, nan where S(1.2) is not above S(1.0)."""
-        if not x[AT_12] > x[AT_10]:
-            return np.full(len(self.weight), np.nan)
+        """Return the weighted errors (M,) of the points."""
         simulated = self._mean(self.points.vt, x) + self._loop @ x[HALF_LOOP:]
         return np.asarray(self.weight * (simulated - self.points.ifd))
 
@@ -169,18 +169,77 @@ class FormFit:
         Those of base, S10 and S12 are from the profiles of the cost; in the others it is quadratic.
         """
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        functions = OneByOne(self.residuals, self.jacobian)
-        bounds = bounds_of(self.points, len(self.x))
-        rises = dict.fromkeys((BASE, AT_10, AT_12), self.rise)
-        curved = profiles(functions, self.x, rises, bounds, points=PROFILE_POINTS, workers=1)
-        half = self.quantile * errors[OFFSET:]
-        linear = zip(self.x[OFFSET:] - half, self.x[OFFSET:] + half, strict=True)
-        ends = [(profile.low, profile.high) for profile in curved]
-        ends += [(float(low), float(high)) for low, high in linear]
+        half = self.quantile * errors
+        ends: list[Interval] = [
+            (float(x - h), float(x + h)) for x, h in zip(self.x, half, strict=True)
+        ]
+        for kept, indices in ((AT_10, (AT_10,)), (AT_12, (BASE, AT_12))):
+            search = SearchVariables(self, kept)
+            rises = dict.fromkeys(indices, self.rise)
+            found = profiles(
+                OneByOne(search.residuals, search.jacobian), search.of(self.x), rises,
+                search.bounds, points=PROFILE_POINTS, workers=1,
+            )  # fmt: skip
+            for index, profile in zip(indices, found, strict=True):
+                nothing = index != BASE and profile.ends[0] is ProfileEnd.BOUND
+                ends[index] = 0.0 if nothing else profile.low, profile.high
         return tuple(
             MeasuredValue(float(x), float(error), interval)
             for x, error, interval in zip(self.x, errors, ends, strict=True)
         )
+
+
+class SearchVariables(NamedTuple):
+    """The variables of a search: one of S10 and S12 is ``kept``, the other's place has S10 / S12.
+
+    So the bounds of a box keep S(1.2) above S(1.0), by as much as a curve has it that is quadratic
+    from zero on.
+    """
+
+    fit: FormFit
+    kept: int
+
+    def of(self, x: Array) -> Array:
+        """Return the variables (N,) of parameters (N,)."""
+        u = x.copy()
+        u[AT_10 + AT_12 - self.kept] = x[AT_10] / x[AT_12]
+        return u
+
+    def parameters(self, u: Array) -> Array:
+        """Return the parameters (N,)."""
+        x = u.copy()
+        if self.kept == AT_12:
+            x[AT_10] = u[AT_10] * u[AT_12]
+        else:
+            x[AT_12] = u[AT_10] / u[AT_12]
+        return x
+
+    def residuals(self, u: Array) -> Array:
+        """Return the residuals of the fit."""
+        return self.fit.residuals(self.parameters(u))
+
+    def jacobian(self, u: Array) -> Array:
+        """Return their derivatives by the variables."""
+        J = self.fit.jacobian(self.parameters(u))
+        by_10, by_12 = J[:, AT_10].copy(), J[:, AT_12].copy()
+        if self.kept == AT_12:
+            J[:, AT_10], J[:, AT_12] = by_10 * u[AT_12], by_10 * u[AT_10] + by_12
+        else:
+            share = u[AT_12]
+            J[:, AT_10], J[:, AT_12] = by_10 + by_12 / share, -by_12 * u[AT_10] / share**2
+        return J
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """The bounds (N,), far from what any machine has."""
+        points, count = self.fit.points, len(self.fit.x)
+        steepest = float(np.min(points.ifd / points.vt))
+        low = np.full(count, -MOST_OFFSET * steepest)
+        high = -low
+        low[:OFFSET] = BASES[0] * steepest, SHARES[0], SHARES[0]
+        high[:OFFSET] = BASES[1] * steepest, SHARES[1], SHARES[1]
+        low[self.kept], high[self.kept] = LEAST_S[self.kept], MOST_S
+        return low, high
 
 
 def fitted(form: SaturationForm, points: CurvePoints) -> FormFit:
@@ -200,9 +259,11 @@ def weighted(fit: FormFit) -> FormFit:
 
 def at_minimum(fit: FormFit) -> FormFit:
     """Return the fit with the parameters that match best."""
-    bounds = bounds_of(fit.points, len(fit.x))
-    least = least_squares(fit.residuals, fit.x, fit.jacobian, bounds, method="lm-then-dgn")
-    return replace(fit, x=least.x)
+    search = SearchVariables(fit, AT_12)
+    least = least_squares(
+        search.residuals, search.of(fit.x), search.jacobian, search.bounds, method="lm-then-dgn"
+    )
+    return replace(fit, x=search.parameters(least.x))
 
 
 def start_of(form: SaturationForm, points: CurvePoints) -> FormFit:
@@ -213,17 +274,7 @@ def start_of(form: SaturationForm, points: CurvePoints) -> FormFit:
     for S10, S12 in STARTS:
         matrix = np.column_stack([vt + EXCESS[form](vt, S10, S12), ones, loop])
         (base, *offsets), *_ = np.linalg.lstsq(matrix, points.ifd, rcond=None)
-        low, high = bounds_of(points, 3 + len(offsets))
-        x = np.clip(np.array([base, S10, S12, *offsets]), low, high)
-        fits.append(FormFit(form, points, x, ones))
+        fit = FormFit(form, points, np.array([base, S10, S12, *offsets]), ones)
+        search = SearchVariables(fit, AT_12)
+        fits.append(replace(fit, x=search.parameters(np.clip(search.of(fit.x), *search.bounds))))
     return min(fits, key=lambda fit: half_square(fit.residuals(fit.x)))
-
-
-def bounds_of(points: CurvePoints, count: int) -> tuple[Array, Array]:
-    """Return the bounds (N,) of the parameters, far from what any machine has."""
-    steepest = float(np.min(points.ifd / points.vt))
-    low = np.full(count, -MOST_OFFSET * steepest)
-    high = -low
-    low[:OFFSET] = BASES[0] * steepest, LEAST_S, LEAST_S
-    high[:OFFSET] = BASES[1] * steepest, MOST_S, MOST_S
-    return low, high

@@ -192,3 +192,18 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say():
     # 3 of 12 intervals of 95 % miss with a probability of 2 %; the study has 200 of each form
     assert np.all(shares(hits) > 0.7)
     assert np.all(np.isfinite([hit.widths for hit in hits]))
+
+
+def test_a_machine_without_saturation_has_none_and_a_determined_air_gap_line():
+    vt = np.linspace(0.1, 1.2, 12)
+    result = saturation_curve(vt, BASE * (vt + 1e-3 * np.cos(7.0 * np.arange(12.0))))
+    low, high = result.curve.ifd_base.interval
+    assert low < BASE < high
+    assert result.curve.S12.interval[0] == 0.0
+    assert result.curve.S12.interval[1] < 0.05
+
+
+def test_six_points_are_too_few_for_two_branches():
+    vt = np.array([0.3, 0.7, 1.2, 1.1, 0.6, 0.2])
+    with pytest.raises(ExfitError, match="6 points on two branches; at least 7"):
+        saturation_curve(vt, BASE * vt)
