@@ -2,62 +2,29 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
-from typed_rejection import Load, TypedMachine, recorded_rejection
+from places import CONFIGS
+from rejection_cases import (
+    D_AXIS,
+    OPENS,
+    Q_AXIS,
+    REACTIVE,
+    TRUE,
+    case_of,
+    content_of,
+    of_machine,
+    on_the_q_axis,
+)
+from rejection_record import FILE, UNIT, rejection_record
+from rejection_record import OPENS as OPENS_IN_SAMPLE
+from typed_rejection import Load, recorded_rejection
 
 import exfit
 from exfit.case.case import Case
+from exfit.case.load import load_case
 from exfit.errors import RecordError
 from exfit.fitting.build import build_experiments
 from exfit.fitting.nuisances.parameters import names_of
 from exfit.records.record import Record
-
-TRUE = {
-    "Tpd0": 6.2, "Tppd0": 0.045, "Tpq0": 0.6, "Tppq0": 0.08, "H": 3.5, "D": 0.0, "Xd": 1.75,
-    "Xq": 1.68, "Xpd": 0.29, "Xpq": 0.5, "Xppd": 0.22, "Xl": 0.15, "S10": 0.12, "S12": 0.4,
-}  # fmt: skip
-D_AXIS = {"Xd": 1.1, "Xpd": 1.3, "Xppd": 0.8, "Tpd0": 0.8, "Tppd0": 1.5}  # starts, of the truth
-Q_AXIS = {"Xq": 1.1, "Xpq": 1.2, "Xppd": 0.9, "Tpq0": 0.8, "Tppq0": 1.3, "H": 1.2}
-NOISE, RATE = 2e-4, 1000.0  # pu, Hz
-REACTIVE = Load(0.0, -0.3)
-OPENS = 1.0003  # s; between two samples
-
-
-def content_of(load, free, signals, **breaker):
-    return {
-        "plant": {
-            "type": "machine-on-load",
-            "machine": "GENROU",
-            "parameters": {name: value for name, value in TRUE.items() if name not in free},
-            "network": {"P": load.P, "Q": load.Q},
-            "free": {
-                name: {"start": share * TRUE[name], "min": TRUE[name] / 3, "max": TRUE[name] * 3}
-                for name, share in free.items()
-            },
-        },
-        "test": {"breaker": {"opens": OPENS} | breaker},
-        "record": {"channels": {signal: {"noise": NOISE} for signal in signals}},
-        "estimate": {"search": "local"},
-    }
-
-
-def case_of(load, free, signals=("vt", "ifd"), end=10.0, seed=0, driving=(), **breaker):
-    time = np.arange(0.0, end + 0.5 / RATE, 1.0 / RATE)
-    shown = recorded_rejection("GENROU", TRUE, load, OPENS, time, NOISE, seed)
-    record = Record.from_arrays(time, {signal: shown[signal] for signal in (*signals, *driving)})
-    content = content_of(load, free, signals, **breaker)
-    content["record"]["channels"] |= {signal: {} for signal in driving}
-    return Case.from_dict(content, record)
-
-
-def of_machine(result):
-    return {name.removeprefix("machine."): p for name, p in result.parameters.items()}
-
-
-def on_the_q_axis(power):
-    """Return the load whose current has no part along d."""
-    typed = TypedMachine("GENROU", TRUE)
-    return Load(power, brentq(lambda q: typed.start(Load(power, q))[2], -0.25, 0.1))
 
 
 def test_a_reactive_rejection_determines_the_d_axis_and_says_what_it_does_not():
@@ -99,6 +66,22 @@ def test_the_intervals_of_a_rejection_hold_the_truth():
     assert min(held.values()) >= 16, held
 
 
+def test_the_sample_of_a_rejection_gives_back_the_data_of_its_unit():
+    """Another integrator computed it; the default search, and intervals of all that is found."""
+    found = of_machine(exfit.fit(load_case(CONFIGS / "rejection.yaml")))
+    for name, true in {**UNIT, "breaker.opens": OPENS_IN_SAMPLE, "vt0": 1.0}.items():
+        if name in found:
+            low, high = found[name].interval
+            assert low < true < high, name
+    assert {*D_AXIS} < found.keys()
+
+
+def test_that_record_is_what_its_script_makes():
+    made = np.loadtxt(rejection_record().splitlines(), delimiter=",", skiprows=1)
+    kept = np.loadtxt(FILE, delimiter=",", skiprows=1)
+    assert np.abs(made - kept).max() < 1.1e-5  # a digit may round the other way
+
+
 def test_the_level_before_the_opening_is_found_with_the_rest():
     """A jump is no surer than the level that it leaves; with a given vt0 that level is sure."""
     case = case_of(REACTIVE, D_AXIS)
@@ -116,9 +99,23 @@ def test_the_instant_is_found_between_the_samples_of_the_jump():
     assert setup.test.steady == opens.low
 
 
-def test_derivatives_to_all_that_a_rejection_finds_are_exact():
+def with_exciter(case):
+    """Return a case on load with an exciter in service, of which a parameter is free."""
+    (recording,) = case.recordings
+    content = content_of(Load(0.3, -0.2), D_AXIS | Q_AXIS, ("vt", "ifd"), opens={"start": "auto"})
+    content["plant"] |= {
+        "type": "infinite-bus",
+        "network": {"f0": 50, "X": 0.3, "P": 0.3, "Q": -0.2},
+    }
+    content |= {"model": "SEXS", "parameters": {"fixed": {"EMAX": 99.0, "EMIN": -99.0}}}
+    content["parameters"]["free"] = {"K": {"start": 30.0, "min": 3.0, "max": 300.0}}
+    return Case.from_dict(content, case.given_records[recording.name])
+
+
+@pytest.mark.parametrize("plant", [lambda case: case, with_exciter])
+def test_derivatives_to_all_that_a_rejection_finds_are_exact(plant):
     """Beside central differences of the response, to the instant among them."""
-    case = case_of(Load(0.3, -0.2), D_AXIS | Q_AXIS, end=2.0, opens={"start": "auto"})
+    case = plant(case_of(Load(0.3, -0.2), D_AXIS | Q_AXIS, end=2.0, opens={"start": "auto"}))
     (setup,) = build_experiments(case)
     experiment = setup.experiment
     at = setup.with_start_values(case.values())
