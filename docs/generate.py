@@ -22,7 +22,12 @@ MODEL_PAGES = DOCS / "models"
 BEGIN, END = "<!-- keys -->", "<!-- /keys -->"
 
 # what a value of a JSON type is called in the tables
-TYPES = {"number": "number", "integer": "whole number", "string": "text"}
+TYPES = {
+    "number": "number",
+    "integer": "whole number",
+    "string": "text",
+    "boolean": "true or false",
+}
 WIDTH, HEIGHT, DPI = 7.2, 2.2, 110  # of a figure and of each of its panels, inches
 LABELS = {"vt": "vt (pu)", "efd": "efd (pu)", "p": "p (pu)"}
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from exfit.case.case import Case
     from exfit.fleet.fits import fit_all
     from exfit.fleet.ranking import rank
+    from exfit.programme.run import run
     from exfit.records.record import Record
     from exfit.results.io import load_result
     from exfit.results.model import FitResult
@@ -63,6 +64,7 @@ __all__ = [
     "profile",
     "rank",
     "read_record",
+    "run",
     "saturation_curve",
     "simulate",
     "translate",
@@ -82,6 +84,7 @@ _MODULES = {
     "profile": "exfit.workflows",
     "rank": "exfit.fleet.ranking",
     "read_record": "exfit.workflows",
+    "run": "exfit.programme.run",
     "saturation_curve": "exfit.analysis.steady.saturation",
     "simulate": "exfit.workflows",
     "translate": "exfit.analysis.translation.translate",

@@ -36,6 +36,7 @@ MAY_IMPORT["analysis"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["exchange"] = {"results", "case", "models"}
 MAY_IMPORT["workflows"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
 MAY_IMPORT["fleet"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
+MAY_IMPORT["programme"] = {*MAY_IMPORT} - {"exchange", "errors", "util"}
 MAY_IMPORT["output"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["cli"] = {*MAY_IMPORT} - {"errors", "util"}
 MAY_IMPORT["__main__"] = {"cli"}

@@ -23,12 +23,16 @@ def files_of(case: Path) -> tuple[Path, ...]:
 
     Of a file that cannot be read as YAML it is the case alone.
     """
-    content = _content(case)
+    return (case, *(file for file in files_in(_content(case), case.parent) if file != case))
+
+
+def files_in(content: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
+    """Return the files that the content of a case names: its model, its records, in a folder."""
     model = content.get("model")
     named = [model] if isinstance(model, str) and model.endswith(".py") else []
     named += [file for key in NAMING_FILES for file in _files(content.get(key))]
-    files = [part for name in named for part in _parts(case.parent / name)]
-    return tuple(dict.fromkeys([case, *files]))
+    files = [part for name in named for part in _parts(folder / name)]
+    return tuple(dict.fromkeys(files))
 
 
 def free_of(case: Path) -> tuple[str, ...]:

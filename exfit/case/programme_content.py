@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from exfit.case.schema.programme import BUMP, REJECTION
+from exfit.case.schema.programme import BUMP, REJECTION, STEADY
 from exfit.case.yaml import Fault
+from exfit.records.units import alike, needs_base
 from exfit.util.text import Place
 
 Content = dict[str, Any]
@@ -68,38 +69,76 @@ def bump_content(content: Content) -> CaseContent:
     return CaseContent({**common_content(content).content, **given}, places)
 
 
-def rejection_content(content: Content, index: int) -> CaseContent:
-    """Return the case of the test at an index: nothing is free in it but what it gives itself."""
+def machine_content(content: Content, index: int) -> CaseContent:
+    """Return the case of a test of the machine: nothing is free in it but what it gives itself."""
     test = content[TESTS][index]
-    places: dict[Place, Place | None] = {
-        **_places_of_recording(("records", 0), index),
-        ("plant", "free"): (TESTS, index, "free"),
-    }
-    inner = {**common_content(content).content, "records": [_recording(test)]}
+    places: dict[Place, Place | None] = {("plant", "free"): (TESTS, index, "free")}
+    inner = common_content(content).content
+    if test["kind"] == REJECTION:
+        inner = {**inner, "records": [_recording(test)]}
+        places |= _places_of_recording(("records", 0), index)
     for (section, free), (_, fixed) in FREE_SECTIONS:
-        if not isinstance(inner.get(section), dict):
-            continue
-        given = inner[section].get(free)
-        starts = _starts(given) if isinstance(given, dict) else {}
-        values = inner[section].get(fixed, {})
-        if isinstance(values, dict):
-            values = {**starts, **values}
+        if isinstance(inner.get(section), dict):
+            inner[section], starts = _with_fixed_starts(inner[section], free, fixed)
             places |= {(section, fixed, symbol): None for symbol in starts}
-        others = {key: value for key, value in inner[section].items() if key != free}
-        inner[section] = {**others, fixed: values}
-    own = test.get("free")
-    plant = inner.get("plant")
-    if isinstance(plant, dict) and isinstance(own, dict):
-        given = plant["parameters"]
-        kept = given if not isinstance(given, dict) else _without(given, own)
-        inner["plant"] = {**plant, "parameters": kept, "free": own}
+    if isinstance(inner.get("plant"), dict) and isinstance(test.get("free"), dict):
+        inner["plant"] = _with_free(inner["plant"], test["free"])
     return CaseContent(inner, places)
 
 
-def rejections(content: Content) -> Iterator[CaseContent]:
-    """Yield the case of each test that determines data of the machine."""
-    for index, _ in tests_of_kind(content, REJECTION):
-        yield rejection_content(content, index)
+def with_bases(content: Content, bases: Mapping[str, tuple[float, str]]) -> Content:
+    """Return a programme whose channels have the bases of their signals where they give none.
+
+    ``bases`` are those by signal, each with its unit; a channel in another unit has none.
+    """
+    if not bases or not isinstance(content.get(TESTS), list):
+        return content
+    tests = [
+        _with_columns(test, bases) if isinstance(test, dict) else test for test in content[TESTS]
+    ]
+    return {**content, TESTS: tests}
+
+
+def _with_columns(test: Content, bases: Mapping[str, tuple[float, str]]) -> Content:
+    record = test.get("record")
+    if isinstance(record, dict):
+        return {**test, "record": {**record, **_based(record, "channels", bases)}}
+    return {**test, **_based(test, "columns", bases)} if test.get("kind") == STEADY else test
+
+
+def _based(section: Content, key: str, bases: Mapping[str, tuple[float, str]]) -> Content:
+    """Return the channels of a section, with bases, under their key; nothing where there are none.
+
+    A base beside a scale would be another one.
+    """
+    channels = section.get(key)
+    if not isinstance(channels, dict):
+        return {}
+    based = dict(channels)
+    for signal, (base, unit) in bases.items():
+        channel = channels.get(signal)
+        if not isinstance(channel, dict) or {"base", "scale"} & channel.keys():
+            continue
+        own = channel.get("unit")
+        if isinstance(own, str) and needs_base(own) and alike(own, unit):
+            based[signal] = {**channel, "base": base}
+    return {key: based}
+
+
+def _with_fixed_starts(section: Content, free: str, fixed: str) -> tuple[Content, Content]:
+    """Return a section in which nothing is free, and the starts that are fixed in it."""
+    given, values = section.get(free), section.get(fixed, {})
+    starts = _starts(given) if isinstance(given, dict) else {}
+    if isinstance(values, dict):
+        values = {**starts, **values}
+    return {**_without(section, [free]), fixed: values}, starts
+
+
+def _with_free(plant: Content, free: Content) -> Content:
+    """Return a plant with free data of the machine in place of fixed ones."""
+    given = plant["parameters"]
+    kept = _without(given, free) if isinstance(given, dict) else given
+    return {**plant, "parameters": kept, "free": free}
 
 
 def _places_of_recording(place: Place, index: int) -> dict[Place, Place | None]:

@@ -15,6 +15,7 @@ from exfit.cli.comparing import compare
 from exfit.cli.exchange import export, import_
 from exfit.cli.fitting import check, fit
 from exfit.cli.options import Interruption, Refusal
+from exfit.cli.programme import run
 from exfit.cli.ranking import rank
 from exfit.cli.records import inspect_, new
 from exfit.cli.reporting import report
@@ -62,7 +63,7 @@ def main() -> None:
 
 
 OF_RECORDS = (inspect_, new)
-OF_CASES = (fit, rank, simulate, validate, check, profile, identify)
+OF_CASES = (fit, run, rank, simulate, validate, check, profile, identify)
 OF_RESULTS = (report, compare, translate, import_, export)
 COMMANDS = (*OF_RECORDS, *OF_CASES, *OF_RESULTS, models, schema)
 for command in COMMANDS:

@@ -15,7 +15,7 @@ from exfit.util.sources import FITTED, TYPICAL
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
-WHOLE_FIT = "result.json"
+WHOLE_FIT, WHOLE_PROGRAMME = "result.json", "programme.json"
 VERSION = 6  # of the file; a file without a version is of the first
 
 

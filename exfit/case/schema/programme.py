@@ -5,10 +5,15 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Discriminator, Field, Tag
 
 from exfit.case.schema.records import Recording
+from exfit.case.schema.saturation_tests import SaturationTest
+from exfit.case.schema.steady_tests import SteadyTest
 from exfit.case.schema.values import FreeSection, Frozen
 
-BUMP: Final = "bump"
+SATURATION: Final = "saturation"
+STEADY: Final = "steady"
 REJECTION: Final = "rejection"
+BUMP: Final = "bump"
+ORDER = (SATURATION, STEADY, REJECTION, BUMP)  # what measures the machine before what needs it
 
 
 class RecordedBump(Recording):
@@ -37,6 +42,9 @@ def _kind_of_test(value: Any) -> str:
 
 
 TestOfProgramme = Annotated[
-    Annotated[RecordedRejection, Tag(f"[{REJECTION}]")] | Annotated[RecordedBump, Tag(f"[{BUMP}]")],
+    Annotated[SaturationTest, Tag(f"[{SATURATION}]")]
+    | Annotated[SteadyTest, Tag(f"[{STEADY}]")]
+    | Annotated[RecordedRejection, Tag(f"[{REJECTION}]")]
+    | Annotated[RecordedBump, Tag(f"[{BUMP}]")],
     Discriminator(_kind_of_test),
 ]

@@ -6,6 +6,7 @@ from exfit.output.terminal.checks import check
 from exfit.output.terminal.comparisons import comparisons, validation
 from exfit.output.terminal.fit_series import SeriesProgress, fit_series
 from exfit.output.terminal.fits import fit
+from exfit.output.terminal.programme import ProgrammeProgress, programme
 from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
 from exfit.output.terminal.ranking import ranking
 from exfit.output.terminal.records import inspection
@@ -23,6 +24,7 @@ from exfit.output.terminal.uncertainty import design, profiles
 
 __all__ = [
     "LiveIterations",
+    "ProgrammeProgress",
     "ProgressBar",
     "SeriesProgress",
     "again",
@@ -40,6 +42,7 @@ __all__ = [
     "model",
     "notes",
     "profiles",
+    "programme",
     "ranking",
     "task",
     "translation",

@@ -41,7 +41,7 @@ class SeriesProgress:
 
     def __call__(self, fit: PlannedFit, progress: Progress) -> None:
         """Show how far the fit that runs is."""
-        self._show(fit.name, _words(progress))
+        self._show(fit.name, progress_words(progress))
 
     def finished(self, run: FitRun) -> None:
         """Show a fit that has ended."""
@@ -68,7 +68,8 @@ class SeriesProgress:
         return " ".join([f"{name:<{self._width}}", *others]).rstrip()
 
 
-def _words(progress: Progress) -> str:
+def progress_words(progress: Progress) -> str:
+    """Return how far a fit is, in words."""
     if isinstance(progress, Iteration):
         return f"iteration {progress.number}, f {progress.cost:.4e}"
     return f"{progress.stage} {progress.done} of {progress.total}, best f {progress.best:.4e}"

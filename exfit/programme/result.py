@@ -1,0 +1,192 @@
+"""The result of a programme: its tests with what each shows, and the values that they gave."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from exfit.results.model import ERRORS_IN_INTERVAL, FitResult
+from exfit.results.saturation import SaturationResult
+from exfit.results.side_by_side import explanation_of, outcome_of
+from exfit.results.v_curve import VCurve
+from exfit.results.verdict import GOOD, MATCHES
+from exfit.util.text import rounded
+from exfit.util.typed import plain
+
+StepResult = SaturationResult | VCurve | FitResult
+
+
+@dataclass(frozen=True)
+class EnteredValue:
+    """A value that a test gave, and whether it entered the later tests.
+
+    ``name`` is that of a parameter (machine.S10), or of the base of a signal (ifd.base) in
+    ``unit``; ``interval`` holds it with 95 % confidence. ``given`` is what the file of the
+    programme has in its place, None where it has nothing, and ``given_source`` where that comes
+    from; ``excluded`` says whether that lies outside the interval.
+    """
+
+    name: str
+    value: float
+    interval: tuple[float, float]
+    source: str
+    test: str
+    unit: str = ""
+    given: float | None = None
+    given_source: str = ""
+    entered: bool = True
+    excluded: bool = False
+
+    @property
+    def error(self) -> float:
+        """The standard error to which tables round."""
+        low, high = self.interval
+        return (high - low) / ERRORS_IN_INTERVAL
+
+    @property
+    def warning(self) -> str:
+        """What to look into, in a sentence; "" where nothing contradicts the value."""
+        if not self.excluded or self.given is None:
+            return ""
+        low, high = (rounded(end, self.error) for end in self.interval)
+        measured = f"{low} ... {high} {self.unit}".rstrip()
+        used = f"the value of {'the test' if self.entered else 'the file'} is used"
+        return (
+            f"{self.name}: {self.given:g} in the file ({self.given_source}) lies outside "
+            f"{measured}, which the test {self.test} gave; {used}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedTest:
+    """A test that has been run, or all bump tests, which are fitted together.
+
+    ``key`` is a hash of all that goes into it; ``kept`` says whether the result is that of an
+    earlier run with the same key.
+    """
+
+    name: str
+    kind: str
+    tests: tuple[str, ...]
+    key: str
+    result: StepResult
+    kept: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """What it comes to, in the words of a fit's verdict."""
+        return verdict_of(self.result)
+
+    @property
+    def reason(self) -> str:
+        """The verdict in a sentence."""
+        return reason_of(self.result)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether its result is the best point of a fit that was interrupted."""
+        return isinstance(self.result, FitResult) and self.result.interrupted
+
+    @property
+    def holds(self) -> bool:
+        """Whether its results can be used: an exit code of 0 by itself."""
+        if isinstance(self.result, FitResult):
+            return self.result.holds
+        return self.verdict in (GOOD, MATCHES)
+
+
+@dataclass(frozen=True, eq=False)
+class ProgrammeResult:
+    """A programme that has been run: its tests in the order of the run, and the values they gave.
+
+    ``failed`` holds the error of each test that could not be run, by its name; ``not_run`` names
+    those that an interruption left out.
+    """
+
+    path: Path
+    about: Mapping[str, float | str]
+    tests: tuple[FinishedTest, ...]
+    values: tuple[EnteredValue, ...] = ()
+    failed: Mapping[str, str] = field(default_factory=dict)
+    not_run: tuple[str, ...] = ()
+    interrupted: bool = False
+
+    @property
+    def name(self) -> str:
+        """The name of the programme."""
+        return self.path.stem
+
+    @property
+    def results(self) -> dict[str, StepResult]:
+        """The results by the names of the tests; that of all bump tests is named fit."""
+        return {test.name: test.result for test in self.tests}
+
+    @property
+    def fit(self) -> FitResult | None:
+        """The fit of the bump tests; None where there is none."""
+        result = self.results.get("fit")
+        return result if isinstance(result, FitResult) else None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What contradicts the file of the programme, in sentences."""
+        return tuple(filter(None, (value.warning for value in self.values)))
+
+    @property
+    def holds(self) -> bool:
+        """Whether every test has been run, and its result can be used."""
+        done = not (self.failed or self.not_run or self.interrupted)
+        return done and all(test.holds for test in self.tests)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of all tests as plain data, as ``exfit run --json`` prints them."""
+        return {
+            "programme": str(self.path),
+            "about": plain(self.about),
+            "tests": [
+                {
+                    "name": test.name,
+                    "kind": test.kind,
+                    "tests": list(test.tests),
+                    "verdict": test.verdict,
+                    "reason": test.reason,
+                    "holds": test.holds,
+                    "kept": test.kept,
+                    "result": plain(test.result),
+                }
+                for test in self.tests
+            ],
+            "values": [plain(value) for value in self.values],
+            "failed": plain(self.failed),
+            "not_run": list(self.not_run),
+            "interrupted": self.interrupted,
+            "warnings": list(self.warnings),
+        }
+
+
+def verdict_of(result: StepResult) -> str:
+    """Return what a test comes to, in the words of a fit's verdict."""
+    if isinstance(result, FitResult):
+        return outcome_of(result)
+    if isinstance(result, VCurve):
+        return result.verdict.verdict
+    return MATCHES if _undetermined(result) else GOOD
+
+
+def reason_of(result: StepResult) -> str:
+    """Return what a test comes to in a sentence."""
+    if isinstance(result, FitResult):
+        return explanation_of(result)
+    if isinstance(result, VCurve):
+        return result.verdict.reason
+    names = _undetermined(result)
+    if names:
+        return f"the points do not limit {' and '.join(names)} on both sides"
+    return "the points determine the air-gap line and the saturation"
+
+
+def _undetermined(result: SaturationResult) -> list[str]:
+    """Return what a saturation test does not limit on both sides."""
+    curve = result.curve
+    values = {"the base of ifd": curve.ifd_base, "S10": curve.S10, "S12": curve.S12}
+    return [name for name, value in values.items() if not value.determined]
