@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from exfit.case.checks.content import contradictions
+from exfit.case.open_values import TO_BE_FILLED_IN, open_places
 from exfit.case.parts import Parts, parts_of, ties_of
 from exfit.case.schema import CaseDocument
 from exfit.case.ties import Ties
@@ -38,8 +39,11 @@ def check_content(
     if "tests" in content:
         faults.append(Fault(("tests",), PROGRAMME))
         return None
+    still_open = [Fault(place, TO_BE_FILLED_IN) for place in open_places(content)]
     parts = parts_of(content, folder, faults, model_sha256)
     ties = ties_of(content, parts, faults)
+    places = {fault.place for fault in still_open}
+    faults[:] = [*still_open, *(fault for fault in faults if fault.place not in places)]
     document = validated_document(content, faults)
     places = {fault.place for fault in faults}
     faults += [fault for fault in contradictions(content, parts, ties) if fault.place not in places]

@@ -6,7 +6,7 @@ from exfit.case.assembly import check_content
 from exfit.case.case import Case
 from exfit.case.yaml import Fault, YamlNode, read_text, read_yaml
 from exfit.errors import CaseError
-from exfit.util.text import dotted
+from exfit.util.text import Place, dotted
 
 
 def load_case(path: Path, model_sha256: str = "") -> Case:
@@ -32,7 +32,11 @@ def parse_case(text: str, path: Path, model_sha256: str = "") -> Case:
 def faults_with_lines(faults: list[Fault], top: YamlNode, path: Path) -> CaseError:
     """Return the faults of a file as an error, in the order of their lines."""
     lines = [(fault.line or top.line_of(fault.place), fault) for fault in faults]
+    # what an alias repeats is wrong once
+    first: dict[tuple[int, Place, str], Fault] = {}
+    for line, fault in sorted(lines, key=lambda pair: pair[0]):
+        first.setdefault((line, fault.place[-1:], fault.text), fault)
     return CaseError(
         f"{path}:{line}: {dotted(fault.place)}: {fault.text}"
-        for line, fault in sorted(lines, key=lambda pair: pair[0])
+        for (line, _, _), fault in first.items()
     )

@@ -4,25 +4,25 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from exfit.case.open_values import QUESTION, TO_BE_FILLED_IN
 from exfit.case.yaml import Fault
 from exfit.util.text import Place, near, show_value
 
 Data = Mapping[str, Any]
 
-FILL_IN = "'?'"  # what a new case has in place of a missing value, as it is shown
-FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._%-]*$"  # of any system; a percent sign as in up-5%
 KIND_OF_TEST = "_kind_of_test"  # the function by which the schema distinguishes tests
 PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
 
 PATTERNS: Mapping[str, str] = {
-    FILE_NAME: "must begin with a letter or digit and hold letters, digits, - _ . only",
+    FILE_NAME: "must begin with a letter or digit and hold letters, digits, - _ . % only",
     PERCENT: "is neither a number nor a percentage such as 20 %",
 }
 # kind of fault -> what to say of the value, given the limits
 WORDS: Mapping[str, Callable[[str, Data], str]] = {
     "float_type": lambda value, _: (
-        f"{value} is to be filled in" if value == FILL_IN else f"{value} is not a number"
+        TO_BE_FILLED_IN if value == repr(QUESTION) else f"{value} is not a number"
     ),
     "int_type": lambda value, _: f"{value} is not a whole number",
     "int_from_float": lambda value, _: f"{value} is not a whole number",

@@ -6,8 +6,8 @@ from typing import Any
 
 import yaml
 
-from exfit.case.starting_case import BOUNDS, bounds_of, free_of
-from exfit.case.suggestion import relative
+from exfit.case.starting.free_parameters import BOUNDS, bounds_of, free_of
+from exfit.case.starting.suggestion import relative
 from exfit.case.templates import commented, source_lines
 from exfit.case.yaml import read_yaml
 from exfit.models.sheet import Model, Parameter
@@ -87,7 +87,7 @@ def _with_values(plant: Mapping[str, Any], values: Mapping[str, float]) -> dict[
 def _parameters(
     model: Model, values: Mapping[str, float], provenance: Mapping[str, str]
 ) -> Iterator[str]:
-    free = [row for row in free_of(model) if values[row.symbol] != 0.0]
+    free = free_of(model, values)
     yield "  fixed:"
     for row in model.sheet:
         if row not in free:
@@ -102,7 +102,7 @@ def _parameters(
 
 def _section(row: Parameter, value: float) -> str:
     """Return a start within the bounds of a fit, also where it is not physical."""
-    low, high = bounds_of(row._replace(typical=value))
+    low, high = bounds_of(row, value)
     if not row.low <= value <= row.high:
         low, high = sorted(share * value for share in BOUNDS)
     bounds = float(f"{min(low, value):.6g}"), float(f"{max(high, value):.6g}")

@@ -17,9 +17,10 @@ from exfit.cli.fitting import check, fit
 from exfit.cli.options import Interruption, Refusal
 from exfit.cli.programme import run
 from exfit.cli.ranking import rank
-from exfit.cli.records import inspect_, new
+from exfit.cli.records import inspect_
 from exfit.cli.reporting import report
 from exfit.cli.responses import simulate, validate
+from exfit.cli.starting import new
 from exfit.cli.streams import unfailing_output
 from exfit.cli.translating import translate
 from exfit.cli.uncertainty import identify, profile

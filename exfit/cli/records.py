@@ -1,20 +1,11 @@
-"""The commands inspect and new."""
+"""The command inspect, and the options of commands that inspect a record."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from exfit.cli import completion
-from exfit.cli.options import (
-    Output,
-    file_option,
-    force_option,
-    output_options,
-    print_json,
-    refuse_existing,
-    write_text,
-)
+from exfit.cli.options import Output, output_options, print_json
 
 if TYPE_CHECKING:
     from exfit.records.inspection import Inspection
@@ -53,12 +44,12 @@ def inspect_(
     Suggests the record, test and estimate sections of a case; guesses are marked. Writes
     inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
-    from exfit.case.suggestion import bump_section, record_section, weights_section
+    from exfit.case.starting.suggestion import bump_section, record_section, weights_section
     from exfit.output import run_folder
 
     # files of one record in several formats have one stem
     folder = output.folder(f"{file.name}-inspect")
-    inspection = _inspected(file, clock, unit, sheet)
+    inspection = inspected(file, clock, unit, sheet)
     figures = run_folder.write_inspection(inspection, folder)
     if output.as_json:
         print_json(inspection.as_json())
@@ -79,68 +70,10 @@ def inspect_(
     output.draw(figures)
 
 
-@click.command(short_help="Make a case from a model and a record.")
-@click.option(
-    "--model",
-    required=True,
-    metavar="NAME",
-    help="Exciter, or the file of a model.",
-    shell_complete=completion.exciters,
-)
-@click.option(
-    "--machine",
-    default="GENROU",
-    metavar="NAME",
-    help="Machine model (default: GENROU).",
-    shell_complete=completion.machines,
-)
-@click.option(
-    "--record",
-    "file",
-    required=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Record of the bump test.",
-)
-@time_option
-@unit_option
-@sheet_option
-@file_option
-@force_option
-def new(
-    model: str,
-    machine: str,
-    file: Path,
-    clock: tuple[str, ...],
-    unit: str | None,
-    sheet: str | None,
-    output: Path | None,
-    force: bool,
-) -> None:
-    """Make a commented case from a model and a record: detected steps, typical values as starts.
-
-    The parameters that a bump test is fitted for are free; `exfit models NAME` lists them. What the
-    record does not show is left to be filled in, and the case is refused until it is.
-    """
-    from exfit.case.starting_case import starting_case
-    from exfit.case.suggestion import relative
-    from exfit.models import find
-    from exfit.models.machines import find_machine
-
-    if output is not None:
-        refuse_existing(output, force)
-    folder = Path() if output is None else output.parent
-    exciter, around = find(model, Path()), find_machine(machine)
-    name = relative(Path(model), folder) if model.endswith(".py") else exciter.name
-    text = starting_case(exciter, name, around, _inspected(file, clock, unit, sheet), folder)
-    write_text(text, output, ())
-    if output is not None:
-        click.echo(f"written to {output}; next: exfit check {output}")
-
-
-def _inspected(
+def inspected(
     file: Path, clock: tuple[str, ...], unit: str | None, sheet: str | None
 ) -> "Inspection":
+    """Return what a recorder's file holds; raises RecordError where it is none."""
     from exfit.records.formats import open_table
     from exfit.records.inspection import inspect
 

@@ -19,7 +19,7 @@ from exfit.dsp.filtering import outliers
 from exfit.dsp.jump import largest_jump
 from exfit.dsp.step_detection import find_step
 from exfit.errors import CaseError, RecordError
-from exfit.fitting.levels import initial_voltage
+from exfit.fitting.levels import initial_level
 from exfit.fitting.nuisances.parameters import finds_level, prefix_of
 from exfit.plants import REFERENCES
 from exfit.records.record import Record
@@ -51,11 +51,17 @@ def with_detected_steps(case: Case, recording: Recording, record: Record) -> Bum
         breaker = test.breaker.model_copy(update={"opens": opens})
         test = test.model_copy(update={"breaker": breaker})
     test = test.model_copy(update={"steady_until": _steady_until(test, recording.record, record)})
-    if not finds_level(test, recording.record):
-        return test
-    level = initial_voltage(test, record)
-    bounds = sorted(((1 - LEVEL_WITHIN) * level, (1 + LEVEL_WITHIN) * level))
-    return test.model_copy(update={"vt0": Unknown(start=level, min=bounds[0], max=bounds[1])})
+    given = Unknown(start="auto") if finds_level(test, recording.record) else test.vt0
+    if isinstance(given, Unknown) and given.start == "auto":
+        test = test.model_copy(update={"vt0": _level(f"{place}.vt0", given, test, record)})
+    return test
+
+
+def _level(place: str, given: Unknown, test: BumpTest, record: Record) -> Unknown:
+    """Return the voltage at rest that a fit finds, with the numbers that its record gives."""
+    level = initial_level(test, record, "vt")
+    low, high = sorted(((1 - LEVEL_WITHIN) * level, (1 + LEVEL_WITHIN) * level))
+    return _with_bounds(place, given, level, low, high)
 
 
 def _refuse_wrong_order(place: str, steps: Sequence[FindableStep]) -> None:
@@ -137,11 +143,15 @@ def _bounded(place: str, step: FindableStep, record: Record, limit: float | None
     }
     update = {}
     for key in auto:
-        value, (start, low, high) = getattr(step, key), bounds[key]
-        low = low if value.min is None else value.min
-        high = high if value.max is None else value.max
-        if not low <= start <= high:
-            text = f"the record shows {start:.4g}, outside {low:g} ... {high:g}"
-            raise CaseError([f"{place}.{key}: {text}"])
-        update[key] = Unknown(start=start, min=low, max=high)
+        update[key] = _with_bounds(f"{place}.{key}", getattr(step, key), *bounds[key])
     return step.model_copy(update=update)
+
+
+def _with_bounds(place: str, given: Unknown, start: float, low: float, high: float) -> Unknown:
+    """Return a start that a record shows, with its bounds where the case gives none."""
+    low = low if given.min is None else given.min
+    high = high if given.max is None else given.max
+    if not low <= start <= high:
+        text = f"the record shows {start:.4g}, outside {low:g} ... {high:g}"
+        raise CaseError([f"{place}: {text}"])
+    return Unknown(start=start, min=low, max=high)

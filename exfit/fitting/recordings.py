@@ -131,7 +131,7 @@ def _refuse_steps_outside(case: Case, test: BumpTest, record: Record, path: Path
             f"{path}: ends at {show(end)} s, before test.steady_until = {show(steady)} s "
             f"of {case.path}"
         )
-    if test.vt0 is None and steady is not None and not start < steady:
+    if start_value(test.vt0) is None and steady is not None and not start < steady:
         what = "the first step" if test.steady_until is None else "test.steady_until"
         raise RecordError(
             f"{path}: begins at {show(start)} s, with {what}: nothing before it shows "

@@ -7,7 +7,7 @@ from typing import Any
 from exfit.analysis.ranking import RankedModel, ranked, ranking_sentences
 from exfit.case.case import Case
 from exfit.case.other_model import with_exciter
-from exfit.case.starting_case import ALONE
+from exfit.case.starting.starting_case import ALONE
 from exfit.errors import CaseError
 from exfit.fleet.fits import FitRun, FitSeries, PlannedFit, Progress, run_all
 from exfit.models import MODELS, find

@@ -3,19 +3,42 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from exfit.errors import ModelError
 
 Limits = tuple[float, float]
 
-FREE: Literal["free"] = "free"  # ends the row of a parameter that a bump test is fitted for
+
+class SearchRange(NamedTuple):
+    """How a fit of a bump test looks for a parameter: from ``low`` to ``high``, where units lie.
+
+    It is left out where the parameter that it ``needs`` is zero, as the lag of a term without its
+    gain; where it equals the time that it must be ``unlike``, as a lead that its lag cancels; and
+    where a lag and a lead that it is ``instead_of`` do its work.
+    """
+
+    low: float = 0.0
+    high: float = inf
+    needs: str = ""
+    unlike: str = ""
+    instead_of: tuple[str, ...] = ()
+
+
+FREE = SearchRange()  # ends the row of a parameter that a bump test is fitted for
+LOADING = SearchRange(high=1.0)  # a rectifier that commutates longer supplies nothing
+DEMAGNETISING = SearchRange(high=3.0)
+FEEDBACK = SearchRange(high=1.0)
+REGULATOR_LAG = SearchRange(high=1.0)
+EXCITER_LAG = SearchRange(low=0.02, high=10.0)
+LAG_OF_KF = SearchRange(needs="KF")
+LEAD_OF_TB, LAG_OF_TC = SearchRange(unlike="TB"), SearchRange(unlike="TC")
 
 
 class Parameter(NamedTuple):
     """One row of a data sheet; between ``low`` and ``high`` lie its physical values.
 
-    ``free`` says that a fit of a bump test finds it, unless the case says otherwise. Fixed are, as
+    ``search`` says how a fit of a bump test finds it, unless the case says otherwise. Fixed are, as
     a rule, limits and saturation, which a small step hardly reaches; the transducer, which is
     known; KE and what scales the supply, which base values fix; what acts on load or in a limiter;
     a gain behind a PID, of which the products with the PID's gains alone act; a lead and its lag
@@ -29,7 +52,12 @@ class Parameter(NamedTuple):
     low: float
     high: float
     meaning: str
-    free: bool = False
+    search: SearchRange | None = None
+
+    @property
+    def free(self) -> bool:
+        """Whether a bump test is fitted for it, as a rule."""
+        return self.search is not None
 
     @property
     def is_time(self) -> bool:
@@ -70,17 +98,17 @@ class Parameter(NamedTuple):
 
 
 Sheet = tuple[Parameter, ...]
-Row = tuple[str, float, str, Limits, str] | tuple[str, float, str, Limits, str, Literal["free"]]
+Row = tuple[str, float, str, Limits, str] | tuple[str, float, str, Limits, str, SearchRange]
 
 
 def sheet(*rows: Row) -> Sheet:
     """Return the data sheet of rows (symbol, typical value, unit, (low, high), meaning).
 
-    FREE behind the meaning marks a parameter that a bump test is fitted for.
+    FREE, or another range of search, behind the meaning marks what a bump test is fitted for.
     """
     return tuple(
-        Parameter(symbol, typical, unit, *limits, meaning, bool(mark))
-        for symbol, typical, unit, limits, meaning, *mark in rows
+        Parameter(symbol, typical, unit, *limits, meaning, *search)
+        for symbol, typical, unit, limits, meaning, *search in rows
     )
 
 

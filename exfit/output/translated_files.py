@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from exfit.analysis.translation.steps import network_of
-from exfit.case.suggestion import relative
+from exfit.case.starting.suggestion import relative
 from exfit.case.translated_case import translated_case
 from exfit.exchange.psse.export import export
 from exfit.exchange.psse.records import alternatives

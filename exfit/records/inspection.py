@@ -132,7 +132,7 @@ def inspect(
     units = {name: _unit(table, name) for name in samples}
     stated = {name: unit for name, (unit, _) in units.items() if unit}
     groups = tuple(_phase_groups(time, samples, stated))
-    signals = samples | {group.name: _effective(samples, group.columns) for group in groups}
+    signals = samples | {group.name: effective_value(samples, group.columns) for group in groups}
     guesses = _guesses(samples, groups, stated)
     references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
     own_steps, steps = steps_of_signals(time, signals, references)
@@ -231,14 +231,14 @@ def _phase_groups(
     """Yield the three-phase voltages among the columns."""
     for group in three_phases(tuple(samples), units):
         waves = {mains_frequency(time, samples[name]) is not None for name in group}
-        effective = _effective(samples, group)
+        effective = effective_value(samples, group)
         measured = effective[np.isfinite(effective)]  # where a sample of no phase is missing
         if len(waves) == 1 and len(measured):
             level = float(np.median(measured[: max(len(effective) // 10, 1)]))
             yield InspectedPhases(group, "waveform" if waves == {True} else "rms", level)
 
 
-def _effective(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
+def effective_value(samples: Mapping[str, Array], columns: Sequence[str]) -> Array:
     """Return the effective value (M,) of three phases, waveforms or effective values each."""
     return np.asarray(np.sqrt(np.mean([samples[name] ** 2 for name in columns], axis=0)))
 

@@ -34,6 +34,7 @@ _PREFIXED = re.compile(
 _MEGA = re.compile(r"mw|mva|m(?i:var)")  # no generator makes milliwatts in small letters, or mvar
 _ALONE = re.compile(r"[kKMG](?:V|A|W|(?i:var))|mvar|mw")  # a unit in place of a name
 _PREFIXES: Mapping[str, str] = {"K": "k", "µ": "u", "μ": "u"}
+FACTORS: Mapping[str, float] = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 _BARE = re.compile(r"[\[({<]\s*(.*?)\s*[\])}>]")
 _TIME = re.compile(r"t|time|zeit|tiempo|temps|tempo", re.IGNORECASE)
 _OF_PHASES = re.compile(r"[uve]\w{0,4}|.*(?:volt|spannung|phase|tensi)\w*", re.IGNORECASE)
@@ -150,3 +151,18 @@ def _prefixed(unit: str) -> tuple[str, str] | None:
     if _MEGA.fullmatch(prefix + body):
         prefix = "M"
     return _PREFIXES.get(prefix, prefix) + symbol, quantity
+
+
+def scale_between(unit: str, other: str) -> float | None:
+    """Return how many of another unit one of a unit is: 1000 V for a kV; None for no such pair."""
+    symbol, wanted = usual(unit), usual(other)
+    first, second = _prefixed(symbol), _prefixed(wanted)
+    if first is None or second is None or first[1] != second[1]:
+        return None
+    return _factor(symbol, first[1]) / _factor(wanted, second[1])
+
+
+def _factor(symbol: str, quantity: str) -> float:
+    """Return the factor of the prefix of a unit in its usual spelling."""
+    bodies = {body for body, of in BODIES.values() if of == quantity}
+    return 1.0 if symbol in bodies else FACTORS[symbol[0]]

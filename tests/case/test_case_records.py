@@ -254,12 +254,6 @@ MEANING = {
         ("records", 1, "test", "vt0", "min"),
         "0 is not above 0",
     ),
-    "auto vt0": (
-        ("records", 1, "test", "vt0"),
-        {"start": "auto"},
-        ("records", 1, "test", "vt0", "start"),
-        "auto finds the first step of vref",
-    ),
     "auto in the second step": (
         (*TEST, "vref"),
         [{"at": 1, "step": 0.05}, {"at": {"start": "auto"}, "step": 0.1}],

@@ -10,7 +10,10 @@ from places import SAMPLES
 from step_records import step_record
 
 from exfit.case.load import load_case
-from exfit.case.starting_case import bounds_of, free_of, starting_case
+from exfit.case.starting.free_parameters import bounds_of, free_of
+from exfit.case.starting.starting_case import starting_case
+from exfit.case.starting.starting_tests import starting_tests
+from exfit.case.starting.starting_unit import PartData, UnitData
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments
 from exfit.models import MODELS
@@ -53,10 +56,15 @@ def record(tmp_path):
     return made
 
 
+def text_of(name, inspection, folder, machine="GENROU", sizes=()):
+    """Return the text of the case that a model with typical data and a record begin with."""
+    exciter, around = PartData.typical(MODELS[name]), PartData.typical(MACHINES[machine])
+    return starting_case(UnitData(name, exciter, around), starting_tests(inspection, sizes), folder)
+
+
 def started(name, table, folder, machine="GENROU", step=STEP):
     """Write the case that a model and a record begin with, the step filled in; return its path."""
-    found = inspect(table)
-    text = starting_case(MODELS[name], name, MACHINES[machine], found, folder)
+    text = text_of(name, inspect(table), folder, machine)
     path = folder / "case.yaml"
     path.write_text(text.replace('step: "?"', f"step: {step}"), encoding="utf-8")
     return path
@@ -84,6 +92,8 @@ def test_what_is_free_is_a_gain_or_a_time_and_starts_between_its_bounds(model):
     for row in free:
         low, high = bounds_of(row)
         assert row.low <= low < row.typical < high <= row.high
+        assert low >= 0.1 * row.typical
+        assert high <= 10.0 * row.typical
         assert low > 0.0
         assert row.unit != "s" or low >= SHORTEST
         assert not row.symbol.endswith(("MAX", "MIN"))
@@ -110,15 +120,17 @@ def test_the_case_is_fitted_as_it_stands(name, record, tmp_path):
 
 def test_a_recorded_reference_is_used_in_place_of_steps(tmp_path):
     file = SAMPLES / "ac1a_ramp.csv"
-    text = starting_case(
-        MODELS["AC1A"], "AC1A", MACHINES["GENROU"], inspect(open_table(file)), tmp_path
-    )
-    (tmp_path / "case.yaml").write_text(text)
+    (tmp_path / "case.yaml").write_text(text_of("AC1A", inspect(open_table(file)), tmp_path))
     case = load_case(tmp_path / "case.yaml")
-    assert case.test.vref == "recorded"
-    assert case.record.channels.keys() == {"vt", "vref"}
+    (recording,), (validation,) = case.records, case.validations
+    for each in (recording, validation):
+        assert each.test.vref == "recorded"
+        assert each.record.channels.keys() == {"vt", "vref"}
+    assert recording.record.window[1] < 9.0 < validation.record.window[1]  # the second ramp
     (setup,) = build_experiments(case)
-    assert [parameter.name for parameter in setup.free] == ["vref.at"]
+    assert [parameter.name for parameter in setup.free] == [
+        f"{recording.name}.vt0"
+    ]  # a ramp jumps nowhere
 
 
 @pytest.mark.parametrize("machine", MACHINES)
@@ -201,7 +213,7 @@ def test_a_field_voltage_that_rests_where_the_model_does_not_is_noted(tmp_path):
     sound = {"t": content["t"], "vt": content["vt"], "efd": content["efd"]}
     for scale in (1.0, 1.0 / 3.0):
         inspection = inspect(Columns({**sound, "efd": scale * sound["efd"]}))
-        text = starting_case(MODELS["AC1A"], "AC1A", MACHINES["GENROU"], inspection, tmp_path)
+        text = text_of("AC1A", inspection, tmp_path)
         notes = " ".join(line.lstrip("# ") for line in text.splitlines() if line.startswith("#"))
         assert ("efd rests at 0.373" in notes) == (scale != 1.0)
         assert ("the model with the breaker open at 0.95 to 1.6 pu" in notes) == (scale != 1.0)

@@ -84,3 +84,28 @@ def test_auto_refuses_a_record_without_a_step_and_one_whose_step_comes_after_the
     test = {"vref": [auto, {"at": 2.0, "step": 0.01}]}
     with pytest.raises(CaseError, match=r"test\.vref\[1\]\.at: 2 s is not after"):
         build_experiments(case_of(one(test), tmp_path))
+
+
+def test_the_voltage_at_rest_starts_at_its_mean_and_is_found_with_an_error(tmp_path):
+    """Its error is at most that of the mean before the step: 100 samples."""
+    noise = 1e-3
+    shown = synthetic(tmp_path, TEST, TIME, noise=noise)
+    content = one({**TEST, "vt0": {"start": "auto"}}, free=["TE"])
+    case = case_of(content, tmp_path)
+    vt0 = build_experiments(case)[0].free[0]
+    mean = float(np.mean(shown["vt"][TIME < 1.0]))
+    assert (vt0.name, vt0.start) == ("vt0", pytest.approx(mean, abs=1e-9))
+    assert (vt0.low, vt0.high) == (pytest.approx(0.98 * mean), pytest.approx(1.02 * mean))
+    found = fit(case).parameters["vt0"]
+    assert 0.0 < found.std_error < 1.2 * noise / np.sqrt(100)
+    assert abs(found.value - 1.0) < 4.0 * found.std_error
+
+
+def test_the_voltage_at_rest_keeps_the_bounds_that_are_given(tmp_path):
+    synthetic(tmp_path, TEST, TIME)
+    test = {**TEST, "vt0": {"start": "auto", "min": 0.9, "max": 1.1}}
+    (vt0,) = build_experiments(case_of(one(test), tmp_path))[0].free
+    assert (vt0.low, vt0.high) == (0.9, 1.1)
+    test["vt0"]["min"] = 1.05
+    with pytest.raises(CaseError, match=r"test\.vt0: the record shows .* outside 1\.05"):
+        build_experiments(case_of(one(test), tmp_path))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from exfit.case.starting_case import ALONE
+from exfit.case.starting.starting_case import ALONE
 from exfit.models import MODELS
 from exfit.models.families import family_of, relatives
 

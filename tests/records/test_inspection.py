@@ -14,7 +14,7 @@ from places import REFERENCE, SAMPLES
 from step_records import step_record
 from tables import read_columns
 
-from exfit.case.suggestion import bump_section, record_section, weights_section
+from exfit.case.starting.suggestion import bump_section, record_section, weights_section
 from exfit.errors import RecordError
 from exfit.output import plots
 from exfit.records.channel_recognition import connection_of, guess_signals, three_phases

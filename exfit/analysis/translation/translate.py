@@ -43,7 +43,7 @@ from exfit.analysis.translation.steps import (
     times_of_steps,
 )
 from exfit.analysis.translation.words import translated_parameters, translation_notes
-from exfit.case.starting_case import ALONE
+from exfit.case.starting.starting_case import ALONE
 from exfit.errors import ExfitError, SimulationError
 from exfit.fitting.parameters import FreeParameter
 from exfit.models import MODELS, find

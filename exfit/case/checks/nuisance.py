@@ -9,6 +9,7 @@ from exfit.plants import BREAKER, PlantKind
 from exfit.util.text import show
 
 AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
+LEVEL = "vt0"  # what it shows before that step
 
 
 def nuisance_faults(
@@ -74,7 +75,8 @@ def _ramp_faults(steps: Sequence[ContentNode]) -> Iterator[Fault]:
 def _level_faults(test: ContentNode, vt: ContentNode) -> Iterator[Fault]:
     """Yield the voltage that is missing where a fit finds scale or offset of the recorded one."""
     unknown = [key for key in ("scale", "offset") if vt.at(key).is_section]
-    if test.content and unknown and "vt0" not in test:
+    shown = "vt0" not in test or test.at("vt0", "start").text == "auto"
+    if test.content and unknown and shown:
         text = f"is missing: the record does not show it where {unknown[0]} of vt is to be found"
         yield test.at("vt0").fault(text)
 
@@ -84,8 +86,8 @@ def _value_faults(value: ContentNode) -> Iterator[Fault]:
     key = value.place[-1]
     automatic = value.at("start").text == "auto"
     of_step = key in AUTOMATIC and value.place[-3:-1] == ("vref", 0)
-    if automatic and not (of_step or value.place[-2] == BREAKER):
-        text = "auto finds the first step of vref, its at and its step, or breaker.opens"
+    if automatic and not (of_step or key == LEVEL or value.place[-2] == BREAKER):
+        text = "auto finds the first step of vref, its at and its step, vt0, or breaker.opens"
         yield value.at("start").fault(text)
     yield from _bound_faults(value, needed=not automatic)
     low, high = value.at("min").number, value.at("max").number

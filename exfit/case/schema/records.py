@@ -169,7 +169,7 @@ class Recording(Section):
     name: str = Field(
         pattern=FILE_NAME,
         max_length=100,
-        description="Name of letters, digits, - _ and .; files are named after it.",
+        description="Name of letters, digits, - _ . and %; files are named after it.",
     )
     plant: Annotated[OffLine | OnLine | AloneOnLoad, Field(discriminator="type")] | None = Field(
         default=None, description="Plant of this record, if it differs from that of the case."

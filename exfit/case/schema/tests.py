@@ -129,7 +129,7 @@ class BumpTest(Section):
     vt0: Findable | None = Field(
         default=None,
         description="Terminal voltage before the first step, pu, or {start, min, max} to fit it; "
-        "default: mean of the record there.",
+        "{start: auto} starts at the mean of the record there. Default: that mean, as if exact.",
     )
     begin: Number | None = Field(
         default=None,

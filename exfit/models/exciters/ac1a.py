@@ -23,7 +23,17 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import (
+    DEMAGNETISING,
+    EXCITER_LAG,
+    FEEDBACK,
+    FREE,
+    LAG_OF_KF,
+    LOADING,
+    REGULATOR_LAG,
+    record,
+    sheet,
+)
 
 ALIASES = ("ESAC1A",)
 
@@ -32,16 +42,16 @@ SHEET = sheet(
     ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
     ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
     ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", FREE),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
     ("VAMAX", 14.5, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VAMIN", -14.5, "pu", (-9999.0, 9999.0), "regulator floor"),
     ("VRMAX", 6.03, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VRMIN", -5.43, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", FREE),
-    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FREE),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", FREE),
-    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor", FREE),
-    ("KD", 0.38, "pu", (0.0, 100.0), "demagnetising factor", FREE),
+    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
+    ("KD", 0.38, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("E1", 4.18, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.10, "pu", (0.0, 100.0), "saturation at E1"),

@@ -36,7 +36,17 @@ from exfit.models.blocks import (
     smaller,
     washout,
 )
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import (
+    DEMAGNETISING,
+    EXCITER_LAG,
+    FEEDBACK,
+    FREE,
+    LAG_OF_KF,
+    LOADING,
+    REGULATOR_LAG,
+    record,
+    sheet,
+)
 
 ALIASES = ("ESAC2A",)
 
@@ -45,19 +55,19 @@ SHEET = sheet(
     ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
     ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
     ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", FREE),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
     ("VAMAX", 8.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VAMIN", -8.0, "pu", (-9999.0, 9999.0), "regulator floor"),
     ("KB", 25.0, "pu", (0.01, 10000.0), "second stage gain", FREE),
     ("VRMAX", 105.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VRMIN", -95.0, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),
-    ("TE", 0.6, "s", (0.01, 100.0), "exciter time constant", FREE),
+    ("TE", 0.6, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("VFEMAX", 4.4, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
     ("KH", 1.0, "pu", (0.0, 100.0), "feedback gain of the exciter's field current", FREE),
-    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FREE),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", FREE),
-    ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor", FREE),
-    ("KD", 0.35, "pu", (0.0, 100.0), "demagnetising factor", FREE),
+    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    ("KC", 0.28, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
+    ("KD", 0.35, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("E1", 4.4, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.037, "pu", (0.0, 100.0), "saturation at E1"),

@@ -36,7 +36,17 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import (
+    DEMAGNETISING,
+    EXCITER_LAG,
+    FEEDBACK,
+    FREE,
+    LAG_OF_KF,
+    LOADING,
+    REGULATOR_LAG,
+    record,
+    sheet,
+)
 
 ALIASES = ("ESAC3A",)
 
@@ -45,18 +55,18 @@ SHEET = sheet(
     ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
     ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
     ("KA", 45.62, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.013, "s", (0.0, 10.0), "regulator time constant", FREE),
+    ("TA", 0.013, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
     ("VAMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VAMIN", -0.95, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TE", 1.17, "s", (0.01, 100.0), "exciter time constant", FREE),
+    ("TE", 1.17, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("VEMIN", 0.1, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
     ("KR", 3.77, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
-    ("KF", 0.143, "pu", (0.0, 10.0), "stabilising feedback gain up to EFDN", FREE),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", FREE),
-    ("KN", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain beyond EFDN", FREE),
+    ("KF", 0.143, "pu", (0.0, 10.0), "stabilising feedback gain up to EFDN", FEEDBACK),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    ("KN", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain beyond EFDN"),
     ("EFDN", 2.36, "pu", (0.0, 100.0), "field voltage where the feedback gain changes"),
-    ("KC", 0.104, "pu", (0.0, 100.0), "rectifier loading factor", FREE),
-    ("KD", 0.499, "pu", (0.0, 100.0), "demagnetising factor", FREE),
+    ("KC", 0.104, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
+    ("KD", 0.499, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
     ("VFEMAX", 16.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
     ("E1", 6.24, "pu", (0.01, 100.0), "first voltage of the saturation curve"),

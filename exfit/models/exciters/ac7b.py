@@ -35,14 +35,14 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import DEMAGNETISING, EXCITER_LAG, FREE, LOADING, SearchRange, record, sheet
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
     ("KPR", 4.24, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
     ("KIR", 4.24, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
     ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain of the regulator"),
-    ("TDR", 0.03, "s", (0.001, 10.0), "lag of the derivative", FREE),
+    ("TDR", 0.03, "s", (0.001, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
     ("VRMAX", 5.79, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", -5.79, "pu", (-9999.0, 9999.0), "regulator floor"),
     ("KPA", 65.36, "pu", (0.0, 100000.0), "proportional gain of the amplifier", FREE),
@@ -54,11 +54,11 @@ SHEET = sheet(
     ("KF1", 0.212, "pu", (0.0, 100.0), "feedback gain of the generator field voltage", FREE),
     ("KF2", 0.0, "pu", (0.0, 100.0), "feedback gain of the exciter field current"),
     ("KF3", 0.0, "pu", (0.0, 100.0), "stabilising feedback gain"),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", FREE),
-    ("KC", 0.18, "pu", (0.0, 100.0), "rectifier loading factor", FREE),
-    ("KD", 0.02, "pu", (0.0, 100.0), "demagnetising factor", FREE),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", SearchRange(needs="KF3")),
+    ("KC", 0.18, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
+    ("KD", 0.02, "pu", (0.0, 100.0), "demagnetising factor", DEMAGNETISING),
     ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
-    ("TE", 1.1, "s", (0.01, 100.0), "exciter time constant", FREE),
+    ("TE", 1.1, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("VFEMAX", 6.9, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
     ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
     ("E1", 6.3, "pu", (0.01, 100.0), "first voltage of the saturation curve"),

@@ -42,22 +42,30 @@ from exfit.models.blocks import (
     smaller,
     washout,
 )
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import (
+    EXCITER_LAG,
+    FREE,
+    LAG_OF_KF,
+    REGULATOR_LAG,
+    SearchRange,
+    record,
+    sheet,
+)
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
     ("KP", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
     ("KI", 20.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
     ("KD", 20.0, "pu s", (0.0, 100000.0), "derivative gain", FREE),
-    ("TD", 0.01, "s", (0.001, 10.0), "lag of the derivative", FREE),
+    ("TD", 0.01, "s", (0.001, 10.0), "lag of the derivative", SearchRange(needs="KD")),
     ("VRMAX", 2.7, "pu", (-9999.0, 9999.0), "regulator ceiling at rated voltage, or 0"),
     ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor at rated voltage"),
     ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
-    ("TA", 0.2, "s", (0.0, 10.0), "regulator time constant", FREE),
+    ("TA", 0.2, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
     ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", FREE),
+    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
     ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", FREE),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
     ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
     ("E1", 2.33, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
     ("SE1", 0.27, "pu", (0.0, 100.0), "saturation at E1"),

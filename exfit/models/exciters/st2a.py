@@ -25,20 +25,20 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
 
 ALIASES = ("ESST2A",)
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
     ("KA", 120.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.15, "s", (0.0, 10.0), "regulator time constant", FREE),
+    ("TA", 0.15, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
     ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "regulator floor"),
     ("KE", 1.0, "pu", (0.01, 10.0), "exciter constant"),
-    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant", FREE),
-    ("KF", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain", FREE),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", FREE),
+    ("TE", 0.5, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    ("KF", 0.05, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
+    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
     ("KP", 4.88, "pu", (0.0, 100.0), "potential source gain"),
     ("KI", 8.0, "pu", (0.0, 100.0), "current source gain, on load"),
     ("KC", 1.82, "pu", (0.0, 100.0), "rectifier loading factor"),

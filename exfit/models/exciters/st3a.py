@@ -17,7 +17,7 @@ only. The standard has no OEL gate here.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller, source_voltage
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, record, sheet
 
 ALIASES = ("ESST3A",)
 
@@ -26,8 +26,8 @@ SHEET = sheet(
     ("VIMAX", 0.2, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
     ("VIMIN", -0.2, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
     ("KM", 7.93, "pu", (0.01, 100000.0), "gain of the field voltage loop", FREE),
-    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", FREE),
-    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", FREE),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
     ("KA", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
     ("TA", 0.0, "s", (0.0, 10.0), "regulator time constant"),
     ("VRMAX", 10.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),

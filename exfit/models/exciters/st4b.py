@@ -16,7 +16,7 @@ only. Not modelled: UEL at the summing point, and VGMAX of later editions.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, pi, pi_rest, smaller, source_voltage
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, REGULATOR_LAG, record, sheet
 
 ALIASES = ("ESST4B",)
 
@@ -28,7 +28,7 @@ SHEET = sheet(
     ("KIR", 2.97, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
     ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", FREE),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
     ("KPM", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field voltage loop", FREE),
     ("KIM", 0.2, "pu/s", (0.0, 100000.0), "integral gain of the field voltage loop", FREE),
     ("VMMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),

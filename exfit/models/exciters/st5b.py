@@ -23,14 +23,14 @@ has the gate; while none acts they have no effect.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, limited_lag, limited_lead_lag, smaller
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 SHEET = sheet(
     ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead", FREE),
-    ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag", FREE),
-    ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead", FREE),
-    ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag", FREE),
+    ("TC1", 0.8, "s", (0.0, 100.0), "first regulator lead", SearchRange(unlike="TB1")),
+    ("TB1", 6.0, "s", (0.0, 100.0), "first regulator lag", SearchRange(unlike="TC1")),
+    ("TC2", 0.08, "s", (0.0, 100.0), "second regulator lead", SearchRange(unlike="TB2")),
+    ("TB2", 0.01, "s", (0.0, 100.0), "second regulator lag", SearchRange(unlike="TC2")),
     ("KR", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
     ("VRMAX", 5.0, "pu", (-9999.0, 9999.0), "regulator ceiling, and at rated voltage"),
     ("VRMIN", -4.0, "pu", (-9999.0, 9999.0), "regulator floor, and at rated voltage"),

@@ -21,14 +21,14 @@ gate (OEL = 1 in a PSS/E record) or behind it (OEL = 2).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, pi_rest, pid, smaller
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 SHEET = sheet(
     ("TR", 0.012, "s", (0.0, 1.0), "voltage transducer lag"),
     ("KPA", 18.038, "pu", (0.0, 100000.0), "proportional gain", FREE),
     ("KIA", 45.094, "pu/s", (0.0, 100000.0), "integral gain", FREE),
     ("KDA", 0.1, "pu s", (0.0, 100000.0), "derivative gain", FREE),
-    ("TDA", 0.1, "s", (0.001, 10.0), "lag of the derivative", FREE),
+    ("TDA", 0.1, "s", (0.001, 10.0), "lag of the derivative", SearchRange(needs="KDA")),
     ("VAMAX", 4.81, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
     ("VAMIN", -3.85, "pu", (-9999.0, 9999.0), "floor of the PID"),
     ("KFF", 1.0, "pu", (0.0, 1000.0), "feedforward gain"),

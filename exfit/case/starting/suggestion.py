@@ -2,11 +2,14 @@
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import yaml
 
+from exfit.case.open_values import FILL_IN
+from exfit.case.starting.bases import Base
 from exfit.case.templates import commented
 from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel
 from exfit.records.channel_recognition import connection_of
@@ -16,35 +19,63 @@ from exfit.records.units import quantity_of
 from exfit.signals import COMPARED, RECORDED, SIGNALS
 from exfit.util.text import yaml_number
 
-FILL_IN = '"?"'  # no number: a case that holds it is refused by place
+NO_BASES: Mapping[str, Base] = MappingProxyType({})
 DIGITS = 4
 COLUMNS_LISTED = 6  # among which the voltage may be
 
 
 def record_section(
-    inspection: Inspection, file: str, only: tuple[str, ...] = COMPARED
+    inspection: Inspection,
+    file: str,
+    only: tuple[str, ...] = COMPARED,
+    bases: Mapping[str, Base] = NO_BASES,
+    window: tuple[float, float] | None = None,
 ) -> list[str]:
     """Return the lines of a ``record:`` section; signals that are not in ``only`` as comments.
 
-    A channel in engineering units has a base that is to be filled in: no number, so that a case
-    with it is refused.
+    A channel in engineering units without one of the ``bases`` has a base that is to be filled in:
+    no number, so that a case with it is refused.
     """
+    lines = ["record:", f"  file: {plain_text(file)}", f"  time: {clock_text(inspection)}"]
+    lines += ["  channels:", *channel_lines(inspection, only, bases)]
+    return [*lines, *window_lines(window), *gap_lines(inspection)]
+
+
+def channel_lines(
+    inspection: Inspection, only: tuple[str, ...], bases: Mapping[str, Base]
+) -> list[str]:
+    """Return the entries of all channels, those that are not compared as comments."""
     channels = [channel for signal in RECORDED if (channel := inspection.channel_of(signal))]
-    lines = ["record:", f"  file: {_text(file)}", f"  time: {_clock(inspection)}", "  channels:"]
-    lines += _voltage_lines(inspection)
-    lines += _channel_lines(channels, only, inspection.reference)
-    if any(channel.missing for channel in channels):
-        lines.append("  gaps: skip            # samples without a number are left out")
-    return lines
+    return [
+        *_voltage_lines(inspection, bases.get("vt")),
+        *_channel_lines(channels, only, inspection.reference, bases),
+    ]
 
 
-def _voltage_lines(inspection: Inspection) -> Iterator[str]:
+def window_lines(window: tuple[float, float] | None) -> list[str]:
+    """Return the line of a window (s), if there is one."""
+    return (
+        []
+        if window is None
+        else [f"  window: [{number_text(window[0])}, {number_text(window[1])}]"]
+    )
+
+
+def gap_lines(inspection: Inspection) -> list[str]:
+    """Return the line that a record with missing samples needs."""
+    signals = (inspection.channel_of(signal) for signal in RECORDED)
+    if not any(channel.missing for channel in signals if channel is not None):
+        return []
+    return ["  gaps: skip            # samples without a number are left out"]
+
+
+def _voltage_lines(inspection: Inspection, base: Base | None) -> Iterator[str]:
     """Yield the entry of vt where no channel is vt by itself: three phases, or an open question."""
     if inspection.channel_of("vt") is not None:
         return
     for group in inspection.phases[:1]:
         yield from (f"    # {line}" for line in _about_phases(inspection, group))
-        yield f"    vt: {_phases(inspection, group)}"
+        yield f"    vt: {_phases(inspection, group, base)}"
     if not inspection.phases:
         columns = ", ".join(channel.name for channel in inspection.channels[:COLUMNS_LISTED])
         more = ", ..." if len(inspection.channels) > COLUMNS_LISTED else ""
@@ -54,7 +85,10 @@ def _voltage_lines(inspection: Inspection) -> Iterator[str]:
 
 
 def _channel_lines(
-    channels: Sequence[InspectedChannel], only: tuple[str, ...], reference: InspectedChannel | None
+    channels: Sequence[InspectedChannel],
+    only: tuple[str, ...],
+    reference: InspectedChannel | None,
+    bases: Mapping[str, Base],
 ) -> Iterator[str]:
     """Yield the entry of each channel, with what to check above it.
 
@@ -64,7 +98,8 @@ def _channel_lines(
         drives = channel is reference
         mark = "" if drives or channel.signal in only else "# "
         yield f"    # {_about(channel)}"
-        yield f"    {mark}{channel.signal}: {_channel(channel, drives)}"
+        base = bases.get(str(channel.signal))
+        yield f"    {mark}{channel.signal}: {_channel(channel, drives, base)}"
 
 
 def weights_section(inspection: Inspection) -> list[str]:
@@ -80,50 +115,59 @@ def weights_section(inspection: Inspection) -> list[str]:
     return ["estimate:", commented("  weights: balanced", text)]
 
 
-def bump_section(inspection: Inspection, vt0: bool = False) -> list[str]:
+def bump_section(inspection: Inspection) -> list[str]:
     """Return the lines of a ``test:`` section: the recorded reference, or steps.
 
     The instants of steps are found by the fit; their sizes are to be filled in: vt changes by less,
-    and the gain of a regulator is what makes the difference. ``vt0`` says whether to give the level
-    before.
+    and the gain of a regulator is what makes the difference.
     """
-    lines = ["test:"]
-    if vt0:
-        level = inspection.channel_of("vt")
-        lines.append(commented(f"  vt0: {_number(level.level if level else 1.0)}", "at rest"))
+    return steps_section(inspection, inspection.steps, (None,) * len(inspection.steps))
+
+
+def steps_section(
+    inspection: Inspection,
+    steps: Sequence[RecordedStep],
+    sizes: Sequence[float | None],
+    level: Sequence[str] = (),
+) -> list[str]:
+    """Return the lines of a ``test:`` section as ``bump_section``, of some steps of known sizes.
+
+    The size (pu) of a step is None where it is to be filled in; ``level`` is the line of vt0.
+    """
+    lines = ["test:", *level]
     if inspection.reference is not None:
         text = f"{inspection.reference.name}, from its level at rest on"
         return [*lines, commented("  vref: recorded", text)]
-    if not inspection.steps:
+    if not steps:
         at = "the record shows no step: when, s, and by how much, pu?"
         return [*lines, f"  # {at}", f"  vref: [{{at: {FILL_IN}, step: {FILL_IN}}}]"]
     lines.append("  vref:")
-    for step in inspection.steps:
-        lines += _step(inspection, step)
+    for step, size in zip(steps, sizes, strict=True):
+        lines += _step(inspection, step, size)
     return lines
 
 
-def _step(inspection: Inspection, step: RecordedStep) -> Iterator[str]:
+def _step(inspection: Inspection, step: RecordedStep, given: float | None) -> Iterator[str]:
     reference = inspection.channel_of("vref")
     if reference is not None and reference.name in step.seen_in:
         own = min((change.at for change in reference.steps), key=lambda at: abs(at - step.at))
         size = step.sizes.get(reference.name, 0.0)
-        yield f"    - at: {_number(own)}"
+        yield f"    - at: {number_text(own)}"
         if reference.seems_per_unit:
-            yield f"      step: {_number(size)}"
+            yield f"      step: {number_text(size)}"
         else:
             yield commented(f"      step: {FILL_IN}", f"pu; {reference.name} {size:+.4g}")
         return
     if step.from_start:
         text = "the record moves from its first sample: made then, or before?"
-        yield commented(f"    - at: {_number(step.at)}", text)
+        yield commented(f"    - at: {number_text(step.at)}", text)
     else:
         low = max(step.at - INSTANT_WITHIN, float(inspection.time[0]))
         high = min(step.at + INSTANT_WITHIN, float(inspection.time[-1]))
         yield commented(f"    - at: {_range(step.at, low, high)}", f"+- {step.error:.1g} s")
-    yield commented(
-        f"      step: {FILL_IN}", f"pu, as it was keyed in{_change_of_vt(inspection, step)}"
-    )
+    change = _change_of_vt(inspection, step)
+    keyed_in = FILL_IN if given is None else yaml_number(given)
+    yield commented(f"      step: {keyed_in}", f"pu, as it was keyed in{change}")
 
 
 def _change_of_vt(inspection: Inspection, step: RecordedStep) -> str:
@@ -131,20 +175,28 @@ def _change_of_vt(inspection: Inspection, step: RecordedStep) -> str:
     voltage = inspection.channel_of("vt")
     if voltage is not None and voltage.name in step.sizes:
         size = step.sizes[voltage.name]
-        return (
-            f"; vt changed by {_number(size if voltage.seems_per_unit else size / voltage.level)}"
-        )
+        share = size if voltage.seems_per_unit else size / voltage.level
+        return f"; vt changed by {number_text(share)}"
     for group in inspection.phases:
         if group.name in step.sizes:
-            return f"; vt changed by {_number(step.sizes[group.name] / group.level)}"
+            return f"; vt changed by {number_text(step.sizes[group.name] / group.level)}"
     return ""
 
 
-def _phases(inspection: Inspection, group: InspectedPhases) -> str:
-    columns = ", ".join(_text(name) for name in group.columns)
-    unit = _first_phase(inspection, group).unit
+def _phases(inspection: Inspection, group: InspectedPhases, base: Base | None) -> str:
+    columns = ", ".join(plain_text(name) for name in group.columns)
     kind = f"kind: {group.kind}, connection: {connection_of(group.columns)}"
-    return f"{{phases: [{columns}], {kind}, unit: {unit or FILL_IN}, base: {FILL_IN}}}"
+    unit, value = _unit_and_base(_first_phase(inspection, group), base)
+    return f"{{phases: [{columns}], {kind}, unit: {unit}, base: {value}}}"
+
+
+def _unit_and_base(channel: InspectedChannel, base: Base | None) -> tuple[str, str]:
+    """Return the unit and the base of a channel that needs both, as far as they are known."""
+    known = channel.unit if quantity_of(channel.unit) else None
+    if base is None:
+        return known or FILL_IN, FILL_IN
+    value = base.in_unit(known, channel.name)
+    return known or base.unit or FILL_IN, yaml_number(value)
 
 
 def _first_phase(inspection: Inspection, group: InspectedPhases) -> InspectedChannel:
@@ -173,14 +225,15 @@ def _about(channel: InspectedChannel) -> str:
     return f"{why}; {channel.level:.5g} {channel.unit or '?'} at rest; base: {base}"
 
 
-def _channel(channel: InspectedChannel, drives: bool) -> str:
-    entries = {"column": _text(channel.name)}
-    if channel.unit == "%":
+def _channel(channel: InspectedChannel, drives: bool, base: Base | None) -> str:
+    entries = {"column": plain_text(channel.name)}
+    if base is not None and (channel.seems_per_unit or channel.unit == "%"):
+        entries |= {"unit": '"%"'} if channel.unit == "%" else {}
+        entries["base"] = yaml_number(base.in_unit(channel.unit or "pu", channel.name))
+    elif channel.unit == "%":
         entries["scale"] = "0.01"
-    elif not channel.seems_per_unit and quantity_of(channel.unit):
-        entries |= {"unit": str(channel.unit), "base": FILL_IN}
     elif not channel.seems_per_unit:
-        entries |= {"unit": FILL_IN, "base": FILL_IN}
+        entries["unit"], entries["base"] = _unit_and_base(channel, base)
     if channel.spikes and not drives:
         entries["outliers"] = f"{SPIKE_LIMIT:g}"
     if len(entries) == 1:
@@ -188,24 +241,25 @@ def _channel(channel: InspectedChannel, drives: bool) -> str:
     return "{" + ", ".join(f"{key}: {value}" for key, value in entries.items()) + "}"
 
 
-def _clock(inspection: Inspection) -> str:
-    names = [_text(name) for name in inspection.clock.columns]
+def clock_text(inspection: Inspection) -> str:
+    """Return the columns of the time as a case has them."""
+    names = [plain_text(name) for name in inspection.clock.columns]
     if inspection.clock.unit is not None:
         return f"{{column: {names[0]}, unit: {inspection.clock.unit}}}"
     return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
 
 
 def _range(start: float, low: float, high: float) -> str:
-    return f"{{start: {_number(start)}, min: {_number(low)}, max: {_number(high)}}}"
+    return f"{{start: {number_text(start)}, min: {number_text(low)}, max: {number_text(high)}}}"
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
     """Return a number in a few digits, of an instant no fewer than 0.1 ms."""
     rounded = float(f"{value:.{DIGITS}g}")
     return yaml_number(round(value, DIGITS) if abs(value) >= 1.0 else rounded)
 
 
-def _text(name: str) -> str:
+def plain_text(name: str) -> str:
     """Return a text as YAML has it, in quotes where it would be read as something else."""
     plain = re.fullmatch(r"[A-Za-zäöüÄÖÜß./][\w./ -]*", name) and name == name.strip()
     if plain and yaml.safe_load(name) == name:

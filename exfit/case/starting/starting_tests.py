@@ -1,0 +1,164 @@
+"""The tests of a new case: what was done, as far as it is given, and how each one counts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import copysign
+from typing import NamedTuple
+
+from exfit.case.starting.bases import Base
+from exfit.errors import ExfitError
+from exfit.records.contradictions import LARGEST_STEP, size_in_words
+from exfit.records.inspection import Inspection
+from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
+from exfit.records.steps import RecordedStep
+
+LIKE = (0.9, 1.25)  # of what vt changes by: the step of a reference, as the regulator's gain is
+
+
+@dataclass(frozen=True)
+class StartingTest:
+    """A test of a recorder's file, with the sizes (pu) of its steps, None where they are unknown.
+
+    ``window`` (s) is None where the whole record is used. ``bases`` are given by signal.
+    """
+
+    name: str
+    inspection: Inspection
+    steps: tuple[RecordedStep, ...]
+    window: tuple[float, float] | None = None
+    sizes: tuple[float | None, ...] = ()
+    bases: Mapping[str, Base] = field(default_factory=dict)
+    validates: bool = False
+
+
+def starting_tests(
+    inspection: Inspection,
+    sizes: Sequence[str] = (),
+    bases: Mapping[str, Base] | None = None,
+) -> tuple[StartingTest, ...]:
+    """Return the tests of a record: every other one, from the second on, validates.
+
+    ``sizes`` (pu) are texts as 0.05 for all tests or up=0.05 for those whose names have that word;
+    they are amounts, or have the sign of the step. Of a record without steps it is one test.
+
+    Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows.
+    """
+    recorded, given = tests_of(inspection), bases or {}
+    if not recorded:
+        _refuse_unused(sizes, [])
+        return (StartingTest("fit", inspection, (), bases=given),)
+    names = unique_names([test.name() for test in recorded], recorded)
+    by_name = _sizes_by_name(sizes, names)
+    for test, name in zip(recorded, names, strict=True):
+        if len(recorded) > 1 and name in by_name and by_name[name].of_all:
+            _refuse_impossible(f"{inspection.path}: --step", by_name[name].amount)
+            _refuse_other_size(inspection, test, by_name[name].amount)
+    amounts = [by_name[name].amount if name in by_name else None for name in names]
+    tests = [
+        started(inspection, test, amount, given, k % 2 == 1)
+        for k, (test, amount) in enumerate(zip(recorded, amounts, strict=True))
+    ]
+    return renamed(tests, recorded)
+
+
+def renamed(
+    tests: Sequence[StartingTest], recorded: Sequence[DetectedTest]
+) -> tuple[StartingTest, ...]:
+    """Return tests under names by their sizes as given, of which no two are the same."""
+    names = [
+        own.name(test.sizes[0] if test.sizes else None)
+        for test, own in zip(tests, recorded, strict=True)
+    ]
+    return tuple(
+        replace(test, name=name)
+        for test, name in zip(tests, unique_names(names, recorded), strict=True)
+    )
+
+
+def started(
+    inspection: Inspection,
+    test: DetectedTest,
+    amount: float | None,
+    bases: Mapping[str, Base],
+    validates: bool,
+) -> StartingTest:
+    """Return a recorded test whose steps all have an amount (pu) with the signs that vt shows.
+
+    Raises ExfitError where the record shows another one.
+    """
+    return StartingTest(
+        test.name(),
+        inspection,
+        test.steps,
+        None if is_whole_record(test, inspection) else test.window,
+        tuple(_sized(inspection, test, k, amount) for k in range(len(test.steps))),
+        bases,
+        validates,
+    )
+
+
+def _sized(
+    inspection: Inspection, test: DetectedTest, index: int, amount: float | None
+) -> float | None:
+    """Return the size (pu) of a step; raises ExfitError where the record contradicts it."""
+    if amount is None:
+        return None
+    change = test.changes[index]
+    place = f"{inspection.path}: step {amount:g} at {test.steps[index].at:.4g} s"
+    _refuse_impossible(place, amount)
+    if change is None:
+        return amount if index == 0 else None
+    if index == 0 and amount < 0.0 < change:
+        raise ExfitError(f"{place}: vt rises there, by {100.0 * change:.2g} %")
+    return copysign(amount, change)
+
+
+def _refuse_impossible(place: str, amount: float) -> None:
+    """Raise ExfitError for a size (pu) that no test has."""
+    if amount == 0.0 or abs(amount) > LARGEST_STEP:
+        text = "0 is no step" if amount == 0.0 else size_in_words(amount)
+        raise ExfitError(f"{place}: {text}")
+
+
+def _refuse_other_size(inspection: Inspection, test: DetectedTest, amount: float) -> None:
+    """Raise ExfitError where a size that all tests share is not that of this one."""
+    change = test.changes[0]
+    if change is None or len(test.steps) > 1:
+        return
+    low, high = (share * abs(change) for share in LIKE)
+    if not low <= abs(amount) <= high:
+        raise ExfitError(
+            f"{inspection.path}: --step {amount:g}: vt changes by {100.0 * change:+.2g} % at "
+            f"{test.at:.4g} s; give the size of that test, as --step at-{test.at:.0f}s=..."
+        )
+
+
+class StepAmount(NamedTuple):
+    """The size (pu) of the steps of a test, and whether it is that of all tests."""
+
+    amount: float
+    of_all: bool
+
+
+def _sizes_by_name(texts: Sequence[str], names: Sequence[str]) -> dict[str, StepAmount]:
+    """Return the sizes of tests by name; one for all counts less than one of some."""
+    sizes: dict[str, StepAmount] = {}
+    unused = []
+    for text in sorted(texts, key=lambda text: "=" in text):
+        words, _, number = text.rpartition("=")
+        try:
+            amount = float(number)
+        except ValueError:
+            raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
+        named = [name for name in names if f"-{words}-" in f"-{name}-" or not words]
+        sizes |= dict.fromkeys(named, StepAmount(amount, not words))
+        unused += [] if named else [text]
+    _refuse_unused(unused, names)
+    return sizes
+
+
+def _refuse_unused(texts: Sequence[str], names: Sequence[str]) -> None:
+    """Raise ExfitError for sizes that belong to no test."""
+    if texts:
+        tests = ", ".join(names) or "none: it shows no step"
+        raise ExfitError(f"--step {texts[0]}: no test of that name; the record's tests: {tests}")

@@ -1,0 +1,59 @@
+"""The data of a new case: models with their values, typical or taken from elsewhere."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from exfit.case.load import load_case
+from exfit.errors import CaseError
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model, typical
+from exfit.plants import MACHINE
+from exfit.util.sources import TYPICAL
+
+
+@dataclass(frozen=True)
+class PartData:
+    """A model with a value for each parameter, and the sources of these in the words of a case.
+
+    A value without a source is not stated; ``origin`` says in a comment where the data are from.
+    """
+
+    model: Model | Machine
+    values: Mapping[str, float]
+    sources: Mapping[str, str]
+    origin: str = ""
+
+    @classmethod
+    def typical(cls, model: Model | Machine) -> "PartData":
+        """Return a model with its typical data."""
+        return cls(model, typical(model.sheet), {row.symbol: TYPICAL for row in model.sheet})
+
+
+@dataclass(frozen=True)
+class UnitData:
+    """The exciter, behind the ``name`` that the case gives it, its machine and its stabiliser."""
+
+    name: str
+    exciter: PartData
+    machine: PartData
+    stabiliser: PartData | None = None
+
+
+def machine_of_case(path: Path) -> PartData:
+    """Return the machine of another case with its values, those that are fitted at their start.
+
+    Raises CaseError with all faults of that case, and where it has no machine.
+    """
+    case = load_case(path)
+    machine = case.parts.machine
+    if machine is None:
+        raise CaseError([f"{path}: plant {case.plant.type} has no machine"])
+    values, sources = case.values(), case.sources()
+    names = {row.symbol: MACHINE + row.symbol for row in machine.sheet}
+    return PartData(
+        machine,
+        {symbol: values[name] for symbol, name in names.items()},
+        {symbol: sources[name] for symbol, name in names.items()},
+        f"those of {path.name}",
+    )

@@ -1,0 +1,281 @@
+"""The command new: from a recorder's file to a case."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli import completion
+from exfit.cli.exchange import BUSES
+from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
+from exfit.cli.records import inspected, sheet_option, time_option, unit_option
+from exfit.errors import ExfitError
+
+if TYPE_CHECKING:
+    from exfit.case.open_values import OpenValue
+    from exfit.case.starting.bases import Base
+    from exfit.case.starting.starting_tests import StartingTest
+    from exfit.case.starting.starting_unit import PartData, UnitData
+    from exfit.records.inspection import Inspection
+
+
+@dataclass(frozen=True)
+class RecordReading:
+    """How the files of a new case are read."""
+
+    clock: tuple[str, ...]
+    unit: str | None
+    sheet: str | None
+
+    def inspect(self, file: Path) -> "Inspection":
+        """Return what a recorder's file holds."""
+        return inspected(file, self.clock, self.unit, self.sheet)
+
+
+@dataclass(frozen=True)
+class UnitSources:
+    """Where the data of a unit come from, as the options say."""
+
+    model: str | None
+    machine: str | None
+    dyr: Path | None
+    bus: int | None
+    machine_id: str | None
+    machine_from: Path | None
+
+
+@click.command(short_help="Make a case from a record and a model or a planner's file.")
+@click.option(
+    "--model",
+    metavar="NAME",
+    help="Exciter, or the file of a model; default: that of --dyr.",
+    shell_complete=completion.exciters,
+)
+@click.option(
+    "--machine",
+    metavar="NAME",
+    help="Machine model (default: GENROU, or that of --dyr).",
+    shell_complete=completion.machines,
+)
+@click.option(
+    "--record",
+    "file",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Record of one or several bump tests.",
+)
+@click.option(
+    "--step",
+    "sizes",
+    multiple=True,
+    metavar="[TEST=]PU",
+    help="Size of the steps: 0.05; of one test: up=0.05, at-312s=0.02.",
+)
+@click.option(
+    "--tests",
+    "table",
+    type=click.Path(path_type=Path),
+    metavar="CSV",
+    help="Table of tests: file, at, step, base, validates.",
+)
+@click.option(
+    "--base", "bases", multiple=True, metavar="SIGNAL=VALUE", help="Value of 1 pu: vt=15.75kV."
+)
+@click.option(
+    "--dyr",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="PSS/E file with the data of machine, exciter and stabiliser.",
+)
+@click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit in it.")
+@click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
+@click.option(
+    "--machine-from",
+    type=click.Path(path_type=Path),
+    metavar="CASE",
+    help="Another case, whose machine is taken.",
+)
+@click.option(
+    "--about", "facts", multiple=True, metavar="NAME=FACT", help="For the report: Unit=3."
+)
+@time_option
+@unit_option
+@sheet_option
+@file_option
+@force_option
+def new(
+    model: str | None,
+    machine: str | None,
+    file: Path | None,
+    sizes: tuple[str, ...],
+    table: Path | None,
+    bases: tuple[str, ...],
+    dyr: Path | None,
+    bus: int | None,
+    machine_id: str | None,
+    machine_from: Path | None,
+    facts: tuple[str, ...],
+    clock: tuple[str, ...],
+    unit: str | None,
+    sheet: str | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Make a commented case from a record: its tests, the data of the unit, what is free.
+
+    Of several tests in a record, each is a record of the case with a window; every other one
+    validates. Values are typical, or those of a planner's file. What the record does not show is
+    asked on a terminal, or left as "?", and the case is refused until it is filled in.
+    """
+    from exfit.case.starting.bases import bases_of
+    from exfit.case.starting.starting_case import starting_case
+
+    if output is not None:
+        refuse_existing(output, force)
+    folder = Path() if output is None else output.parent
+    sources = UnitSources(model, machine, dyr, bus, machine_id, machine_from)
+    data = _unit(sources, folder)
+    reading = RecordReading(clock, unit, sheet)
+    tests = _tests(file, table, sizes, bases_of(bases), reading)
+    text = starting_case(data, tests, folder, _facts(facts))
+    if is_terminal():
+        text = _asked(text)
+    write_text(text, output, ())
+    if output is not None:
+        _report(text, output)
+
+
+def is_terminal() -> bool:
+    """Return whether someone sits at the keyboard who can be asked."""
+    return sys.stdin.isatty()
+
+
+def _tests(
+    file: Path | None,
+    table: Path | None,
+    sizes: tuple[str, ...],
+    bases: "dict[str, Base]",
+    reading: RecordReading,
+) -> "tuple[StartingTest, ...]":
+    """Return the tests of a record, or those that a table names."""
+    from exfit.case.starting.starting_tests import starting_tests
+    from exfit.case.starting.table_of_tests import read_test_table, tests_of_table
+
+    if table is None:
+        if file is None:
+            raise click.UsageError("Missing option '--record', or '--tests'.")
+        return starting_tests(reading.inspect(file), sizes, bases)
+    if sizes:
+        raise click.UsageError("--step: not allowed with --tests, which has a column step.")
+    rows = [row if row.file else row._replace(file=file) for row in read_test_table(table)]
+    for row in rows:
+        if row.file is None:
+            raise ExfitError(f"{row.place}: file: missing, and no --record is given")
+    files = dict.fromkeys(row.file for row in rows if row.file is not None)
+    return tests_of_table(rows, {path: reading.inspect(path) for path in files}, bases)
+
+
+def _unit(given: UnitSources, folder: Path) -> "UnitData":
+    """Return the data of the unit: typical, a planner's, with the machine of another case."""
+    from dataclasses import replace
+
+    from exfit.case.starting.starting_unit import PartData, UnitData, machine_of_case
+    from exfit.models.machines import find_machine
+
+    _refuse_unused(given)
+    if given.dyr is not None:
+        data = _planner(given.dyr, given.bus, given.machine_id)
+        if given.model is not None:
+            name, exciter = _exciter(given.model, folder)
+            same = exciter.model is data.exciter.model
+            data = data if same else replace(data, name=name, exciter=exciter)
+    else:
+        machine = PartData.typical(find_machine(given.machine or "GENROU"))
+        data = UnitData(*_exciter(str(given.model), folder), machine)
+    if given.machine_from is not None:
+        data = replace(data, machine=machine_of_case(given.machine_from))
+    return data
+
+
+def _refuse_unused(given: UnitSources) -> None:
+    """Raise UsageError for options that lack another, or contradict one."""
+    if given.model is None and given.dyr is None:
+        raise click.UsageError("Missing option '--model', or '--dyr'.")
+    if given.machine is not None and (given.dyr or given.machine_from):
+        raise click.UsageError("--machine: not allowed with --dyr or --machine-from.")
+    if given.dyr is None and (given.bus is not None or given.machine_id is not None):
+        raise click.UsageError("--bus and --id: only with --dyr.")
+
+
+def _exciter(model: str, folder: Path) -> "tuple[str, PartData]":
+    """Return an exciter with its typical data, behind the name that a case in a folder gives it."""
+    from exfit.case.starting.starting_unit import PartData
+    from exfit.case.starting.suggestion import relative
+    from exfit.models import find
+
+    exciter = find(model, Path())
+    name = relative(Path(model), folder) if model.endswith(".py") else exciter.name
+    return name, PartData.typical(exciter)
+
+
+def _planner(dyr: Path, bus: int | None, machine_id: str | None) -> "UnitData":
+    """Return the data of a unit of a PSS/E file; what of it is left out is reported."""
+    from exfit.exchange.psse.fields import located
+    from exfit.exchange.psse.import_case import import_unit
+    from exfit.exchange.psse.unit_data import unit_data
+
+    unit = import_unit(dyr, bus, machine_id)
+    warn(located(unit.warnings, str(dyr)))
+    return unit_data(unit, dyr.name)
+
+
+def _facts(texts: tuple[str, ...]) -> dict[str, str]:
+    """Return facts by name; raises ExfitError for a text of another form."""
+    facts = {}
+    for text in texts:
+        name, equals, fact = (part.strip() for part in text.partition("="))
+        if not (name and equals and fact):
+            raise ExfitError(f"--about {text}: not of the form Unit=3")
+        facts[name] = fact
+    return facts
+
+
+def _asked(text: str) -> str:
+    """Return the text of a case with what the user gives for open values; Enter leaves one open."""
+    from exfit.case.open_values import filled, open_values
+
+    given = {}
+    for value in open_values(text):
+        answer = click.prompt(_question(value), default="", show_default=False, err=True)
+        if answer.strip():
+            given[value] = _answer(answer.strip(), value.place)
+    return filled(text, given)
+
+
+def _question(value: "OpenValue") -> str:
+    """Return the place of an open value, with what to know of it."""
+    return f"{value.place} ({value.hint})" if value.hint else value.place
+
+
+def _answer(answer: str, place: str) -> str:
+    """Return an answer as a case has it; raises ExfitError where a number is needed."""
+    from exfit.case.starting.suggestion import plain_text
+
+    if place.rpartition(".")[2] in ("column", "unit"):
+        return plain_text(answer)
+    try:
+        float(answer)
+    except ValueError:
+        raise ExfitError(f"{place}: {answer!r} is not a number") from None
+    return answer
+
+
+def _report(text: str, output: Path) -> None:
+    """Say where the case is, what is still open, and what comes next."""
+    from exfit.case.open_values import open_values
+
+    click.echo(f"written to {output}; next: exfit check {output}")
+    for value in open_values(text):
+        click.echo(f"to be filled in: {_question(value)}, line {value.line}")

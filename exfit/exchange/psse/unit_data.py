@@ -1,0 +1,21 @@
+"""The data of a new case from a unit of a PSS/E dynamics file."""
+
+from exfit.case.starting.starting_unit import PartData, UnitData
+from exfit.exchange.psse.unit import Unit, UnitPart
+from exfit.util.sources import TYPICAL
+
+
+def unit_data(unit: Unit, file: str) -> UnitData:
+    """Return the machine, exciter and stabiliser of a unit; ``file`` is what comments name.
+
+    The file does not say where its values come from; what it does not hold is typical.
+    """
+    stabiliser = None if unit.stabiliser is None else _part(unit.stabiliser, file)
+    exciter = _part(unit.exciter, file)
+    return UnitData(exciter.model.name, exciter, _part(unit.machine, file), stabiliser)
+
+
+def _part(part: UnitPart, file: str) -> PartData:
+    names, model = part.definition.names, part.definition.model
+    absent = [row.symbol for row in model.sheet if row.symbol not in names]
+    return PartData(model, part.values, dict.fromkeys(absent, TYPICAL), f"those of {file}")

@@ -1,0 +1,181 @@
+"""The tests that a recorder's file holds: each step, or steps and their return, with a window."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, floor, inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.dsp.noise import noise
+from exfit.dsp.step_detection import running_median
+from exfit.records.inspection import Inspection, effective_value
+from exfit.records.steps import INSTANT_WITHIN, RecordedStep
+
+Array = NDArray[np.float64]
+
+LONGEST_RESPONSE = 60.0  # s: what still moves then drifts
+SETTLED = 0.01  # of a step: so near to where it ends, a response has settled
+NOISE_OF_SETTLED = 2.0  # times the noise: their running median is no farther by chance
+SMOOTHED_OVER = 0.1  # s
+QUARTERS = 4  # of what is looked at: in the last two a response that has settled is level
+REST = (3.0, 0.5)  # s, and of the response: so long a rest before a step is in its window
+LEAST_REST = 1.0  # s: with less of it before a step both are one test
+RESPONSES_SHOWN = 2.0  # times what the response takes is in the window, and at least
+SHORTEST_SHOWN = 10.0  # s
+FEWEST_SMOOTHED = 10  # samples of a smoothed response: with fewer it has no time to settle
+WHOLE_RECORD = 2.0  # times a window: a record that is not longer is used as it is
+DIGITS = 2  # of a size in a name
+
+
+@dataclass(frozen=True)
+class DetectedTest:
+    """Steps of the reference from one rest to the next, and the window (s) to look at.
+
+    ``changes`` are those of the reference, if it was recorded, else of the voltage, as shares of
+    the level at the start of the record; None where neither shows a step.
+    """
+
+    steps: tuple[RecordedStep, ...]
+    window: tuple[float, float]
+    changes: tuple[float | None, ...]
+
+    @property
+    def at(self) -> float:
+        """The instant of the first step, s."""
+        return self.steps[0].at
+
+    def name(self, size: float | None = None) -> str:
+        """Return what it is, as up-5%-at-312s; of a size (pu) that is known otherwise."""
+        size = self.changes[0] if size is None else size
+        words = ["pulse" if len(self.steps) == 2 else "steps"] if len(self.steps) > 1 else []
+        if size:
+            words += ["up" if size > 0.0 else "down", f"{abs(100.0 * size):.{DIGITS}g}%"]
+        return "-".join([*(words or ["step"]), "at", f"{self.at:.0f}s"])
+
+
+def tests_of(inspection: Inspection) -> tuple[DetectedTest, ...]:
+    """Return the tests of a record in order of time; none where it shows no step."""
+    if not inspection.steps:
+        return ()
+    settled = _settled(inspection)
+    tests = [
+        replace(test, window=_window(test, before, after))
+        for test, before, after in _groups(inspection, settled)
+    ]
+    begins = [test.window[0] for test in tests[1:]]
+    return tuple(
+        replace(test, window=(test.window[0], min(test.window[1], begin)))
+        for test, begin in zip(tests, [*begins, inf], strict=True)
+    )
+
+
+def is_whole_record(test: DetectedTest, inspection: Inspection) -> bool:
+    """Return whether the record of a test needs no window: it has no other, and little beyond."""
+    start, end = test.window
+    alone = len(test.steps) == len(inspection.steps)
+    return alone and float(np.ptp(inspection.time)) <= WHOLE_RECORD * (end - start)
+
+
+def unique_names(names: Sequence[str], tests: Sequence[DetectedTest]) -> list[str]:
+    """Return names of tests, with the tenth of a second or a number where two are the same."""
+    finer = [
+        name if Counter(names)[name] == 1 else name.rpartition("-")[0] + f"-{test.at:.1f}s"
+        for name, test in zip(names, tests, strict=True)
+    ]
+    return [
+        name if finer.count(name) == 1 else f"{name}-{finer[:k].count(name) + 1}"
+        for k, name in enumerate(finer)
+    ]
+
+
+def _groups(
+    inspection: Inspection, settled: Sequence[float]
+) -> Iterator[tuple[DetectedTest, float, float]]:
+    """Yield each test, still without its window, and between what instants that may lie."""
+    steps, first, last = inspection.steps, float(inspection.time[0]), float(inspection.time[-1])
+    begins = [k for k, step in enumerate(steps) if k == 0 or step.at - settled[k - 1] >= LEAST_REST]
+    before = first
+    for begin, end in zip(begins, [*begins[1:], len(steps)], strict=True):
+        own = steps[begin:end]
+        after = steps[end].at - INSTANT_WITHIN - steps[end].error if end < len(steps) else last
+        changes = tuple(_change(inspection, step) for step in own)
+        yield DetectedTest(own, (first, settled[end - 1]), changes), before, after
+        before = min(settled[end - 1], after)
+
+
+def _window(test: DetectedTest, before: float, after: float) -> tuple[float, float]:
+    """Return the window of a test whose own ends where it has settled; between two instants."""
+    response = test.window[1] - test.steps[-1].at
+    rest = max(REST[0], REST[1] * response)
+    shown = max(SHORTEST_SHOWN, RESPONSES_SHOWN * response)
+    start, end = max(before, test.at - rest), min(after, test.steps[-1].at + shown)
+    return (
+        start if start == before else ceil(10.0 * start) / 10.0,
+        end if end == after else floor(10.0 * end) / 10.0,
+    )
+
+
+def _settled(inspection: Inspection) -> list[float]:
+    """Return when the response to each step has settled, s; where the next one begins at most."""
+    time, response = _response(inspection)
+    ends = [*(step.at for step in inspection.steps[1:]), float(inspection.time[-1])]
+    return [
+        _settled_at(time, response, step.at, min(end, step.at + LONGEST_RESPONSE))
+        for step, end in zip(inspection.steps, ends, strict=False)
+    ]
+
+
+def _settled_at(time: Array, response: Array, start: float, end: float) -> float:
+    """Return when a response to a step at ``start`` is where it ends for good."""
+    first, last = np.searchsorted(time, [start, end])
+    if last - first < FEWEST_SMOOTHED:
+        return start
+    t, scatter = time[first:last], noise(response[first:last])
+    y = running_median(response[first:last])
+    before, level = (float(np.median(part)) for part in np.array_split(y, QUARTERS)[-2:])
+    far = max(SETTLED * float(np.max(np.abs(y - level))), NOISE_OF_SETTLED * scatter)
+    if abs(level - before) > far:
+        return end
+    away = np.flatnonzero(np.abs(y - level) > far)
+    return float(t[min(away[-1] + 1, len(t) - 1)]) if len(away) else start
+
+
+def _response(inspection: Inspection) -> tuple[Array, Array]:
+    """Return the instants and the smoothed voltage, or what else shows the steps, (M,) each."""
+    time, samples = inspection.time, _voltage(inspection)
+    present = np.isfinite(samples)
+    time, samples = time[present], samples[present]
+    block = max(round(SMOOTHED_OVER / inspection.sampling.step), 1)
+    whole = len(time) // block * block
+    return (
+        np.mean(time[:whole].reshape(-1, block), axis=1),
+        np.median(samples[:whole].reshape(-1, block), axis=1),
+    )
+
+
+def _voltage(inspection: Inspection) -> Array:
+    channel = inspection.channel_of("vt")
+    if channel is not None:
+        return inspection.samples[channel.name]
+    for group in inspection.phases:
+        return effective_value(inspection.samples, group.columns)
+    shown = [name for step in inspection.steps for name in step.seen_in]
+    names = [name for name in shown if name in inspection.samples] or [*inspection.samples]
+    return inspection.samples[names[0]]
+
+
+def _change(inspection: Inspection, step: RecordedStep) -> float | None:
+    """Return a step as a share of the level: of the reference, else of the voltage."""
+    for signal in ("vref", "vt"):
+        channel = inspection.channel_of(signal)
+        if channel is not None and channel.name in step.sizes:
+            level = 1.0 if channel.seems_per_unit else channel.level
+            return step.sizes[channel.name] / level if level else None
+    sizes = (
+        step.sizes[group.name] / group.level
+        for group in inspection.phases
+        if group.name in step.sizes
+    )
+    return next(sizes, None)
