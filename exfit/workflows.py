@@ -178,6 +178,7 @@ def fit(
         verdict=verdict_of(evidence),
         given_values=given_values(case),
         typical_values=analysis.typical_values,
+        windows=analysis.windows,
         sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
         strategy_given=method != case.estimate.strategy,
         parts=tuple(parts_of(case)),

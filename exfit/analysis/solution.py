@@ -18,6 +18,7 @@ from exfit.analysis.diagnostics import (
 )
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.intervals.determination import Determination
+from exfit.analysis.intervals.windows import spread_over_windows, with_spread
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.analysis.other_values import as_found_of, phase_ends
 from exfit.analysis.typical_values import influence_of_typical_values
@@ -38,6 +39,7 @@ from exfit.results.description import Behaviour
 from exfit.results.model import FittedParameter, Iteration
 from exfit.results.other_values import AsFound, PhaseEnd
 from exfit.results.typical_values import TypicalValue, by_weight
+from exfit.results.windows import WindowSpread
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -66,6 +68,7 @@ class Analysis(NamedTuple):
     unfinished: bool
     typical_values: Mapping[str, TypicalValue]
     as_found: AsFound | None
+    windows: WindowSpread | None = None
 
     @property
     def why(self) -> str:
@@ -94,6 +97,7 @@ def analysed(
     uncertainty, behaviour, validation = determined.uncertainty, None, list[Comparison]()
     ends, typical = list[PhaseEnd](), dict[str, TypicalValue]()
     as_found: AsFound | None = None
+    windows: WindowSpread | None = None
     try:
         ends += phase_ends(case, setups, problem.residuals, history)
         validated = [aligned(case, setup, values) for setup in unseen]
@@ -102,6 +106,8 @@ def analysed(
         as_found = as_found_of(case, [*((setup, values) for setup in setups), *validated])
         if uncertainty is not None:
             typical = influence_of_typical_values(case, problem.compressed, best.x, uncertainty)
+            windows = spread_over_windows(case, setups, problem.residuals, values, uncertainty)
+            uncertainty = with_spread(uncertainty, windows)
     except KeyboardInterrupt:  # what the search came to stays
         interrupted = unfinished = True
     return Analysis(
@@ -113,6 +119,7 @@ def analysed(
         unfinished,
         typical,
         as_found,
+        windows,
     )
 
 
@@ -210,6 +217,8 @@ def fit_notes(
         yield from speed_notes(
             experiment.simulator.inputs, experiment.parameters(residuals.values(best.x))
         )
+    if analysis.windows is not None:
+        yield analysis.windows.sentence
     yield from skipped_response_notes(comparisons)
     if analysis.unfinished:
         yield INTERRUPTED_AFTERWARDS

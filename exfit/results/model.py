@@ -19,6 +19,7 @@ from exfit.results.description import Behaviour, GivenInPlace, PartDescription, 
 from exfit.results.other_values import AsFound, PhaseEnd
 from exfit.results.typical_values import TypicalValue
 from exfit.results.verdict import NO_MATCH, Verdict
+from exfit.results.windows import WindowSpread
 from exfit.util.criteria import Criteria
 from exfit.util.sources import NOT_STATED, TYPICAL
 from exfit.util.text import rounded
@@ -73,7 +74,8 @@ class FittedParameter:
 
     ``interval`` holds the true value with 95 % confidence; a side without a limit is None, and
     ``why`` is the reason for that, or for no interval at all. ``interval_method`` says how it was
-    found: by linear theory, from the profile likelihood, or as the hull over several minima.
+    found: by linear theory, from the profile likelihood, as the hull over several minima, or over
+    windows of the records.
     ``min`` and ``max`` are infinite where there is no bound; ``physical`` says whether the value
     lies in the range of its data sheet.
     """
@@ -184,7 +186,8 @@ class FitResult:
     ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
     what identifies the unit and the test. ``inputs`` is the SHA-256 of every file by its label,
     ``files`` its name. ``given_values`` are those in place of the case's. ``as_found`` is
-    the model before the test, ``criteria`` are those by which a report judges. ``verdict``,
+    the model before the test, ``criteria`` are those by which a report judges; ``windows`` is T'd0
+    over windows of its records, None unless it is fitted to several steps by playback. ``verdict``,
     ``behaviour`` and ``as_found`` are None in results of an earlier version.
     """
 
@@ -236,6 +239,7 @@ class FitResult:
     strategy_given: bool = field(default=True, metadata=IN_FILE)
     parts: tuple[PartDescription, ...] = field(default=(), metadata=IN_FILE)
     tests: tuple[RecordedTest, ...] = field(default=(), metadata=IN_FILE)
+    windows: WindowSpread | None = None
     behaviour: Behaviour | None = field(default=None, metadata=IN_FILE)
     files: Mapping[str, str] = field(default_factory=dict, metadata=IN_FILE)
     case_text: str = field(default="", metadata=IN_FILE)

@@ -19,11 +19,13 @@ SEED = 0
 REALISATIONS = 4
 
 
-def carried_noise(setup: ExperimentSetup, values: Values) -> list[Array]:
+def carried_noise(
+    setup: ExperimentSetup, values: Values, realisations: int = REALISATIONS
+) -> list[Array]:
     """Return by how much more noise on the recorded inputs moves each channel, pu.
 
     White noise as strong as that of each input is added to it, several times: what the response
-    then does (REALISATIONS, errors) is what the record's own noise does to it. It is empty without
+    then does (realisations, errors) is what the record's own noise does to it. It is empty without
     recorded inputs, or where the response to them diverges.
     """
     experiment, at = setup.experiment, setup.with_start_values(values)
@@ -38,7 +40,7 @@ def carried_noise(setup: ExperimentSetup, values: Values) -> list[Array]:
 
     try:
         usual = response(simulator)
-        noisy = [response(_noisier(simulator, generator, steady)) for _ in range(REALISATIONS)]
+        noisy = [response(_noisier(simulator, generator, steady)) for _ in range(realisations)]
     except SimulationError:
         return []
     return [

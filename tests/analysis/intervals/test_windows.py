@@ -1,0 +1,51 @@
+"""T'd0 over windows of a playback: one that moves after the step down, and one that does not."""
+
+from dataclasses import replace
+
+import pytest
+from two_steps import CASE, DOWN, UP, record_of_two_steps
+
+from exfit.case.load import load_case
+from exfit.results.io import load_result, result_text
+from exfit.workflows import fit
+
+
+def fitted(folder, of_up, of_down):
+    (folder / "two_steps.yaml").write_text(CASE, encoding="utf-8")
+    case = load_case(folder / "two_steps.yaml")
+    return fit(replace(case, given_records={"fit": record_of_two_steps(of_up, of_down)}))
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    return fitted(tmp_path_factory.mktemp("moving"), 4.9, 5.3)
+
+
+def test_a_time_constant_that_moves_after_the_step_down_is_found_by_the_windows(moving):
+    up, down = (window for window in moving.windows.windows if window.kind == "step")
+    assert up.start < UP < up.end < DOWN < down.end
+    assert up.value == pytest.approx(4.9, abs=4 * up.std_error)
+    assert down.value == pytest.approx(5.3, abs=4 * down.std_error)
+    assert moving.windows.moves
+
+
+def test_its_interval_is_then_the_one_over_windows_and_the_fit_says_so(moving):
+    parameter = moving.parameters["machine.Tpd0"]
+    low, high = parameter.interval
+    assert low < 4.95
+    assert high > 5.25
+    assert parameter.interval_note == "windows"
+    assert any("more than noise spreads them" in note for note in moving.notes)
+
+
+def test_a_constant_one_keeps_the_interval_of_the_fit(tmp_path):
+    result = fitted(tmp_path, 5.0, 5.0)
+    assert not result.windows.moves
+    assert result.parameters["machine.Tpd0"].interval == result.windows.interval
+    assert any("no more than noise spreads them" in note for note in result.notes)
+
+
+def test_the_windows_are_in_the_file_of_the_result(moving, tmp_path):
+    file = tmp_path / "result.json"
+    file.write_text(result_text(moving), encoding="utf-8")
+    assert load_result(file).windows == moving.windows
