@@ -30,8 +30,8 @@ class WindowSpread:
     """A parameter over several windows.
 
     ``p_value`` is the probability that noise alone spreads the windows of the steps, or the halves,
-    so far (Cochran's Q); ``interval`` is the one of the fit to all, ``hull`` holds it and the
-    values of all windows.
+    so far (Cochran's Q); ``interval`` is the one of the fit to all, ``hull`` holds it, the 95 %
+    intervals by the steps one by one, and the values by their halves.
     """
 
     DERIVED: ClassVar = {"moves": "moves", "sentence": "sentence"}

@@ -25,6 +25,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import UNDETERMINED, Uncertainty
+from exfit.inference.confidence import NORMAL
 from exfit.inference.quantiles import chi_square_tail
 from exfit.plants import MACHINE
 from exfit.plants.machine_playback import MACHINE_PLAYBACK
@@ -68,35 +69,51 @@ def spread_over_windows(
 
     Source: Cochran 1954, The combination of estimates from different experiments.
     """
-    parameter = next((free for free in residuals.free if free.name == TPD0), None)
-    if case.kind is not MACHINE_PLAYBACK or parameter is None:
+    if case.kind is not MACHINE_PLAYBACK or TPD0 not in {free.name for free in residuals.free}:
         return None
-    found = [
-        (setup, recording, window)
-        for setup, recording in zip(setups, case.recordings, strict=True)
-        for window in windows_of(setup)
-    ]
-    if len(found) < FEWEST_STEPS:
-        return None
-    estimates = [
-        each
-        for setup, recording, window in found
-        for each in _estimates(case, recording, setup, window, residuals, values)
-    ]
+    estimates = estimates_of_windows(case, setups, residuals, values)
     if sum(each.kind == "step" for each in estimates) < FEWEST_STEPS:
         return None
-    interval = uncertainty.confidence.parameters[TPD0].interval
-    low, high = interval or (None, None)
-    closed = None if low is None or high is None else (low, high)
-    every = [*(each.value for each in estimates), *(closed or ())]
+    low, high = uncertainty.confidence.parameters[TPD0].interval or (None, None)
+    interval = None if low is None or high is None else (low, high)
     return WindowSpread(
         name=TPD0,
         unit=case.units()[TPD0],
         windows=tuple(estimates),
         p_value=p_value_of(estimates),
-        interval=closed,
-        hull=(min(every), max(every)),
+        interval=interval,
+        hull=hull_of(estimates, interval),
     )
+
+
+def estimates_of_windows(
+    case: Case, setups: Sequence[ExperimentSetup], residuals: Residuals, values: Values
+) -> list[WindowEstimate]:
+    """Return T'd0 by each window of all records, if these hold several steps."""
+    windows = [
+        (setup, recording, window)
+        for setup, recording in zip(setups, case.recordings, strict=True)
+        for window in windows_of(setup)
+    ]
+    if len(windows) < FEWEST_STEPS:
+        return []
+    return [
+        by_window
+        for setup, recording, window in windows
+        for by_window in _estimates(case, recording, setup, window, residuals, values)
+    ]
+
+
+def hull_of(
+    estimates: Sequence[WindowEstimate], interval: tuple[float, float] | None
+) -> tuple[float, float]:
+    """Return what holds an interval, those by the steps at 95 %, and the values by their halves."""
+    ends = [each.value for each in estimates]
+    for each in estimates:
+        if each.kind == "step":
+            ends += [each.value - NORMAL * each.std_error, each.value + NORMAL * each.std_error]
+    ends += interval or ()
+    return min(ends), max(ends)
 
 
 def with_spread(
@@ -275,20 +292,29 @@ def _fitted(setup: ExperimentSetup, residuals: Residuals, values: Values) -> Win
     best = descent.run(own.start)
     if best.stop is estimate.Stop.INTERRUPTED:
         raise KeyboardInterrupt
-    carried = carried_noise(setup, own.values(best.x), REALISATIONS)
-    if not (best.success and carried):
+    values = own.values(best.x)
+    draws = _draws(setup, values)
+    if not best.success or draws is None:
         return None
     scales = [parameter.slope(float(x)) for parameter, x in zip(free, best.x, strict=True)]
-    generator = np.random.default_rng(SEED)
-    draws = [
-        channel.weight * (own + generator.normal(0.0, noise(channel.record), own.shape))
-        for channel, own in zip(experiment.channels, carried, strict=True)
-    ]
     times = [experiment.simulator.times[channel.kept] for channel in experiment.channels]
-    return WindowFit(
-        values=own.values(best.x),
-        errors=best.fun,
-        slopes=best.jac / scales,
-        draws=np.concatenate(draws, axis=1),
-        times=np.concatenate(times),
-    )
+    return WindowFit(values, best.fun, best.jac / scales, draws, np.concatenate(times))
+
+
+def _draws(setup: ExperimentSetup, values: Values) -> Array | None:
+    """Return what noise as strong as that of the record does to the errors (K, M).
+
+    None where the response to it diverges.
+    """
+    experiment, generator = setup.experiment, np.random.default_rng(SEED)
+    carried = carried_noise(setup, values, REALISATIONS)
+    if not carried:
+        return None
+    draws = []
+    for channel, by_inputs in zip(experiment.channels, carried, strict=True):
+        white = generator.normal(0.0, noise(channel.record), by_inputs.shape)
+        if channel.signal == "vt":  # its level at rest is where the simulation starts
+            at_rest = experiment.simulator.times[channel.kept] < (setup.test.steady or -inf)
+            white -= np.mean(white[:, at_rest], axis=1, keepdims=True)
+        draws.append(channel.weight * (by_inputs + white))
+    return np.concatenate(draws, axis=1)

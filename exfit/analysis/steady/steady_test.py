@@ -8,12 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.steady.field_on_load import field_on_load
-from exfit.analysis.steady.v_curve import (
-    FieldMeasurement,
-    PointsOnLoad,
-    base_of,
-    v_curve,
-)
+from exfit.analysis.steady.fields_on_load import FieldMeasurement, PointsOnLoad, base_of
+from exfit.analysis.steady.v_curve import v_curve
 from exfit.case.bounds import search_bounds
 from exfit.case.schema import FreeSection, PointColumn, SteadyTest, Unknown
 from exfit.case.schema.steady_tests import FIELDS, POINT_SIGNALS, TERMINALS

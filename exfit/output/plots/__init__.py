@@ -12,6 +12,7 @@ from exfit.output.plots.search import convergence, trajectories, waterfall
 from exfit.output.plots.style import drawn, encoded, png
 from exfit.output.plots.translations import translation
 from exfit.output.plots.uncertainty import correlation, profiles, sensitivity
+from exfit.output.plots.v_curve import v_curve
 
 __all__ = [
     "agreement",
@@ -32,5 +33,6 @@ __all__ = [
     "sensitivity",
     "trajectories",
     "translation",
+    "v_curve",
     "waterfall",
 ]

@@ -1,7 +1,10 @@
 """The field current on load: the textbook's closed form, and equations that are typed again."""
 
+import csv
+
 import numpy as np
 import pytest
+from places import REFERENCE
 from scipy.optimize import brentq
 
 from exfit.analysis.steady.field_on_load import field_on_load
@@ -38,6 +41,23 @@ def test_at_no_load_it_is_the_saturation_curve(machine):
     none = np.zeros(2)
     ifd = field_on_load(machine, data, none, none, np.array([1.0, 1.2]))
     assert ifd == pytest.approx([1.0 + 0.12, 1.2 * (1.0 + 0.45)], abs=1e-12)
+
+
+OF_ANDES = {
+    "Tpd0": 6.27, "Tppd0": 0.059, "Tpq0": 0.7, "Tppq0": 0.096, "H": 4.471, "D": 0.0,
+    "Xd": 2.014, "Xq": 1.96, "Xpd": 0.331, "Xpq": 0.466, "Xppd": 0.2059, "Xl": 0.129,
+    "S10": 0.14, "S12": 0.56,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["ieee", "openipsl"])
+def test_a_saturated_machine_on_load_rests_as_another_simulator_has_it(name):
+    """ANDES 2.0.0, GENROU behind a reactance: the first row of its run, to the digits printed."""
+    with (REFERENCE / f"andes_ac8b_{name}_smib.csv").open() as file:
+        first = next(csv.DictReader(file))
+    p, q, vt, ifd = (float(first[column]) for column in ("pe", "qe", "vt", "xadifd"))
+    ours = field_on_load(MACHINES["GENROU"], OF_ANDES, [p], [q], [vt])
+    assert ours == pytest.approx([ifd], abs=5e-7)
 
 
 def quadratic_excess(flux):

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from exfit.analysis.steady.field_on_load import field_on_load
-from exfit.analysis.steady.v_curve import FieldMeasurement, PointsOnLoad, v_curve
+from exfit.analysis.steady.fields_on_load import FieldMeasurement, PointsOnLoad
+from exfit.analysis.steady.v_curve import v_curve
+from exfit.errors import ModelError
 from exfit.fitting.parameters import FreeParameter
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
@@ -59,3 +61,50 @@ def test_points_without_power_do_not_determine_the_q_axis():
     assert not curve.parameters["Xq"].determined
     assert curve.verdict.verdict == "matches, not all determined"
     assert any("Xq" in sentence for sentence in curve.undetermined)
+
+
+def test_what_would_match_the_points_is_named_where_the_machine_data_do_not():
+    curve = v_curve(SALIENT, TRUTH | {"Xd": 1.3}, points())
+    (cause,) = curve.verdict.causes
+    assert cause.cause.startswith("the points are matched much better by Xd = 1.07")
+
+
+def test_a_reactive_power_with_the_other_sign_is_named():
+    measured = points()
+    curve = v_curve(SALIENT, TRUTH, measured._replace(q=-measured.q))
+    assert curve.verdict.verdict == "no match"
+    assert "q reversed" in curve.verdict.causes[0].cause
+
+
+def test_points_that_match_have_no_cause():
+    assert v_curve(SALIENT, TRUTH, points()).verdict.causes == ()
+
+
+def test_a_fit_from_data_that_contradict_each_other_is_refused():
+    with pytest.raises(ModelError, match=r"the fit starts from S12: 0\.05"):
+        v_curve(SALIENT, TRUTH, points(), [free("S12", 0.05, 0.01, 1.0)])
+
+
+def test_the_points_are_grouped_by_their_power():
+    curve = v_curve(SALIENT, TRUTH, points())
+    assert [level.points for level in curve.levels] == [
+        (0, 1, 2, 3, 4),
+        (5, 6, 7, 8, 9),
+        (10, 11, 12, 13, 14),
+    ]
+    for level in curve.levels:
+        rows = list(level.points)
+        assert np.interp(Q[rows], level.q, level.it) == pytest.approx(curve.it[rows], abs=1e-3)
+
+
+def test_a_round_rotor_leaves_the_upper_limit_of_xq_open():
+    """At Xq = Xd the field current is stationary in Xq: it shows little of it near there."""
+    machine = MACHINES["GENROU"]
+    data = typical(machine.sheet) | {"S10": 0.1, "S12": 0.4}
+    ifd = field_on_load(machine, data, P, Q, VT)
+    ifd = ifd + np.random.default_rng(1).normal(0.0, NOISE, len(P))
+    measured = PointsOnLoad(P, Q, VT, {"ifd": FieldMeasurement(ifd)})
+    curve = v_curve(machine, data, measured, [free("Xq", 1.2, 0.6, 5.0), free("Xd", 1.5, 0.5, 5.0)])
+    xq = curve.parameters["Xq"]
+    assert xq.interval[0] < data["Xq"]
+    assert xq.interval[1] is None or xq.interval[1] <= curve.parameters["Xd"].interval[1]
