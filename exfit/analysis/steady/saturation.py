@@ -179,6 +179,7 @@ def curve_of(fit: FormFit, refuted: bool) -> FittedCurve:
     values, per_unit = fit.values(), 1.0 / float(fit.x[BASE])
     grid = np.linspace(0.0, max(1.2, float(fit.points.vt.max())), SAMPLES_OF_CURVE)
     mean, half = per_unit * fit.mean(grid), per_unit * fit.band(grid)
+    line = grid + per_unit * float(fit.x[OFFSET]) - half[0]  # no saturation is below none
     loop = values[HALF_LOOP].times(2.0 * per_unit) if fit.points.branches > 1 else None
     return FittedCurve(
         form=fit.form,
@@ -192,7 +193,7 @@ def curve_of(fit: FormFit, refuted: bool) -> FittedCurve:
         extrapolated=(),
         vt=grid,
         ifd=mean,
-        low=mean - half,
+        low=np.maximum(mean - half, np.minimum(line, mean)),
         high=mean + half,
     )
 

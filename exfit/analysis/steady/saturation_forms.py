@@ -203,7 +203,8 @@ class SearchVariables(NamedTuple):
         """Return the variables (N,) of parameters (N,)."""
         u = x.copy()
         u[AT_10 + AT_12 - self.kept] = x[AT_10] / x[AT_12]
-        return u
+        # a share that lies on its bound comes back a rounding beyond it
+        return np.clip(u, *self.bounds)
 
     def parameters(self, u: Array) -> Array:
         """Return the parameters (N,)."""

@@ -207,3 +207,15 @@ def test_six_points_are_too_few_for_two_branches():
     vt = np.array([0.3, 0.7, 1.2, 1.1, 0.6, 0.2])
     with pytest.raises(ExfitError, match="6 points on two branches; at least 7"):
         saturation_curve(vt, BASE * vt)
+
+
+@pytest.mark.parametrize("top", [0.6, 0.8, 1.0])
+def test_points_that_end_early_leave_the_saturation_open_and_do_no_harm(top):
+    random = np.random.default_rng(3)
+    drawn = drawn_curve("exponential", random)
+    low = drawn.vt < top
+    result = saturation_curve(drawn.vt[low], drawn.ifd[low], "exponential")
+    low_end, high_end = result.curve.S12.interval
+    assert result.curve.extrapolated[-1] == 1.2
+    assert low_end < drawn.truth[2]
+    assert high_end is None or high_end - low_end > 0.5 * drawn.truth[2]
