@@ -71,6 +71,7 @@ def page_html(page: Page, interactive: bool = True) -> str:
             title=page.title,
             headline=page.headline,
             sections=page.sections,
+            numbers={part.key: k for k, (part, _) in enumerate(page.sections, start=1)},
             folder=str(page.folder),
             data=list(live_data(overlays)),
             css=CHART_STYLE.read_text(encoding="utf-8") + style.read_text(encoding="utf-8"),

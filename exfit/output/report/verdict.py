@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.verdict import GOOD, MATCHES
@@ -12,18 +13,21 @@ from exfit.results.verdict import GOOD, MATCHES
 class Headline:
     """What the fit comes to: a word, a sentence, whether it is good, and the causes.
 
-    ``good`` is None where it is neither good nor bad.
+    ``good`` is None where it is neither good nor bad. ``criteria`` says whether the responses meet
+    the limits of the report, ``passed`` as `CriteriaVerdict` has it.
     """
 
     word: str
     sentence: str
     good: bool | None
     causes: tuple[str, ...]
+    criteria: str = ""
+    passed: bool | None = None
 
 
 def headline(result: FitResult) -> Headline:
     """Return what a fit comes to."""
-    outcome = outcome_of(result)
+    outcome, judged = outcome_of(result), judged_by_criteria(result)
     rmse = ", ".join(
         f"{match.rmse:.2e} pu ({match.name})" for match in (*result.comparisons, *result.validation)
     )
@@ -33,6 +37,8 @@ def headline(result: FitResult) -> Headline:
         sentence=f"{sentence[:1].upper()}{sentence[1:]}; rmse {rmse}.",
         good={GOOD: True, MATCHES: None}.get(outcome, None if result.verdict is None else False),
         causes=() if result.verdict is None else tuple(c.sentence for c in result.verdict.causes),
+        criteria=judged.sentence,
+        passed=judged.passed,
     )
 
 

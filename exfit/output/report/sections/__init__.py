@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from exfit.output.report.sections.as_found import as_found
+from exfit.output.report.sections.criteria import criteria
 from exfit.output.report.sections.dynamics import dynamics
 from exfit.output.report.sections.findings import findings
-from exfit.output.report.sections.flat_run import flat_runs
+from exfit.output.report.sections.form import form
 from exfit.output.report.sections.identifiability import identifiability
 from exfit.output.report.sections.limits import limits
 from exfit.output.report.sections.matches import fitted_matches, validation_matches
@@ -13,8 +15,10 @@ from exfit.output.report.sections.model import model
 from exfit.output.report.sections.parameters import parameters
 from exfit.output.report.sections.reproduction import reproduction
 from exfit.output.report.sections.search import search
+from exfit.output.report.sections.signatures import signatures
 from exfit.output.report.sections.small_signal import small_signal
 from exfit.output.report.sections.unit_and_test import unit_and_test
+from exfit.output.report.sections.usability import usability
 from exfit.results.model import FitResult
 
 
@@ -28,20 +32,24 @@ class ReportSection(NamedTuple):
 
 
 SECTIONS = (
+    ReportSection("form", "The form of a verification report", form, "form"),
+    ReportSection("criteria", "Criteria", criteria, "criteria"),
     ReportSection("test", "Unit and test", unit_and_test, "unit_and_test"),
     ReportSection("model", "Model", model, "model"),
     ReportSection("parameters", "Parameters", parameters, "parameters"),
+    ReportSection("as-found", "As found and verified", as_found, "as_found"),
     ReportSection("findings", "Notes and unresolved findings", findings, "findings"),
     ReportSection("fit", "Fitted records", fitted_matches, "fit"),
     ReportSection(
         "validation", "Validation on records that were not fitted", validation_matches,
         "validation",
     ),
+    ReportSection("flat", "Usability", usability, "usability"),
     ReportSection("search", "Search", search, "search"),
     ReportSection("identifiability", "Identifiability", identifiability, "identifiability"),
-    ReportSection("flat", "Flat run", flat_runs, "flat_run"),
     ReportSection("small", "Small-signal view", small_signal, "small_signal"),
     ReportSection("limits", "Limits that were hit", limits, "limits"),
     ReportSection("dyr", "PSS/E dynamics records", dynamics, "dynamics"),
     ReportSection("reproduction", "Reproduction", reproduction, "reproduction"),
+    ReportSection("signatures", "Revision and signatures", signatures, "signatures"),
 )  # fmt: skip

@@ -1,0 +1,137 @@
+"""The model in the planner's base beside the verified one: parameters and responses."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from exfit.dsp.decimation import envelope
+from exfit.output.report.charts import Chart, Panel, Series
+from exfit.output.report.layout import BINS, LEVEL, LOW, MILLI, TALL, TIME
+from exfit.results.comparisons import Comparison
+from exfit.results.model import FitResult
+from exfit.results.other_values import AsFound
+from exfit.signals import label_of
+
+UNCHANGED = "unchanged"
+
+
+@dataclass(frozen=True)
+class ChangedParameter:
+    """A parameter before and after; None where the model does not have it."""
+
+    name: str
+    unit: str
+    before: float | None
+    verified: float | None
+    rounding_error: float | None
+    change: str
+    source: str
+
+
+@dataclass(frozen=True)
+class MatchBefore:
+    """How well a record was matched before and is now: rms of the difference, pu."""
+
+    record: str
+    signal: str
+    before: float
+    verified: float
+
+
+@dataclass(frozen=True)
+class AsFoundView:
+    """What was in the planner's base, or what the fit started from, and what has changed."""
+
+    unit: AsFound
+    verified_model: str
+    parameters: tuple[ChangedParameter, ...]
+    same: tuple[str, ...]
+    matches: tuple[MatchBefore, ...]
+    charts: tuple[Chart, ...]
+
+
+def as_found(result: FitResult) -> AsFoundView | None:
+    """Return the model as found beside the verified one; None where the result does not hold it."""
+    unit = result.as_found
+    if unit is None:
+        return None
+    rows = tuple(_parameters(result, unit))
+    pairs = [*zip(unit.comparisons, (*result.comparisons, *result.validation), strict=False)]
+    return AsFoundView(
+        unit=unit,
+        verified_model=result.model,
+        parameters=tuple(row for row in rows if row.change != UNCHANGED),
+        same=tuple(row.name for row in rows if row.change == UNCHANGED),
+        matches=tuple(
+            MatchBefore(now.name, now.judged_by, before.rmse, now.rmse) for before, now in pairs
+        ),
+        charts=tuple(
+            _chart(f"before-{k}", before, now)
+            for k, (before, now) in enumerate(pairs)
+            if before.overlays and now.overlays
+        ),
+    )
+
+
+def _parameters(result: FitResult, unit: AsFound) -> Iterator[ChangedParameter]:
+    """Yield the parameters of both models, those of records aside."""
+    values, rows = result.values, _units(result)
+    own = [name for name in values if name not in result.of_records and name in rows]
+    for name in dict.fromkeys([*own, *unit.values]):
+        before, verified = unit.values.get(name), values.get(name)
+        fitted = result.parameters.get(name)
+        yield ChangedParameter(
+            name,
+            rows.get(name, ""),
+            before,
+            verified,
+            None if fitted is None else fitted.rounding_error,
+            _change(before, verified),
+            result.source_of(name) if verified is not None else "",
+        )
+
+
+def _units(result: FitResult) -> dict[str, str]:
+    return {
+        part.prefix + symbol: row.unit
+        for part in result.parts
+        for symbol, row in (part.sheet or {}).items()
+    }
+
+
+def _change(before: float | None, verified: float | None) -> str:
+    """Return what changed, in words."""
+    if before is None:
+        return "new"
+    if verified is None:
+        return "left out"
+    if verified == before:
+        return UNCHANGED
+    share = "" if before == 0.0 else f" ({100.0 * (verified / before - 1.0):+.3g} %)"
+    return f"{verified - before:+.3g}{share}"
+
+
+def _chart(key: str, before: Comparison, now: Comparison) -> Chart:
+    """Return a record with the response of the model as found and of the verified one."""
+    signal = now.judged_by
+    old, new = before.overlays[signal], now.overlays[signal]
+    lines = (
+        Series("measured", *envelope(now.time, new.measured, BINS), "measured", dots=True),
+        Series("as found", *envelope(before.time, old.simulated, BINS), "start"),
+        Series("verified", *envelope(now.time, new.simulated, BINS), "simulated"),
+    )
+    errors = (
+        Series("", *envelope(before.time, MILLI * old.error, BINS), "start thin"),
+        Series("", *envelope(now.time, MILLI * new.error, BINS), "simulated thin"),
+    )
+    return Chart(
+        key=key,
+        title=f"{now.name}: as found and verified, {label_of(signal)}",
+        text=f"Measured {signal}, simulated with the model as found and with the verified one, the "
+        f"differences below: rmse {before.rmse:.3g} pu as found, {now.rmse:.3g} pu verified.",
+        x_title=TIME,
+        panels=(
+            Panel(label_of(signal), lines, TALL),
+            Panel("simulated - measured (1e-3 pu)", errors, LOW, rules=(LEVEL,)),
+        ),
+        x_range=(float(now.time[0]), float(now.time[-1])),
+    )

@@ -1,0 +1,158 @@
+"""The form: what a verification report must state, row by row, and what this one answers."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from exfit.models.families import family_of
+from exfit.output.report import facts
+from exfit.output.report.facts import AskedFact, answer, stated
+from exfit.output.report.sections.usability import usability
+from exfit.results.criteria import judged_by_criteria
+from exfit.results.description import PartDescription
+from exfit.results.model import FitResult
+from exfit.util.sources import NOT_STATED, by_source
+from exfit.util.text import show
+
+TYPES = {"DC": "DC commutator exciter", "AC": "alternator exciter", "ST": "static exciter"}
+MACHINE_DATA = (
+    ("Reactances of the generator", ("X",)),
+    ("Time constants of the generator", ("T",)),
+    ("Saturation of the generator", ("S",)),
+    ("Inertia of the generator", ("H",)),
+)
+TESTS = (facts.DATE, facts.TESTED, facts.INSTRUMENTS, facts.RECORDER)
+AMBIENT = {facts.STATE: "cold or hot machine", facts.TAP: "of the transformer", facts.SPEED: ""}
+REPORT = (facts.WRITTEN, facts.CHECKED, facts.APPROVED, facts.REVISION, facts.REPORTED)
+
+
+class FormRow(NamedTuple):
+    """A row of the form: what is asked, by which words of the standard, and the answer.
+
+    ``section`` is the id of the section that has the rest, "" for none.
+    """
+
+    cf: str
+    asked: str
+    answer: str
+    section: str = ""
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the case, or the fit, answers it."""
+        return not self.answer.startswith(NOT_STATED)
+
+
+def form(result: FitResult) -> tuple[FormRow, ...]:
+    """Return the rows of the form for a fit (cf. NERC MOD-026-1 R2.1 and R6)."""
+    about = result.about
+    return (
+        *(_fact(result, "", fact, "test") for fact in (facts.PLANT, facts.UNIT, facts.RATED)),
+        FormRow("R2.1.1", "Model response beside a recorded response", _responses(result), "fit"),
+        _fact(result, "R2.1.2", facts.MAKER),
+        _fact(result, "R2.1.2", facts.MODEL),
+        FormRow("R2.1.2", "Excitation type", _type(result), "model"),
+        *_generator(result),
+        FormRow("R2.1.4", "Excitation model and data", _excitation(result), "parameters"),
+        _fact(result, "R2.1.4", facts.REGULATOR),
+        FormRow("R2.1.4", "Model in the planner's base", _before(result), "as-found"),
+        FormRow("R2.1.5", "Compensation (droop, line drop)", _compensation(result)),
+        FormRow("R2.1.6", "Stabiliser", _stabiliser(result), "parameters"),
+        *(FormRow("R6", check.name, _usable(*check[1:]), "flat") for check in usability(result)),
+        *(_fact(result, "", fact, "test") for fact in TESTS),
+        *(
+            FormRow("", f"{fact.key}{f' ({words})' if words else ''}", answer(about, fact), "test")
+            for fact, words in AMBIENT.items()
+        ),
+        *(_fact(result, "", fact, "signatures") for fact in REPORT),
+    )
+
+
+def _fact(result: FitResult, cf: str, fact: AskedFact, section: str = "") -> FormRow:
+    return FormRow(cf, fact.key, answer(result.about, fact), section)
+
+
+def _responses(result: FitResult) -> str:
+    names = ", ".join(match.name for match in result.comparisons)
+    unseen = ", ".join(match.name for match in result.validation)
+    text = f"fitted: {names}; " + (f"validated on: {unseen}" if unseen else "no validation")
+    return f"{text}; {judged_by_criteria(result).sentence}"
+
+
+def _type(result: FitResult) -> str:
+    """Return the type of the excitation system, as stated or as its model is."""
+    given = stated(result.about, facts.TYPE)
+    part = _part(result, "exciter")
+    if given is not None or part is None:
+        return given or NOT_STATED
+    family = family_of(part.name)
+    return NOT_STATED if family is None else f"{TYPES[family]}, by its model {part.name}"
+
+
+def _part(result: FitResult, kind: str) -> PartDescription | None:
+    return next((part for part in result.parts if part.kind == kind), None)
+
+
+def _generator(result: FitResult) -> Iterator[FormRow]:
+    """Yield the rows of the generator: its model, and each kind of its data with the sources."""
+    part = _part(result, "machine")
+    name = NOT_STATED if part is None else f"{part.name}, {part.title}"
+    yield FormRow("R2.1.3", "Generator model", name, "model")
+    for asked, begins in MACHINE_DATA:
+        symbols = [symbol for symbol in result.machine if symbol.startswith(begins)]
+        yield FormRow("R2.1.3", asked, _by_source(result, symbols), "parameters")
+
+
+def _by_source(result: FitResult, symbols: list[str]) -> str:
+    """Return values of the machine with where they are from."""
+    values = result.values_of("machine.")
+    sources = {symbol: result.source_of(f"machine.{symbol}") for symbol in symbols}
+    groups = by_source(symbols, sources)
+    texts = (
+        f"{', '.join(f'{symbol} {show(values[symbol])}' for symbol in group)} ({_source(word)})"
+        for word, group in groups.items()
+    )
+    return "; ".join(texts) or f"{NOT_STATED}: the model has none"
+
+
+def _source(word: str) -> str:
+    return f"source {NOT_STATED}" if word == NOT_STATED else word
+
+
+def _excitation(result: FitResult) -> str:
+    part = _part(result, "exciter")
+    if part is None:
+        return f"{NOT_STATED}: the machine alone was fitted"
+    names = [name for name in result.values if "." not in name and name not in result.of_records]
+    words = by_source(names, {name: result.source_of(name) for name in names})
+    counts = ", ".join(f"{len(group)} {_source(word)}" for word, group in words.items())
+    return f"{part.name}, {part.title}; {len(names)} values: {counts}"
+
+
+def _before(result: FitResult) -> str:
+    unit = result.as_found
+    if unit is None or not unit.is_stated:
+        return f"{NOT_STATED}; the start values of the fit are shown"
+    return f"{unit.model}, {unit.source}"
+
+
+def _compensation(result: FitResult) -> str:
+    """Return the load compensation, as stated and as the network of a test has it."""
+    given = stated(result.about, facts.COMPENSATION)
+    values = {name: result.network.get(name, 0.0) for name in ("Rc", "Xc")}
+    for test in result.tests:
+        values |= {name: test.network[name].value for name in values if name in test.network}
+    in_model = ", ".join(f"{name} {show(value)} pu" for name, value in values.items() if value)
+    if in_model:
+        return f"{given}; in the model {in_model}" if given else in_model
+    return given or f"{NOT_STATED}; none in the model"
+
+
+def _stabiliser(result: FitResult) -> str:
+    given, part = stated(result.about, facts.STABILISER), _part(result, "stabiliser")
+    if part is not None:
+        return f"{part.name}, {part.title}" + (f"; {given}" if given else "")
+    return given or f"{NOT_STATED} whether the unit has one; none in the model"
+
+
+def _usable(passed: bool | None, text: str) -> str:
+    return text if passed is None else f"{'passed' if passed else 'FAILED'}: {text}"
