@@ -14,10 +14,11 @@ class SignalRow(NamedTuple):
     ``noise`` is the standard deviation that a recorder's channel typically has, in that unit; a
     signal without one is never compared with a record. ``jumps`` says that it follows a step of
     the reference at once, ``positive`` that it is above zero at rest. The rest serves the
-    recognition of a recorder's columns: the ``quantity`` of the column's unit, the ``words`` that
-    recorders use, the surest first, whether the unit alone is enough, and the ``turn``, as a
-    signal with common words must not take the columns of others. ``base`` says what 1 pu is. A
-    signal without words is in no record.
+    recognition of a recorder's columns: the ``quantity`` of the column's unit and the ``place``
+    where it is measured, in whatever words of the vocabulary; the ``words`` that are its own, the
+    surest first, and the ``vague_words`` that may be something else; whether the unit alone is
+    enough, and the ``turn`` in which it takes its column. ``base`` says what 1 pu is. A signal
+    without words is in no record.
     """
 
     symbol: str
@@ -27,7 +28,9 @@ class SignalRow(NamedTuple):
     jumps: bool = False
     positive: bool = False
     quantity: str = ""
+    place: str = ""
     words: tuple[str, ...] = ()
+    vague_words: tuple[str, ...] = ()
     unit_suffices: bool = False
     turn: int = 0
     base: str = ""
@@ -43,57 +46,40 @@ RATED_VOLTAGE, AIR_GAP_LINE, RATED_POWER = "rated, line to line", "air-gap line"
 ROWS = (
     SignalRow(
         "vt", "terminal voltage", noise=1e-4, positive=True, quantity="voltage", turn=7,
-        base=RATED_VOLTAGE,
-        words=(
-            "vt", "ut", "ug", "vg", "ugen", "vgen", "uterm", "vterm", "ugenerator",
-            "terminal voltage", "generator voltage", "stator voltage", "generatorspannung",
-            "klemmenspannung", "ustator", "vstator", "eterm", "ugrel", "gen kv", "gen volts",
-            "voltage", "volt", "spannung", "kv", "u", "v", "vab", "uab", "u12", "u1",
-        ),
+        base=RATED_VOLTAGE, place="stator",
+        words=("vt", "ut", "ug", "vg", "eterm", "etrm"),
+        vague_words=("u12", "uab", "vab", "u1", "v1"),
     ),
     SignalRow(
-        "vref", "reference", quantity="voltage", turn=1, base=RATED_VOLTAGE,
-        words=(
-            "vref", "uref", "usoll", "ugsoll", "vset", "uset", "reference", "setpoint", "sollwert",
-            "ref",
-        ),
+        "vref", "reference", quantity="voltage", turn=1, base=RATED_VOLTAGE, place="reference",
+        words=("vref", "uref"),
     ),
     SignalRow(
         "efd", "field voltage", noise=5e-3, jumps=True, positive=True, quantity="voltage", turn=2,
-        base=AIR_GAP_LINE,
-        words=(
-            "efd", "vfd", "ufd", "vf", "uf", "field voltage", "ufield", "vfield",
-            "erregerspannung", "feldspannung", "field v", "field volts", "fld volts",
-        ),
+        base=AIR_GAP_LINE, place="field",
+        words=("efd", "vfd", "ufd", "vf", "uf"),
+        vague_words=("ue",),
     ),
     SignalRow(
         "ifd", "field current", noise=5e-3, positive=True, quantity="current", turn=3,
-        base=AIR_GAP_LINE,
-        words=(
-            "ifd", "if", "field current", "ifield", "erregerstrom", "feldstrom", "lad ifd",
-            "field i", "field amps", "fld amps",
-        ),
+        base=AIR_GAP_LINE, place="field",
+        words=("ifd", "if", "lad ifd", "ladifd", "xadifd", "xadi"),
+        vague_words=("ie",),
     ),
     SignalRow(
         "p", "active power", noise=1e-3, quantity="power", turn=5, base=RATED_POWER,
-        words=(
-            "p", "pe", "pg", "pgen", "active power", "real power", "wirkleistung", "power",
-            "mw",
-        ),
+        words=("p", "pe", "pg"),
         unit_suffices=True,
     ),
     SignalRow(
         "q", "reactive power", noise=1e-3, quantity="reactive", turn=4, base=RATED_POWER,
-        words=("q", "qe", "qg", "qgen", "reactive power", "reactive", "blindleistung", "mvar"),
+        words=("q", "qe", "qg"),
         unit_suffices=True,
     ),
     SignalRow(
         "it", "stator current", noise=1e-3, positive=True, quantity="current", turn=6,
-        base="rated current",
-        words=(
-            "it", "ig", "igen", "istator", "stator current", "armature current",
-            "generator current", "statorstrom", "generatorstrom",
-        ),
+        base="rated current", place="stator",
+        words=("it", "ig"),
     ),
     SignalRow("delta", "rotor angle", "rad"),
     SignalRow(
@@ -114,6 +100,7 @@ ROWS = (
 SIGNALS: Mapping[str, SignalRow] = {row.symbol: row for row in ROWS}
 RECORDED = tuple(row.symbol for row in ROWS if row.words)
 COMPARED = tuple(row.symbol for row in ROWS if row.noise is not None)
+OF_BUMP_TEST = ("vt", "efd", "ifd")  # what a record of a bump test mostly holds
 POSITIVE_AT_REST = tuple(row.symbol for row in ROWS if row.positive)
 NOISE: Mapping[str, float] = {row.symbol: row.noise for row in ROWS if row.noise is not None}
 

@@ -45,6 +45,11 @@ def parameters_of(case: Path) -> tuple[str, ...]:
     return _names(_content(case), free=False)
 
 
+def keys_of(file: Path) -> frozenset[str]:
+    """Return the keys at the top of a file; none where it cannot be read as YAML."""
+    return frozenset(map(str, _content(file)))
+
+
 def section_of(text: str, case: Path, key: str) -> Any:
     """Return what the text of a case has under a key of its top; None where there is nothing."""
     try:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import Output, output_options, print_json
 from exfit.errors import ExfitError
 
@@ -14,14 +15,14 @@ FEWEST_CURVES = 2  # without a record
 @click.command(short_help="Compare responses, from any program.")
 @click.argument(
     "curves",
-    type=click.Path(path_type=Path),
+    type=GivenFile(Kind.RECORD, Kind.RESULT),
     nargs=-1,
     required=True,
     metavar="CURVE [CURVE]...",
 )
 @click.option(
     "--record",
-    type=click.Path(path_type=Path),
+    type=GivenFile(Kind.RECORD, Kind.RESULT),
     metavar="FILE",
     help="Measured curve: the reference in place of the first CURVE.",
 )

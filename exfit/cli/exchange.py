@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, write_text
 from exfit.errors import ExfitError
 
@@ -11,7 +12,7 @@ BUSES = click.IntRange(1, 999_999)
 
 
 @click.command("import", short_help="Make a case from a PSS/E dynamics file.")
-@click.argument("unit", type=click.Path(path_type=Path))
+@click.argument("unit", type=GivenFile(Kind.DYNAMICS))
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit.")
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
 @file_option
@@ -36,7 +37,7 @@ def import_(
 
 
 @click.command(short_help="Write the result of a fit as PSS/E records.")
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", type=GivenFile(Kind.RESULT))
 @click.option(
     "--format",
     "_format",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from exfit.cli import completion
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
@@ -19,13 +20,13 @@ if TYPE_CHECKING:
 NOT_CONVERGED = 3
 NAMED_AFTER_RECORDS = ("fit", "validate")  # commands that name files so
 
-case_argument = click.argument("case", type=click.Path(path_type=Path))
+case_argument = click.argument("case", type=GivenFile(Kind.CASE))
 cases_argument = click.argument(
-    "cases", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="CASE [CASE]..."
+    "cases", type=GivenFile(Kind.CASE), nargs=-1, required=True, metavar="CASE [CASE]..."
 )
 parameters_option = click.option(
     "--parameters",
-    type=click.Path(path_type=Path),
+    type=GivenFile(Kind.PARAMETERS, Kind.RESULT),
     metavar="FILE",
     help="Values from the parameters.yaml of a fit.",
 )

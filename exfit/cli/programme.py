@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import (
     NOT_CONVERGED,
     Interruption,
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Run all tests of a unit, each feeding the later ones.")
-@click.argument("programme", type=click.Path(path_type=Path))
+@click.argument("programme", type=GivenFile(Kind.CASE))
 @click.option("--again", is_flag=True, help="Run every test, whatever is kept of an earlier run.")
 @output_options
 def run(programme: Path, again: bool, output: Output) -> None:

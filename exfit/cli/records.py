@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import Output, output_options, print_json
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel f
 
 
 @click.command("inspect", short_help="Show the content of a recorder's file.")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=GivenFile(Kind.RECORD))
 @time_option
 @unit_option
 @sheet_option

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import click
 
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import force_option
 
 
 @click.command(short_help="Make a verification report of a fit.")
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", type=GivenFile(Kind.RESULT))
 @click.option(
     "-o",
     "--output",

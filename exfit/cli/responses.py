@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import (
     NOT_CONVERGED,
     Output,
@@ -63,7 +64,7 @@ def simulate(
 @parameters_option
 @click.option(
     "--record",
-    type=click.Path(path_type=Path),
+    type=GivenFile(Kind.RECORD),
     metavar="FILE",
     help="Record in place of those under validate; its steps are found in it.",
 )

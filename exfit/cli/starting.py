@@ -9,6 +9,7 @@ import click
 
 from exfit.cli import completion
 from exfit.cli.exchange import BUSES
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
 from exfit.cli.records import inspected, sheet_option, time_option, unit_option
 from exfit.errors import ExfitError
@@ -62,7 +63,7 @@ class UnitSources:
 @click.option(
     "--record",
     "file",
-    type=click.Path(path_type=Path),
+    type=GivenFile(Kind.RECORD),
     metavar="FILE",
     help="Record of one or several bump tests.",
 )
@@ -85,7 +86,7 @@ class UnitSources:
 )
 @click.option(
     "--dyr",
-    type=click.Path(path_type=Path),
+    type=GivenFile(Kind.DYNAMICS),
     metavar="FILE",
     help="PSS/E file with the data of machine, exciter and stabiliser.",
 )
@@ -93,7 +94,7 @@ class UnitSources:
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
 @click.option(
     "--machine-from",
-    type=click.Path(path_type=Path),
+    type=GivenFile(Kind.CASE),
     metavar="CASE",
     help="Another case, whose machine is taken.",
 )

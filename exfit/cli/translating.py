@@ -5,12 +5,13 @@ from pathlib import Path
 import click
 
 from exfit.cli import completion
+from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import NOT_CONVERGED, Output, output_options, print_json
 from exfit.errors import ExfitError
 
 
 @click.command(short_help="Find the parameters of another model for the same response.")
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", type=GivenFile(Kind.RESULT))
 @click.option(
     "--model",
     required=True,

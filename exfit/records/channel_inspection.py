@@ -34,7 +34,9 @@ class InspectedChannel:
     which it stands still; ``frequency`` (Hz) is that of a waveform, whose noise, spikes and steps
     are not looked for. ``drift`` is how far it moves before the first step, beyond chance, and
     ``ripple`` a line in its spectrum at rest. ``remark`` says why there is no step. ``unit_from``
-    is the source of the unit: file or name.
+    is the source of the unit: file or name. The ``signal`` that it seems to be is ``sure`` or a
+    guess, by what is said under ``why``; ``question`` is what must be asked about it. With
+    ``system_base`` 1 pu is that of the grid.
     """
 
     name: str
@@ -55,7 +57,10 @@ class InspectedChannel:
     drift: float = 0.0
     ripple: Ripple | None = None
     signal: str | None = None
+    sure: bool = False
     why: str = ""
+    question: str = ""
+    system_base: bool = False
 
     @property
     def constant(self) -> bool:
@@ -68,6 +73,8 @@ class InspectedChannel:
         return tuple(f"{self.name}: {finding}" for finding in self._findings())
 
     def _findings(self) -> Iterator[str]:
+        if self.question:
+            yield self.question
         if self.missing:
             yield f"{self.missing} samples are missing"
         if self.constant:
@@ -120,6 +127,23 @@ class InspectedChannel:
         low, high = AT_REST_PU
         per_unit = self.signal == "vt" and self.unit in (None, "pu")
         return per_unit and (self.level > high or 0.0 < self.level < low)
+
+
+@dataclass(frozen=True)
+class InspectedPhases:
+    """Three columns that are one voltage: its waveforms, or their effective values.
+
+    ``level`` is the effective value at rest, in the unit of the columns.
+    """
+
+    columns: tuple[str, ...]
+    kind: str
+    level: float
+
+    @property
+    def name(self) -> str:
+        """The name of the voltage that they are."""
+        return ", ".join(self.columns)
 
 
 def inspect_channel(

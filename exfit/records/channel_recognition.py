@@ -1,52 +1,60 @@
 """Which signals a recorder's columns hold, by their names and units."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from exfit.records.channel_names import Clarity, NameReading, read_name
 from exfit.records.units import bare, quantity_of
-from exfit.signals import ROWS, SignalRow
+from exfit.signals import ROWS
 
 IN_TURN = sorted((row for row in ROWS if row.words), key=lambda row: row.turn)
-OF_EXCITER = {"exciter", "erregermaschine", "pilot", "ve", "ife", "ief", "efe", "vfe"}
-BY_UNIT: Mapping[str, str] = {row.quantity: row.symbol for row in ROWS if row.unit_suffices}
 TRIPLES = (
     ("l1", "l2", "l3"), ("12", "23", "31"), ("ab", "bc", "ca"), ("rs", "st", "tr"),
     ("a", "b", "c"), ("r", "s", "t"), ("1", "2", "3"),
 )  # fmt: skip
 LINE_TO_LINE = TRIPLES[1:4]
-CAPITAL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])")  # where a word of a name begins
 OF_VOLTAGE = re.compile(r"^(u|v|.*volt|.*spannung)")
 
 
 @dataclass(frozen=True)
 class Guess:
-    """A signal that a column seems to be, and why."""
+    """The signal that a column seems to be by its name and unit, and the columns it shares it with.
 
-    signal: str
-    why: str
-
-
-def guess_signals(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Guess]:
-    """Return the signals that columns seem to be, by column: each signal once, by the surest word.
-
-    The unit must be one of the signal; where the name shows nothing, MW and Mvar still do.
+    ``rivals`` are columns whose names show the same signal as clearly.
     """
+
+    reading: NameReading
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def signal(self) -> str:
+        """The signal."""
+        return str(self.reading.signal)
+
+
+def guess_signals(
+    names: Sequence[str], units: Mapping[str, str], moving: Collection[str] = ()
+) -> dict[str, Guess]:
+    """Return the signals that columns seem to be, each signal once, by the clearest name.
+
+    Of equally clear names the columns that are ``moving`` with the test come first. Where several
+    remain that have no more than a quantity in common, none of them is taken.
+    """
+    readings = {name: read_name(name, units.get(name)) for name in names}
     guesses: dict[str, Guess] = {}
     for row in IN_TURN:
         ranked = [
-            (rank, name)
-            for name in names
-            if name not in guesses and (rank := _rank(name, units.get(name), row)) is not None
+            ((reading.clarity, reading.order, name not in moving), name)
+            for name, reading in readings.items()
+            if reading.signal == row.symbol
         ]
-        if ranked:
-            rank, name = min(ranked, key=lambda pair: pair[0])
-            guesses[name] = Guess(row.symbol, f"its name: {row.words[rank]}")
-    for name in names:
-        signal = BY_UNIT.get(quantity_of(units.get(name)) or "", "")
-        recognised = {guess.signal for guess in guesses.values()}
-        if signal and name not in guesses and signal not in recognised:
-            guesses[name] = Guess(signal, f"its unit: {units[name]}")
+        if not ranked:
+            continue
+        first = min(rank for rank, _ in ranked)
+        name, *rivals = (name for rank, name in ranked if rank == first)
+        if not rivals or readings[name].clarity < Clarity.QUANTITY:
+            guesses[name] = Guess(readings[name], tuple(rivals))
     return guesses
 
 
@@ -82,28 +90,3 @@ def _triples(name: str, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
             phases = [text[:at] + mark + text[at + len(marks[0]) :] for mark in marks]
             if at > 0 and all(phase in by_lower_case for phase in phases):
                 yield tuple(by_lower_case[phase] for phase in phases)
-
-
-def _rank(name: str, unit: str | None, row: SignalRow) -> int | None:
-    """Return how surely a column is a signal, the surest 0; None where it is not.
-
-    A word is the whole name, with or without its unit, or a part that is set apart: by a mark, or,
-    if it has two letters or more, by its capital as in rUgRel.
-    """
-    if unit not in (None, "pu", "%") and quantity_of(unit) != row.quantity:
-        return None
-    tokens = _tokens(bare(name))
-    if OF_EXCITER & {*tokens}:
-        return None
-    whole = {" ".join(tokens), "".join(tokens), " ".join(_tokens(name))}
-    text, split_at_capitals = " ".join(tokens), " ".join(_tokens(CAPITAL.sub(" ", bare(name))))
-    for rank, word in enumerate(row.words):
-        part = re.compile(rf"(^| ){re.escape(word)}( |$)")
-        if word in whole or part.search(text) or (len(word) > 1 and part.search(split_at_capitals)):
-            return rank
-    return None
-
-
-def _tokens(name: str) -> list[str]:
-    """Return the words and numbers of a name, in small letters."""
-    return [token for token in re.split(r"[^a-zäöüß0-9]+", name.lower()) if token]

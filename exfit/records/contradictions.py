@@ -9,7 +9,6 @@ from exfit.signals import SIGNALS
 LARGEST_STEP = 0.2  # pu: no regulator is tested with more
 FOLLOWS = ("efd", "ifd", "vref")  # signals that rise for good where vt does
 CERTAIN_CHANGE = (0.01, 6.0)  # of the level and times the noise: a change whose sign is certain
-SAME_BASE = 0.2  # of their level: how far efd and ifd in per unit may be from each other at rest
 
 
 def contradictions(
@@ -22,7 +21,6 @@ def contradictions(
         yield from _too_large(by_signal, step)
         if voltage is not None:
             yield from _opposite(voltage, by_signal, step)
-    yield from _different_bases(by_signal)
 
 
 def size_in_words(size: float) -> str:
@@ -70,16 +68,3 @@ def _opposite(
 def _certain(channel: InspectedChannel, size: float) -> bool:
     share, times = CERTAIN_CHANGE
     return abs(size) > max(share * abs(channel.level), times * channel.noise)
-
-
-def _different_bases(channels: Mapping[str, InspectedChannel]) -> Iterator[str]:
-    """Yield that field voltage and field current in per unit rest at different levels."""
-    efd, ifd = channels.get("efd"), channels.get("ifd")
-    if efd is None or ifd is None or not (efd.seems_per_unit and ifd.seems_per_unit):
-        return
-    larger = max(efd.level, ifd.level)
-    if min(efd.level, ifd.level) > 0.0 and abs(efd.level - ifd.level) > SAME_BASE * larger:
-        yield (
-            f"{efd.name} rests at {efd.level:.4g}, {ifd.name} at {ifd.level:.4g}: in per unit of "
-            "the air-gap line both are equal at rest, so that one of them has another base"
-        )

@@ -13,10 +13,17 @@ from exfit.dsp.quality import mains_frequency, noise_of
 from exfit.dsp.reference_moves import rest_end
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
-from exfit.records.channel_inspection import PLACES_LISTED, InspectedChannel, inspect_channel
-from exfit.records.channel_recognition import Guess, guess_signals, three_phases
+from exfit.records.channel_identity import identified
+from exfit.records.channel_inspection import (
+    PLACES_LISTED,
+    InspectedChannel,
+    InspectedPhases,
+    inspect_channel,
+)
+from exfit.records.channel_recognition import guess_signals, three_phases
 from exfit.records.clock import Clock, check_finite
 from exfit.records.contradictions import contradictions
+from exfit.records.field_base import base_findings
 from exfit.records.formats.table import Table, listed, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.steps import (
@@ -30,23 +37,6 @@ from exfit.records.units import unit_in, usual
 Array = NDArray[np.float64]
 
 REFERENCE = "vref"
-
-
-@dataclass(frozen=True)
-class InspectedPhases:
-    """Three columns that are one voltage: its waveforms, or their effective values.
-
-    ``level`` is the effective value at rest, in the unit of the columns.
-    """
-
-    columns: tuple[str, ...]
-    kind: str
-    level: float
-
-    @property
-    def name(self) -> str:
-        """The name of the voltage that they are."""
-        return ", ".join(self.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +79,7 @@ class Inspection:
         """What must be known before the record is used, in sentences."""
         of_channels = (finding for channel in self.channels for finding in channel.findings)
         between = contradictions(self.channels, self.steps)
-        return (*_clock_findings(self), *of_channels, *between)
+        return (*_clock_findings(self), *of_channels, *between, *base_findings(self.channels))
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures."""
@@ -133,9 +123,7 @@ def inspect(
     stated = {name: unit for name, (unit, _) in units.items() if unit}
     groups = tuple(_phase_groups(time, samples, stated))
     signals = samples | {group.name: effective_value(samples, group.columns) for group in groups}
-    guesses = _guesses(samples, groups, stated)
-    references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
-    own_steps, steps = steps_of_signals(time, signals, references)
+    own_steps, steps = steps_of_signals(time, signals, *_recognised(samples, groups, stated))
     channels = tuple(
         inspect_channel(name, units[name], time, column, own_steps[name], steps)
         for name, column in samples.items()
@@ -147,7 +135,7 @@ def inspect(
         place,
         sampling,
         tuple(table.place(row) for row in sampling.backward[:PLACES_LISTED]),
-        tuple(_completed(channel, steps, guesses.get(channel.name)) for channel in channels),
+        identified([_with_sizes_of(channel, steps) for channel in channels], steps, groups),
         groups,
         steps,
         unreadable,
@@ -216,13 +204,14 @@ def _unit(table: Table, name: str) -> tuple[str | None, str]:
     return (None, "") if unit is None else (usual(unit), "name")
 
 
-def _guesses(
+def _recognised(
     samples: Mapping[str, Array], groups: Sequence[InspectedPhases], units: Mapping[str, str]
-) -> dict[str, Guess]:
-    """Return the signals that channels seem to be; none for one that never changes or a phase."""
+) -> tuple[list[str], set[str]]:
+    """Return the channels of the reference, and all that are a signal by their names."""
     phases = {name for group in groups for name in group.columns}
-    moving = [name for name, y in samples.items() if np.fmax.reduce(y) > np.fmin.reduce(y)]
-    return guess_signals([name for name in moving if name not in phases], units)
+    guesses = guess_signals([name for name in samples if name not in phases], units)
+    references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
+    return references, {*guesses, *(group.name for group in groups)}
 
 
 def _phase_groups(
@@ -257,16 +246,13 @@ def _with_sizes(
     return with_sizes(steps, moving, noises, time)
 
 
-def _completed(
-    channel: InspectedChannel, steps: Sequence[RecordedStep], guess: Guess | None
-) -> InspectedChannel:
-    """Return a channel with the signal that it seems to be, and steps of their lasting size."""
+def _with_sizes_of(channel: InspectedChannel, steps: Sequence[RecordedStep]) -> InspectedChannel:
+    """Return a channel whose own steps have their lasting size."""
     changes = []
     for change in channel.steps:
         step = min(steps, key=lambda step: abs(step.at - change.at))
         changes.append(replace(change, size=step.sizes.get(channel.name, change.size)))
-    signal, why = (None, "") if guess is None else (guess.signal, guess.why)
-    return replace(channel, steps=tuple(changes), signal=signal, why=why)
+    return replace(channel, steps=tuple(changes))
 
 
 def _clock_findings(inspection: Inspection) -> Iterator[str]:

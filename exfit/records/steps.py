@@ -105,11 +105,16 @@ def steps_of_channel(time: Array, samples: Array, reference: bool) -> ChannelSte
 
 
 def steps_of_signals(
-    time: Array, signals: Mapping[str, Array], references: Collection[str] = ()
+    time: Array,
+    signals: Mapping[str, Array],
+    references: Collection[str] = (),
+    recognised: Collection[str] = (),
 ) -> tuple[dict[str, ChannelSteps], tuple[RecordedStep, ...]]:
     """Return the steps of each signal (M,), and those of the test; these without lasting sizes.
 
-    Where no signal rests before a step, it is one that the record begins with.
+    Where no signal rests before a step, it is one that the record begins with. What no
+    ``recognised`` channel shows is no step of the test, if one of them shows any: a frequency
+    wanders by itself.
     """
     own = {name: steps_of_channel(time, y, name in references) for name, y in signals.items()}
     if not any(channel.changes for channel in own.values()):
@@ -117,8 +122,16 @@ def steps_of_signals(
         starting = changes_from_start(time, {name: signals[name] for name in early})
         own |= {name: ChannelSteps((change,)) for name, change in starting.items()}
     steps = combined_steps({name: channel.changes for name, channel in own.items()})
+    steps = _of_test(steps, recognised)
     responding = {name: signals[name] for name, channel in own.items() if channel.responds}
     return own, tuple(_sharpened(time, responding, steps))
+
+
+def _of_test(
+    steps: tuple[RecordedStep, ...], recognised: Collection[str]
+) -> tuple[RecordedStep, ...]:
+    """Return the steps that a recognised channel shows; all where none of them shows any."""
+    return tuple(step for step in steps if {*step.seen_in} & {*recognised}) or steps
 
 
 def _sharpened(
@@ -135,7 +148,9 @@ def _sharpened(
             _departure(*present_samples(time[near], signals[name][near])) for name in others
         ]
         known = Onset(step.at - step.error, step.at + step.error)
-        interval = _first_of([known, *(each for each in departures if each is not None)])
+        # what sets out long before wanders by itself, as a temperature
+        own = [each for each in departures if each and each.latest > known.earliest - SAME_STEP]
+        interval = _first_of([known, *own])
         yield replace(step, at=interval.at, error=interval.error)
 
 

@@ -35,7 +35,7 @@ def test_inspect_shows_the_record_and_leaves_its_files(run):
     code, out, err = run("inspect", "up.csv")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= WIDTH
-    for words in ("1001 samples", "100 Hz", "vt?", "+0.04949", "runs/up.csv-inspect"):
+    for words in ("1001 samples", "100 Hz", "vt is vt: sure", "+0.04949", "runs/up.csv-inspect"):
         assert words in out
     folder = Path("runs/up.csv-inspect")
     assert sorted(path.name for path in folder.iterdir()) == ["inspect.json", "inspect.png"]

@@ -215,6 +215,6 @@ def test_a_field_voltage_that_rests_where_the_model_does_not_is_noted(tmp_path):
         inspection = inspect(Columns({**sound, "efd": scale * sound["efd"]}))
         text = text_of("AC1A", inspection, tmp_path)
         notes = " ".join(line.lstrip("# ") for line in text.splitlines() if line.startswith("#"))
-        assert ("efd rests at 0.373" in notes) == (scale != 1.0)
-        assert ("the model with the breaker open at 0.95 to 1.6 pu" in notes) == (scale != 1.0)
+        assert ("efd: rests at 0.373" in notes) == (scale != 1.0)
+        assert ("the machine with the breaker open at 0.95 to 1.6 pu" in notes) == (scale != 1.0)
         assert max(map(len, text.splitlines())) <= 100

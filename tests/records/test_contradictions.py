@@ -40,11 +40,20 @@ def test_a_channel_that_moves_against_the_voltage_is_inverted_about_an_offset():
 
 
 def test_field_voltage_and_current_rest_together_in_per_unit():
-    (finding,) = with_fault(efd=CHANNELS["efd"] / 3.0)
-    assert "efd rests at 0.37" in finding
+    (finding,) = with_fault(efd=1.3 * CHANNELS["efd"])
+    assert "efd rests at 1.45" in finding
     assert "ifd at 1.12" in finding
     units = {"ifd": "A"}
     assert findings(units, **{**CHANNELS, "ifd": 500.0 * CHANNELS["ifd"]}) == ()
+
+
+def test_a_field_voltage_that_rests_where_no_machine_does_needs_a_base_or_has_its_scale_found():
+    (finding,) = with_fault(efd=CHANNELS["efd"] / 3.0)
+    assert finding.startswith("efd: rests at 0.37")
+    assert "0.95 to 1.6 pu" in finding
+    assert "air-gap line" in finding
+    (finding,) = with_fault(efd=CHANNELS["efd"] / CHANNELS["efd"][0])
+    assert "is 1 pu of efd that without load?" in finding
 
 
 @pytest.mark.parametrize("signal", ["vref", "vt"])

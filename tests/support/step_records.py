@@ -35,8 +35,16 @@ class StepRecord:
 
 @cache
 def _response(model: str, size: float, at: float, length: float):
-    """Return the instants (M,) and the signals (M,) of a unit with typical data, per unit."""
+    return response_of_unit(model, size, at, length)
+
+
+def response_of_unit(model: str, size: float, at: float, length: float, plant: dict | None = None):
+    """Return the instants (M,) and the signals (M,) of a unit with typical data, per unit.
+
+    ``plant`` is what differs from a unit on open circuit.
+    """
     content = yaml.safe_load((CONFIGS / "models" / f"{model.lower()}.yaml").read_text("utf-8"))
+    content["plant"] |= plant or {}
     content["test"] = {"vt0": 1.0, "duration": length, "vref": [{"at": at, "step": size}]}
     content["simulation"] = {"output_step": FINE}
     with tempfile.TemporaryDirectory() as folder:

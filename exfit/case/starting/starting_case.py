@@ -21,18 +21,14 @@ from exfit.case.starting.suggestion import (
     window_lines,
 )
 from exfit.case.templates import commented, parameter_line, source_lines
-from exfit.models.machines import Machine
-from exfit.models.sheet import Model
 from exfit.records.channel_inspection import InspectedChannel
+from exfit.records.field_base import shows_power
 from exfit.records.inspection import Inspection
 from exfit.util.sources import TYPICAL
 from exfit.util.text import yaml_number
 
 WIDTH = 80  # columns of a note
 ALONE = "FIRST_ORDER"  # the model whose output is vt itself
-ON_LOAD = 0.05  # pu of power at rest: with less the breaker is taken for open
-FIELD_WITHOUT_LOAD = (0.95, 1.6)  # of the voltage: air-gap line, and its excess by saturation
-FIELD_ON_LOAD = (0.5, 5.0)  # of the voltage: under-excited to ceiling
 IN_A_LIST = "    "  # before the lines of a section that is in an entry of a list
 
 
@@ -73,7 +69,7 @@ def _heading(unit: UnitData, tests: Sequence[StartingTest]) -> Iterator[str]:
     yield from _wrapped(f"{exciter.name} on {records} {files}: a case to start from.")
     yield from _advice(unit)
     for inspection in inspections:
-        for text in (*inspection.findings, *_other_bases(exciter, inspection)):
+        for text in inspection.findings:
             yield from _note(text)
 
 
@@ -183,7 +179,7 @@ def _plant(unit: UnitData, inspection: Inspection) -> Iterator[str]:
         yield "  type: none"
         return
     power, sources = inspection.channel_of("p"), dict[str, str]()
-    if power is not None and _on_load(power):
+    if power is not None and shows_power(power):
         yield commented("  type: infinite-bus", f"{_plain(power.name)} shows power")
         yield from _network(inspection)
         sources = _network_sources(inspection)
@@ -216,28 +212,6 @@ def _wrapped(text: str) -> list[str]:
 def _note(text: str) -> list[str]:
     """Return a note as lines of comment."""
     return wrap(f"# note: {_plain(text)}.", WIDTH, subsequent_indent="#   ", break_long_words=False)
-
-
-def _other_bases(model: Model | Machine, inspection: Inspection) -> Iterator[str]:
-    """Yield the field signals whose level in per unit is none that the machine has at rest."""
-    power, voltage = inspection.channel_of("p"), inspection.channel_of("vt")
-    loaded = power is not None and _on_load(power)
-    vt = voltage.level if voltage is not None and voltage.seems_per_unit else 1.0
-    low, high = (share * vt for share in (FIELD_ON_LOAD if loaded else FIELD_WITHOUT_LOAD))
-    for signal in () if model.name == ALONE else ("efd", "ifd"):
-        channel = inspection.channel_of(signal)
-        if channel is None or not channel.seems_per_unit or low <= channel.level <= high:
-            continue
-        where = "on load" if loaded else "with the breaker open"
-        yield (
-            f"{channel.name} rests at {channel.level:.4g}, the model {where} at {low:.3g} to "
-            f"{high:.3g} pu: 1 pu of {signal} is that of the air-gap line; give the channel a base"
-        )
-
-
-def _on_load(power: InspectedChannel) -> bool:
-    """Return whether a channel shows active power at rest."""
-    return not _per_unit(power) or abs(power.level) > ON_LOAD
 
 
 def _network(inspection: Inspection) -> Iterator[str]:

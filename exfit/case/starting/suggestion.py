@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from textwrap import wrap
 from types import MappingProxyType
 
 import yaml
@@ -11,16 +12,20 @@ import yaml
 from exfit.case.open_values import FILL_IN
 from exfit.case.starting.bases import Base
 from exfit.case.templates import commented
-from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel
+from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
 from exfit.records.channel_recognition import connection_of
-from exfit.records.inspection import InspectedPhases, Inspection
+from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
+from exfit.records.inspection import Inspection
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep
-from exfit.records.units import quantity_of
+from exfit.records.units import unit_of
 from exfit.signals import COMPARED, RECORDED, SIGNALS
 from exfit.util.text import yaml_number
 
 NO_BASES: Mapping[str, Base] = MappingProxyType({})
 DIGITS = 4
+WIDTH = 80  # columns of a comment
+BASE_ON_LOAD = "; check its base: on load the level does not show whether it is the air-gap line"
+SPEED = "speed"  # which no plant with the breaker open has
 COLUMNS_LISTED = 6  # among which the voltage may be
 
 
@@ -48,7 +53,7 @@ def channel_lines(
     channels = [channel for signal in RECORDED if (channel := inspection.channel_of(signal))]
     return [
         *_voltage_lines(inspection, bases.get("vt")),
-        *_channel_lines(channels, only, inspection.reference, bases),
+        *_channel_lines(channels, only, inspection, bases),
     ]
 
 
@@ -87,19 +92,23 @@ def _voltage_lines(inspection: Inspection, base: Base | None) -> Iterator[str]:
 def _channel_lines(
     channels: Sequence[InspectedChannel],
     only: tuple[str, ...],
-    reference: InspectedChannel | None,
+    inspection: Inspection,
     bases: Mapping[str, Base],
 ) -> Iterator[str]:
     """Yield the entry of each channel, with what to check above it.
 
-    A recorded ``reference`` drives the simulation: it is not compared.
+    A recorded reference drives the simulation: it is not compared.
     """
+    loaded = is_on_load(inspection.channels)
     for channel in channels:
-        drives = channel is reference
-        mark = "" if drives or channel.signal in only else "# "
-        yield f"    # {_about(channel)}"
+        drives = channel is inspection.reference
+        compared = channel.signal in only and (channel.signal != SPEED or loaded)
+        mark = "" if drives or compared else "# "
         base = bases.get(str(channel.signal))
-        yield f"    {mark}{channel.signal}: {_channel(channel, drives, base)}"
+        scale = None if base is not None else scale_to_find(channel, inspection.channels)
+        about = _about(channel, scale, loaded)
+        yield from wrap(about, WIDTH, initial_indent="    # ", subsequent_indent="    #   ")
+        yield f"    {mark}{channel.signal}: {_channel(channel, drives, base, scale)}"
 
 
 def weights_section(inspection: Inspection) -> list[str]:
@@ -192,7 +201,7 @@ def _phases(inspection: Inspection, group: InspectedPhases, base: Base | None) -
 
 def _unit_and_base(channel: InspectedChannel, base: Base | None) -> tuple[str, str]:
     """Return the unit and the base of a channel that needs both, as far as they are known."""
-    known = channel.unit if quantity_of(channel.unit) else None
+    known = channel.unit if channel.unit and unit_of(channel.unit) else None
     if base is None:
         return known or FILL_IN, FILL_IN
     value = base.in_unit(known, channel.name)
@@ -214,22 +223,34 @@ def _about_phases(inspection: Inspection, group: InspectedPhases) -> Iterator[st
         yield f"waveforms of {first.frequency:.4g} Hz, crest {max(first.high, -first.low):.5g}"
 
 
-def _about(channel: InspectedChannel) -> str:
+def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) -> str:
     """Return what to check of a channel."""
-    why = f"{channel.signal} by {channel.why}"
-    if channel.seems_per_unit:
-        return f"{why}; {'pu' if channel.unit else 'taken for pu'}, {channel.level:.5g} at rest"
-    if channel.unit == "%":
-        return f"{why}; {channel.level:.5g} % at rest"
+    by, _, _ = channel.why.partition(";")
+    why = f"{'' if channel.sure else 'a guess: '}{channel.signal} by {by}"
+    if scale is not None:
+        return f"{why}; {channel.level:.4g} at rest: another base, which is found"
+    if channel.system_base:
+        return f"{why}; {channel.level:.5g} at rest"
+    percent = channel.unit == "%"
+    if percent or channel.seems_per_unit:
+        unit = "%" if percent else "pu" if channel.unit else "taken for pu"
+        doubt = loaded and channel.signal in FIELD
+        return f"{why}; {unit}, {channel.level:.5g} at rest" + (BASE_ON_LOAD if doubt else "")
     base = SIGNALS[str(channel.signal)].base
     return f"{why}; {channel.level:.5g} {channel.unit or '?'} at rest; base: {base}"
 
 
-def _channel(channel: InspectedChannel, drives: bool, base: Base | None) -> str:
+def _channel(
+    channel: InspectedChannel, drives: bool, base: Base | None, scale: ScaleRange | None
+) -> str:
     entries = {"column": plain_text(channel.name)}
     if base is not None and (channel.seems_per_unit or channel.unit == "%"):
         entries |= {"unit": '"%"'} if channel.unit == "%" else {}
         entries["base"] = yaml_number(base.in_unit(channel.unit or "pu", channel.name))
+    elif scale is not None:
+        entries["scale"] = _range(scale.start, scale.low, scale.high)
+    elif channel.system_base:
+        entries |= {"unit": "pu", "base": FILL_IN}
     elif channel.unit == "%":
         entries["scale"] = "0.01"
     elif not channel.seems_per_unit:

@@ -1,6 +1,6 @@
 """The content of a recorder's file."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 from rich.text import Text
@@ -30,6 +30,9 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     paragraph(console, in_words(result.sampling))
     console.print()
     _channels(console, result.channels)
+    console.print()
+    for line in _signals(result.channels):
+        paragraph(console, line)
     console.print()
     _steps(console, result)
     console.print()
@@ -68,7 +71,7 @@ def _channels(console: Console, channels: Sequence[InspectedChannel]) -> None:
         cells = (
             name,
             unit,
-            f"{channel.signal}?" if channel.signal else "",
+            "" if channel.signal is None else channel.signal + ("" if channel.sure else "?"),
             number(channel.level),
             number(channel.low),
             number(channel.high),
@@ -77,6 +80,17 @@ def _channels(console: Console, channels: Sequence[InspectedChannel]) -> None:
         )
         table.add_row(*(Text(cell) for cell in cells))
     show_table(console, table)
+
+
+def _signals(channels: Sequence[InspectedChannel]) -> Iterator[str]:
+    """Yield which signal each channel is taken for, how surely and why, and which are none."""
+    for channel in channels:
+        if channel.signal:
+            surely = "sure" if channel.sure else "a guess"
+            yield f"{channel.name} is {channel.signal}: {surely}, by {channel.why}"
+    others = [channel.name for channel in channels if not channel.signal]
+    if others:
+        yield f"taken for no signal: {', '.join(others)}"
 
 
 def _steps(console: Console, result: Inspection) -> None:

@@ -117,9 +117,15 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def _near(name: str, names: Sequence[str]) -> str:
-    """Return a hint at similar column names, and all of them."""
+    """Return a hint at similar column names, and all of them.
+
+    Where only capitals differ, that name alone is meant.
+    """
     from difflib import get_close_matches
 
-    near = get_close_matches(name, names)
+    folded = [other.casefold() for other in names]
+    same = [other for other in names if other.casefold() == name.casefold()]
+    close = get_close_matches(name.casefold(), folded)
+    near = same or [other for other in names if other.casefold() in close]
     hint = f"did you mean {' or '.join(map(repr, near))}? The" if near else "the"
     return f"; {hint} columns are {listed(names)}"

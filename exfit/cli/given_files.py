@@ -1,0 +1,110 @@
+"""Files given to a command: one of another kind, or with a name that is not quite right.
+
+Each is refused with what it is and with the command, or the file, that was meant.
+"""
+
+import os
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import click
+
+from exfit.errors import ExfitError
+
+RECORDS = (
+    ".csv", ".tsv", ".txt", ".asc", ".dat", ".cfg", ".cff", ".mat", ".parquet", ".xlsx", ".xlsm",
+    ".xls", ".ods",
+)  # fmt: skip
+CASES = (".yaml", ".yml")
+RESULT = "result.json"
+
+
+class Kind(StrEnum):
+    """What a file is, in words."""
+
+    CASE = "a case"
+    RECORD = "a recorder's file"
+    RESULT = "the result of a fit"
+    PARAMETERS = "the parameters of a fit"
+    DYNAMICS = "a PSS/E dynamics file"
+
+
+# what takes a file of a kind
+COMMANDS = {
+    Kind.CASE: "exfit fit {path} fits it, exfit simulate {path} simulates it",
+    Kind.RECORD: (
+        "exfit inspect {path} shows it, exfit new --model NAME --record {path} makes a case of it"
+    ),
+    Kind.RESULT: "exfit report {path} and exfit export {path} take it",
+    Kind.PARAMETERS: "give it beside a case: exfit simulate CASE --parameters {path}",
+    Kind.DYNAMICS: "exfit import {path} makes a case of it",
+}
+
+
+class GivenFile(click.Path):
+    """The path of a file of some kinds, the usual first; what is certainly no such is refused."""
+
+    def __init__(self, *kinds: Kind) -> None:
+        super().__init__(path_type=Path)
+        self.kinds = kinds
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path; raises ExfitError with the command or the file that was meant."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if not path.exists():
+            meant = _meant(path)
+            if meant is not None:
+                raise ExfitError(f"{path}: cannot be read: No such file; did you mean {meant}?")
+            return path
+        kind = _kind_of(path)
+        if kind is None or kind in self.kinds:
+            return path
+        advice = COMMANDS[kind].format(path=path)
+        if kind is Kind.CASE and ctx is not None and Kind.RESULT in self.kinds:
+            advice = _fit_first(path, f"exfit {ctx.info_name}")
+        raise ExfitError(f"{path}: {kind}, not {self.kinds[0]}; {advice}")
+
+
+def _fit_first(case: Path, command: str) -> str:
+    """Return what makes the result of a case that a command takes."""
+    folder = Path("runs") / f"{case.stem}-fit"
+    if (folder / RESULT).is_file():
+        return f"{command} {folder} takes that of its fit"
+    return f"fit it first: exfit fit {case}, then {command} {folder}"
+
+
+def _meant(path: Path) -> Path | None:
+    """Return the file beside one that does not exist whose name is nearly its name, or None."""
+    from difflib import get_close_matches
+
+    try:
+        names = [other.name for other in path.parent.iterdir()]
+    except OSError:
+        return None
+    stems = [name for name in names if Path(name).stem.casefold() == path.stem.casefold()]
+    near = stems or get_close_matches(path.name, names, n=1, cutoff=0.8)
+    return path.with_name(near[0]) if near else None
+
+
+def _kind_of(path: Path) -> Kind | None:
+    """Return what a file certainly is, None where that is not certain."""
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        return Kind.RESULT if (path / RESULT).is_file() else None
+    if suffix in RECORDS:
+        return Kind.RECORD
+    if suffix == ".dyr":
+        return Kind.DYNAMICS
+    if path.name == RESULT:
+        return Kind.RESULT
+    return _kind_of_yaml(path) if suffix in CASES else None
+
+
+def _kind_of_yaml(path: Path) -> Kind | None:
+    from exfit.case.peek import keys_of
+
+    keys = keys_of(path)
+    if {"plant", "test", "tests", "record"} & keys:
+        return Kind.CASE
+    return Kind.PARAMETERS if "parameters" in keys else None
