@@ -243,23 +243,31 @@ def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) ->
 def _channel(
     channel: InspectedChannel, drives: bool, base: Base | None, scale: ScaleRange | None
 ) -> str:
-    entries = {"column": plain_text(channel.name)}
-    if base is not None and (channel.seems_per_unit or channel.unit == "%"):
-        entries |= {"unit": '"%"'} if channel.unit == "%" else {}
-        entries["base"] = yaml_number(base.in_unit(channel.unit or "pu", channel.name))
-    elif scale is not None:
-        entries["scale"] = _range(scale.start, scale.low, scale.high)
-    elif channel.system_base:
-        entries |= {"unit": "pu", "base": FILL_IN}
-    elif channel.unit == "%":
-        entries["scale"] = "0.01"
-    elif not channel.seems_per_unit:
-        entries["unit"], entries["base"] = _unit_and_base(channel, base)
+    entries = {"column": plain_text(channel.name), **_scaling(channel, base, scale)}
     if channel.spikes and not drives:
         entries["outliers"] = f"{SPIKE_LIMIT:g}"
     if len(entries) == 1:
         return entries["column"]
     return "{" + ", ".join(f"{key}: {value}" for key, value in entries.items()) + "}"
+
+
+def _scaling(
+    channel: InspectedChannel, base: Base | None, scale: ScaleRange | None
+) -> dict[str, str]:
+    """Return what makes the numbers of a channel per unit."""
+    percent = channel.unit == "%"
+    if base is not None and (channel.seems_per_unit or percent):
+        value = yaml_number(base.in_unit(channel.unit or "pu", channel.name))
+        return {"unit": '"%"', "base": value} if percent else {"base": value}
+    if scale is not None:
+        return {"scale": _range(scale.start, scale.low, scale.high)}
+    if channel.system_base:
+        return {"unit": "pu", "base": FILL_IN}
+    if percent:
+        return {"scale": "0.01"}
+    if channel.seems_per_unit:
+        return {}
+    return dict(zip(("unit", "base"), _unit_and_base(channel, base), strict=True))
 
 
 def clock_text(inspection: Inspection) -> str:
