@@ -1,6 +1,8 @@
 """What all tests share: the models that they run over, and the folder of machine code."""
 
+import gc
 import os
+import sys
 
 import hypothesis
 import pytest
@@ -36,8 +38,29 @@ def pytest_configure(config):
     few = config.getoption("models") == "few"
     hypothesis.settings.load_profile("few" if few else "all")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _keep_bytecode(str(config.cache.mkdir("bytecode")))
     if "EXFIT_CACHE" not in os.environ:
         os.environ["EXFIT_CACHE"] = str(config.cache.mkdir("machine_code"))
+
+
+def _keep_bytecode(folder):
+    """Let the next session have what this one compiled, also where Python is told to write none.
+
+    The tests themselves are half of what a session compiles before its first test.
+    """
+    if sys.dont_write_bytecode and sys.pycache_prefix is None:
+        sys.dont_write_bytecode, sys.pycache_prefix = False, folder
+
+
+def pytest_collection():
+    """Collect no garbage while tests are collected: they all stay."""
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """Spare the garbage collector what the tests are made of: it would go through it each time."""
+    gc.enable()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(config, items):

@@ -17,10 +17,10 @@ COARSE, STATIC = (15, 1, 7), (16, 1, 7)  # seeds: AC8B every 20 ms, ST1A with ef
     ("kind", "seed"),
     [
         ("step off by 20 %", COARSE),
-        ("spikes", COARSE),
+        pytest.param("spikes", COARSE, marks=pytest.mark.long),
         ("limit not of the unit", COARSE),
-        ("ripple", STATIC),
-        ("Tpd0", STATIC),
+        pytest.param("ripple", STATIC, marks=pytest.mark.long),
+        pytest.param("Tpd0", STATIC, marks=pytest.mark.long),
         ("sign of the step", STATIC),
     ],
 )

@@ -77,6 +77,7 @@ def test_a_sway_is_found_and_its_parameters_are_far_nearer_the_truth(response):
     assert np.mean(errors["without"]) > 1.5 * np.mean(errors["with"])
 
 
+@pytest.mark.long
 def test_white_residuals_have_no_line_and_coloured_ones_none_that_is_fitted(response):
     rng = np.random.default_rng(2)
     reasons = {"does not stand out": white(rng), "are not white": coloured(rng)}
