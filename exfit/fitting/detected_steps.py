@@ -87,22 +87,28 @@ def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | N
 
 
 def _bounded_opening(place: str, opens: float | Unknown, record: Record) -> float | Unknown:
-    """Return when the breaker opens, where it says auto between the samples where vt jumps.
+    """Return when the breaker opens, where it says auto between the samples of a jump.
 
-    There nothing that is compared jumps with the instant: the cost is smooth in it.
+    There nothing that is compared jumps with the instant: the cost is smooth in it. The jump is
+    that of vt or, where a recorder has averaged that, of another signal.
     """
     if not isinstance(opens, Unknown) or opens.start != "auto":
         return opens
-    recorded = np.isfinite(record.signals["vt"])
-    time, vt = record.time[recorded], record.signals["vt"][recorded]
-    try:
-        before = largest_jump(vt)
-    except ValueError as fault:
-        text = f"{record.source}: vt: {fault}; {place} has start: auto"
-        raise RecordError(f"{text}: give start, min and max") from fault
-    margin = INSIDE_INTERVAL * float(time[before + 1] - time[before])
-    low, high = float(time[before]) + margin, float(time[before + 1]) - margin
-    return Unknown(start=0.5 * (low + high), min=low, max=high)
+    faults = []
+    for signal in sorted(record.signals, key=lambda signal: signal != "vt"):
+        samples = record.signals[signal]
+        looked_at = np.isfinite(samples) & (record.time >= _lowest(opens))
+        looked_at &= record.time <= (inf if opens.max is None else opens.max)
+        try:
+            before = largest_jump(samples[looked_at])
+        except ValueError as fault:
+            faults.append(f"{signal}: {fault}")
+        else:
+            start, end = map(float, record.time[looked_at][before : before + 2])
+            margin = INSIDE_INTERVAL * (end - start)
+            return Unknown(start=0.5 * (start + end), min=start + margin, max=end - margin)
+    text = f"{record.source}: {'; '.join(faults)}; {place} has start: auto"
+    raise RecordError(f"{text}: give start, min and max")
 
 
 def _lowest(value: float | Unknown) -> float:

@@ -99,6 +99,26 @@ def test_the_instant_is_found_between_the_samples_of_the_jump():
     assert setup.test.steady == opens.low
 
 
+def test_where_the_recorder_averages_vt_another_signal_shows_the_instant():
+    case = case_of(REACTIVE, D_AXIS, opens={"start": "auto"})
+    record = case.given_records["fit"]
+    window = np.ones(21) / 21.0
+    smeared = np.convolve(record.signals["vt"], window, mode="same")
+    signals = {"vt": smeared, "ifd": record.signals["ifd"]}
+    inside = (record.time > 0.5) & (record.time < 9.0)
+    signals = {name: samples[inside] for name, samples in signals.items()}
+    (setup,) = build_experiments(case.with_record(Record.from_arrays(record.time[inside], signals)))
+    opens = next(p for p in setup.free if p.name == "breaker.opens")
+    assert opens.low < OPENS < opens.high
+    assert opens.high - opens.low < 1e-3
+
+
+def test_bounds_say_where_the_jump_is_looked_for():
+    case = case_of(REACTIVE, D_AXIS, opens={"start": "auto", "min": 3.0, "max": 5.0})
+    with pytest.raises(RecordError, match="no jump stands out"):
+        build_experiments(case)
+
+
 def with_exciter(case):
     """Return a case on load with an exciter in service, of which a parameter is free."""
     (recording,) = case.recordings

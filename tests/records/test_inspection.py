@@ -65,7 +65,8 @@ def truth(record):
     return [up if record.endswith("up") else down]
 
 
-RECORDS = sorted(path.stem for path in SAMPLES.glob("*.csv"))
+REJECTION = "rejection"  # whose breaker opens: no step of a reference
+RECORDS = sorted(path.stem for path in SAMPLES.glob("*.csv") if path.stem != REJECTION)
 
 
 @pytest.mark.parametrize("record", RECORDS)
@@ -113,6 +114,14 @@ def test_the_channels_of_a_sample_record_are_recognised(record):
     assert inspection.sampling.even
     assert inspection.sampling.step == pytest.approx(0.01)
     assert inspection.findings == ()
+
+
+def test_the_opening_of_a_breaker_is_found_as_an_instant():
+    """The jump lies between two samples; the instant is within what is stated."""
+    inspection = inspect(sample(SAMPLES / f"{REJECTION}.csv"))
+    assert {channel.signal for channel in inspection.channels} == {"vt", "ifd"}
+    (step,) = inspection.steps
+    assert step.at == pytest.approx(1.0013, abs=0.004)
 
 
 def test_the_field_record_is_described_as_it_was_made():

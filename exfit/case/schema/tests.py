@@ -113,7 +113,8 @@ class BreakerSection(Section):
 
     opens: Findable = Field(
         description="Time at which the stator current becomes zero, s; or {start: auto} to fit it "
-        "between the two samples between which vt jumps; or {start, min, max}."
+        "between the two samples between which vt, or else another signal, jumps; or {start, min, "
+        "max}."
     )
     speed: Literal["recorded", "simulated"] | None = Field(
         default=None,
