@@ -122,10 +122,11 @@ def _uncertainty_after(
     starts = {parameter.name: parameter.start for parameter in free}
     fixed = {name: value for name, value in case.values().items() if name not in starts}
     at = {**fixed, **starts, **_steps(experiments)}
-    finest = min(min(of_signal.values()) for of_signal in levels)
+    pairs = [*zip(experiments, levels, strict=True)]
+    finest = min(of_signal[name] for experiment, of_signal in pairs for name in experiment.signals)
     expected = [
         with_enough_substeps(_with_noise(experiment, of_signal, finest), at, case.path)
-        for experiment, of_signal in zip(experiments, levels, strict=True)
+        for experiment, of_signal in pairs
     ]
     problem = problem_of(Residuals(expected, _with_steps(free, experiments), fixed, case.ties))
     residuals = problem.residuals

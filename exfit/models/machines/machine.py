@@ -3,7 +3,7 @@
 Per unit as excitation studies have it: 1 pu of efd and of ifd gives 1 pu of terminal voltage on the
 air-gap line; power, current and reactances are on the machine's own base. The rotor's q axis leads
 its d axis. Neglected, as in PSS/E: armature resistance, the stator's own transients, and speed in
-the stator's voltages.
+the stator's voltages, until a breaker opens (`plants.breaker`).
 """
 
 from collections.abc import Callable, Iterable, Mapping
