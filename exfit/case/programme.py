@@ -11,6 +11,7 @@ from exfit.case.checks.content import contradictions
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import repeated_names
 from exfit.case.checks.saturation_test import saturation_test_faults
+from exfit.case.checks.steady_test import steady_test_faults
 from exfit.case.load import faults_with_lines, parse_case
 from exfit.case.parts import kind_of, parts_of, ties_of
 from exfit.case.peek import files_in
@@ -193,6 +194,8 @@ def _points_faults(tests: list[ContentNode], kind: PlantKind) -> Iterator[Fault]
             yield test.at("kind").fault(f"not allowed with plant {kind.name}: it has no machine")
         if test.at("kind").text == SATURATION:
             yield from saturation_test_faults(test)
+        elif test.at("kind").text == STEADY:
+            yield from steady_test_faults(test)
 
 
 def _faults_of_case(inner: CaseContent, folder: Path) -> Iterator[Fault]:

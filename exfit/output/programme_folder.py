@@ -70,7 +70,7 @@ def points_table(result: SaturationResult | VCurve) -> str:
 def _planned(test: FinishedTest) -> Callable[[], PlannedFigures]:
     if isinstance(test.result, FitResult):
         return partial(run_figures.of_fit, test.result)
-    return dict
+    return partial(run_figures.of_steady_test, test.result, test.name)
 
 
 def _missing(folder: Path, planned: Callable[[], PlannedFigures]) -> PlannedFigures:

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from exfit.records.inspection import Inspection
     from exfit.results.comparisons import Comparison
     from exfit.results.model import FitResult
+    from exfit.results.saturation import SaturationResult
     from exfit.results.translation import Translation
+    from exfit.results.v_curve import VCurve
     from exfit.workflows import SimulationResult
 
 
@@ -86,6 +88,18 @@ def of_phase_ends(result: "FitResult") -> PlannedFigures:
         for end in result.phase_ends
         for match in end.comparisons
     }
+
+
+def of_steady_test(result: "SaturationResult | VCurve", name: str) -> PlannedFigures:
+    """Return the figure of a test at rest."""
+    from exfit.output import plots
+    from exfit.results.v_curve import VCurve
+
+    if isinstance(result, VCurve):
+        shows = "V-curves: the points beside the machine's model"
+        return {"v_curve.png": PlannedFigure(shows, partial(plots.v_curve, result, name))}
+    shows = "the saturation curve with its points"
+    return {"saturation.png": PlannedFigure(shows, partial(plots.saturation, result, name))}
 
 
 def of_series(series: "FitSeries") -> PlannedFigures:

@@ -82,8 +82,9 @@ def _measured(test: FinishedTest) -> Iterator[EnteredValue]:
         for signal, (value, unit) in channel_bases(result).items():
             yield from _by_points(signal + BASE, value, test.name, unit)
     elif isinstance(result, VCurve):
-        for name in result.determined:
-            yield from _fitted(MACHINE + name, result.parameters[name], MEASURED, test.name)
+        for name, parameter in result.parameters.items():
+            known_as = name if parameter.of_record else MACHINE + name
+            yield from _fitted(known_as, parameter, MEASURED, test.name)
     elif test.kind != "bump":
         for name, parameter in result.parameters.items():
             if name.startswith(MACHINE):

@@ -5,7 +5,6 @@ import pytest
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.steady_test import steady_test_faults
 from exfit.case.schema import SteadyTest
-from exfit.models.machines import MACHINES
 
 COLUMNS = {
     "p": {"column": "MW", "unit": "MW", "base": 120.0},
@@ -29,10 +28,9 @@ INLINE = {
 
 def faults(**changes):
     test = {key: value for key, value in {**TEST, **changes}.items() if value is not None}
-    sheet = MACHINES["GENSAL"].sheet
     return {
         ".".join(map(str, fault.place)): fault.text
-        for fault in steady_test_faults(ContentNode((), test), "GENSAL", sheet)
+        for fault in steady_test_faults(ContentNode((), test))
     }
 
 
@@ -74,12 +72,6 @@ def test_a_file_with_its_columns_and_points_in_place_of_it_are_valid():
             columns(ifd={"column": "If", "noise": 0.01}, efd={"column": "Uf"}),
             "columns.efd.noise",
             "is missing: the other one has it",
-        ),
-        ({"free": {"Xpq": {"start": 1.0}}}, "free.Xpq", "not a parameter of GENSAL"),
-        (
-            {"free": {"Xd": {"start": 3.0, "min": 0.5, "max": 2.0}}},
-            "free.Xd.start",
-            "outside its bounds",
         ),
     ],
 )

@@ -1,5 +1,7 @@
 """Points of V-curves on the terminal and as a figure."""
 
+import json
+
 import numpy as np
 import pytest
 from rich.console import Console
@@ -12,6 +14,9 @@ from exfit.models.machines import MACHINES
 from exfit.models.sheet import typical
 from exfit.output import plots
 from exfit.output.terminal.v_curve import v_curve as show
+from exfit.results.v_curve import VCurve
+from exfit.util.text import to_json
+from exfit.util.typed import Reader, plain
 
 P, Q = np.repeat([0.1, 0.8], 3), np.tile([-0.3, 0.0, 0.4], 2)
 MACHINE = MACHINES["GENSAL"]
@@ -49,3 +54,9 @@ def test_the_figure_has_a_curve_and_points_for_each_power(result):
     assert above.get_ylabel() == "stator current it (pu)"
     assert below.get_xlabel() == "reactive power q (pu)"
     assert plots.png(figure).startswith(b"\x89PNG")
+
+
+def test_the_result_is_read_back_as_it_was_written(result):
+    text = to_json(plain(result, whole=True))
+    again = Reader().read(VCurve, json.loads(text))
+    assert to_json(plain(again, whole=True)) == text

@@ -90,7 +90,7 @@ def part_faults(
     for symbol, parameter in free.sections:
         if symbol in fixed:
             yield parameter.fault("both fixed and free")
-        yield from free_faults(parameter, rows.get(symbol))
+        yield from _free_faults(parameter, rows.get(symbol))
     # what follows without standing in the file is checked where it comes from
     places = dict.fromkeys(tied, place_of_points(content))
     places |= {symbol: (*part.fixed, symbol) for symbol in fixed}
@@ -127,7 +127,7 @@ def _outside_sheet(given: ContentNode, rows: Mapping[str, Parameter]) -> Iterato
             yield given.at(symbol).fault(text)
 
 
-def free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]:
+def _free_faults(section: ContentNode, row: Parameter | None) -> Iterator[Fault]:
     """Yield the faults of one free parameter: its bounds, its start, its scale, its prior.
 
     Its bounds and its start may leave the range of the data sheet where the equations allow it.

@@ -3,20 +3,18 @@
 from collections.abc import Iterator
 
 from exfit.case.checks.bounds import bound_faults
-from exfit.case.checks.model import free_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.schema.steady_tests import FIELDS, POINT_SIGNALS, TERMINALS
 from exfit.case.yaml import Fault
-from exfit.models.sheet import Sheet
 from exfit.records.units import needs_base
-from exfit.util.text import near, show
+from exfit.util.text import show
 
 ROW_LENGTHS = (len(POINT_SIGNALS) - 1, len(POINT_SIGNALS))  # without efd, and with it
 AUTO = "auto"
 
 
-def steady_test_faults(test: ContentNode, machine: str, sheet: Sheet) -> Iterator[Fault]:
-    """Yield what contradicts itself in a steady test of a machine with a name and a data sheet."""
+def steady_test_faults(test: ContentNode) -> Iterator[Fault]:
+    """Yield what contradicts itself in the points of a steady test, beside what is free."""
     if "points" in test:
         yield from _inline_faults(test)
     elif "file" not in test:
@@ -26,12 +24,6 @@ def steady_test_faults(test: ContentNode, machine: str, sheet: Sheet) -> Iterato
     for signal, column in test.at("columns").sections:
         yield from _column_faults(signal, column)
     yield from _noise_faults(test)
-    rows = {row.symbol: row for row in sheet}
-    for symbol, section in test.at("free").sections:
-        if symbol in rows:
-            yield from free_faults(section, rows[symbol])
-        else:
-            yield section.fault(f"not a parameter of {machine}; {near(symbol, rows)}")
 
 
 def _inline_faults(test: ContentNode) -> Iterator[Fault]:
