@@ -167,9 +167,10 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
     tests = top.at(TESTS).entries
     yield from repeated_names(tests)
     yield from _use_faults(tests)
-    yield from _points_faults(tests, kind_of(top.at("plant").content))
     if any(test.at("kind").text == SATURATION for test in tests):
         content = with_bases(content, BASES_TO_COME)
+    based = ContentNode((), content).at(TESTS).entries
+    yield from _points_faults(based, kind_of(top.at("plant").content))
     machine = (index for index, _ in tests_of_kind(content, STEADY, REJECTION))
     for inner in (
         common_content(content),
