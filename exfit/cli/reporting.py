@@ -18,8 +18,14 @@ from exfit.cli.options import force_option
     help="File to write (default: report.html beside the result, or report.pdf).",
 )
 @click.option("--pdf", is_flag=True, help="Make a PDF, with bookmarks and page numbers.")
+@click.option(
+    "--against",
+    type=click.Path(path_type=Path),
+    metavar="RESULT",
+    help="Another fit to be shown beside it: an earlier revision, or another unit.",
+)
 @force_option
-def report(result: Path, output: Path | None, pdf: bool, force: bool) -> None:
+def report(result: Path, output: Path | None, pdf: bool, against: Path | None, force: bool) -> None:
     """Make a verification report of RESULT: one HTML file, to be read, printed and handed in.
 
     RESULT is the result.json of a fit, or the folder that holds it: nothing else is read, and
@@ -28,4 +34,4 @@ def report(result: Path, output: Path | None, pdf: bool, force: bool) -> None:
     """
     from exfit.output.report import write_report
 
-    click.echo(f"written to {write_report(result, output, force, pdf)}")
+    click.echo(f"written to {write_report(result, output, force, pdf, against)}")

@@ -6,6 +6,7 @@ from exfit.errors import ExfitError
 from exfit.output.report.page import Page, fit_page, html, is_page, page_html
 from exfit.output.report.pdf import is_pdf, page_pdf
 from exfit.results.io import WHOLE_PROGRAMME, load_result, result_file
+from exfit.results.model import FitResult
 from exfit.util.files import write
 
 __all__ = ["html", "write_report"]
@@ -14,16 +15,21 @@ PAGE, PRINT = "report.html", "report.pdf"
 
 
 def write_report(
-    result: Path, output: Path | None = None, force: bool = False, pdf: bool = False
+    result: Path,
+    output: Path | None = None,
+    force: bool = False,
+    pdf: bool = False,
+    against: Path | None = None,
 ) -> Path:
     """Write the report of a fit or a programme, by default into its folder; return where.
 
     ``result`` is a result.json, a programme.json, or the folder that holds it; nothing is read but
-    results, and nothing is simulated. With ``pdf`` it is a PDF, else an HTML page. A report that is
-    there already is replaced, any other file only with ``force``. Raises ExfitError for what cannot
-    be used.
+    results, and nothing is simulated. With ``pdf`` it is a PDF, else an HTML page. ``against`` is
+    the result of another fit, of an earlier revision or another unit, to be shown beside it. A
+    report that is there already is replaced, any other file only with ``force``. Raises ExfitError
+    for what cannot be used.
     """
-    page = _page(result)
+    page = _page(result, None if against is None else load_result(against))
     place = output or page.folder / (PRINT if pdf else PAGE)
     is_report = is_pdf if pdf else is_page
     if place.is_dir():
@@ -34,13 +40,15 @@ def write_report(
     return place
 
 
-def _page(result: Path) -> Page:
+def _page(result: Path, other: FitResult | None) -> Page:
     """Return the page of a result that a file or folder holds."""
     summary = result / WHOLE_PROGRAMME if result.is_dir() else result
     if summary.name == WHOLE_PROGRAMME and summary.is_file():
         from exfit.output.report.programme_page import programme_page
         from exfit.programme.kept import load_summary
 
+        if other is not None:
+            raise ExfitError(f"{summary}: --against compares fits, and this is a programme")
         return programme_page(load_summary(summary.parent), summary.parent)
     source = result_file(result)
-    return fit_page(load_result(source), source.parent)
+    return fit_page(load_result(source), source.parent, other)

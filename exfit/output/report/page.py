@@ -15,7 +15,8 @@ from exfit import __version__
 from exfit.dsp.features import LABELS
 from exfit.errors import ExfitError
 from exfit.output.report.charts import drawing
-from exfit.output.report.sections import SECTIONS, ReportSection
+from exfit.output.report.sections import AGAINST, SECTIONS, ReportSection
+from exfit.output.report.sections.against import against
 from exfit.output.report.sections.matches import MatchView, OverlayChart, live_data
 from exfit.output.report.verdict import Headline, headline
 from exfit.results.feature_digits import feature_cells
@@ -48,14 +49,19 @@ class Page:
     folder: Path
 
 
-def html(result: FitResult, folder: Path) -> str:
-    """Return the page of a fit; ``folder`` is where the fit lies, for the commands on the page."""
-    return page_html(fit_page(result, folder))
+def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str:
+    """Return the page of a fit; ``folder`` is where the fit lies, for the commands on the page.
+
+    With an ``other`` fit, an earlier revision or another unit, a section compares both.
+    """
+    return page_html(fit_page(result, folder, other))
 
 
-def fit_page(result: FitResult, folder: Path) -> Page:
-    """Return what the page of a fit shows."""
+def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) -> Page:
+    """Return what the page of a fit shows, beside an ``other`` fit where there is one."""
     sections = [(section, section.content(result)) for section in SECTIONS]
+    if other is not None:
+        sections.insert(len(sections) - 1, (AGAINST, against(result, other)))
     return Page(f"{result.model}: {result.name}", headline(result), sections, folder)
 
 

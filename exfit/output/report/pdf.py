@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from exfit.errors import ExfitError
-from exfit.output.report.page import CHART_STYLE, Page, page_html
+from exfit.output.report.page import CHART_STYLE, TEMPLATES, Page, page_html
 
 MARK = b"% report of exfit\n"  # a comment behind the end of a file
 DRAWING = re.compile(r"<svg class=\"(?:static|sample)[^>]*>")
@@ -16,7 +16,7 @@ def page_pdf(page: Page) -> bytes:
     Raises ExfitError where WeasyPrint is missing, or the libraries that it draws with.
     """
     try:
-        from weasyprint import HTML
+        from weasyprint import CSS, HTML
     except ImportError:
         raise ExfitError(
             "a PDF needs WeasyPrint: pip install 'exfit[pdf]'; or print the HTML page in a browser"
@@ -26,7 +26,8 @@ def page_pdf(page: Page) -> bytes:
             f"WeasyPrint lacks a library of the system, Pango ({error}); see its page on "
             "installation, or print the HTML page in a browser"
         ) from None
-    pdf: bytes = HTML(string=_styled_drawings(page_html(page, interactive=False))).write_pdf()
+    html = HTML(string=_styled_drawings(page_html(page, interactive=False)))
+    pdf: bytes = html.write_pdf(stylesheets=[CSS(TEMPLATES / "paged.css")])
     return pdf + MARK
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from exfit.output.report.sections.against import against
 from exfit.output.report.sections.as_found import as_found
 from exfit.output.report.sections.criteria import criteria
 from exfit.output.report.sections.dynamics import dynamics
@@ -19,15 +20,14 @@ from exfit.output.report.sections.signatures import signatures
 from exfit.output.report.sections.small_signal import small_signal
 from exfit.output.report.sections.unit_and_test import unit_and_test
 from exfit.output.report.sections.usability import usability
-from exfit.results.model import FitResult
 
 
 class ReportSection(NamedTuple):
-    """A section of a report: its id, its heading, what it says; its template is named after it."""
+    """A section of a report: its id, its heading, what it says of a fit, its template."""
 
     key: str
     heading: str
-    content: Callable[[FitResult], Any]
+    content: Callable[..., Any]
     template: str
 
 
@@ -53,3 +53,4 @@ SECTIONS = (
     ReportSection("reproduction", "Reproduction", reproduction, "reproduction"),
     ReportSection("signatures", "Revision and signatures", signatures, "signatures"),
 )  # fmt: skip
+AGAINST = ReportSection("against", "Beside another fit", against, "against")
