@@ -48,13 +48,14 @@ BASES_TO_COME = {"ifd": (1.0, "A"), "efd": (1.0, "V")}
 class Programme:
     """The tests of a unit, in the order of their file, and what they share.
 
-    ``content`` is that of the file, ``text`` the file itself. A case is the programme of one test:
-    ``single``, and the programme has no other test.
+    ``content`` is that of the file, ``text`` the file itself, ``about`` what identifies the unit.
+    A case is the programme of one test: ``single``, and the programme has no other test.
     """
 
     path: Path
     text: str
     content: Mapping[str, Any]
+    about: Mapping[str, float | str]
     tests: tuple[TestOfProgramme, ...] = ()
     single: Case | None = None
 
@@ -62,12 +63,6 @@ class Programme:
     def folder(self) -> Path:
         """The folder to which the paths in the file are relative."""
         return self.path.parent
-
-    @property
-    def about(self) -> Mapping[str, float | str]:
-        """The facts about the unit."""
-        facts: Mapping[str, float | str] = self.content.get("about", {})
-        return facts
 
     @property
     def bumps(self) -> tuple[RecordedBump, ...]:
@@ -146,7 +141,8 @@ def load_programme(path: Path) -> Programme:
     text = read_text(path)
     top, faults = read_yaml(text, path)
     if TESTS not in top.value:
-        return Programme(path=path, text=text, content=top.value, single=parse_case(text, path))
+        case = parse_case(text, path)
+        return Programme(path=path, text=text, content=top.value, about=case.about, single=case)
     document = validated_document(top.value, faults)
     places = {fault.place for fault in faults}
     for fault in programme_faults(top.value, path.parent):
@@ -155,7 +151,9 @@ def load_programme(path: Path) -> Programme:
             places.add(fault.place)
     if faults or document is None:
         raise faults_with_lines(faults, top, path)
-    return Programme(path=path, text=text, content=top.value, tests=document.programme)
+    return Programme(
+        path=path, text=text, content=top.value, about=document.about, tests=document.programme
+    )
 
 
 def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:

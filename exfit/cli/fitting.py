@@ -12,7 +12,6 @@ from exfit.cli.options import (
     Output,
     case_argument,
     cases_argument,
-    load,
     output_options,
     parameters_option,
     print_json,
@@ -23,6 +22,7 @@ from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRAT
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.case.programme import Programme
     from exfit.results.model import FitResult
 
 
@@ -131,11 +131,32 @@ def check(case: Path) -> None:
 
     Warns of an inverted channel, another base, a step that no regulator is tested with, ripple, a
     start that is not at rest, and of a validation that sees what is fitted.
+
+    Of a programme it runs the tests at rest, which takes no time, and checks each fit with what
+    they give.
     """
     from exfit import workflows
+    from exfit.case.programme import load_programme
     from exfit.output import terminal
 
-    result = workflows.check(load(case))
+    programme = load_programme(case)
+    if programme.single is None:
+        _check_programme(programme)
+        return
+    result = workflows.check(programme.single)
     terminal.check(terminal.console(), result)
     if not (result.agrees and result.flat):
+        raise SystemExit(NOT_CONVERGED)
+
+
+def _check_programme(programme: "Programme") -> None:
+    """Check each test of a programme; raises SystemExit where something speaks against one."""
+    from exfit.output import terminal
+    from exfit.programme.checking import check_programme
+
+    sound = True
+    for checked in check_programme(programme):
+        terminal.checked_step(terminal.console(), checked)
+        sound = sound and checked.sound
+    if not sound:
         raise SystemExit(NOT_CONVERGED)

@@ -106,7 +106,9 @@ def _turns(
     """Yield each test as it ends; ``values`` and ``failed`` take what it gives, or its error."""
     for step in steps_of(programme):
         try:
-            test = _finished(programme, step, tuple(values), None if again else folder, progress)
+            test = finished_test(
+                programme, step, tuple(values), None if again else folder, progress
+            )
             if folder is not None:
                 keep(test, folder)
         except ExfitError as fault:
@@ -151,12 +153,12 @@ def case_of(programme: Programme, step: ProgrammeStep) -> Case:
     return programme.bump_case() if step.name == FIT else programme.rejection_case(step.name)
 
 
-def _finished(
+def finished_test(
     programme: Programme,
     step: ProgrammeStep,
     values: Values,
     folder: Path | None,
-    progress: Callable[[ProgrammeStep, Progress | None], None],
+    progress: Callable[[ProgrammeStep, Progress | None], None] = _ignore_progress,
 ) -> FinishedTest:
     """Return a test with its result: the one that is kept in a folder, or else that of a run."""
     programme = programme.with_bases(bases_of(values))

@@ -89,7 +89,7 @@ def test_a_test_that_is_not_matched_gives_exit_code_3(run, place, tmp_path):
     content["tests"][1]["accept"] = {"rmse": 1e-9}
     ran = run("run", written(content, tmp_path), "--no-plots", "-o", tmp_path / "out")
     assert ran.code == 3
-    assert "v-curve: no match" in " ".join(ran.out.split())
+    assert "verdict: no match" in " ".join(ran.out.split())
     assert (tmp_path / "out" / "report.html").is_file()
 
 
@@ -106,3 +106,12 @@ def test_the_other_commands_name_the_one_for_programmes(run, place):
     ran = run("fit", place)
     assert ran.code == 1
     assert "exfit run runs it" in ran.err
+
+
+def test_a_programme_is_checked_with_what_its_tests_at_rest_give(run, place):
+    ran = run("check", place)
+    assert ran.code == 0
+    for words in ("saturation (saturation)", "v-curve (steady)", f"{OF_MACHINE} (rejection)",
+                  "fit of up, down (bump)"):  # fmt: skip
+        assert words in ran.out
+    assert ran.out.count("derivatives agree") == 2

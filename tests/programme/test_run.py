@@ -180,7 +180,6 @@ def test_a_test_that_is_not_matched_gives_nothing(again):
 
 def test_a_test_that_fails_keeps_no_other_from_running(again):
     content = programme_content()
-    content["tests"][-1]["free"]["Tpd0"] = {"start": 2.1, "min": 2.0, "max": 12.0}
     content["plant"]["free"] = {"Xd": {"start": 1.5, "min": 1.0, "max": 1.6}}
     del content["plant"]["parameters"]["Xd"]
     result, _ = again(content)

@@ -1,14 +1,16 @@
-"""The points of a unit's tests at rest, from equations typed for them alone.
+"""A unit's tests at rest and its load rejection, from equations typed for them alone.
 
 ``python tests/support/programme_records.py`` writes sample_data/programme_*.csv anew: the machine
 of configs/ac8b_unit1.yaml, whose q axis has Xq = 1.72, of 120 MVA and 13.8 kV; 1 pu of field
-current is 850 A. Saturation is B (flux - A)^2 of the flux.
+current is 850 A. Saturation is B (flux - A)^2 of the flux. The rejection is that of
+`typed_rejection`: at Q = -0.3 pu with a constant field voltage.
 """
 
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq
+from typed_rejection import Load, recorded_rejection
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 XD, XQ, XPPD, XL = 1.8, 1.72, 0.25, 0.2  # pu
@@ -17,6 +19,12 @@ BASE, KILOVOLTS, MVA = 850.0, 13.8, 120.0  # A, kV, MVA
 LOOP = 0.02  # pu, between rising and falling branch
 READING = 1e-3  # of a reading: the class of the instruments
 SEED = 15
+UNIT = {
+    "Tpd0": 6.0, "Tppd0": 0.035, "Tpq0": 0.7, "Tppq0": 0.08, "H": 3.5, "D": 0.0, "Xd": XD,
+    "Xq": XQ, "Xpd": 0.3, "Xpq": 0.5, "Xppd": XPPD, "Xl": XL, "S10": S10, "S12": S12,
+}  # fmt: skip
+TIME = np.round(np.arange(0.0, 6.0, 0.01), 2)  # s, of the rejection
+OPENS, NOISE = 1.003, 2e-4  # s, pu
 
 
 def excess(flux):
@@ -79,11 +87,15 @@ def write(name, header, rows, formats):
 
 
 def main():
-    """Write both files."""
+    """Write the three files."""
     rng = np.random.default_rng(SEED)
     write("programme_saturation.csv", "Vt,If", saturation_rows(rng), ["{:.3f}", "{:.1f}"])
     formats = ["{:.2f}", "{:.2f}", "{:.3f}", "{:.1f}"]
     write("programme_v_curve.csv", "P,Q,Vt,If", v_curve_rows(rng), formats)
+    load = Load(0.0, -0.3)
+    signals = recorded_rejection("GENROU", UNIT, load, OPENS, TIME, NOISE, SEED)
+    rows = np.stack([TIME, signals["vt"], BASE * signals["ifd"]], axis=1)
+    write("programme_rejection.csv", "t,vt,If", rows, ["{:.2f}", "{:.5f}", "{:.1f}"])
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ TRUTH = {
 }  # fmt: skip
 FREE = ("KPR", "TE")
 TPD0 = {"start": 5.0, "min": 2.0, "max": 12.0}
-OF_MACHINE = "off-line"  # the name of its test of the machine: the step up, for T'd0
+OF_MACHINE = "off-line"  # its test of the machine in place of a rejection: a step, for T'd0
 
 
 def programme_content():
@@ -27,9 +27,10 @@ def programme_content():
         "free": {name: {**free[name], "start": TRUTH[name]} for name in FREE},
     }
     content["estimate"] = {"search": "local"}
-    del content["plant"]["sources"]["Tpd0"]
-    up = next(test for test in content["tests"] if test["name"] == "up")
-    content["tests"].append({**up, "name": OF_MACHINE, "kind": "rejection", "free": {"Tpd0": TPD0}})
+    *at_rest, _, up, down = content["tests"]
+    machine = {**up, "name": OF_MACHINE, "kind": "rejection", "free": {"Tpd0": TPD0}}
+    content["tests"] = [*at_rest, up, down, machine]
+    content["plant"]["parameters"]["Xpd"] = 0.3
     return content
 
 

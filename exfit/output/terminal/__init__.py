@@ -6,7 +6,7 @@ from exfit.output.terminal.checks import check
 from exfit.output.terminal.comparisons import comparisons, validation
 from exfit.output.terminal.fit_series import SeriesProgress, fit_series
 from exfit.output.terminal.fits import fit
-from exfit.output.terminal.programme import ProgrammeProgress, programme
+from exfit.output.terminal.programme import ProgrammeProgress, checked_step, programme
 from exfit.output.terminal.progress import LiveIterations, ProgressBar, task
 from exfit.output.terminal.ranking import ranking
 from exfit.output.terminal.records import inspection
@@ -31,6 +31,7 @@ __all__ = [
     "agreement",
     "catalogue",
     "check",
+    "checked_step",
     "comparisons",
     "console",
     "design",

@@ -7,9 +7,12 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from exfit.analysis.model_check import Check
 from exfit.estimate import Progress
+from exfit.output.terminal.checks import check
 from exfit.output.terminal.fit_series import BRIEF, progress_words
 from exfit.output.terminal.fits import fit
+from exfit.output.terminal.saturation import saturation
 from exfit.output.terminal.terminal import (
     interval,
     paragraph,
@@ -17,11 +20,14 @@ from exfit.output.terminal.terminal import (
     remarks,
     show_table,
 )
+from exfit.output.terminal.v_curve import v_curve
+from exfit.programme.checking import CheckedStep
 from exfit.programme.result import EnteredValue, FinishedTest, ProgrammeResult
 from exfit.programme.steps import ProgrammeStep
 from exfit.results.model import FitResult, Iteration
+from exfit.results.saturation import SaturationResult
+from exfit.results.v_curve import VCurve
 from exfit.results.verdict import NOT_CONVERGED
-from exfit.util.sources import TYPICAL
 from exfit.util.text import rounded
 
 KIND, VERDICT, SECONDS = 10, 27, 7  # characters of the columns behind the name
@@ -85,15 +91,19 @@ class ProgrammeProgress:
 
 def programme(console: Console, result: ProgrammeResult) -> None:
     """Show what a programme came to: the fit of its bump tests, what else its tests gave."""
+    for test in result.tests:
+        if not isinstance(test.result, FitResult):
+            console.print()
+            paragraph(console, f"{test.name} ({test.kind})", "bold")
+            _at_rest(console, test)
     if result.fit is not None:
-        console.print()
         fit(console, result.fit)
     if result.values:
         console.print()
         _values(console, result.values)
     console.print()
     for test in result.tests:
-        if not test.holds:
+        if not test.holds and isinstance(test.result, FitResult):
             remarks(console, f"{test.name}: {test.verdict}:", [test.reason], "bold red")
     for name, fault in result.failed.items():
         remarks(console, f"{name}: failed:", fault.splitlines(), "bold red")
@@ -103,13 +113,37 @@ def programme(console: Console, result: ProgrammeResult) -> None:
         paragraph(console, f"not run, interrupted: {names}; run again to go on", "bold red")
 
 
+def checked_step(console: Console, checked: CheckedStep) -> None:
+    """Show a test of a programme that is checked: its result at rest, or the check of its fit."""
+    step = checked.step
+    tests = "" if step.tests in ((), (step.name,)) else f" of {', '.join(step.tests)}"
+    paragraph(console, f"{step.name}{tests} ({step.kind})", "bold")
+    if isinstance(checked.outcome, Check):
+        check(console, checked.outcome)
+    elif checked.outcome is None:
+        paragraph(console, checked.fault, "bold red")
+    else:
+        _at_rest(console, checked.outcome)
+    console.print()
+
+
+def _at_rest(console: Console, test: FinishedTest) -> None:
+    """Show what a test at rest gives; nothing of a fit."""
+    if isinstance(test.result, SaturationResult):
+        paragraph(console, f"verdict: {test.verdict}: {test.reason}", "green")
+        saturation(console, test.result)
+    elif isinstance(test.result, VCurve):
+        v_curve(console, test.result)
+
+
 def _values(console: Console, values: Sequence[EnteredValue]) -> None:
     """Show the values that tests gave, each beside the one of the file."""
     paragraph(console, "values that tests gave to those after them", "bold")
     heads = ("value", "unit", "measured", "95 % interval", "source", "test", "in the file")
     table = plain_table(*heads, numbers=("measured",))
     for value in values:
-        given = TYPICAL if value.given is None else f"{value.given:g}, {value.given_source}"
+        known = value.given is not None
+        given = f"{value.given:g}, {value.given_source}" if known else value.given_source or "none"
         if not value.entered:
             given += ", used"
         table.add_row(
