@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import BumpTest, RecordFile, Recording, start_value
+from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
 from exfit.errors import CaseError
 from exfit.fitting.channels import channel_of, without_masked
 from exfit.fitting.detected_steps import with_detected_steps
@@ -45,13 +45,18 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     network = {} if view is case else _network_values(view)
     steps = tuple(input_steps(view, test, {**values, **network}))
     nuisances, free = nuisance_parameters(
-        prefix_of(recording), test, file, steps, alone=not references.recorded
+        prefix_of(recording),
+        test,
+        file,
+        steps,
+        alone=not references.recorded,
+        scaled=view.kind.scaled,
     )
     if any(nuisance.kind == "shift" for nuisance in nuisances):
         steps = tuple(step._replace(smooth=False) for step in steps)
     delay = start_value(file.delay) or 0.0
     beyond = max(0.0, _earliest_reading(nuisances, free) - delay)
-    recorded = {**_driving(view, test, record, driving), **references.recorded}
+    recorded = {**_driving(view, test, record, file, driving), **references.recorded}
     begin, end = span_of(test, record)
     inputs = Inputs(begin, end + beyond, steps, recorded)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
@@ -102,12 +107,27 @@ def _earliest_reading(nuisances: Sequence[Nuisance], free: Sequence[FreeParamete
 
 
 def _driving(
-    case: Case, test: BumpTest, record: Record, driving: Sequence[str]
+    case: Case, test: BumpTest, record: Record, file: RecordFile, driving: Sequence[str]
 ) -> dict[str, RecordedInput]:
-    """Return the signals of a record that drive the simulation, but for recorded references."""
+    """Return the signals of a record that drive the simulation, but for recorded references.
+
+    One whose scale is found is without any: the system multiplies it.
+    """
     if not case.kind.plays_back:
         driving = [signal for signal in driving if signal not in REFERENCES]
-    return {s: RecordedInput(record.time, deviation(test, record, s)) for s in driving}
+    return {
+        signal: RecordedInput(
+            record.time, deviation(test, record, signal) / _start_of_scale(file, signal)
+        )
+        for signal in driving
+    }
+
+
+def _start_of_scale(file: RecordFile, signal: str) -> float:
+    """Return the start of the scale of a channel where a fit finds it, by which it was read."""
+    scale = getattr(file.channels[signal], "scale", 1.0)
+    start = start_value(scale) if isinstance(scale, Unknown) else None
+    return 1.0 if start is None else start
 
 
 def _channels(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.filtering import Filtering
 from exfit.fitting.nuisances.sine import Sine
-from exfit.plants import VT0
+from exfit.plants import DRIVING_SCALE, VT0
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Simulator
 
@@ -20,7 +20,17 @@ Values = Mapping[str, float]
 
 
 NuisanceKind = Literal[
-    "at", "shift", "step", "vt0", "delay", "scale", "offset", "frequency", "cosine", "sine"
+    "at",
+    "shift",
+    "step",
+    "vt0",
+    "delay",
+    "scale",
+    "offset",
+    "driving",
+    "frequency",
+    "cosine",
+    "sine",
 ]
 
 NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
@@ -31,10 +41,15 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
     "delay": ("s", "delay of the recorder"),
     "scale": ("", "factor of a channel"),
     "offset": ("pu", "offset of a channel"),
+    "driving": ("", "factor of a channel that drives the machine"),
     "frequency": ("Hz", "frequency of a periodic disturbance"),
     "cosine": ("pu", "cosine of it, about the middle of the record"),
     "sine": ("pu", "sine of it, about the middle of the record"),
 }  # unit and meaning of each kind
+
+
+# those that are a parameter of the system
+OF_SYSTEM: Mapping[NuisanceKind, str] = {"vt0": VT0, "driving": DRIVING_SCALE}
 
 
 @dataclass(frozen=True)
@@ -171,8 +186,8 @@ class Experiment:
         """Return the parameters of the system."""
         parameters = {**values, **self.own}
         for nuisance in self.nuisances:
-            if nuisance.kind == "vt0":
-                parameters[VT0] = values[nuisance.name]
+            if nuisance.kind in OF_SYSTEM:
+                parameters[OF_SYSTEM[nuisance.kind]] = values[nuisance.name]
         return parameters
 
     def with_inputs(self, values: Values) -> Simulator:
@@ -355,8 +370,8 @@ class Experiment:
                 steps[nuisance.step] = (at, step + d)
             elif nuisance.kind in ("delay", "shift"):
                 delay += d
-            elif nuisance.kind == "vt0":
-                parameters = {**parameters, VT0: d}
+            elif nuisance.kind in OF_SYSTEM:
+                parameters = {**parameters, OF_SYSTEM[nuisance.kind]: d}
         return Direction(parameters, steps, delay)
 
     def _measured_slopes(

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, start_value
 from exfit.errors import RecordError
-from exfit.plants import VT0, initial
+from exfit.plants import DRIVING_SCALE, VT0, initial
 from exfit.records.record import Record
 from exfit.util.text import show
 
@@ -26,7 +26,8 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
         if signal in record.signals
     }
     given = {initial(name): v for name, v in case.plant.given.items() if name in kind.driving}
-    return {**levels, VT0: vt0, **given}
+    scales = {DRIVING_SCALE: 1.0} if kind.scaled else {}
+    return {**levels, VT0: vt0, **scales, **given}
 
 
 def _refuse_impossible(vt0: float, record: Record) -> None:

@@ -8,6 +8,7 @@ from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
 from exfit.plants.parts import (
+    DRIVING_SCALE,
     MACHINE,
     MEASURED,
     NETWORK,
@@ -25,6 +26,7 @@ from exfit.plants.playback import DRIVING, initial, playback
 __all__ = [
     "BREAKER",
     "DRIVING",
+    "DRIVING_SCALE",
     "EVENTS",
     "HEARD",
     "INFINITE_BUS",

@@ -5,7 +5,16 @@ from functools import cache
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.models.machines import Machine
 from exfit.plants.open_circuit import at_rest, machine_on_open_circuit
-from exfit.plants.parts import MACHINE, VT0, Names, motion, named_parameters, seconds, symbols
+from exfit.plants.parts import (
+    DRIVING_SCALE,
+    MACHINE,
+    VT0,
+    Names,
+    motion,
+    named_parameters,
+    seconds,
+    symbols,
+)
 from exfit.plants.plant import PlantKind, present
 
 OUTPUTS = ("efd", "vt", "ifd")
@@ -16,7 +25,8 @@ def machine_playback(machine: Machine) -> System:
     """Return a machine on open circuit that a recorded field voltage drives.
 
     Its input is the change of ``efd`` from the start, where it holds the parameter ``vt0``; so an
-    offset of the recorder does no harm. All per unit.
+    offset of the recorder does no harm. The parameter ``driving_scale`` multiplies that change: the
+    base of a recorder may be another. All per unit.
     """
 
     def rest(p: Signals) -> Rest:
@@ -26,12 +36,12 @@ def machine_playback(machine: Machine) -> System:
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         values, d = named_parameters(p, MACHINE, machine.sheet), Names()
         at = machine_on_open_circuit(machine, x, values)
-        efd = r["efd"] + u["efd"]
+        efd = r["efd"] + p[DRIVING_SCALE] * u["efd"]
         at.slopes(efd, d)
         return motion(d, machine.d_axis, {"efd": efd, "vt": at.vt, "ifd": at.ifd, **x})
 
     return System(
-        parameters=(*symbols(MACHINE, machine.sheet), VT0),
+        parameters=(*symbols(MACHINE, machine.sheet), VT0, DRIVING_SCALE),
         setpoints=("efd",),
         states=machine.d_axis,
         inputs=("efd",),
@@ -50,5 +60,6 @@ MACHINE_PLAYBACK = PlantKind(
     signals=OUTPUTS,
     driving=("efd",),
     required=("efd",),
+    scaled=("efd",),
     build=lambda equipment: machine_playback(present(equipment.machine)),
 )

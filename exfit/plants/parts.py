@@ -25,6 +25,7 @@ MACHINE = "machine."
 NETWORK = "network."
 STABILISER = "stabiliser."
 VT0 = "vt0"
+DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
 
 MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
 

@@ -51,7 +51,8 @@ class PlantKind:
     ``needs`` are the parts that a case gives, ``events`` what a test may change, ``signals`` what
     a record may hold. Of these ``driving`` drive the simulation in place of the plant: ``required``
     ones must be recorded, those ``required_if_used`` where the exciter uses them; ``levels`` are
-    recorded signals whose level at the start is a parameter. ``network`` is the data sheet of the
+    recorded signals whose level at the start is a parameter, ``scaled`` driving ones whose scale is
+    one. ``network`` is the data sheet of the
     network of which these values are given. ``per_unit`` says that voltages are those of a
     machine: per unit, and above zero at rest.
     """
@@ -66,6 +67,7 @@ class PlantKind:
     required: tuple[str, ...] = ()
     required_if_used: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
+    scaled: tuple[str, ...] = ()
     network: Callable[[Collection[str]], Sheet] = no_network
     per_unit: bool = True
 

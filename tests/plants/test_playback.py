@@ -104,6 +104,28 @@ def test_an_offset_of_the_recorded_field_voltage_does_no_harm(noisy, tmp_path):
         assert other.parameters[name].value == pytest.approx(found.value, rel=1e-6)
 
 
+@pytest.mark.parametrize("base", [0.4, -0.4])
+def test_the_scale_of_a_relative_field_voltage_is_found_with_the_time_constant(base, tmp_path):
+    """In pu of another base: its scale and T'd0 both show in how vt and ifd move, at no noise."""
+    with REFERENCE.open() as file:
+        header, *rows = csv.reader(file)
+    table = np.array(rows, dtype=float)
+    table[:, header.index("efd")] *= base
+    path = tmp_path / "relative.csv"
+    np.savetxt(path, table, delimiter=",", header=",".join(header), comments="", fmt="%.10f")
+    low, high = sorted((0.8 / base, 1.6 / base))
+    scale = f"{{column: efd, scale: {{start: {1.3 / base}, min: {low}, max: {high}}}}}"
+    text = MACHINE.replace("efd: efd", f"efd: {scale}")
+    text = "\n".join(
+        line for line in text.splitlines() if "S10:" not in line and "S12:" not in line
+    )
+    text = text.replace("Xl: 0.2", "Xl: 0.2, S10: 0.12, S12: 0.4")
+    result = fit(case_of(text, tmp_path, path))
+    assert result.success
+    assert result.parameters["efd.scale"].value == pytest.approx(1.0 / base, rel=1e-4)
+    assert result.parameters["machine.Tpd0"].value == pytest.approx(6.0, rel=1e-4)
+
+
 # --- the exciter alone ----------------------------------------------------------------------------
 
 

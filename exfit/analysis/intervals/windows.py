@@ -27,7 +27,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import UNDETERMINED, Uncertainty
 from exfit.inference.confidence import NORMAL
 from exfit.inference.quantiles import chi_square_tail
-from exfit.plants import MACHINE
+from exfit.plants import DRIVING_SCALE, MACHINE
 from exfit.plants.machine_playback import MACHINE_PLAYBACK
 from exfit.records.record import Record, read_only
 from exfit.records.steps import steps_of_signals
@@ -252,7 +252,8 @@ def _record_in(setup: ExperimentSetup, window: Window, values: Values) -> Record
     record, experiment = setup.record, setup.experiment
     rows = (record.time >= window.begin) & (record.time <= window.end)
     driving = experiment.with_inputs(values).inputs.recorded
-    signals = {name: driving[name].samples for name in driving}
+    scale = experiment.parameters(values).get(DRIVING_SCALE, 1.0)
+    signals = {name: scale * driving[name].samples for name in driving}
     signals |= {each.signal: experiment.measured(each, values) for each in setup.channels}
     return replace(
         record,

@@ -9,6 +9,7 @@ from exfit.plants import BREAKER, PlantKind
 from exfit.util.text import show
 
 AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
+LEVEL_OF = "vt"  # the signal whose level at rest a machine starts with
 LEVEL = "vt0"  # what it shows before that step
 
 
@@ -20,7 +21,7 @@ def nuisance_faults(
         if not value.is_section:
             continue
         yield from _value_faults(value)
-        if kind.plays_back:
+        if kind.plays_back and not _scale_of(value, kind):
             yield value.fault(f"not allowed with plant {kind.name}: the record drives it")
         elif value.at("start").text == "auto":
             yield from _automatic_faults(value.at("start"), record, has_record)
@@ -31,6 +32,12 @@ def nuisance_faults(
     delay = record.at("delay")
     if kind.plays_back and (delay.number or 0.0) != 0.0:
         yield delay.fault(f"not allowed with plant {kind.name}")
+
+
+def _scale_of(value: ContentNode, kind: PlantKind) -> bool:
+    """Return whether a value is the scale of a channel that a fit may find in a playback."""
+    *_, signal, key = value.place
+    return bool(kind.scaled) and key == "scale" and signal != LEVEL_OF
 
 
 def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:

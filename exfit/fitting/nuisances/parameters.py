@@ -1,6 +1,6 @@
 """What a fit finds about a record beside the parameters of the unit: instants, sizes, levels."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Literal
 
 from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
@@ -69,14 +69,20 @@ def _sine_names(prefix: str, file: RecordFile) -> Iterator[str]:
 
 
 def nuisance_parameters(
-    prefix: str, test: BumpTest, file: RecordFile, steps: Sequence[InputStep], alone: bool = True
+    prefix: str,
+    test: BumpTest,
+    file: RecordFile,
+    steps: Sequence[InputStep],
+    alone: bool = True,
+    scaled: Collection[str] = (),
 ) -> tuple[tuple[Nuisance, ...], tuple[FreeParameter, ...]]:
     """Return what a fit finds about a record; the names begin with ``prefix``.
 
-    ``alone`` says that nothing but the steps moves the unit.
+    ``alone`` says that nothing but the steps moves the unit; ``scaled`` are the channels that drive
+    it, whose scale is a parameter of the system.
     """
     shift = alone and shifted(test, file, steps)
-    nuisances = [*_of_steps(prefix, test, steps, shift), *_of_record(prefix, test, file)]
+    nuisances = [*_of_steps(prefix, test, steps, shift), *_of_record(prefix, test, file, scaled)]
     return tuple(nuisance for nuisance, _ in nuisances), tuple(
         _free(nuisance.name, value) for nuisance, value in nuisances
     )
@@ -98,7 +104,9 @@ def _of_steps(
         yield Nuisance(f"{prefix}{OPENING}", "shift"), test.breaker.opens
 
 
-def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[Nuisance, Unknown]]:
+def _of_record(
+    prefix: str, test: BumpTest, file: RecordFile, scaled: Collection[str] = ()
+) -> Iterator[tuple[Nuisance, Unknown]]:
     if isinstance(test.vt0, Unknown):
         yield Nuisance(f"{prefix}{VT0}", "vt0"), test.vt0
     if isinstance(file.delay, Unknown):
@@ -108,7 +116,9 @@ def _of_record(prefix: str, test: BumpTest, file: RecordFile) -> Iterator[tuple[
         for kind in kinds:
             value = getattr(channel, kind, None)
             if isinstance(value, Unknown):
-                yield Nuisance(f"{prefix}{signal}.{kind}", kind, signal=signal), value
+                driving = kind == "scale" and signal in scaled
+                name = f"{prefix}{signal}.{kind}"
+                yield Nuisance(name, "driving" if driving else kind, signal=signal), value
 
 
 def _free(name: str, value: Unknown) -> FreeParameter:
