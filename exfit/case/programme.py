@@ -168,7 +168,7 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
     if any(test.at("kind").text == SATURATION for test in tests):
         content = with_bases(content, BASES_TO_COME)
     based = ContentNode((), content).at(TESTS).entries
-    yield from _points_faults(based, kind_of(top.at("plant").content))
+    yield from _machine_faults(based, kind_of(top.at("plant").content))
     machine = (index for index, _ in tests_of_kind(content, STEADY, REJECTION))
     for inner in (
         common_content(content),
@@ -185,15 +185,15 @@ def _use_faults(tests: list[ContentNode]) -> Iterator[Fault]:
         yield bumps[0].at("use").fault("no bump test is fitted that it could validate")
 
 
-def _points_faults(tests: list[ContentNode], kind: PlantKind) -> Iterator[Fault]:
-    """Yield what contradicts itself in the tests at rest."""
+def _machine_faults(tests: list[ContentNode], kind: PlantKind) -> Iterator[Fault]:
+    """Yield what contradicts itself in the tests of the machine, or that there is none."""
     for test in tests:
-        of_machine = test.at("kind").text in (SATURATION, STEADY, REJECTION)
-        if of_machine and not kind.has_machine:
+        of_test = test.at("kind").text
+        if of_test in (SATURATION, STEADY, REJECTION) and not kind.has_machine:
             yield test.at("kind").fault(f"not allowed with plant {kind.name}: it has no machine")
-        if test.at("kind").text == SATURATION:
+        elif of_test == SATURATION:
             yield from saturation_test_faults(test)
-        elif test.at("kind").text == STEADY:
+        elif of_test == STEADY:
             yield from steady_test_faults(test)
 
 
