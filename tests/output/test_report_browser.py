@@ -41,6 +41,7 @@ CASES = (
     "several",
 )
 WIDTHS = (390, 1280)  # of a telephone and of a desk, px
+READABLE = 10.0  # px: the least size of a text
 BLANK = 0.02  # spread of the pixels, of white: a page of text and lines has ten times that
 WHEEL = -400.0  # towards the reader
 
@@ -236,11 +237,22 @@ def test_pointing_at_an_overlay_shows_its_values(opened):
     assert 1.04 < float(told["measured"]) < 1.06
 
 
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_text_of_every_figure_can_be_read(opened, width):
+    page = opened("ac1a_typical", width, scripts=False)
+    for text in page.locator("figure svg text").all():
+        size = text.evaluate(
+            "(text) => parseFloat(getComputedStyle(text).fontSize) * text.getScreenCTM().a"
+        )
+        assert size >= READABLE, text.text_content()
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_without_scripts_every_drawing_is_seen(opened, name):
     page = opened(name, scripts=False)
     drawings = page.locator("svg[role=img]").all()
-    assert len(drawings) == page.locator("figure").count() > 5
+    # the small multiples of the search lie in a figure of their own
+    assert len(drawings) == page.locator("figure:not(:has(figure))").count() > 5
     for one in drawings:
         assert one.is_visible()
         assert spread(one.screenshot()) > BLANK

@@ -32,6 +32,7 @@ CAPTIONS = {"caption": "Table", "figcaption": "Figure"}  # what each kind of cap
 CAPTION = re.compile(r"<(caption|figcaption)>")  # those of small multiples have a class
 LIBRARY = ("bokeh.min.js", "bokeh-api.min.js")
 LONG = 12  # lines of a history that a reader sees without asking for more
+MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper
 GENERATOR = '<meta name="generator" content="exfit '
 HEAD = 2000  # characters at the beginning of a page, among which it says what made it
 
@@ -144,6 +145,7 @@ def _environment() -> "Environment":
     environment.filters |= {"drawing": drawing, "command": shlex.join}
     environment.tests |= {"finite": _is_finite}
     environment.globals |= {"version": __version__, "features": LABELS, "long": LONG}
+    environment.globals |= {"most_printed": MOST_PRINTED}
     return environment
 
 
