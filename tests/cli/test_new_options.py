@@ -214,7 +214,7 @@ def test_options_that_contradict_each_other_are_refused(record, run, options, sa
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize("number", [2, 3])
 def test_three_commands_lead_from_a_long_file_to_a_report(empty_folder, run, number):
     """With no edit but the base: the intervals hold the truth, but for one that chance leaves."""
     made = programme_file(number, empty_folder)
