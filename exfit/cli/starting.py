@@ -132,6 +132,7 @@ def new(
     """
     from exfit.case.starting.bases import bases_of
     from exfit.case.starting.starting_case import starting_case
+    from exfit.case.starting.starting_tests import doubtful_bases
 
     if output is not None:
         refuse_existing(output, force)
@@ -140,6 +141,7 @@ def new(
     data = _unit(sources, folder)
     reading = RecordReading(clock, unit, sheet)
     tests = _tests(file, table, sizes, bases_of(bases), reading)
+    warn(doubtful_bases(tests))
     text = starting_case(data, tests, folder, _facts(facts))
     if is_terminal():
         text = _asked(text)

@@ -109,6 +109,12 @@ def test_a_base_that_cannot_be_is_refused(record, run, base, says):
     assert says in ran.err
 
 
+def test_a_base_far_from_the_voltage_at_rest_is_warned_of(record, new):
+    ran, _ = new("--record", record, "--base", "vt=18kV")
+    assert "Ugen (kV) rests at 0.875 times its base: is 18 the rated voltage" in ran.err
+    assert new("--record", record, "--base", "vt=15kV")[0].err == ""
+
+
 def test_what_is_open_is_named_once_with_its_line(record, new, run):
     ran, _ = new("--record", record, "--step", "up=0.05", "--step", "at-120s=0.02")
     lines = (record.parent / "case.yaml").read_text(encoding="utf-8").splitlines()

@@ -12,6 +12,7 @@ from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
 from exfit.records.steps import RecordedStep
 
+AT_REST = (0.9, 1.1)  # pu: a voltage at rest is within the limits of a machine
 LIKE = (0.9, 1.25)  # of what vt changes by: the step of a reference, as the regulator's gain is
 
 
@@ -59,6 +60,23 @@ def starting_tests(
         for k, (test, amount) in enumerate(zip(recorded, amounts, strict=True))
     ]
     return renamed(tests, recorded)
+
+
+def doubtful_bases(tests: Sequence[StartingTest]) -> list[str]:
+    """Return what is doubtful in the bases of tests: a voltage that rests far from them."""
+    low, high = AT_REST
+    doubts = []
+    for test in tests:
+        channel, base = test.inspection.channel_of("vt"), test.bases.get("vt")
+        if channel is None or base is None:
+            continue
+        level = channel.level / base.in_unit(channel.unit, channel.name)
+        if not low <= level <= high:
+            doubts.append(
+                f"{test.inspection.path}: {channel.name} rests at {level:.3g} times its base: is "
+                f"{base.value:g} the rated voltage of this unit?"
+            )
+    return list(dict.fromkeys(doubts))
 
 
 def renamed(
