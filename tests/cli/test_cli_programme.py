@@ -115,3 +115,10 @@ def test_a_programme_is_checked_with_what_its_tests_at_rest_give(run, place):
                   "fit of up, down (bump)"):  # fmt: skip
         assert words in ran.out
     assert ran.out.count("derivatives agree") == 2
+
+
+def test_the_report_says_how_the_programme_is_run_again(run, place):
+    run("run", place, *OUT)
+    report = Path("out/report.html").read_text(encoding="utf-8")
+    assert f"exfit run {place} -o out" in report
+    assert "--set" not in report.partition('id="reproduction"')[2]

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from exfit import __version__
+from exfit.programme.kept import KEY
 from exfit.results.description import GivenInPlace
 from exfit.results.model import FitResult
 
@@ -28,9 +29,10 @@ def reproduction(result: FitResult) -> Reproduction:
     versions = dict(result.versions)
     if versions.get("exfit") != __version__:
         versions["exfit that made this report"] = __version__
+    of_programme = KEY in result.inputs
     return Reproduction(
-        fit=("exfit", "fit", str(result.case)),
-        options=tuple(_options(result)),
+        fit=("exfit", "run" if of_programme else "fit", str(result.case)),
+        options=() if of_programme else tuple(_options(result)),
         versions=versions,
         inputs={
             label: (result.files.get(label, "–"), sha256) for label, sha256 in result.inputs.items()
