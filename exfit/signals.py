@@ -101,6 +101,7 @@ SIGNALS: Mapping[str, SignalRow] = {row.symbol: row for row in ROWS}
 RECORDED = tuple(row.symbol for row in ROWS if row.words)
 COMPARED = tuple(row.symbol for row in ROWS if row.noise is not None)
 OF_BUMP_TEST = ("vt", "efd", "ifd")  # what a record of a bump test mostly holds
+TERMINALS, FIELDS = ("p", "q", "vt"), ("ifd", "efd")  # what is read of a unit at rest on load
 POSITIVE_AT_REST = tuple(row.symbol for row in ROWS if row.positive)
 NOISE: Mapping[str, float] = {row.symbol: row.noise for row in ROWS if row.noise is not None}
 

@@ -16,6 +16,7 @@ from exfit.results.model import FitResult
 from exfit.results.saturation import SaturationResult
 from exfit.results.tables import table
 from exfit.results.v_curve import VCurve
+from exfit.signals import TERMINALS
 from exfit.util.files import write, write_together
 
 POINTS = "points.csv"
@@ -60,7 +61,7 @@ def points_table(result: SaturationResult | VCurve) -> str:
     if isinstance(result, SaturationResult):
         columns = {"vt": result.vt, f"ifd_{result.unit}": result.ifd, "direction": result.direction}
     else:
-        columns = {"p": result.p, "q": result.q, "vt": result.vt}
+        columns = dict(zip(TERMINALS, (result.p, result.q, result.vt), strict=True))
         for signal, reading in result.readings.items():
             columns |= {f"{signal}_measured": reading.measured}
             columns |= {f"{signal}_simulated": reading.simulated}

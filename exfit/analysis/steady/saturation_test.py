@@ -15,8 +15,9 @@ from exfit.models.machines import Machine
 from exfit.records.points import Points, read_points
 from exfit.records.units import needs_base
 from exfit.results.saturation import MeasuredValue, SaturationResult
+from exfit.signals import FIELDS
 
-DEFAULT_UNITS = MappingProxyType({"vt": "pu", "ifd": "A", "efd": "V"})
+DEFAULT_UNITS = MappingProxyType({"vt": "pu", **dict(zip(FIELDS, ("A", "V"), strict=True))})
 
 
 def curve_points(test: SaturationTest, folder: Path) -> Points:

@@ -12,7 +12,7 @@ from exfit.analysis.steady.fields_on_load import FieldMeasurement, PointsOnLoad,
 from exfit.analysis.steady.v_curve import v_curve
 from exfit.case.bounds import search_bounds
 from exfit.case.schema import FreeSection, PointColumn, SteadyTest, Unknown
-from exfit.case.schema.steady_tests import FIELDS, POINT_SIGNALS, TERMINALS
+from exfit.case.schema.steady_tests import POINT_SIGNALS
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.models.machines import Machine
@@ -20,6 +20,7 @@ from exfit.models.sheet import Parameter
 from exfit.records.points import Points, given_points, read_points
 from exfit.records.units import needs_base
 from exfit.results.v_curve import VCurve
+from exfit.signals import FIELDS, TERMINALS
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]

@@ -4,9 +4,10 @@ from collections.abc import Iterator
 
 from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
-from exfit.case.schema.steady_tests import FIELDS, POINT_SIGNALS, TERMINALS
+from exfit.case.schema.steady_tests import POINT_SIGNALS
 from exfit.case.yaml import Fault
 from exfit.records.units import needs_base
+from exfit.signals import FIELDS, TERMINALS
 from exfit.util.text import show
 
 ROW_LENGTHS = (len(POINT_SIGNALS) - 1, len(POINT_SIGNALS))  # without efd, and with it

@@ -9,9 +9,10 @@ from pydantic import AfterValidator, BeforeValidator, Field, WrapSerializer
 from exfit.case.messages import FILE_NAME
 from exfit.case.schema.plants import SaturationName
 from exfit.case.schema.values import Number, Positive, Section, Text, nothing, thawed
+from exfit.signals import FIELDS
 
 MOST_POINTS = 1000  # of a list; a longer one is a file
-CURVE_SIGNALS = ("vt", "ifd", "efd")
+CURVE_SIGNALS = ("vt", *FIELDS)
 
 if TYPE_CHECKING:
     CurveSignal = str

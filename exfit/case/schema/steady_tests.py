@@ -19,10 +19,10 @@ from exfit.case.schema.values import (
     nothing,
     thawed,
 )
+from exfit.signals import FIELDS, TERMINALS
 
 MOST_POINTS = 1000  # of a list; a longer one is a file
-POINT_SIGNALS = ("p", "q", "vt", "ifd", "efd")
-TERMINALS, FIELDS = POINT_SIGNALS[:3], POINT_SIGNALS[3:]
+POINT_SIGNALS = (*TERMINALS, *FIELDS)
 
 if TYPE_CHECKING:
     PointSignal = str

@@ -16,6 +16,7 @@ from exfit.output.terminal.terminal import (
 )
 from exfit.results.model import FittedParameter
 from exfit.results.v_curve import VCurve
+from exfit.signals import TERMINALS
 from exfit.util.text import rounded
 
 
@@ -40,7 +41,7 @@ def points_table(result: VCurve) -> Table:
         for signal in result.readings
         for words in ("measured", "simulated", "differs")
     ]
-    heads = ("point", "p", "q", "vt", *fields)
+    heads = ("point", *TERMINALS, *fields)
     table = plain_table(*heads, "", numbers=heads)
     for row in range(len(result.p)):
         cells = [f"{value:.3f}" for value in (result.p[row], result.q[row], result.vt[row])]
