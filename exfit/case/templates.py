@@ -35,7 +35,7 @@ def source_lines(sources: Mapping[str, str], indent: str) -> Iterator[str]:
 
 def as_found_lines(source: str, model: str, values: Mapping[str, float]) -> Iterator[str]:
     """Yield the section that says what was in the planner's base, by the names of the system."""
-    yield "as_found:               # in the planner's base; a report compares the fit with it"
+    yield "as_found:               # in the planner's base; a report compares it"
     yield f"  source: {json.dumps(source, ensure_ascii=False)}"
     yield f"  model: {model}"
     yield "  parameters:"
