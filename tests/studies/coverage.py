@@ -75,7 +75,8 @@ def record_of(task):
         },
     }
     if dense:
-        outcome["dense"] = dense_intervals(name, problem, search)
+        printed = {parameter: known.interval for parameter, known in parameters.items()}
+        outcome["dense"] = dense_intervals(name, problem, search, printed)
         outcome["dense_seconds"] = round(time.process_time() - began - seconds, 3)
     return name, number, outcome
 

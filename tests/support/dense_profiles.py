@@ -14,13 +14,17 @@ from exfit.fitting.parameters import UNIT
 from exfit.fitting.residuals import SideBySide
 
 CHI_SQUARE = 3.841  # of one degree of freedom, 95 %
-OVER_BOUNDS, NEAR = 9, 15  # values
+OVER_BOUNDS, NEAR, ABOUT_PRINTED = 9, 15, 15  # values
+BEYOND_PRINTED = 0.2  # of the printed interval, on either side of it
 REACH = 4.0  # standard errors about the fit, the truth and the other minima
 LIKELY = 20.0  # times the rise: minima higher than that are not followed
 
 
-def dense_intervals(name, problem, search):
-    """Return the interval of each parameter, None for a side that does not close within bounds."""
+def dense_intervals(name, problem, search, printed):
+    """Return the interval of each parameter, None for a side that does not close within bounds.
+
+    ``printed`` are the intervals to compare with: the costs are looked at about their ends, too.
+    """
     residuals, truth = problem.compressed, truth_of(name, problem)
     errors, rises = errors_and_rises(name, problem, truth)
     minima = [] if search.minima is None else [*search.minima.minima]
@@ -30,7 +34,8 @@ def dense_intervals(name, problem, search):
     low, high = residuals.bounds
     functions, descents, places = SideBySide(residuals), [], []
     for k in range(len(truth)):
-        for value in values_of(likely[:, k], errors[k], low[k], high[k]):
+        about = ends_of(printed[residuals.free[k].name], residuals.free[k], low[k], high[k])
+        for value in values_of(likely[:, k], errors[k], about, low[k], high[k]):
             at_low, at_high = low.copy(), high.copy()
             at_low[k] = at_high[k] = value
             leg = Descent(
@@ -61,15 +66,25 @@ def dense_intervals(name, problem, search):
     }
 
 
-def values_of(likely, error, low, high):
+def ends_of(interval, parameter, low, high):
+    """Return the ends of a printed interval, scaled, an open side ending at its bound."""
+    if interval is None:
+        return low, high
+    ends = [None if end is None else parameter.scaled(end) for end in interval]
+    return low if ends[0] is None else ends[0], high if ends[1] is None else ends[1]
+
+
+def values_of(likely, error, about, low, high):
     """Return the values of a parameter, scaled, at which the others are fitted anew.
 
     Those of the fit, the truth and the other minima are among them: a minimum may be narrower than
-    the distance of the others.
+    the distance of the others. So may the end of a valley, which lies ``about`` a printed end.
     """
     reach = REACH * error if np.isfinite(error) else high - low
     near = np.linspace(min(likely) - reach, max(likely) + reach, NEAR)
-    every = [*np.linspace(low, high, OVER_BOUNDS), *near, *likely]
+    more = BEYOND_PRINTED * (about[1] - about[0])
+    printed = np.linspace(about[0] - more, about[1] + more, ABOUT_PRINTED)
+    every = [*np.linspace(low, high, OVER_BOUNDS), *near, *printed, *likely]
     return np.unique(np.clip(every, low, high))
 
 
