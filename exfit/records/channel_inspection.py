@@ -36,7 +36,8 @@ class InspectedChannel:
     ``ripple`` a line in its spectrum at rest. ``remark`` says why there is no step. ``unit_from``
     is the source of the unit: file or name. The ``signal`` that it seems to be is ``sure`` or a
     guess, by what is said under ``why``; ``question`` is what must be asked about it. With
-    ``system_base`` 1 pu is that of the grid.
+    ``system_base`` 1 pu is that of the grid. With ``rejected_load`` the unit is on load until its
+    breaker opens in the record.
     """
 
     name: str
@@ -61,6 +62,7 @@ class InspectedChannel:
     why: str = ""
     question: str = ""
     system_base: bool = False
+    rejected_load: bool = False
 
     @property
     def constant(self) -> bool:

@@ -28,9 +28,10 @@ class ScaleRange:
 
 
 def is_on_load(channels: Sequence[InspectedChannel]) -> bool:
-    """Return whether a channel shows active power at rest."""
+    """Return whether a channel shows active power at rest, or the record that load is rejected."""
     power = _of(channels, "p")
-    return power is not None and shows_power(power)
+    rejected = any(channel.rejected_load for channel in channels)
+    return rejected or (power is not None and shows_power(power))
 
 
 def shows_power(power: InspectedChannel) -> bool:

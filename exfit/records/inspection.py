@@ -26,6 +26,7 @@ from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
 from exfit.records.formats.table import Table, listed, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES
+from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
 from exfit.records.steps import (
     SAME_STEP,
     RecordedStep,
@@ -43,6 +44,8 @@ REFERENCE = "vref"
 class Inspection:
     """What a file holds; ``unreadable`` says by column why it has no numbers.
 
+    ``opening`` is that of the breaker in a load rejection.
+
     ``time`` (M,) in s and ``samples``, each (M,), are those whose time increases.
     """
 
@@ -57,6 +60,7 @@ class Inspection:
     unreadable: Mapping[str, str]
     time: Array
     samples: Mapping[str, Array]
+    opening: BreakerOpening | None = None
 
     def channel_of(self, signal: str) -> InspectedChannel | None:
         """Return the channel that seems to be a signal, None without one."""
@@ -78,8 +82,15 @@ class Inspection:
     def findings(self) -> tuple[str, ...]:
         """What must be known before the record is used, in sentences."""
         of_channels = (finding for channel in self.channels for finding in channel.findings)
-        between = contradictions(self.channels, self.steps)
-        return (*_clock_findings(self), *of_channels, *between, *base_findings(self.channels))
+        opening = self.opening
+        of_reference = [step for step in self.steps if not (opening and opening.causes(step.at))]
+        return (
+            *_clock_findings(self),
+            *of_channels,
+            *rejection_findings(opening),
+            *contradictions(self.channels, of_reference),
+            *base_findings(self.channels),
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures."""
@@ -94,6 +105,7 @@ class Inspection:
             "channels": [asdict(channel) for channel in self.channels],
             "phases": [asdict(group) for group in self.phases],
             "steps": [asdict(step) for step in self.steps],
+            "breaker_opens": None if self.opening is None else asdict(self.opening),
             "unreadable": dict(self.unreadable),
             "findings": list(self.findings),
         }
@@ -129,18 +141,21 @@ def inspect(
         for name, column in samples.items()
     )
     steps = _with_sizes(steps, time, signals, channels)
+    channels = identified([_with_sizes_of(channel, steps) for channel in channels], steps, groups)
+    opening = breaker_opening(time, samples, channels)
     return Inspection(
         table.path,
         table.sha256,
         place,
         sampling,
         tuple(table.place(row) for row in sampling.backward[:PLACES_LISTED]),
-        identified([_with_sizes_of(channel, steps) for channel in channels], steps, groups),
+        tuple(replace(channel, rejected_load=opening is not None) for channel in channels),
         groups,
         steps,
         unreadable,
         time,
         samples,
+        opening,
     )
 
 

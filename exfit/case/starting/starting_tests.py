@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from exfit.case.starting.bases import Base
 from exfit.errors import ExfitError
 from exfit.records.contradictions import LARGEST_STEP, size_in_words
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
+from exfit.records.rejection import REMEDY, BreakerOpening
 from exfit.records.steps import RecordedStep
 
 AT_REST = (0.9, 1.1)  # pu: a voltage at rest is within the limits of a machine
@@ -42,8 +43,11 @@ def starting_tests(
     ``sizes`` (pu) are texts as 0.05 for all tests or up=0.05 for those whose names have that word;
     they are amounts, or have the sign of the step. Of a record without steps it is one test.
 
-    Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows.
+    Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
+    and for a record in which the breaker opens.
     """
+    if inspection.opening is not None:
+        _refuse_rejection(inspection, inspection.opening)
     recorded, given = tests_of(inspection), bases or {}
     if not recorded:
         _refuse_unused(sizes, [])
@@ -102,8 +106,10 @@ def started(
 ) -> StartingTest:
     """Return a recorded test whose steps all have an amount (pu) with the signs that vt shows.
 
-    Raises ExfitError where the record shows another one.
+    Raises ExfitError where the record shows another one, or that the breaker opens.
     """
+    if inspection.opening and any(inspection.opening.causes(step.at) for step in test.steps):
+        _refuse_rejection(inspection, inspection.opening)
     return StartingTest(
         test.name(),
         inspection,
@@ -112,6 +118,13 @@ def started(
         tuple(_sized(inspection, test, k, amount) for k in range(len(test.steps))),
         bases,
         validates,
+    )
+
+
+def _refuse_rejection(inspection: Inspection, opening: BreakerOpening) -> NoReturn:
+    raise ExfitError(
+        f"{inspection.path}: {opening.in_words}; new makes cases of bump tests: {REMEDY}; if the "
+        "file has bump tests as well, --tests gives a table of them"
     )
 
 

@@ -16,6 +16,7 @@ from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, Insp
 from exfit.records.channel_recognition import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
 from exfit.records.inspection import Inspection
+from exfit.records.rejection import POWERS, BreakerOpening
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep
 from exfit.records.units import unit_of
 from exfit.signals import COMPARED, RECORDED, SIGNALS
@@ -125,12 +126,33 @@ def weights_section(inspection: Inspection) -> list[str]:
 
 
 def bump_section(inspection: Inspection) -> list[str]:
-    """Return the lines of a ``test:`` section: the recorded reference, or steps.
+    """Return the lines of a ``test:`` section: a breaker that opens, the recorded reference, steps.
 
     The instants of steps are found by the fit; their sizes are to be filled in: vt changes by less,
     and the gain of a regulator is what makes the difference.
     """
+    if inspection.opening is not None:
+        return _rejection_sections(inspection, inspection.opening)
     return steps_section(inspection, inspection.steps, (None,) * len(inspection.steps))
+
+
+def _rejection_sections(inspection: Inspection, opening: BreakerOpening) -> list[str]:
+    """Return the lines of the sections ``plant:`` and ``test:`` of a load rejection."""
+    levels = dict.fromkeys(POWERS, FILL_IN)
+    for signal, level in opening.levels.items():
+        channel = inspection.channel_of(signal)
+        if signal in POWERS and channel is not None and channel.unit in (None, "pu"):
+            levels[signal] = number_text(level)
+    powers = ", ".join(f"{signal.upper()}: {level}" for signal, level in levels.items())
+    return [
+        "plant:",
+        commented("  type: machine-on-load", "or infinite-bus, with the exciter in service"),
+        commented(f"  network: {{{powers}}}", "pu of the machine, until the breaker opens"),
+        "test:",
+        commented(
+            "  breaker: {opens: {start: auto}}", f"{opening.at:.4f} +- {opening.error:.1g} s"
+        ),
+    ]
 
 
 def steps_section(
