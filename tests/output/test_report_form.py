@@ -9,7 +9,7 @@ from exfit import workflows
 from exfit.output.report import facts, html
 from exfit.output.report.sections import SECTIONS
 from exfit.output.report.sections.as_found import as_found
-from exfit.output.report.sections.form import form
+from exfit.output.report.sections.form import form, rated
 from exfit.output.report.sections.signatures import signatures
 from exfit.output.report.sections.usability import usability
 
@@ -138,3 +138,11 @@ def test_what_was_found_and_what_was_verified_stand_beside_each_other(unit):
     assert match.verified == unit.rmse < match.before
     assert len(view.charts) == 1
     assert answers(unit)["Model in the planner's base"].answer == "AC1A, unit.dyr, bus 101"
+
+
+def test_a_rating_may_be_several_facts():
+    assert rated({"Rated MVA": 120.0, "Plant": "A", "Rated voltage": "13.8 kV"}) == (
+        "MVA 120, voltage 13.8 kV"
+    )
+    assert rated({"Rating": "120 MVA", "Rated voltage": "13.8 kV"}) == "120 MVA"
+    assert rated({"Plant": "A"}) == "not stated"

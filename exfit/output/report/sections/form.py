@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 from exfit.models.families import family_of
 from exfit.output.report import facts
-from exfit.output.report.facts import AskedFact, answer, stated
+from exfit.output.report.facts import AskedFact, Facts, answer, stated
 from exfit.output.report.sections.usability import usability
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import PartDescription
 from exfit.results.model import FitResult
 from exfit.util.sources import NOT_STATED, by_source
-from exfit.util.text import show
+from exfit.util.text import rounded, show
 
 TYPES = {"DC": "DC commutator exciter", "AC": "alternator exciter", "ST": "static exciter"}
 MACHINE_DATA = (
@@ -46,7 +46,8 @@ def form(result: FitResult) -> tuple[FormRow, ...]:
     """Return the rows of the form for a fit (cf. NERC MOD-026-1 R2.1 and R6)."""
     about = result.about
     return (
-        *(_fact(result, "", fact, "test") for fact in (facts.PLANT, facts.UNIT, facts.RATED)),
+        *(_fact(result, "", fact, "test") for fact in (facts.PLANT, facts.UNIT)),
+        FormRow("", facts.RATED.key, rated(about), "test"),
         FormRow("R2.1.1", "Model response beside a recorded response", _responses(result), "fit"),
         _fact(result, "R2.1.2", facts.MAKER),
         _fact(result, "R2.1.2", facts.MODEL),
@@ -69,6 +70,18 @@ def form(result: FitResult) -> tuple[FormRow, ...]:
 
 def _fact(result: FitResult, cf: str, fact: AskedFact, section: str = "") -> FormRow:
     return FormRow(cf, fact.key, answer(result.about, fact), section)
+
+
+def rated(about: Facts) -> str:
+    """Return the rating, as one fact or as several whose names begin with Rated."""
+    begins = f"{facts.RATED.key} "
+    ratings = {name.removeprefix(begins): value for name, value in about.items()}
+    each = (
+        f"{name} {value if isinstance(value, str) else show(value)}"
+        for name, value in ratings.items()
+        if begins + name in about
+    )
+    return stated(about, facts.RATED) or ", ".join(each) or NOT_STATED
 
 
 def _responses(result: FitResult) -> str:
@@ -108,7 +121,7 @@ def _by_source(result: FitResult, symbols: list[str]) -> str:
     sources = {symbol: result.source_of(f"machine.{symbol}") for symbol in symbols}
     groups = by_source(symbols, sources)
     texts = (
-        f"{', '.join(f'{symbol} {show(values[symbol])}' for symbol in group)} ({_source(word)})"
+        f"{', '.join(f'{symbol} {rounded(values[symbol])}' for symbol in group)} ({_source(word)})"
         for word, group in groups.items()
     )
     return "; ".join(texts) or f"{NOT_STATED}: the model has none"
