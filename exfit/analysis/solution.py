@@ -18,6 +18,11 @@ from exfit.analysis.diagnostics import (
 )
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.intervals.determination import Determination
+from exfit.analysis.intervals.value_errors import (
+    allowing_for,
+    errors_of_values,
+    given_error_notes,
+)
 from exfit.analysis.intervals.windows import spread_over_windows, with_spread
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.analysis.other_values import as_found_of, phase_ends
@@ -29,6 +34,7 @@ from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.problem import FitProblem, robust_of
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.search import names_of_records
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Uncertainty
@@ -105,9 +111,12 @@ def analysed(
         behaviour = behaviour_of(setups, values, validated)
         as_found = as_found_of(case, [*((setup, values) for setup in setups), *validated])
         if uncertainty is not None:
-            typical = influence_of_typical_values(case, problem.compressed, best.x, uncertainty)
+            errors = errors_of_values(case, problem, best.x)
+            at = problem, best.x, names_of_records(setups)
+            wider = allowing_for(errors, uncertainty, *at)
+            typical = influence_of_typical_values(case, problem.compressed, best.x, wider)
             windows = spread_over_windows(case, setups, problem.residuals, values, uncertainty)
-            uncertainty = with_spread(uncertainty, windows)
+            uncertainty = allowing_for(errors, with_spread(uncertainty, windows), *at)
     except KeyboardInterrupt:  # what the search came to stays
         interrupted = unfinished = True
     return Analysis(
@@ -217,6 +226,8 @@ def fit_notes(
         yield from speed_notes(
             experiment.simulator.inputs, experiment.parameters(residuals.values(best.x))
         )
+    if analysis.uncertainty is not None:
+        yield from given_error_notes(analysis.uncertainty, names_of_records(setups))
     if analysis.windows is not None:
         yield analysis.windows.sentence
     yield from skipped_response_notes(comparisons)

@@ -1,17 +1,15 @@
 """Which typical values matter: what a fit would find if one of them were wrong."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.analysis.intervals.value_shifts import shifts_by_values
 from exfit.case.case import Case
-from exfit.errors import SimulationError
-from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.system import system_of
-from exfit.fitting.uncertainty import UncertaintyAnalysis, slopes_of
+from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.typical_values import DEVIATION, TypicalValue
 from exfit.simulation.kernels import parameters_used
 
@@ -37,58 +35,21 @@ def influence_of_typical_values(
 ) -> dict[str, TypicalValue]:
     """Return what each typical value that is not 0 would move, if it were DEVIATION larger.
 
-    At the minimum theta (N,) the gradient stays zero, so that to first order the parameters move by
-    -(J'J)^-1 J' dr/dv times the deviation of v: one Jacobian with a column more for each of these
-    values gives both. A parameter on a bound stays there. Nothing where a derivative is not finite.
-
-    Source: the implicit function theorem on the gradient, with the Gauss-Newton matrix.
+    To first order, by `shifts_by_values`: nothing where a derivative is not finite.
     """
     typical = {name: value for name, value in typical_values_used(case).items() if value}
     if not typical:
         return {}
-    jacobian = _in_own_units(residuals, theta, typical)
-    if jacobian is None:
+    deviations = {name: DEVIATION * value for name, value in typical.items()}
+    shifts = shifts_by_values(residuals, theta, deviations)
+    if shifts is None:
         return {}
-    count, values = len(residuals.free), residuals.values(theta)
-    deviations = DEVIATION * np.array([*typical.values()])
-    moving = np.array([free.bound(values[free.name]) is None for free in residuals.free])
-    shifts = np.zeros((count, len(typical)))
-    own, of_typical = jacobian[:, :count][:, moving], jacobian[:, count:] * deviations
-    shifts[moving] = -_least_squares(own, of_typical)
     names = [free.name for free in residuals.free]
     half_widths = _half_widths(residuals, uncertainty)
     return {
         name: _typical_value(value, dict(zip(names, column.tolist(), strict=True)), half_widths)
         for (name, value), column in zip(typical.items(), shifts.T, strict=True)
     }
-
-
-def _least_squares(matrix: Array, right: Array) -> Array:
-    """Return X (N, K) with the least norm of matrix (M, N) X - right (M, K), of small columns too.
-
-    Source: Golub & Van Loan 2013, section 5.3.
-    """
-    triangle = np.linalg.qr(np.hstack([matrix, right]), mode="r")
-    own, other = np.split(triangle, [matrix.shape[1]], axis=1)
-    size = np.linalg.norm(own, axis=0)
-    size[size == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(own / size, other)[0] / size[:, None])
-
-
-def _in_own_units(residuals: Residuals, theta: Array, typical: Mapping[str, float]) -> Array | None:
-    """Return the Jacobian by the free parameters and typical values, None where not finite."""
-    added = [
-        FreeParameter(name, value, -np.inf, np.inf, logarithmic=False)
-        for name, value in typical.items()
-    ]
-    fixed = {name: value for name, value in residuals.fixed.items() if name not in typical}
-    extended = replace(residuals, free=[*residuals.free, *added], fixed=fixed, counter=None)
-    point = np.array([*theta, *(free.scaled(free.start) for free in added)])
-    try:
-        jacobian = extended.exact(point) / slopes_of(extended, point)
-    except SimulationError:
-        return None
-    return jacobian if np.isfinite(jacobian).all() else None
 
 
 def _half_widths(residuals: Residuals, uncertainty: UncertaintyAnalysis) -> dict[str, float]:

@@ -57,7 +57,8 @@ class Case:
     (``from_file`` is false) ``path`` is the folder of its files and the name that messages use.
     ``given_records`` holds, by name, the records that were given as arrays instead of files,
     ``given_values`` the values of parameters that were given in place of those of the sections,
-    ``given_sources`` where values that were given beside the case come from.
+    ``given_sources`` where values that were given beside the case come from, ``given_std_errors``
+    their standard errors.
     """
 
     path: Path
@@ -82,6 +83,7 @@ class Case:
     given_records: Mapping[str, Record] = field(default_factory=dict)
     given_values: Mapping[str, GivenValue] = field(default_factory=dict)
     given_sources: Mapping[str, str] = field(default_factory=dict)
+    given_std_errors: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the name, what is studied, and the free parameters, in one line."""
@@ -313,6 +315,22 @@ class Case:
         for name in self.ties.order:
             sources[name] = least_certain(sources[used] for used in self.ties.by_name[name].names)
         return sources
+
+    def std_errors(self) -> dict[str, float]:
+        """Return the standard errors of given values, as the system names them.
+
+        What is free or follows others has none, nor what was given in place of a value of the case
+        without an error of its own.
+        """
+        std_errors: dict[str, float] = {}
+        for part in self.parts.all:
+            stated: Mapping[str, float] = _at(self, part.std_errors)
+            own = {*part.symbols, *(stated if part.kind == "exciter" else ())}  # with helpers
+            std_errors |= {part.prefix + name: std for name, std in stated.items() if name in own}
+        kept = {name: std for name, std in std_errors.items() if name not in self.given_values}
+        others = {*self.ties.by_name, *self._free_as_given()}
+        every = {**kept, **self.given_std_errors}
+        return {name: std for name, std in every.items() if name not in others}
 
     def typical(self) -> tuple[str, ...]:
         """Return the parameters that keep a typical value, as the system names them."""

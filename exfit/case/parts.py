@@ -54,6 +54,11 @@ class Part:
     check: Callable[[Mapping[str, float]], Contradictions] = field(compare=False)
 
     @property
+    def std_errors(self) -> Place:
+        """Where the file gives the standard errors of its values."""
+        return (*self.sources[:-1], "std_errors")
+
+    @property
     def symbols(self) -> tuple[str, ...]:
         """Its parameters by symbol."""
         return tuple(row.symbol for row in self.sheet)

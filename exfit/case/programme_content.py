@@ -138,7 +138,9 @@ def _with_free(plant: Content, free: Content) -> Content:
     """Return a plant with free data of the machine in place of fixed ones."""
     given = plant["parameters"]
     kept = _without(given, free) if isinstance(given, dict) else given
-    return {**plant, "parameters": kept, "free": free}
+    std_errors = plant.get("std_errors")
+    others = {"std_errors": _without(std_errors, free)} if isinstance(std_errors, dict) else {}
+    return {**plant, **others, "parameters": kept, "free": free}
 
 
 def _places_of_recording(place: Place, index: int) -> dict[Place, Place | None]:

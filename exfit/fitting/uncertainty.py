@@ -51,6 +51,16 @@ class Sensitivity(NamedTuple):
     moved: Mapping[str, Array]
 
 
+class GivenError(NamedTuple):
+    """The standard error of a value that was given, and by how much it moves each parameter.
+
+    To first order, in the unit of the parameter.
+    """
+
+    std_error: float
+    shifts: Mapping[str, float]
+
+
 @dataclass(frozen=True, eq=False)
 class UncertaintyAnalysis:
     """Confidence and identifiability at the solution.
@@ -61,6 +71,8 @@ class UncertaintyAnalysis:
     go, ``tied_to_bounds`` those of them that one on a bound decides, with that one; ``rises`` is by
     how much the cost rises from its minimum to the ends of each profile's interval, empty where
     that is not stored; ``by_few_samples`` says of which instants one or two samples decide.
+    Standard errors and intervals allow for ``given_errors``, those of given values by name; all
+    else is by the records alone, the correlations and the covariance too.
     """
 
     DERIVED: ClassVar = {"sentences": "sentences"}
@@ -74,6 +86,11 @@ class UncertaintyAnalysis:
     rises: Mapping[str, float] = field(default_factory=dict, metadata=IN_FILE)
     tied_to_bounds: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     by_few_samples: Mapping[str, str] = field(default_factory=dict)
+    given_errors: Mapping[str, GivenError] = field(default_factory=dict)
+
+    def variance_given(self, name: str) -> float:
+        """Return what the errors of given values add to the variance of a parameter."""
+        return sum(error.shifts[name] ** 2 for error in self.given_errors.values())
 
     @property
     def open(self) -> tuple[str, ...]:

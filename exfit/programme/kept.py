@@ -40,7 +40,11 @@ def key_of(step: ProgrammeStep, programme: Programme, values: tuple[EnteredValue
 
     ``values`` are those that the tests before gave. Raises ExfitError for a file that is missing.
     """
-    entered = {value.name: [value.value, value.source] for value in values if value.entered}
+    entered = {
+        value.name: [value.value, value.std_error, value.source]
+        for value in values
+        if value.entered
+    }
     content = {
         "exfit": __version__,
         "content": programme.content_of(step.name),

@@ -44,6 +44,12 @@ class EnteredValue:
         return (high - low) / ERRORS_IN_INTERVAL
 
     @property
+    def std_error(self) -> float:
+        """The standard error that later tests allow for: by the wider side of the interval."""
+        low, high = self.interval
+        return 2.0 * max(self.value - low, high - self.value) / ERRORS_IN_INTERVAL
+
+    @property
     def warning(self) -> str:
         """What to look into, in a sentence; "" where nothing contradicts the value."""
         if not self.excluded or self.given is None:

@@ -47,7 +47,9 @@ def values_given(test: FinishedTest, programme: Programme) -> Iterator[EnteredVa
 
 
 def with_values(case: Case, values: Values) -> Case:
-    """Return a case with what the tests before it gave; a free parameter starts from it.
+    """Return a case with what the tests before it gave, and how uncertain that is.
+
+    A free parameter starts from it.
 
     Raises CaseError where a value contradicts others, or lies outside the bounds of a free one.
     """
@@ -62,7 +64,8 @@ def with_values(case: Case, values: Values) -> Case:
         name: given._replace(source=f"test {last[name].test}") if name in last else given
         for name, given in changed.given_values.items()
     }
-    return replace(changed, given_values=by_test)
+    std_errors = {name: value.std_error for name, value in last.items()}
+    return replace(changed, given_values=by_test, given_std_errors=std_errors)
 
 
 def bases_of(values: Values) -> dict[str, tuple[float, str]]:

@@ -121,6 +121,42 @@ def test_all_faults_of_sources_are_reported_together():
     }
 
 
+def test_standard_errors_are_those_of_given_values():
+    errors = {
+        "plant": {"Tpd0": 0.1, "S10": 0.004, "X": 0.01},
+        "parameters": {"VRMAX": 0.2, "TE0": 0.1},
+    }
+    errors["stabiliser"] = {"K_T": 0.5}
+    case = Case.from_dict(changed(**{key: {"std_errors": own} for key, own in errors.items()}))
+    assert case.std_errors() == {
+        "machine.Tpd0": 0.1, "machine.S10": 0.004, "network.X": 0.01, "VRMAX": 0.2, "TE0": 0.1,
+        "stabiliser.K_T": 0.5,
+    }  # fmt: skip
+    other = case.with_values({"machine.Tpd0": 6.5, "VRMAX": 14.0}, "file").std_errors()
+    assert "machine.Tpd0" not in other  # another value, of whose error nothing is said
+    assert other["VRMAX"] == 0.2  # the same value
+
+
+def test_all_faults_of_standard_errors_are_reported_together():
+    plant = {"Tpd0": 0.0, "Xl": 0.01, "Xq": 0.1, "Xpp": 0.1, "H": 0.2, "Xd": "5 %"}
+    exciter = {"VRMIN": 0.1, "KC": 0.1, "KFF": 0.1, "KA": 5.0}
+    with pytest.raises(CaseError) as caught:
+        Case.from_dict(changed(plant={"std_errors": plant}, parameters={"std_errors": exciter}))
+    faults = dict(line.split(": ", 2)[1:] for line in str(caught.value).splitlines())
+    assert faults == {
+        "plant.std_errors.Tpd0": "0 is not above 0",
+        "plant.std_errors.Xl": "standard error of a value that the case does not give",
+        "plant.std_errors.Xq": "follows others by =0.95*machine.Xd: no error of its own",
+        "plant.std_errors.Xpp": "not given; did you mean Xppd?",
+        "plant.std_errors.H": "is free: the fit finds its standard error; see prior",
+        "plant.std_errors.Xd": "'5 %' is not a number",
+        "parameters.std_errors.VRMIN": "follows others by =-VRMAX: no error of its own",
+        "parameters.std_errors.KC": "standard error of a value that the case does not give",
+        "parameters.std_errors.KFF": "not given; did you mean KF?",
+        "parameters.std_errors.KA": "is free: the fit finds its standard error; see prior",
+    }
+
+
 def test_values_given_beside_the_case_bring_their_sources():
     case = Case.from_dict(CONTENT)
     values = {"KE": 1.0, "KC": 0.3, "machine.Tpd0": 6.5, "VRMAX": 14.0}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programmes import OF_MACHINE, programme_content, written
+from programmes import OF_MACHINE, TRUTH, programme_content, written
 
 import exfit
 from exfit import workflows
@@ -84,6 +84,32 @@ def test_the_intervals_of_the_example_hold_the_unit_that_it_was_made_with(whole)
     assert {name for name, at in truth.items() if values[name][0] < at < values[name][1]} == {
         *truth
     }
+
+
+def test_the_errors_of_what_a_test_measured_enter_the_later_fits(whole):
+    """By the wider side of its interval at 95 %, which is 1.96 standard errors."""
+    entered = {value.name: value for value in whole.values}
+    given = whole.fit.knowledge.given_errors
+    assert {*given} == {"machine.S10", "machine.S12", "machine.Xd", "machine.Tpd0"}
+    for name, error in given.items():
+        value = entered[name]
+        sides = np.abs(np.array(value.interval) - value.value)
+        assert error.std_error == pytest.approx(np.max(sides) / 1.96)
+    of_machine = whole.results[OF_MACHINE].knowledge.given_errors
+    assert {*of_machine} == {"machine.S10", "machine.S12", "machine.Xd"}
+    for name, parameter in whole.fit.parameters.items():
+        low, high = parameter.interval
+        assert low < TRUTH[name] < high
+        shifts = [abs(error.shifts[name]) for error in given.values()]
+        assert high - low > 3.9 * max(shifts)
+
+
+def test_a_standard_error_of_the_file_is_not_that_of_what_a_test_fits(folder):
+    content = programme_content()
+    content["plant"]["std_errors"] = {"Tpd0": 0.2, "Xq": 0.1}
+    programme = load_programme(written(content, folder, "errors.yaml"))
+    assert programme.rejection_case(OF_MACHINE).std_errors() == {"machine.Xq": 0.1}
+    assert programme.bump_case().std_errors() == {"machine.Tpd0": 0.2, "machine.Xq": 0.1}
 
 
 def test_the_bump_tests_are_one_fit_with_its_validation(whole):

@@ -7,6 +7,7 @@ from pydantic import BaseModel, Discriminator, Field, Tag
 
 from exfit.case.schema.values import (
     STATED,
+    STD_ERRORS,
     Count,
     FreeSection,
     Frozen,
@@ -16,6 +17,7 @@ from exfit.case.schema.values import (
     Positive,
     Section,
     Sources,
+    StdErrors,
     nothing,
 )
 from exfit.util.strategies import (
@@ -51,6 +53,7 @@ class Parameters(Section):
         default_factory=nothing, description="Parameters that are fitted."
     )
     sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
 
 
 class Tolerance(Section):

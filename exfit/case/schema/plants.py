@@ -7,12 +7,14 @@ from pydantic import Field
 
 from exfit.case.schema.values import (
     STATED,
+    STD_ERRORS,
     FreeSection,
     Frozen,
     Given,
     Number,
     Section,
     Sources,
+    StdErrors,
     Text,
     nothing,
 )
@@ -51,6 +53,7 @@ class OpenCircuit(PlantSection):
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
     sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
 
 
 class InfiniteBus(PlantSection):
@@ -65,6 +68,7 @@ class InfiniteBus(PlantSection):
         "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
     )
     sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
 
     @property
     def given(self) -> Mapping[str, float]:
@@ -86,6 +90,7 @@ class MachineOnLoad(PlantSection):
         description="P and Q until the breaker opens, pu on the base of the machine."
     )
     sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
 
     @property
     def given(self) -> Mapping[str, float]:
@@ -116,6 +121,7 @@ class MachinePlayback(PlantSection):
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
     sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
 
 
 class NoPlant(PlantSection):
@@ -145,6 +151,7 @@ class Stabiliser(Section):
         default_factory=nothing, description="Parameters that are fitted."
     )
     sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
 
 
 WholePlant = type[OpenCircuit] | type[InfiniteBus] | type[MachineOnLoad]

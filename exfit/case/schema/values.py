@@ -50,6 +50,13 @@ STATED = Field(
     description=f"Where the value of each parameter comes from; {NOT_STATED} by default.",
 )
 
+StdErrors = Frozen[Positive]
+STD_ERRORS = Field(
+    default_factory=nothing,
+    description="Standard error of each given value that is not exact, in its own unit, as from a "
+    "test report; the intervals of a fit allow for it.",
+)
+
 
 def _is_tie(value: Any) -> str:
     return "[tie]" if is_tie(value) else "[number]"
