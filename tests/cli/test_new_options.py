@@ -183,8 +183,11 @@ def test_the_data_of_a_planners_file_are_starts_and_fixed_values(record, new):
     assert content["parameters"]["free"]["KA"]["start"] == 766.0
     assert content["plant"]["parameters"]["Xd"] == 1.8
     assert "sources" not in content["plant"]
+    assert content["as_found"]["source"] == "unit.dyr, bus 101, machine 1"
+    assert content["as_found"]["parameters"]["KA"] == 766.0
     _, other = new("--record", record, "--dyr", SAMPLES / "unit.dyr", model="SEXS")
     assert other["model"] == "SEXS"
+    assert other["as_found"]["model"] == "AC1A"
     assert other["plant"]["parameters"]["Xd"] == 1.8
     assert other["parameters"]["free"]["K"]["start"] == 200.0
 

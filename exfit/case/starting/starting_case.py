@@ -56,6 +56,7 @@ def starting_case(
         *_parameters(unit.exciter),
         *weights_section(first),
         *validations,
+        *unit.as_found,
     ]
     return "\n".join(lines) + "\n"
 

@@ -32,12 +32,16 @@ class PartData:
 
 @dataclass(frozen=True)
 class UnitData:
-    """The exciter, behind the ``name`` that the case gives it, its machine and its stabiliser."""
+    """The exciter, behind the ``name`` that the case gives it, its machine and its stabiliser.
+
+    ``as_found``: lines of the case on what was in the planner's base.
+    """
 
     name: str
     exciter: PartData
     machine: PartData
     stabiliser: PartData | None = None
+    as_found: tuple[str, ...] = ()
 
 
 def machine_of_case(path: Path) -> PartData:

@@ -38,11 +38,11 @@ def case_text(unit: Unit, file: str) -> str:
     lines += [*TEST.splitlines(), "parameters:"]
     lines += [commented("  fixed:", "what a fit shall find goes under free")]
     lines += [*_values(unit.exciter, "    "), *_sources(unit.exciter)]
-    lines += _as_found(unit, file)
+    lines += as_found(unit, file)
     return "\n".join(lines) + "\n"
 
 
-def _as_found(unit: Unit, file: str) -> Iterator[str]:
+def as_found(unit: Unit, file: str) -> Iterator[str]:
     """Yield what the file holds of the unit, for the report to compare with."""
     values = {
         _prefix(part) + row.symbol: part.values[row.symbol]

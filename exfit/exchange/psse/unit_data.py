@@ -1,6 +1,7 @@
 """The data of a new case from a unit of a PSS/E dynamics file."""
 
 from exfit.case.starting.starting_unit import PartData, UnitData
+from exfit.exchange.psse.import_case import as_found
 from exfit.exchange.psse.unit import Unit, UnitPart
 from exfit.util.sources import TYPICAL
 
@@ -12,7 +13,8 @@ def unit_data(unit: Unit, file: str) -> UnitData:
     """
     stabiliser = None if unit.stabiliser is None else _part(unit.stabiliser, file)
     exciter = _part(unit.exciter, file)
-    return UnitData(exciter.model.name, exciter, _part(unit.machine, file), stabiliser)
+    found = tuple(as_found(unit, file))
+    return UnitData(exciter.model.name, exciter, _part(unit.machine, file), stabiliser, found)
 
 
 def _part(part: UnitPart, file: str) -> PartData:
