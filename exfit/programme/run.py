@@ -19,7 +19,7 @@ from exfit.plants import MACHINE
 from exfit.programme.kept import KEY, Keep, keep, key_of, result_kept
 from exfit.programme.result import EnteredValue, FinishedTest, ProgrammeResult, StepResult
 from exfit.programme.steps import ProgrammeStep, steps_of
-from exfit.programme.values import bases_of, values_given, with_values
+from exfit.programme.values import bases_of, errors_of_bases, values_given, with_values
 from exfit.records.reading import file_hash
 from exfit.results.model import FitResult, Iteration
 
@@ -190,9 +190,12 @@ def _result_of(
     if isinstance(section, SaturationTest):
         return saturation(section, curve_points(section, programme.folder), machine)
     if isinstance(section, SteadyTest) and machine is not None:
-        own = with_values(shared, values).values()
+        case = with_values(shared, values)
+        own, errors = case.values(), {**case.std_errors(), **errors_of_bases(values)}
         data = {row.symbol: own[MACHINE + row.symbol] for row in machine.sheet}
-        return steady(section, points_of(section, programme.folder), machine, data)
+        std_errors = {name.removeprefix(MACHINE): error for name, error in errors.items()}
+        points = points_of(section, programme.folder)
+        return steady(section, points, machine, data, std_errors)
     case = with_values(case_of(programme, step), values)
     return workflows.fit(case, progress=progress, search_progress=progress)
 

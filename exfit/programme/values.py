@@ -77,6 +77,15 @@ def bases_of(values: Values) -> dict[str, tuple[float, str]]:
     }
 
 
+def errors_of_bases(values: Values) -> dict[str, float]:
+    """Return the standard errors of the bases that the tests gave, by their names."""
+    return {
+        value.name: value.std_error
+        for value in values
+        if value.name.endswith(BASE) and value.entered
+    }
+
+
 def _measured(test: FinishedTest) -> Iterator[EnteredValue]:
     result = test.result
     if isinstance(result, SaturationResult):

@@ -183,7 +183,7 @@ def test_a_value_of_a_better_source_stays_and_what_excludes_it_is_reported(again
     assert not xd.entered
     assert result.fit.machine["Xd"] == 1.9
     assert result.fit.sources["machine.Xd"] == "maker"
-    assert result.warnings[0].startswith("machine.Xd: 1.9 in the file (maker) lies outside 1.79")
+    assert result.warnings[0].startswith("machine.Xd: 1.9 in the file (maker) lies outside 1.77")
 
 
 def test_a_base_that_the_file_gives_stays(again):

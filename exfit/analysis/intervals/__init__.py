@@ -1,1 +1,1 @@
-"""The intervals of a fit: by linear theory, of profiles and of their hulls over the minima."""
+"""The intervals of a fit: by linear theory, of profiles, their hulls, and with given errors."""

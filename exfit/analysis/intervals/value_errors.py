@@ -1,6 +1,6 @@
 """Intervals that allow for the errors of the values that a fit takes as given."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import hypot, sqrt
 from typing import NamedTuple
@@ -82,12 +82,7 @@ def allowing_for(
     for parameter, x, size in zip(problem.residuals.free, theta, sizes, strict=True):
         own, name = uncertainty.confidence.parameters[parameter.name], parameter.name
         shift = hypot(*(error.shifts[name] for error in given.values()))
-        record = own.std_error if own.method == "linear" else None
-        share = hypot(record or 0.0, shift) / float(size)
-        widened[name] = _widened(own, parameter, float(x), shift, share <= UNDETERMINED)
-        if own.interval is not None and share > UNDETERMINED:
-            why = f"is not determined for the errors of {listed([*given])}: standard error"
-            widened[name] = replace(widened[name], why=f"{why} {digits(100.0 * share)} %")
+        widened[name] = widened_by(shift, own, parameter, float(x), float(size), [*given])
     together = replace(uncertainty, given_errors=given)
     return with_parameters(together, widened)
 
@@ -114,6 +109,27 @@ def given_error_notes(
         times = f"the standard error of {widest} is {digits(ratios[widest])} times as large"
         text += f": {times}, most by {value}" if len(given) > 1 else f": {times}"
     yield text
+
+
+def widened_by(
+    shift: float,
+    own: Uncertainty,
+    parameter: FreeParameter,
+    scaled: float,
+    size: float,
+    names: Sequence[str],
+) -> Uncertainty:
+    """Return what is known of a parameter, widened by a shift for the errors of values.
+
+    ``size`` is what counts as 100 %; ``names`` are those of the values.
+    """
+    linear = own.std_error if own.method == "linear" else None
+    share = hypot(linear or 0.0, shift) / size
+    widened = _widened(own, parameter, scaled, shift, share <= UNDETERMINED)
+    if own.interval is None or share <= UNDETERMINED:
+        return widened
+    why = f"is not determined for the errors of {listed(names)}: standard error"
+    return replace(widened, why=f"{why} {digits(100.0 * share)} %")
 
 
 def _widened(

@@ -33,7 +33,17 @@ def shifts_by_values(
     count, values = len(residuals.free), residuals.values(theta)
     own, of_values = jacobian[:, :count], jacobian[:, count:] * [*deviations.values()]
     moving = np.array([free.bound(values[free.name]) is None for free in residuals.free])
-    shifts = np.zeros((count, len(deviations)))
+    return first_order_shifts(own, of_values, moving, bounds_hold)
+
+
+def first_order_shifts(
+    own: Array, of_values: Array, moving: NDArray[np.bool_], bounds_hold: bool
+) -> Array:
+    """Return by how much changes of the residuals (M, K) move each parameter, (N, K).
+
+    ``own`` (M, N) is the Jacobian by the parameters, ``moving`` (N,) those that lie on no bound.
+    """
+    shifts = np.zeros((own.shape[1], of_values.shape[1]))
     if not (bounds_hold or moving.all()):
         shifts = -_least_squares(own, of_values)
     shifts[moving] = -_least_squares(own[:, moving], of_values)

@@ -22,6 +22,7 @@ from exfit.inference import (
     identifiability,
     rises,
 )
+from exfit.inference.wording import listed
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -97,12 +98,16 @@ class PointProblem:
 
 @dataclass(frozen=True, eq=False)
 class FittedPoints:
-    """The best values of a fit of points, and how well these determine them."""
+    """The best values of a fit of points, and how well these determine them.
+
+    The intervals allow for the errors of the given values that ``allowed_for`` names.
+    """
 
     values: dict[str, float]
     result: estimate.Result
     confidence: Confidence
     identifiability: Identifiability
+    allowed_for: tuple[str, ...] = ()
 
     def scatter(self, signal: str) -> float:
         """Return the standard deviation of a signal's weighted errors, less what was fitted."""
@@ -126,8 +131,11 @@ class FittedPoints:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is remarkable about the noise of the points, in words."""
-        return self.confidence.sentences
+        """What is remarkable about the noise of the points and the intervals, in words."""
+        if not self.allowed_for:
+            return self.confidence.sentences
+        errors = f"the intervals allow for the errors of {listed(self.allowed_for)} (given)"
+        return (*self.confidence.sentences, errors)
 
 
 def fit_points(problem: PointProblem, search: PointProblem) -> FittedPoints:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,10 +44,17 @@ def points_of(test: SteadyTest, folder: Path) -> Points:
     )
 
 
-def steady(test: SteadyTest, points: Points, machine: Machine, data: Values) -> VCurve:
+def steady(
+    test: SteadyTest,
+    points: Points,
+    machine: Machine,
+    data: Values,
+    std_errors: Values = MappingProxyType({}),
+) -> VCurve:
     """Return the points of a test beside the machine's model, fitted where the test asks for it.
 
-    ``data`` has a value for each symbol of the machine's sheet. Raises ExfitError for input that
+    ``data`` has a value for each symbol of the machine's sheet, ``std_errors`` the standard errors
+    of some of them and of bases, for which the intervals allow. Raises ExfitError for input that
     cannot be used.
     """
     columns = {signal: column_of(test, points, signal) for signal in points.columns}
@@ -62,7 +70,7 @@ def steady(test: SteadyTest, points: Points, machine: Machine, data: Values) -> 
     rows = {row.symbol: row for row in machine.sheet}
     free = [free_parameter(symbol, free, rows[symbol]) for symbol, free in test.free.items()]
     limit = None if test.accept is None else test.accept.rmse
-    return v_curve(machine, data, PointsOnLoad(p, q, vt, measurements), free, limit)
+    return v_curve(machine, data, PointsOnLoad(p, q, vt, measurements), free, limit, std_errors)
 
 
 def given_base(column: PointColumn) -> float:

@@ -1,12 +1,14 @@
 """V-curves: the field current that holds points on load, measured beside the machine's model."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.steady.field_on_load import field_on_load
 from exfit.analysis.steady.fields_on_load import FieldsOnLoad, PointsOnLoad, base_of, weight_of
+from exfit.analysis.steady.point_errors import allowing_for_errors
 from exfit.analysis.steady.point_fit import FittedPoints
 from exfit.analysis.steady.v_curve_causes import causes_of
 from exfit.errors import RecordError
@@ -33,6 +35,7 @@ def v_curve(
     points: PointsOnLoad,
     free: Sequence[FreeParameter] = (),
     limit: float | None = None,
+    std_errors: Values = MappingProxyType({}),
 ) -> VCurve:
     """Return the points beside the machine's model, after a fit of its ``free`` data if there are.
 
@@ -43,6 +46,8 @@ def v_curve(
         free: machine data by symbol, which the points are fitted for beside the free bases.
         limit: largest rms of the residuals of a field signal that counts as a match, pu; None:
             LARGEST_SHARE of its rms, or LARGEST_NOISES times its noise where that is larger.
+        std_errors: of machine data by symbol, and of bases such as ``ifd.base`` (in their unit):
+            the intervals allow for them.
 
     Raises RecordError for a point at which the model has no rest.
 
@@ -52,7 +57,9 @@ def v_curve(
     _refuse_no_rest(machine, data, points)
     fields = FieldsOnLoad(machine, points)
     problem = fields.problem(data, free)
-    fit = fields.fit(problem) if problem.free else None
+    fit = None
+    if problem.free:
+        fit = allowing_for_errors(problem, fields.fit(problem), std_errors)
     values = problem.given if fit is None else fit.values
     readings = {
         signal: _reading_of(signal, fields, values, fit, limit) for signal in points.measurements

@@ -56,6 +56,35 @@ def test_a_fit_finds_reactances_and_base_within_their_intervals():
     assert curve.machine_data["Xd"] == curve.parameters["Xd"].value
 
 
+def test_the_intervals_allow_for_the_errors_of_values_and_bases_that_were_given():
+    """By what fits with these values off give; 2 % for what curves over a standard error."""
+    errors, wanted = {"S12": 0.02, "ifd.base": 5.0}, [free("Xd", 1.2, 0.4, 4.0)]
+
+    def log_xd(s12=0.0, base=0.0):
+        data = TRUTH | {"S12": TRUTH["S12"] + s12}
+        fitted = v_curve(SALIENT, data, points(BASE + base), wanted)
+        return np.log(fitted.parameters["Xd"].value)
+
+    moved = [
+        (log_xd(s12=0.02) - log_xd(s12=-0.02)) / 2.0,
+        (log_xd(base=5.0) - log_xd(base=-5.0)) / 2.0,
+    ]
+    alone = v_curve(SALIENT, TRUTH, points(), wanted)
+    wider = v_curve(SALIENT, TRUTH, points(), wanted, std_errors=errors)
+    value = alone.parameters["Xd"].value
+    assert wider.parameters["Xd"].value == value
+    sides, widened = (
+        np.abs(np.log(np.array(curve.parameters["Xd"].interval) / value))
+        for curve in (alone, wider)
+    )
+    assert widened == pytest.approx(np.hypot(sides, 1.96 * np.hypot(*moved)), rel=0.02)
+    assert np.all(widened > 1.5 * sides)
+    assert "the intervals allow for the errors of S12 and ifd.base (given)" in wider.notes
+    own = v_curve(SALIENT, TRUTH, points(), wanted, std_errors={"Xd": 0.1, "H": 0.5})
+    assert own.parameters["Xd"] == alone.parameters["Xd"]  # free, or without effect at rest
+    assert own.notes == alone.notes
+
+
 def test_points_without_power_do_not_determine_the_q_axis():
     curve = v_curve(SALIENT, TRUTH, points(rows=slice(5)), [free("Xq", 0.7, 0.3, 1.2)])
     assert not curve.parameters["Xq"].determined
