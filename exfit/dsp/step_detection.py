@@ -25,11 +25,19 @@ TIMES_OF_STEP = 3.0  # what it takes: then the response is near its rest
 WANDER = 2.5  # times what it moves at rest in the time of a step: less is no step
 LONGEST_REST = 500  # samples before a step, in which its scatter is looked at
 PEAK_PASSED = 0.3  # of a first move: where so much of it is lost, its peak is passed
+PULSE_REACHED = 0.9  # of its first move: there a pulse stands
+STANDS_FOR = 6.0  # times what its return takes to begin: so long a pulse stands at least
+SHORTEST_PULSE = 1.0  # s: a field voltage stands at its limit for less, and then returns
+MOST_RETURNS = 3  # moves that leave no lasting change, beside pulses: with more a channel wanders
 SPIKE_LIMIT_OF_RESPONSE = 6.0  # times the noise: the running median replaces what lies farther off
 
 
 class MovesFromStartError(ValueError):
     """A response without a rest before it moves."""
+
+
+class ReturnsError(ValueError):
+    """A response that leaves its rest and returns to it."""
 
 
 @dataclass(frozen=True)
@@ -72,20 +80,31 @@ def find_steps(time: Array, samples: Array) -> tuple[DetectedStep, ...]:
     """Return all steps of a reference from its response (M,), which ``find_step`` returns first.
 
     The next one is looked for where the response to the one before has settled; what is slower than
-    a fifth of that one passes for its settling. None is a move of which the response does 40 %
-    elsewhere at rest as well, in the same time.
+    a fifth of that one passes for its settling. A pulse, which stands for a while and then returns,
+    is two steps. None is a move of which the response does 40 % elsewhere at rest as well, in the
+    same time.
 
     Raises ValueError like ``find_step``, and where nothing stands out of what it does at rest.
     """
-    step, rest = _step(time, samples)
-    steps, first = [step], rest
+    steps, first, returns = list[DetectedStep](), 0, list[ReturnsError]()
     while True:
+        t, y = time[first:], samples[first:]
         try:
-            step, rest = _step(time[first:], samples[first:])
+            step, rest = _step(t, y)
+            steps.append(step)
+        except ReturnsError as fault:
+            pulse, rest = _pulse(t, y)
+            steps += pulse
+            returns += [] if pulse else [fault]
+            if len(returns) > MOST_RETURNS:
+                break
         except ValueError:
+            if not (steps or returns):
+                raise
             break
-        steps.append(step)
         first += rest
+    if not steps:
+        raise returns[0]
     distinct = tuple(_distinct(time, running_median(samples), steps))
     if not distinct:
         size = f"{abs(steps[0].size):.2g} at {steps[0].at:.4g} s"
@@ -165,10 +184,35 @@ def _step(time: Array, samples: Array) -> tuple[DetectedStep, int]:
     size = float(median(samples[start : end + 1])) - rest.level
     if abs(size) < rest.far:
         begin = f"what begins at {time[rest.left]:g} s"
-        raise ValueError(f"no step: {begin} leaves no lasting change")
+        raise ReturnsError(f"no step: {begin} leaves no lasting change")
     sets_out = _onset(time, samples, rest, max(start, rest.gone))
     until = float(time[moves_until])
     return DetectedStep(sets_out.at, sets_out.error, size, rest.level, until), start
+
+
+def _pulse(time: Array, samples: Array) -> tuple[list[DetectedStep], int]:
+    """Return the two steps of a response that returns, and where it has settled.
+
+    There is none where it does not stand between them for as long as ``STANDS_FOR`` and
+    ``SHORTEST_PULSE`` say.
+    """
+    rest = _left_rest(time, samples)
+    _, settled, end = _settled(rest)
+    way = np.abs(rest.smooth[: settled + 1] - rest.level)
+    peak = _first_peak(way, min(rest.gone, settled))
+    reached = int(np.argmax(way >= PULSE_REACHED * way[peak]))
+    t, y = time[reached : end + 1], samples[reached : end + 1]
+    try:
+        top = _left_rest(t, y)
+        back, _ = _step(t, y)
+        sets_out = _onset(time, samples, rest, peak)
+    except ValueError:
+        return [], settled
+    stands = top.left >= STANDS_FOR * (top.gone - top.left)
+    if not stands or back.at - sets_out.at < SHORTEST_PULSE:
+        return [], settled
+    size, until = back.level - rest.level, float(time[reached])
+    return [DetectedStep(sets_out.at, sets_out.error, size, rest.level, until), back], settled
 
 
 def _onset(time: Array, samples: Array, rest: _LeftRest, last: int) -> Onset:

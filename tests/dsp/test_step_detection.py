@@ -275,6 +275,45 @@ def test_a_response_that_returns_has_no_step_but_departs_in_time():
     assert sets_out.error <= 0.015
 
 
+@pytest.mark.parametrize("length", [2.0, 3.0, 4.0])
+@pytest.mark.parametrize("before", [False, True], ids=["first", "after a step"])
+def test_a_short_pulse_is_two_steps_and_hides_no_other(length, before):
+    time = np.arange(0.0, 120.0, 0.02)
+    pulse = second_order(time - 60.0) - second_order(time - 60.0 - length)
+    steps = second_order(time - 90.0) + before * second_order(time - 20.0)
+    vt = 1.0 + 0.05 * pulse + 0.02 * steps
+    noisy = vt + np.random.default_rng(5).normal(0.0, 2e-4, time.size)
+    instants = [20.0] * before + [60.0, 60.0 + length, 90.0]
+    detected = find_steps(time, noisy)
+    assert len(detected) == len(instants)
+    for step, at in zip(detected, instants, strict=True):
+        assert abs(step.at - at) <= step.error + 0.02  # a sample: its 95 % are no bound
+
+
+def second_order(since):
+    """Return the response to a step since some time (s): two equal lags of 0.35 s."""
+    since = np.maximum(since, 0.0) / 0.35
+    return 1.0 - (1.0 + since) * np.exp(-since)
+
+
+@pytest.mark.parametrize("width", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        lambda since: np.exp(-(since**2)),
+        lambda since: np.where(since > 0.0, np.exp(-np.maximum(since, 0.0)), 0.0),
+        lambda since: np.sin(3.0 * np.clip(since, 0.0, 2.0 * np.pi / 3.0)),
+    ],
+    ids=["bump", "decay", "swing"],
+)
+def test_what_does_not_stand_before_it_returns_is_no_pulse(shape, width):
+    time = np.arange(0.0, 100.0, 0.01)
+    vt = 1.0 + 0.05 * shape((time - 50.0) / width)
+    noisy = vt + np.random.default_rng(6).normal(0.0, 2e-4, time.size)
+    with pytest.raises(ValueError, match="no lasting change"):
+        find_steps(time, noisy)
+
+
 @given(
     st.integers(20, 60).flatmap(
         lambda count: arrays(float, count, elements=st.sampled_from([0.0, 0.1, 0.9, 1.0, 1.1]))
