@@ -21,9 +21,10 @@ NOISE_OF_SETTLED = 2.0  # times the noise: their running median is no farther by
 SMOOTHED_OVER = 0.1  # s
 QUARTERS = 4  # of what is looked at: in the last two a response that has settled is level
 REST = (3.0, 0.5)  # s, and of the response: so long a rest before a step is in its window
+LONGEST_REST = 5.0  # s: more of it is simulated for nothing
 LEAST_REST = 1.0  # s: with less of it before a step both are one test
-RESPONSES_SHOWN = 2.0  # times what the response takes is in the window, and at least
-SHORTEST_SHOWN = 10.0  # s
+SHORTEST_SHOWN = 10.0  # s after a step
+LONGEST_AFTERWARDS = 10.0  # s: as long as the response takes, and no longer, is shown after it
 FEWEST_SMOOTHED = 10  # samples of a smoothed response: with fewer it has no time to settle
 WHOLE_RECORD = 2.0  # times a window: a record that is not longer is used as it is
 DIGITS = 2  # of a size in a name
@@ -108,8 +109,8 @@ def _groups(
 def _window(test: DetectedTest, before: float, after: float) -> tuple[float, float]:
     """Return the window of a test whose own ends where it has settled; between two instants."""
     response = test.window[1] - test.steps[-1].at
-    rest = max(REST[0], REST[1] * response)
-    shown = max(SHORTEST_SHOWN, RESPONSES_SHOWN * response)
+    rest = min(max(REST[0], REST[1] * response), LONGEST_REST)
+    shown = max(SHORTEST_SHOWN, response + min(response, LONGEST_AFTERWARDS))
     start, end = max(before, test.at - rest), min(after, test.steps[-1].at + shown)
     return (
         start if start == before else ceil(10.0 * start) / 10.0,

@@ -134,7 +134,7 @@ def report(outcomes):
     print(f"{held} of {printed} intervals hold the truth: {100 * held / printed:.1f} %", end=" ")
     print(f"({100 * low:.1f} ... {100 * high:.1f})")
     print(f"processor time of a fit: median {np.median(seconds):.1f} s, longest {max(seconds):.1f}")
-    return int(high < BAND[0] or low > BAND[1] or max(seconds) > LONGEST)
+    return int(not BAND[0] <= held / printed <= BAND[1] or max(seconds) > LONGEST)
 
 
 def coverage(outcomes):
