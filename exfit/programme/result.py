@@ -172,27 +172,9 @@ class ProgrammeResult:
 
 def verdict_of(result: StepResult) -> str:
     """Return what a test comes to, in the words of a fit's verdict."""
-    if isinstance(result, FitResult):
-        return outcome_of(result)
-    if isinstance(result, VCurve):
-        return result.verdict.verdict
-    return MATCHES if _undetermined(result) else GOOD
+    return outcome_of(result) if isinstance(result, FitResult) else result.verdict.verdict
 
 
 def reason_of(result: StepResult) -> str:
     """Return what a test comes to in a sentence."""
-    if isinstance(result, FitResult):
-        return explanation_of(result)
-    if isinstance(result, VCurve):
-        return result.verdict.reason
-    names = _undetermined(result)
-    if names:
-        return f"the points do not limit {' and '.join(names)} on both sides"
-    return "the points determine the air-gap line and the saturation"
-
-
-def _undetermined(result: SaturationResult) -> list[str]:
-    """Return what a saturation test does not limit on both sides."""
-    curve = result.curve
-    values = {"the base of ifd": curve.ifd_base, "S10": curve.S10, "S12": curve.S12}
-    return [name for name, value in values.items() if not value.determined]
+    return explanation_of(result) if isinstance(result, FitResult) else result.verdict.reason

@@ -1,5 +1,6 @@
 """The result of an open-circuit saturation test: the curve's numbers, each with its interval."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -7,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.inference.confidence import Interval
+from exfit.inference.wording import listed
+from exfit.results.verdict import GOOD, MATCHES, NO_MATCH, Verdict
 from exfit.util.typed import IN_FILE
 
 Array = NDArray[np.float64]
 SaturationForm = Literal["quadratic", "exponential", "exponential-se"]
+
+LARGEST_SHARE = 0.02  # of the rms of the field current: what instruments and form may leave
 
 
 @dataclass(frozen=True)
@@ -117,3 +122,42 @@ class SaturationResult:
     def highest(self) -> float:
         """The highest voltage of the points, pu."""
         return float(self.vt.max())
+
+    @property
+    def limit(self) -> float:
+        """The largest rms of the residuals that counts as a match, pu."""
+        ifd = np.delete(self.ifd, self.left_out) / self.curve.ifd_base.value
+        return LARGEST_SHARE * float(np.sqrt(np.mean(ifd**2)))
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the test comes to: good only if the form is that of the points, and all is measured.
+
+        A form that another one refutes matches as long as its residuals are within the limit: the
+        intervals hold the values of the other.
+        """
+        curve = self.curve
+        if curve.rms > self.limit:
+            beside = f"{curve.rms:.2g} pu rms beside a curve of form {curve.form}"
+            return Verdict(NO_MATCH, f"the points lie {beside}, beyond {self.limit:.2g} pu")
+        doubts = "; ".join(self._doubts())
+        if doubts:
+            return Verdict(MATCHES, doubts)
+        return Verdict(GOOD, "the points determine the air-gap line and the saturation")
+
+    def _doubts(self) -> Iterator[str]:
+        """Yield what keeps a test that matches from being good."""
+        curve, best = self.curve, self.curves[0]
+        values = {"the base of ifd": curve.ifd_base, "S10": curve.S10, "S12": curve.S12}
+        names = [name for name, value in values.items() if not value.determined]
+        if names:
+            yield f"the points do not limit {listed(names)} on both sides"
+        if curve.refuted:
+            yield (
+                f"form {curve.form} leaves {curve.rms:.2g} pu rms, {best.form} {best.rms:.2g}: "
+                "the intervals hold the values of both"
+            )
+        if curve.extrapolated:
+            levels = listed([f"S({level:.1f})" for level in curve.extrapolated])
+            verb = "is" if len(curve.extrapolated) == 1 else "are"
+            yield f"{levels} {verb} extrapolated from {self.highest:.3g} pu"

@@ -27,7 +27,7 @@ from exfit.programme.steps import ProgrammeStep
 from exfit.results.model import FitResult, Iteration
 from exfit.results.saturation import SaturationResult
 from exfit.results.v_curve import VCurve
-from exfit.results.verdict import NOT_CONVERGED
+from exfit.results.verdict import GOOD, NOT_CONVERGED
 from exfit.util.text import rounded
 
 KIND, VERDICT, SECONDS = 10, 27, 7  # characters of the columns behind the name
@@ -130,7 +130,8 @@ def checked_step(console: Console, checked: CheckedStep) -> None:
 def _at_rest(console: Console, test: FinishedTest) -> None:
     """Show what a test at rest gives; nothing of a fit."""
     if isinstance(test.result, SaturationResult):
-        paragraph(console, f"verdict: {test.verdict}: {test.reason}", "green")
+        style = "green" if test.verdict == GOOD else "yellow" if test.holds else "bold red"
+        paragraph(console, f"verdict: {test.verdict}: {test.reason}", style)
         saturation(console, test.result)
     elif isinstance(test.result, VCurve):
         v_curve(console, test.result)

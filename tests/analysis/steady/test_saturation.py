@@ -8,6 +8,7 @@ from exfit.analysis.steady.saturation import FieldWinding, directions, saturatio
 from exfit.analysis.steady.saturation_forms import EXCESS
 from exfit.errors import ExfitError
 from exfit.results.saturation import SaturationResult
+from exfit.results.verdict import GOOD, MATCHES, NO_MATCH
 from exfit.util.typed import Reader, plain
 
 FORMS = tuple(EXCESS)
@@ -110,6 +111,31 @@ def test_points_on_no_curve_of_the_form_that_is_used_are_named():
     result = saturation_curve(*noisy_loop("quadratic"), "exponential-se")
     assert result.curve.refuted
     assert any("not on a curve of form exponential-se" in note for note in result.notes)
+
+
+def test_a_curve_on_points_that_determine_it_is_good():
+    assert saturation_curve(*noisy_loop()).verdict.verdict == GOOD
+
+
+def test_a_form_that_another_refutes_is_not_good_and_the_verdict_names_both():
+    verdict = saturation_curve(*noisy_loop("quadratic"), "exponential-se").verdict
+    assert verdict.verdict == MATCHES
+    assert "form exponential-se leaves" in verdict.reason
+    assert ", quadratic " in verdict.reason
+
+
+def test_what_is_extrapolated_is_not_good():
+    verdict = saturation_curve(*noisy_loop(top=1.1)).verdict
+    assert verdict.verdict == MATCHES
+    assert "S(1.2) is extrapolated from 1.1" in verdict.reason
+
+
+def test_points_that_lie_far_beside_their_curve_do_not_match_it():
+    vt, ifd = noisy_loop()
+    scattered = ifd * (1.0 + 0.1 * np.resize([1.0, -1.0], len(ifd)))  # five times the limit
+    verdict = saturation_curve(vt, scattered).verdict
+    assert verdict.verdict == NO_MATCH
+    assert "pu rms beside a curve of form quadratic, beyond" in verdict.reason
 
 
 def test_a_misread_point_is_named():
