@@ -17,6 +17,7 @@ from exfit.programme.result import (
 )
 from exfit.programme.steps import ProgrammeStep
 from exfit.records.reading import file_hash
+from exfit.results.description import UnitDescription
 from exfit.results.io import WHOLE_FIT, WHOLE_PROGRAMME, load_result, result_text
 from exfit.results.model import FitResult
 from exfit.results.saturation import SaturationResult
@@ -96,6 +97,7 @@ def summary_text(result: ProgrammeResult) -> str:
         "failed": plain(result.failed),
         "not_run": list(result.not_run),
         "interrupted": result.interrupted,
+        "unit": plain(result.unit, whole=True),
     }
     return to_json({"version": VERSION, "tests": tests, **others})
 
@@ -113,6 +115,7 @@ def load_summary(folder: Path) -> ProgrammeResult:
             for test in content["tests"]
         ]
         values = Reader().read(tuple[EnteredValue, ...], content["values"])
+        unit = Reader().read(UnitDescription, content.get("unit", {}))  # older ones have none
         others = {key: content[key] for key in ("about", "failed", "interrupted")}
         path, not_run = Path(content["programme"]), tuple(content["not_run"])
     except OSError as error:
@@ -125,4 +128,6 @@ def load_summary(folder: Path) -> ProgrammeResult:
         if result is None:
             raise ExfitError(f"{folder / step.name}: not the result of this programme; run again")
         tests.append(FinishedTest(step.name, step.kind, step.tests, key, result, kept=True))
-    return ProgrammeResult(path, tests=tuple(tests), values=values, not_run=not_run, **others)
+    return ProgrammeResult(
+        path, tests=tuple(tests), values=values, not_run=not_run, unit=unit, **others
+    )

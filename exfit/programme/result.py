@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from exfit.results.description import UnitDescription
 from exfit.results.model import ERRORS_IN_INTERVAL, FitResult
 from exfit.results.saturation import SaturationResult
 from exfit.results.side_by_side import explanation_of, outcome_of
@@ -106,7 +107,7 @@ class ProgrammeResult:
     """A programme that has been run: its tests in the order of the run, and the values they gave.
 
     ``failed`` holds the error of each test that could not be run, by its name; ``not_run`` names
-    those that an interruption left out.
+    those that an interruption left out. ``unit`` has the models with what the tests gave.
     """
 
     path: Path
@@ -116,6 +117,7 @@ class ProgrammeResult:
     failed: Mapping[str, str] = field(default_factory=dict)
     not_run: tuple[str, ...] = ()
     interrupted: bool = False
+    unit: UnitDescription = field(default_factory=UnitDescription)
 
     @property
     def name(self) -> str:

@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from exfit import estimate, workflows
+from exfit.analysis.case_description import parts_of
 from exfit.analysis.steady.saturation_test import curve_points, saturation
 from exfit.analysis.steady.steady_test import points_of, steady
 from exfit.case.case import Case
@@ -21,6 +22,7 @@ from exfit.programme.result import EnteredValue, FinishedTest, ProgrammeResult, 
 from exfit.programme.steps import ProgrammeStep, steps_of
 from exfit.programme.values import bases_of, errors_of_bases, values_given, with_values
 from exfit.records.reading import file_hash
+from exfit.results.description import UnitDescription
 from exfit.results.model import FitResult, Iteration
 
 Progress = Iteration | estimate.Progress
@@ -91,7 +93,16 @@ def run(
         failed=failed,
         not_run=tuple(step.name for step in steps if step.name not in ended),
         interrupted=interrupted or any(test.interrupted for test in done),
+        unit=_unit_of(programme, tuple(values)),
     )
+
+
+def _unit_of(programme: Programme, values: Values) -> UnitDescription:
+    """Return the models of a programme, with what its tests gave where the file allows it."""
+    case = programme.shared_case()
+    with suppress(CaseError):  # a fit with these values has failed, which says why
+        case = with_values(case, values)
+    return UnitDescription(tuple(parts_of(case)), case.values(), case.sources())
 
 
 def _turns(

@@ -1,7 +1,7 @@
 """What was fitted to what: the tests, the models with their data sheets; what the fit does."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import nan
 from typing import Annotated, NamedTuple
 
@@ -57,6 +57,23 @@ class PartDescription:
     def heading(self) -> str:
         """Its kind and name, as a heading of a table has them."""
         return "Network" if self.kind == "network" else f"{self.kind.capitalize()} {self.name}"
+
+
+@dataclass(frozen=True)
+class UnitDescription:
+    """The models of a unit, all values by their names in the system, and where these are from."""
+
+    parts: tuple[PartDescription, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def values_of(self, prefix: str) -> dict[str, float]:
+        """Return the values whose names begin so, by what follows."""
+        return {
+            name.removeprefix(prefix): value
+            for name, value in self.values.items()
+            if name.startswith(prefix)
+        }
 
 
 @dataclass(frozen=True)

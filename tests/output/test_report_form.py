@@ -3,10 +3,13 @@
 import pytest
 from pages import Page
 from places import ROOT
+from programmes import programme_content, written
 from records import TEST, TIME, case_of, config, one, synthetic
 
+import exfit
 from exfit import workflows
 from exfit.output.report import facts, html
+from exfit.output.report.programme_page import programme_page
 from exfit.output.report.sections import SECTIONS
 from exfit.output.report.sections.as_found import as_found
 from exfit.output.report.sections.form import form, rated
@@ -146,3 +149,19 @@ def test_a_rating_may_be_several_facts():
     )
     assert rated({"Rating": "120 MVA", "Rated voltage": "13.8 kV"}) == "120 MVA"
     assert rated({"Plant": "A"}) == "not stated"
+
+
+def test_the_form_of_a_programme_without_bump_tests_says_so_and_has_what_it_measured(tmp_path):
+    content = programme_content()
+    content["tests"] = content["tests"][:1]
+    result = exfit.run(written(content, tmp_path))
+    page = programme_page(result, tmp_path)
+    keys = [section.key for section, _ in page.sections]
+    assert keys == ["form", "programme", "test-1", "test", "signatures"]
+    rows = {row.asked: row for row in page.sections[0][1]}
+    assert rows["Model response beside a recorded response"].answer == (
+        "not stated: no bump test in this programme"
+    )
+    assert rows["Unit"].answer == "1"
+    assert "(measured)" in rows["Saturation of the generator"].answer
+    assert not rows["No-disturbance run"].is_stated

@@ -1,4 +1,4 @@
-"""The report of a programme: the tests of its machine, then the fit of its bump tests."""
+"""The report of a programme: the form, the tests of its machine, the fit of its bump tests."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -6,11 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from exfit.output.report.page import Page, fit_page
-from exfit.output.report.sections import ReportSection
+from exfit.output.report.sections import FORM, ReportSection
 from exfit.output.report.sections.findings import findings
+from exfit.output.report.sections.form import form_without_bumps
 from exfit.output.report.sections.matches import MatchView, fitted_matches
 from exfit.output.report.sections.parameters import parameters
+from exfit.output.report.sections.signatures import signatures
 from exfit.output.report.sections.steady_tests import saturation_view, v_curve_view
+from exfit.output.report.sections.unit_and_test import unit_without_bumps
 from exfit.output.report.verdict import Headline
 from exfit.programme.result import EnteredValue, FinishedTest, ProgrammeResult
 from exfit.results.model import FitResult
@@ -37,9 +40,14 @@ def programme_page(result: ProgrammeResult, folder: Path) -> Page:
         if test.result is not result.fit:
             sections += _of_test(test, f"test-{number}")
     if result.fit is None:
-        return Page(f"Programme {result.name}", _headline(result), sections, folder)
+        form = _section("form", FORM, form_without_bumps(result), "form")
+        unit = _section("test", "Unit and test", unit_without_bumps(result), "unit_and_test")
+        signed = _section("signatures", "Revision and signatures", signatures(result), "signatures")
+        whole = [form, *sections, unit, signed]
+        return Page(f"Programme {result.name}", _headline(result), whole, folder)
     page = fit_page(result.fit, folder)
-    return replace(page, sections=[*sections, *page.sections])
+    form, *others = page.sections
+    return replace(page, sections=[form, *sections, *others])
 
 
 def _headline(result: ProgrammeResult) -> Headline:

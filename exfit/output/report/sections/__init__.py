@@ -31,8 +31,9 @@ class ReportSection(NamedTuple):
     template: str
 
 
+FORM = "The form of a verification report"
 SECTIONS = (
-    ReportSection("form", "The form of a verification report", form, "form"),
+    ReportSection("form", FORM, form, "form"),
     ReportSection("criteria", "Criteria", criteria, "criteria"),
     ReportSection("test", "Unit and test", unit_and_test, "unit_and_test"),
     ReportSection("model", "Model", model, "model"),

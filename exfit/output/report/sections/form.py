@@ -1,12 +1,13 @@
 """The form: what a verification report must state, row by row, and what this one answers."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from exfit.models.families import family_of
 from exfit.output.report import facts
 from exfit.output.report.facts import AskedFact, Facts, answer, stated
-from exfit.output.report.sections.usability import usability
+from exfit.output.report.sections.usability import UsabilityCheck, no_usability, usability
+from exfit.programme.result import ProgrammeResult
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import PartDescription
 from exfit.results.model import FitResult
@@ -22,6 +23,7 @@ MACHINE_DATA = (
 )
 TESTS = (facts.DATE, facts.TESTED, facts.INSTRUMENTS, facts.RECORDER)
 AMBIENT = {facts.STATE: "cold or hot machine", facts.TAP: "of the transformer", facts.SPEED: ""}
+NO_TEST = "no bump test in this programme"
 REPORT = (facts.WRITTEN, facts.CHECKED, facts.APPROVED, facts.REVISION, facts.REPORTED)
 
 
@@ -42,34 +44,85 @@ class FormRow(NamedTuple):
         return not self.answer.startswith(NOT_STATED)
 
 
+class FormAnswers(NamedTuple):
+    """What the rows of the form have from a fit or a programme, facts of the case aside.
+
+    ``machine`` are its values by symbol, ``source_of`` says where the value of a name is from.
+    """
+
+    responses: str
+    parts: tuple[PartDescription, ...]
+    machine: Mapping[str, float]
+    source_of: Callable[[str], str]
+    excitation: str
+    before: str
+    compensation: str
+    usable: tuple[UsabilityCheck, ...]
+
+
 def form(result: FitResult) -> tuple[FormRow, ...]:
     """Return the rows of the form for a fit (cf. NERC MOD-026-1 R2.1 and R6)."""
-    about = result.about
+    answers = FormAnswers(
+        responses=_responses(result),
+        parts=result.parts,
+        machine=result.values_of("machine."),
+        source_of=result.source_of,
+        excitation=_excitation(result),
+        before=_before(result),
+        compensation=_compensation(result),
+        usable=usability(result),
+    )
+    return _rows(result.about, answers)
+
+
+def form_without_bumps(result: ProgrammeResult) -> tuple[FormRow, ...]:
+    """Return the rows of the form for a programme in which no bump test was fitted."""
+    why = "the fit of the bump tests has no result" if _has_bumps(result) else NO_TEST
+    unit, silent = result.unit, f"{NOT_STATED}: {why}"
+    exciter = _part(unit.parts, "exciter")
+    answers = FormAnswers(
+        responses=silent,
+        parts=unit.parts,
+        machine=unit.values_of("machine."),
+        source_of=lambda name: unit.sources.get(name, NOT_STATED),
+        excitation=silent if exciter is None else f"{exciter.name}, {exciter.title}; {why}",
+        before=silent,
+        compensation=stated(result.about, facts.COMPENSATION) or silent,
+        usable=no_usability(silent),
+    )
+    return _rows(result.about, answers)
+
+
+def _has_bumps(result: ProgrammeResult) -> bool:
+    return "fit" in (*result.failed, *result.not_run)
+
+
+def _rows(about: Facts, answers: FormAnswers) -> tuple[FormRow, ...]:
     return (
-        *(_fact(result, "", fact, "test") for fact in (facts.PLANT, facts.UNIT)),
+        *(_fact(about, "", fact, "test") for fact in (facts.PLANT, facts.UNIT)),
         FormRow("", facts.RATED.key, rated(about), "test"),
-        FormRow("R2.1.1", "Model response beside a recorded response", _responses(result), "fit"),
-        _fact(result, "R2.1.2", facts.MAKER),
-        _fact(result, "R2.1.2", facts.MODEL),
-        FormRow("R2.1.2", "Excitation type", _type(result), "model"),
-        *_generator(result),
-        FormRow("R2.1.4", "Excitation model and data", _excitation(result), "parameters"),
-        _fact(result, "R2.1.4", facts.REGULATOR),
-        FormRow("R2.1.4", "Model in the planner's base", _before(result), "as-found"),
-        FormRow("R2.1.5", "Compensation (droop, line drop)", _compensation(result)),
-        FormRow("R2.1.6", "Stabiliser", _stabiliser(result), "parameters"),
-        *(FormRow("R6", check.name, _usable(*check[1:]), "flat") for check in usability(result)),
-        *(_fact(result, "", fact, "test") for fact in TESTS),
+        FormRow("R2.1.1", "Model response beside a recorded response", answers.responses, "fit"),
+        _fact(about, "R2.1.2", facts.MAKER),
+        _fact(about, "R2.1.2", facts.MODEL),
+        FormRow("R2.1.2", "Excitation type", _type(about, answers.parts), "model"),
+        *_generator(answers),
+        FormRow("R2.1.4", "Excitation model and data", answers.excitation, "parameters"),
+        _fact(about, "R2.1.4", facts.REGULATOR),
+        FormRow("R2.1.4", "Model in the planner's base", answers.before, "as-found"),
+        FormRow("R2.1.5", "Compensation (droop, line drop)", answers.compensation),
+        FormRow("R2.1.6", "Stabiliser", _stabiliser(about, answers.parts), "parameters"),
+        *(FormRow("R6", check.name, _usable(*check[1:]), "flat") for check in answers.usable),
+        *(_fact(about, "", fact, "test") for fact in TESTS),
         *(
             FormRow("", f"{fact.key}{f' ({words})' if words else ''}", answer(about, fact), "test")
             for fact, words in AMBIENT.items()
         ),
-        *(_fact(result, "", fact, "signatures") for fact in REPORT),
+        *(_fact(about, "", fact, "signatures") for fact in REPORT),
     )
 
 
-def _fact(result: FitResult, cf: str, fact: AskedFact, section: str = "") -> FormRow:
-    return FormRow(cf, fact.key, answer(result.about, fact), section)
+def _fact(about: Facts, cf: str, fact: AskedFact, section: str = "") -> FormRow:
+    return FormRow(cf, fact.key, answer(about, fact), section)
 
 
 def rated(about: Facts) -> str:
@@ -91,37 +144,37 @@ def _responses(result: FitResult) -> str:
     return f"{text}; {judged_by_criteria(result).sentence}"
 
 
-def _type(result: FitResult) -> str:
+def _type(about: Facts, parts: tuple[PartDescription, ...]) -> str:
     """Return the type of the excitation system, as stated or as its model is."""
-    given = stated(result.about, facts.TYPE)
-    part = _part(result, "exciter")
+    given = stated(about, facts.TYPE)
+    part = _part(parts, "exciter")
     if given is not None or part is None:
         return given or NOT_STATED
     family = family_of(part.name)
     return NOT_STATED if family is None else f"{TYPES[family]}, by its model {part.name}"
 
 
-def _part(result: FitResult, kind: str) -> PartDescription | None:
-    return next((part for part in result.parts if part.kind == kind), None)
+def _part(parts: tuple[PartDescription, ...], kind: str) -> PartDescription | None:
+    return next((part for part in parts if part.kind == kind), None)
 
 
-def _generator(result: FitResult) -> Iterator[FormRow]:
+def _generator(answers: FormAnswers) -> Iterator[FormRow]:
     """Yield the rows of the generator: its model, and each kind of its data with the sources."""
-    part = _part(result, "machine")
+    part = _part(answers.parts, "machine")
     name = NOT_STATED if part is None else f"{part.name}, {part.title}"
     yield FormRow("R2.1.3", "Generator model", name, "model")
     for asked, begins in MACHINE_DATA:
-        symbols = [symbol for symbol in result.machine if symbol.startswith(begins)]
-        yield FormRow("R2.1.3", asked, _by_source(result, symbols), "parameters")
+        symbols = [symbol for symbol in answers.machine if symbol.startswith(begins)]
+        yield FormRow("R2.1.3", asked, _by_source(answers, symbols), "parameters")
 
 
-def _by_source(result: FitResult, symbols: list[str]) -> str:
+def _by_source(answers: FormAnswers, symbols: list[str]) -> str:
     """Return values of the machine with where they are from."""
-    values = result.values_of("machine.")
-    sources = {symbol: result.source_of(f"machine.{symbol}") for symbol in symbols}
+    sources = {symbol: answers.source_of(f"machine.{symbol}") for symbol in symbols}
     groups = by_source(symbols, sources)
     texts = (
-        f"{', '.join(f'{symbol} {rounded(values[symbol])}' for symbol in group)} ({_source(word)})"
+        f"{', '.join(f'{symbol} {rounded(answers.machine[symbol])}' for symbol in group)} "
+        f"({_source(word)})"
         for word, group in groups.items()
     )
     return "; ".join(texts) or f"{NOT_STATED}: the model has none"
@@ -132,7 +185,7 @@ def _source(word: str) -> str:
 
 
 def _excitation(result: FitResult) -> str:
-    part = _part(result, "exciter")
+    part = _part(result.parts, "exciter")
     if part is None:
         return f"{NOT_STATED}: the machine alone was fitted"
     names = [name for name in result.values if "." not in name and name not in result.of_records]
@@ -160,8 +213,8 @@ def _compensation(result: FitResult) -> str:
     return given or f"{NOT_STATED}; none in the model"
 
 
-def _stabiliser(result: FitResult) -> str:
-    given, part = stated(result.about, facts.STABILISER), _part(result, "stabiliser")
+def _stabiliser(about: Facts, parts: tuple[PartDescription, ...]) -> str:
+    given, part = stated(about, facts.STABILISER), _part(parts, "stabiliser")
     if part is not None:
         return f"{part.name}, {part.title}" + (f"; {given}" if given else "")
     return given or f"{NOT_STATED} whether the unit has one; none in the model"

@@ -14,6 +14,7 @@ from exfit.output.report.facts import (
     answer,
     stated,
 )
+from exfit.programme.result import ProgrammeResult
 from exfit.results.model import FitResult
 
 
@@ -34,7 +35,7 @@ class Signatures(NamedTuple):
     rows: tuple[Signature, ...]
 
 
-def signatures(result: FitResult) -> Signatures:
+def signatures(result: FitResult | ProgrammeResult) -> Signatures:
     """Return the block of revision and signatures."""
     about = result.about
     return Signatures(

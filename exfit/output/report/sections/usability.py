@@ -9,6 +9,8 @@ from exfit.results.model import FitResult
 
 NOT_HELD = "not stated: the fit was interrupted, or an earlier version of exfit wrote the result"
 
+CHECKS = ("Initialises without error", "No-disturbance run", "Positive damping")
+
 
 class UsabilityCheck(NamedTuple):
     """A check with its result; ``passed`` is None where it could not be made."""
@@ -22,9 +24,13 @@ def usability(result: FitResult) -> tuple[UsabilityCheck, ...]:
     """Return the checks of usability (cf. NERC MOD-026-1 R6), each with its result."""
     behaviour = result.behaviour
     if behaviour is None:
-        names = ("Initialises without error", "No-disturbance run", "Positive damping")
-        return tuple(UsabilityCheck(name, None, NOT_HELD) for name in names)
+        return no_usability(NOT_HELD)
     return (_initialises(behaviour), _no_disturbance(behaviour), _damping(behaviour))
+
+
+def no_usability(why: str) -> tuple[UsabilityCheck, ...]:
+    """Return the checks of usability where none was made."""
+    return tuple(UsabilityCheck(name, None, why) for name in CHECKS)
 
 
 def _initialises(behaviour: Behaviour) -> UsabilityCheck:
