@@ -97,7 +97,7 @@ def test_a_signal_is_one_row_and_an_output_of_its_plant(copy):
         "compare run again -o compared",
         "identify case.yaml --noise verr=0.01",
     )
-    assert "verr by its name" in shown
+    assert "verr is verr: sure, by its name: verr" in shown, shown
     result = json.loads((copy.folder / "run/result.json").read_text())
     assert result["parameters"]["k"]["value"] == pytest.approx(4.0, rel=0.01)
     page = (copy.folder / "run/report.html").read_text(encoding="utf-8")

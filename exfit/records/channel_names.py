@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from exfit.records.units import OTHER_UNITS, bare, quantity_of
-from exfit.records.vocabulary import KINDS, folded, words_of
+from exfit.records.vocabulary import KINDS, folded, tokens, words_of
 from exfit.signals import ROWS, SIGNALS, SignalRow
 
 EXCITER_FIELD = "that of the field of a brushless exciter"
@@ -70,11 +70,21 @@ def read_name(name: str, unit: str | None) -> NameReading:
         return program
     words = words_of(bare(name))
     kinds = {KINDS[word]: word for word in reversed(words) if word in KINDS}
-    reading = _by_words(words, kinds, unit)
+    reading = _whole(" ".join(tokens(bare(name)))) or _by_words(words, kinds, unit)
     row = SIGNALS.get(reading.signal or "")
     if row is not None and not _fits(unit, row):
         return NameReading(None, Clarity.NONE, f"{unit} is no unit of {row.symbol}")
     return reading
+
+
+def _whole(text: str) -> NameReading | None:
+    """Return the signal of which a name is an own word, though it may be joined of others."""
+    for row in ROWS:
+        own = [folded(word) for word in row.words]
+        if text in own:
+            doubts = DOUBTS.get(text, ())
+            return NameReading(row.symbol, Clarity.OWN, _named(text), doubts, own.index(text))
+    return None
 
 
 def _by_words(words: tuple[str, ...], kinds: Mapping[str, str], unit: str | None) -> NameReading:
