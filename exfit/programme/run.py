@@ -9,8 +9,9 @@ from pathlib import Path
 
 from exfit import estimate, workflows
 from exfit.analysis.case_description import parts_of
-from exfit.analysis.steady.saturation_test import curve_points, saturation
-from exfit.analysis.steady.steady_test import points_of, steady
+from exfit.analysis.steady.points import points_of
+from exfit.analysis.steady.saturation_test import saturation
+from exfit.analysis.steady.steady_test import steady
 from exfit.case.case import Case
 from exfit.case.programme import FIT, Programme, load_programme
 from exfit.case.schema import SaturationTest, SteadyTest
@@ -148,9 +149,7 @@ def _readings(programme: Programme) -> "list[Callable[[], object]]":
     readings: list[Callable[[], object]] = []
     for step in steps_of(programme):
         section = None if step.name == FIT else programme.test(step.name)
-        if isinstance(section, SaturationTest):
-            readings.append(partial(curve_points, section, programme.folder))
-        elif isinstance(section, SteadyTest):
+        if isinstance(section, SaturationTest | SteadyTest):
             readings.append(partial(points_of, section, programme.folder))
         else:
             case = case_of(programme, step)
@@ -199,7 +198,7 @@ def _result_of(
     shared = programme.shared_case()
     machine = shared.parts.machine
     if isinstance(section, SaturationTest):
-        return saturation(section, curve_points(section, programme.folder), machine)
+        return saturation(section, points_of(section, programme.folder), machine)
     if isinstance(section, SteadyTest) and machine is not None:
         case = with_values(shared, values)
         own, errors = case.values(), {**case.std_errors(), **errors_of_bases(values)}

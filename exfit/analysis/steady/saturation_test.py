@@ -1,41 +1,18 @@
 """A saturation test of a programme: its points read, its curve, and what it gives the machine."""
 
-import hashlib
-import json
 from collections.abc import Mapping
-from pathlib import Path
 from types import MappingProxyType
-
-import numpy as np
 
 from exfit.analysis.steady.saturation import FieldWinding, saturation_curve
 from exfit.case.schema.saturation_tests import CURVE_SIGNALS, SaturationTest
 from exfit.errors import RecordError
 from exfit.models.machines import Machine
-from exfit.records.points import Points, read_points
+from exfit.records.points import Points
 from exfit.records.units import needs_base
 from exfit.results.saturation import MeasuredValue, SaturationResult
 from exfit.signals import FIELDS
 
 DEFAULT_UNITS = MappingProxyType({"vt": "pu", **dict(zip(FIELDS, ("A", "V"), strict=True))})
-
-
-def curve_points(test: SaturationTest, folder: Path) -> Points:
-    """Return the points of a test, by signal; its file lies in a folder. Raises RecordError."""
-    if test.file is None:
-        columns = zip(*(test.points or ()), strict=True)
-        numbers = dict(zip(CURVE_SIGNALS, map(np.array, columns), strict=False))
-        digest = hashlib.sha256(json.dumps(test.points).encode()).hexdigest()
-        return Points(numbers, {}, Path(test.name), digest)
-    names = {signal: column.column or signal for signal, column in test.columns.items()}
-    units = {names[signal]: column.unit for signal, column in test.columns.items()}
-    read = read_points(folder / test.file, units, test.sheet)
-    return Points(
-        {signal: read.columns[name] for signal, name in names.items()},
-        {signal: read.units[name] for signal, name in names.items() if name in read.units},
-        read.source,
-        read.sha256,
-    )
 
 
 def saturation(test: SaturationTest, points: Points, machine: Machine | None) -> SaturationResult:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from math import isfinite
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -13,12 +12,11 @@ from exfit.analysis.steady.fields_on_load import FieldMeasurement, PointsOnLoad,
 from exfit.analysis.steady.v_curve import v_curve
 from exfit.case.bounds import search_bounds
 from exfit.case.schema import FreeSection, PointColumn, SteadyTest, Unknown
-from exfit.case.schema.steady_tests import POINT_SIGNALS
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.parameters import FreeParameter, Prior
 from exfit.models.machines import Machine
 from exfit.models.sheet import Parameter
-from exfit.records.points import Points, given_points, read_points
+from exfit.records.points import Points
 from exfit.records.units import needs_base
 from exfit.results.v_curve import VCurve
 from exfit.signals import FIELDS, TERMINALS
@@ -27,21 +25,6 @@ Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 FARTHEST_BASE = 4.0  # times the base that fits best at the start: as far as one without bounds goes
-
-
-def points_of(test: SteadyTest, folder: Path) -> Points:
-    """Return the points of a test, by signal; its file lies in a folder. Raises RecordError."""
-    if test.file is None:
-        return given_points(test.points or (), POINT_SIGNALS, Path(test.name))
-    names = {signal: column.column or signal for signal, column in test.columns.items()}
-    units = {names[signal]: column.unit for signal, column in test.columns.items()}
-    read = read_points(folder / test.file, units, test.sheet)
-    return Points(
-        {signal: read.columns[name] for signal, name in names.items()},
-        {signal: read.units[name] for signal, name in names.items() if name in read.units},
-        read.source,
-        read.sha256,
-    )
 
 
 def steady(

@@ -4,58 +4,30 @@ from collections.abc import Iterator
 
 from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
+from exfit.case.checks.points import points_faults
 from exfit.case.schema.steady_tests import POINT_SIGNALS
 from exfit.case.yaml import Fault
 from exfit.records.units import needs_base
 from exfit.signals import FIELDS, TERMINALS
 from exfit.util.text import show
 
-ROW_LENGTHS = (len(POINT_SIGNALS) - 1, len(POINT_SIGNALS))  # without efd, and with it
 AUTO = "auto"
 
 
 def steady_test_faults(test: ContentNode) -> Iterator[Fault]:
     """Yield what contradicts itself in the points of a steady test, beside what is free."""
-    if "points" in test:
-        yield from _inline_faults(test)
-    elif "file" not in test:
-        yield test.at("file").fault("is missing: give a file, or points")
-    else:
-        yield from _file_faults(test)
+    yield from points_faults(test, POINT_SIGNALS, TERMINALS)
+    if "points" not in test:
+        yield from _field_faults(test)
     for signal, column in test.at("columns").sections:
         yield from _column_faults(signal, column)
     yield from _noise_faults(test)
 
 
-def _inline_faults(test: ContentNode) -> Iterator[Fault]:
-    for key in ("file", "sheet"):
-        if key in test:
-            yield test.at(key).fault("not allowed with points, which are given here")
-    for _, column in test.at("columns").sections:
-        if "column" in column or column.text is not None:
-            place = column.at("column") if "column" in column else column
-            yield place.fault(
-                f"not allowed with points, whose columns are {', '.join(POINT_SIGNALS)}"
-            )
-    rows = test.at("points").entries
-    for row in rows:
-        count, first = len(row.entries), len(rows[0].entries)
-        if count not in ROW_LENGTHS:
-            yield row.fault(f"{count} numbers; [p, q, vt, ifd] or [p, q, vt, ifd, efd] needed")
-        elif count != first:
-            yield row.fault(f"{count} numbers, but the first point has {first}")
-
-
-def _file_faults(test: ContentNode) -> Iterator[Fault]:
+def _field_faults(test: ContentNode) -> Iterator[Fault]:
     columns = test.at("columns")
-    for signal in TERMINALS:
-        if signal not in columns:
-            yield columns.at(signal).fault("is missing: the column of the file")
-    if not any(signal in columns for signal in FIELDS):
+    if "file" in test and not any(signal in columns for signal in FIELDS):
         yield columns.at(FIELDS[0]).fault(f"is missing: a column of {' or '.join(FIELDS)}")
-    for _, column in columns.sections:
-        if column.is_section and "column" not in column:
-            yield column.at("column").fault("is missing: the column of the file")
 
 
 def _column_faults(signal: str, column: ContentNode) -> Iterator[Fault]:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from exfit.analysis.steady.points import points_of
 from exfit.analysis.steady.saturation_test import (
     channel_bases,
-    curve_points,
     machine_values,
     saturation,
 )
@@ -40,7 +40,7 @@ def file(tmp_path):
 
 def test_a_file_without_a_time_gives_the_machine_its_saturation_and_the_channels_their_bases(file):
     test = section(file=file.name, columns=COLUMNS)
-    result = saturation(test, curve_points(test, file.parent), MACHINES["GENROU"])
+    result = saturation(test, points_of(test, file.parent), MACHINES["GENROU"])
     values, bases = machine_values(result), channel_bases(result)
     # of the file's six digits after the point
     assert values["S10"].value == pytest.approx(2.0 * 0.2**2, abs=1e-4)
@@ -55,8 +55,7 @@ def test_points_in_place_are_the_same_as_in_a_file(file):
     rows = [[float(vt), float(ifd)] for vt, ifd in zip(VT, IFD, strict=True)]
     in_place = section(points=rows)
     curves = [
-        saturation(test, curve_points(test, file.parent), None).curve
-        for test in (in_file, in_place)
+        saturation(test, points_of(test, file.parent), None).curve for test in (in_file, in_place)
     ]
     assert curves[0].S12.value == pytest.approx(curves[1].S12.value, rel=1e-4)
 
@@ -72,7 +71,7 @@ def test_the_form_is_that_of_the_machine_unless_another_is_given(machine, form):
 
 def test_a_brushless_unit_gives_the_machine_nothing(file):
     test = section(file=file.name, columns=COLUMNS, brushless=True, form="exponential-se")
-    result = saturation(test, curve_points(test, file.parent), MACHINES["GENROU"])
+    result = saturation(test, points_of(test, file.parent), MACHINES["GENROU"])
     assert result.form == "exponential-se"
     assert (dict(machine_values(result)), dict(channel_bases(result))) == ({}, {})
 
@@ -83,7 +82,7 @@ def test_a_unit_of_the_file_needs_a_base(tmp_path):
     path.write_text("\n".join(["Ug (kV),If (A)", *lines]), encoding="utf-8")
     test = section(file=path.name, columns={"vt": "Ug (kV)", "ifd": "If (A)"})
     with pytest.raises(RecordError, match="what is 1 pu in kV"):
-        saturation(test, curve_points(test, tmp_path), None)
+        saturation(test, points_of(test, tmp_path), None)
 
 
 @pytest.mark.parametrize(

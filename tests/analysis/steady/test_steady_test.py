@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from exfit.analysis.steady.field_on_load import field_on_load
-from exfit.analysis.steady.steady_test import points_of, steady
+from exfit.analysis.steady.points import points_of
+from exfit.analysis.steady.steady_test import steady
 from exfit.case.schema import SteadyTest
 from exfit.errors import RecordError
 from exfit.models.machines import MACHINES
