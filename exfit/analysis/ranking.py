@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.fitting.residuals import LEAST_NOISE
-from exfit.inference.noise import SURPRISING, effective_samples, whiteness
+from exfit.inference.noise import effective_samples, is_white, whiteness
 from exfit.inference.wording import listed
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult
@@ -198,9 +198,7 @@ def _gap(better: Likelihood, model: Likelihood, more: int) -> float:
 
 def _effective(errors: Array) -> float:
     """Return how many independent samples errors are worth: all of them where they are white."""
-    p_value = whiteness(errors)
-    white = p_value is None or p_value >= SURPRISING
-    return float(len(errors)) if white else effective_samples(errors)
+    return float(len(errors)) if is_white(whiteness(errors)) else effective_samples(errors)
 
 
 def ranking_sentences(models: Sequence[RankedModel]) -> Iterator[str]:

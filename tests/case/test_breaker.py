@@ -88,7 +88,9 @@ def test_channels_with_noise_beside_what_drives_need_none_there():
     case = content(ALONE, {"breaker": {"opens": 1.0}}, ("vt", "ifd", "efd", "speed"))
     for signal in ("vt", "ifd"):
         case["record"]["channels"][signal]["noise"] = 1e-3
-    Case.from_dict(case)
+    channels = Case.from_dict(case).recordings[0].record.channels
+    noises = {signal: channel.noise for signal, channel in channels.items()}
+    assert noises == {"vt": 1e-3, "ifd": 1e-3, "efd": None, "speed": None}
 
 
 @pytest.mark.parametrize(

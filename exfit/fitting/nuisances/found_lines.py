@@ -20,7 +20,7 @@ from exfit.fitting.nuisances.sine_parameters import with_line
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.uncertainty import slices
-from exfit.inference.noise import SURPRISING, whiteness
+from exfit.inference.noise import SURPRISING, is_white, whiteness
 from exfit.inference.wording import digits
 
 Array = NDArray[np.float64]
@@ -115,8 +115,7 @@ def _coloured(
     errors = disturbed.errors(minimum_near(disturbed, start))[0]
     places = [Place(setup.name, channel.signal) for setup in setups for channel in setup.channels]
     for place, block in zip(places, slices(disturbed.sizes), strict=True):
-        p_value = whiteness(errors[block])
-        if p_value is not None and p_value < SURPRISING:
+        if not is_white(whiteness(errors[block])):
             yield place
 
 

@@ -128,11 +128,10 @@ def _fact(about: Facts, cf: str, fact: AskedFact, section: str = "") -> FormRow:
 def rated(about: Facts) -> str:
     """Return the rating, as one fact or as several whose names begin with Rated."""
     begins = f"{facts.RATED.key} "
-    ratings = {name.removeprefix(begins): value for name, value in about.items()}
     each = (
-        f"{name} {value if isinstance(value, str) else show(value)}"
-        for name, value in ratings.items()
-        if begins + name in about
+        f"{name.removeprefix(begins)} {value if isinstance(value, str) else show(value)}"
+        for name, value in about.items()
+        if name.startswith(begins)
     )
     return stated(about, facts.RATED) or ", ".join(each) or NOT_STATED
 
