@@ -74,18 +74,22 @@ def as_found_of(case: Case, tests: Sequence[tuple[ExperimentSetup, Values]]) -> 
     try:
         before = _case_before(case, section)
     except CaseError as fault:
-        return AsFound(
-            source, section.model or case.subject, dict(section.parameters), (), str(fault)
-        )
+        model, stated = section.model or case.subject, dict(section.parameters)
+        return _of_unit(AsFound(source, model, stated, (), str(fault)), section)
     values = values_of(before, dict(section.parameters))
     own = {name: values[name] for name in before.rows()}
-    unit = AsFound(source, before.subject, own)
+    unit = _of_unit(AsFound(source, before.subject, own), section)
     try:
         comparisons = _comparisons(case, before, values, tests)
     except (CaseError, SimulationError) as fault:
         return replace(unit, why=str(fault))
     kept = comparisons if unit.is_stated else [_without_samples(match) for match in comparisons]
     return replace(unit, comparisons=tuple(kept))
+
+
+def _of_unit(unit: AsFound, section: AsFoundSection) -> AsFound:
+    """Return a model as found with its place in the planner's base."""
+    return replace(unit, bus=section.bus, machine_id=section.id, file=section.file)
 
 
 def _case_before(case: Case, section: AsFoundSection) -> Case:

@@ -3,6 +3,8 @@
 import json
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 
 from exfit.models.sheet import Parameter
 from exfit.util.sources import SOURCES
@@ -33,14 +35,33 @@ def source_lines(sources: Mapping[str, str], indent: str) -> Iterator[str]:
     yield from _flow_mapping(stated, f"{indent}  ")
 
 
-def as_found_lines(source: str, model: str, values: Mapping[str, float]) -> Iterator[str]:
+@dataclass(frozen=True)
+class PlannerUnit:
+    """A unit of a planner's file: its bus, its machine id, and the path of the file."""
+
+    bus: int
+    id: str
+    file: str
+
+    def __str__(self) -> str:
+        return f"{Path(self.file).name}, bus {self.bus}, machine {self.id}"
+
+
+def as_found_lines(unit: PlannerUnit, model: str, values: Mapping[str, float]) -> Iterator[str]:
     """Yield the section that says what was in the planner's base, by the names of the system."""
     yield "as_found:               # in the planner's base; a report compares it"
-    yield f"  source: {json.dumps(source, ensure_ascii=False)}"
+    yield f"  source: {_quoted(str(unit))}"
+    yield f"  bus: {unit.bus}"
+    yield f"  id: {_quoted(unit.id)}"
+    yield f"  file: {_quoted(unit.file)}"
     yield f"  model: {model}"
     yield "  parameters:"
     pairs = [f"{name}: {yaml_number(value)}" for name, value in values.items()]
     yield from _flow_mapping(pairs, "    ")
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _flow_mapping(pairs: Iterable[str], indent: str) -> Iterator[str]:

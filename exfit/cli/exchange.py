@@ -25,13 +25,15 @@ def import_(
     The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
     holds several units, --bus and --id choose one.
     """
+    from exfit.case.starting.suggestion import relative
     from exfit.exchange.psse.fields import located
     from exfit.exchange.psse.import_case import case_text, import_unit
 
     if output is not None:
         refuse_existing(output, force)
     imported = import_unit(unit, bus, machine_id)
-    write_text(case_text(imported, unit.name), output, located(imported.warnings, str(unit)))
+    file = relative(unit, Path() if output is None else output.parent)
+    write_text(case_text(imported, file), output, located(imported.warnings, str(unit)))
     if output is not None:
         click.echo(f"written to {output}; next: exfit simulate {output}")
 

@@ -189,7 +189,7 @@ def _unit(given: UnitSources, folder: Path) -> "UnitData":
 
     _refuse_unused(given)
     if given.dyr is not None:
-        data = _planner(given.dyr, given.bus, given.machine_id)
+        data = _planner(given.dyr, given.bus, given.machine_id, folder)
         if given.model is not None:
             name, exciter = _exciter(given.model, folder)
             same = exciter.model is data.exciter.model
@@ -223,15 +223,16 @@ def _exciter(model: str, folder: Path) -> "tuple[str, PartData]":
     return name, PartData.typical(exciter)
 
 
-def _planner(dyr: Path, bus: int | None, machine_id: str | None) -> "UnitData":
+def _planner(dyr: Path, bus: int | None, machine_id: str | None, folder: Path) -> "UnitData":
     """Return the data of a unit of a PSS/E file; what of it is left out is reported."""
+    from exfit.case.starting.suggestion import relative
     from exfit.exchange.psse.fields import located
     from exfit.exchange.psse.import_case import import_unit
     from exfit.exchange.psse.unit_data import unit_data
 
     unit = import_unit(dyr, bus, machine_id)
     warn(located(unit.warnings, str(dyr)))
-    return unit_data(unit, dyr.name)
+    return unit_data(unit, relative(dyr, folder))
 
 
 def _facts(texts: tuple[str, ...]) -> dict[str, str]:

@@ -13,6 +13,8 @@ from exfit.util.typed import KEY
 class AsFound:
     """The model before the test and its responses; ``source`` is "" for the case's own start.
 
+    ``bus``, ``machine_id`` and ``file``, whose path is relative to the case, are its place in a
+    planner's base, None where the case does not say it.
     ``values`` are all of its parameters, named as in the system; ``comparisons`` those with the
     fitted records and then with the others, empty for the reason ``why``.
     """
@@ -22,6 +24,9 @@ class AsFound:
     values: Mapping[str, float]
     comparisons: tuple[Comparison, ...] = field(default=(), metadata={KEY: "records"})
     why: str = ""
+    bus: int | None = None
+    machine_id: str | None = field(default=None, metadata={KEY: "id"})
+    file: str | None = None
 
     @property
     def is_stated(self) -> bool:

@@ -64,7 +64,10 @@ def test_a_model_that_has_no_state_of_rest_is_reported_with_its_reason(tmp_path)
 
 
 def test_what_was_found_is_read_back(tmp_path):
-    result = fitted(tmp_path, as_found={"parameters": {"KA": 200.0}})
+    where = {"bus": 101, "id": "1", "file": "base/unit.dyr"}
+    result = fitted(tmp_path, as_found={**where, "parameters": {"KA": 200.0}})
+    before = result.as_found
+    assert (before.bus, before.machine_id, before.file) == (101, "1", "base/unit.dyr")
     (tmp_path / "result.json").write_text(result_text(result), encoding="utf-8")
     assert result_text(load_result(tmp_path)) == result_text(result)
 
@@ -76,6 +79,9 @@ def test_what_was_found_is_read_back(tmp_path):
         ({"parameters": {"KAA": 1.0}}, "as_found.parameters.KAA: not a parameter"),
         ({"parameters": {"TA": -1.0}}, "as_found.parameters.TA: -1 is below"),
         ({"model": "SEXS", "parameters": {"KA": 1.0}}, "as_found.parameters.KA: not a parameter"),
+        ({"bus": 1_000_000}, "as_found.bus: 1000000 is above 999999"),
+        ({"bus": "101"}, "as_found.bus: '101' is not a whole number"),
+        ({"id": 1}, "as_found.id: 1 is not text; put it in quotes"),
         ({"model": "own.py"}, "as_found.model: own is not in the catalogue"),
     ],
 )

@@ -185,6 +185,8 @@ def test_the_data_of_a_planners_file_are_starts_and_fixed_values(record, new):
     assert "sources" not in content["plant"]
     assert content["as_found"]["source"] == "unit.dyr, bus 101, machine 1"
     assert content["as_found"]["parameters"]["KA"] == 766.0
+    assert (content["as_found"]["bus"], content["as_found"]["id"]) == (101, "1")
+    assert (record.parent / content["as_found"]["file"]).samefile(SAMPLES / "unit.dyr")
     _, other = new("--record", record, "--dyr", SAMPLES / "unit.dyr", model="SEXS")
     assert other["model"] == "SEXS"
     assert other["as_found"]["model"] == "AC1A"

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from exfit.case.schema.values import Frozen, Number, Positive, Section, Text, nothing
+from exfit.case.schema.values import Bus, Frozen, Number, Positive, Section, Text, nothing
 from exfit.util.criteria import Criteria
 
 DEFAULTS = Criteria()
@@ -13,6 +13,13 @@ class AsFoundSection(Section):
 
     source: Text | None = Field(
         default=None, description="Where it is from, such as unit3.dyr, bus 101, machine 1."
+    )
+    bus: Bus | None = Field(
+        default=None, description="Bus of the unit there; an export finds its records by it."
+    )
+    id: Text | None = Field(default=None, description='Machine id of the unit there, such as "1".')
+    file: Text | None = Field(
+        default=None, description="The PSS/E file that it is from; path, relative to the case file."
     )
     model: Text | None = Field(
         default=None, description="Name of its exciter in the catalogue; default: that of the case."

@@ -3,7 +3,13 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from exfit.case.templates import as_found_lines, commented, parameter_line, source_lines
+from exfit.case.templates import (
+    PlannerUnit,
+    as_found_lines,
+    commented,
+    parameter_line,
+    source_lines,
+)
 from exfit.errors import DynamicsError
 from exfit.exchange.psse.fields import text_of
 from exfit.exchange.psse.unit import Unit, UnitPart, read_unit
@@ -29,7 +35,10 @@ def import_unit(path: Path, bus: int | None = None, machine_id: str | None = Non
 
 
 def case_text(unit: Unit, file: str) -> str:
-    """Return the case of a unit on open circuit, with a comment for all that it rests on."""
+    """Return the case of a unit on open circuit, with a comment for all that it rests on.
+
+    ``file`` is the path of the dynamics file as the case names it.
+    """
     lines = [*_heading(unit, file), *_exciter_name(unit.exciter), *_plant(unit.machine)]
     if unit.stabiliser is not None:
         name = unit.stabiliser.definition.model.name
@@ -51,7 +60,7 @@ def as_found(unit: Unit, file: str) -> Iterator[str]:
         for row in part.definition.model.sheet
         if row.symbol in part.definition.names
     }
-    source = f"{_plain(file)}, bus {unit.bus}, machine {_plain(unit.id)}"
+    source = PlannerUnit(unit.bus, _plain(unit.id), file)
     yield from as_found_lines(source, unit.exciter.definition.model.name, values)
 
 
@@ -61,7 +70,8 @@ def _prefix(part: UnitPart) -> str:
 
 
 def _heading(unit: Unit, file: str) -> Iterator[str]:
-    yield f"# Unit {_plain(unit.id)} at bus {unit.bus} of {_plain(file)}, on open circuit."
+    name = _plain(Path(file).name)
+    yield f"# Unit {_plain(unit.id)} at bus {unit.bus} of {name}, on open circuit."
     for line, text in unit.warnings:
         yield f"# Line {line}: {_plain(text)}."
 

@@ -1,5 +1,7 @@
 """The data of a new case from a unit of a PSS/E dynamics file."""
 
+from pathlib import Path
+
 from exfit.case.starting.starting_unit import PartData, UnitData
 from exfit.exchange.psse.import_case import as_found
 from exfit.exchange.psse.unit import Unit, UnitPart
@@ -7,7 +9,7 @@ from exfit.util.sources import TYPICAL
 
 
 def unit_data(unit: Unit, file: str) -> UnitData:
-    """Return the machine, exciter and stabiliser of a unit; ``file`` is what comments name.
+    """Return the machine, exciter and stabiliser of a unit of a file, whose path the case names.
 
     The file does not say where its values come from; what it does not hold is typical.
     """
@@ -20,4 +22,6 @@ def unit_data(unit: Unit, file: str) -> UnitData:
 def _part(part: UnitPart, file: str) -> PartData:
     names, model = part.definition.names, part.definition.model
     absent = [row.symbol for row in model.sheet if row.symbol not in names]
-    return PartData(model, part.values, dict.fromkeys(absent, TYPICAL), f"those of {file}")
+    return PartData(
+        model, part.values, dict.fromkeys(absent, TYPICAL), f"those of {Path(file).name}"
+    )
