@@ -53,6 +53,7 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult, Iteration
 from exfit.simulation.simulator import Response
+from exfit.util.root import on_disk
 
 if TYPE_CHECKING:
     from exfit.analysis.experiment_design import Design
@@ -193,7 +194,7 @@ def fit(
 
 def _text_of(case: Case) -> str:
     """Return the text of the file of a case; "" for a case that was made in Python."""
-    return case.path.read_text(encoding="utf-8-sig") if case.from_file else ""
+    return on_disk(case.path).read_text(encoding="utf-8-sig") if case.from_file else ""
 
 
 def load_case(path: str | PathLike[str]) -> Case:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from exfit.errors import CaseError
+from exfit.util.root import on_disk
 from exfit.util.text import Place
 
 LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
@@ -57,7 +58,7 @@ class YamlNode:
 def read_text(path: Path) -> str:
     """Return the text of a file; raises CaseError where it cannot be read or is not UTF-8."""
     try:
-        data = path.read_bytes()
+        data = on_disk(path).read_bytes()
     except OSError as error:
         raise CaseError([f"{path}: cannot be read: {error.strerror}"]) from None
     try:

@@ -36,7 +36,7 @@ def system_of(case: Case, recording: Recording | None = None) -> System:
     """
     system = _system_of(case, recording)
     if case.model is not None and case.model.endswith(".py"):
-        _refuse_untraceable(system, (case.folder / case.model).absolute())
+        _refuse_untraceable(system, case.folder / case.model)
     return system
 
 
@@ -139,8 +139,8 @@ def _refuse_untraceable(system: System, path: Path) -> None:
     try:
         trace(system, system.outputs)
     except Exception as fault:  # whatever a user's Python may raise
-        frames = extract_tb(fault.__traceback__)
-        lines = [f":{frame.lineno}" for frame in frames if Path(frame.filename) == path]
+        frames, absolute = extract_tb(fault.__traceback__), path.absolute()
+        lines = [f":{frame.lineno}" for frame in frames if Path(frame.filename) == absolute]
         kind = "" if isinstance(fault, ModelError) else f"{type(fault).__name__}: "
         raise ModelError(f"{path}{lines[-1] if lines else ''}: {kind}{fault}") from fault
 

@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import Any
 
 from exfit.errors import ModelError
+from exfit.util.root import on_disk
 
 HASH_DIGITS = 12  # digits of a hash that distinguish files
 
@@ -16,10 +17,10 @@ def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
     Raises ModelError where the file cannot be read or fails, and, before anything of it is run,
     where its hash is not ``sha256``; empty: any hash will do.
     """
-    if not path.is_file():
+    if not on_disk(path).is_file():
         raise ModelError(f"{path}: no such file")
     try:
-        code = path.read_bytes()
+        code = on_disk(path).read_bytes()
     except OSError as fault:
         raise ModelError(f"{path}: cannot be read: {fault.strerror}") from fault
     own = hashlib.sha256(code).hexdigest()

@@ -10,6 +10,7 @@ from zlib import crc32
 
 from exfit.errors import ExfitError
 from exfit.util.interrupts import deferred_interrupts
+from exfit.util.root import on_disk
 
 # of a file that is still to be renamed: computer, process, and which of its files
 TEMPORARY = re.compile(r"\.exfit-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}\.tmp")
@@ -162,8 +163,10 @@ def siblings(path: Path, suffix: str) -> list[Path]:
 
     Those whose name is the same to the letter count before others.
     """
-    if not path.parent.is_dir():
+    folder = on_disk(path.parent)
+    if not folder.is_dir():
         return []
     wanted = (path.stem + suffix).lower()
-    alike = [file for file in sorted(path.parent.iterdir()) if file.name.lower() == wanted]
+    names = sorted(file.name for file in folder.iterdir())
+    alike = [path.with_name(name) for name in names if name.lower() == wanted]
     return [file for file in alike if file.stem == path.stem] or alike

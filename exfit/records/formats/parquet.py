@@ -13,6 +13,7 @@ from exfit.records.formats.columns import Columns, missing_package, sound
 from exfit.records.formats.heads import stated
 from exfit.records.formats.table import Table, column_error, readable
 from exfit.records.units import unit_in
+from exfit.util.root import on_disk
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -36,7 +37,7 @@ def read_parquet(path: Path) -> Table:
     sha256 = _hash(path)
 
     def opened() -> "ParquetFile":
-        return ParquetFile(path, page_checksum_verification=True)
+        return ParquetFile(on_disk(path), page_checksum_verification=True)
 
     schema, rows = sound(path, PARQUET, lambda: _outline(opened))
     if rows == 0:
@@ -54,7 +55,7 @@ def read_parquet(path: Path) -> Table:
 
 
 def _hash(path: Path) -> str:
-    with readable(path), path.open("rb") as file:
+    with readable(path), on_disk(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

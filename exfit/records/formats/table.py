@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
+from exfit.util.root import on_disk
 
 Array = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def column_error(place: Path | str, name: str, what: str) -> RecordError:
 def read_bytes(path: Path) -> bytes:
     """Return the bytes of a file; raises RecordError where it cannot be read."""
     with readable(path):
-        return path.read_bytes()
+        return on_disk(path).read_bytes()
 
 
 @contextmanager
