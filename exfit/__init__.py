@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
     from exfit.fleet.fits import fit_all
+    from exfit.fleet.folder import read_fleet
     from exfit.fleet.ranking import rank
     from exfit.programme.run import run
     from exfit.records.record import Record
@@ -63,6 +64,7 @@ __all__ = [
     "load_result",
     "profile",
     "rank",
+    "read_fleet",
     "read_record",
     "run",
     "saturation_curve",
@@ -83,6 +85,7 @@ _MODULES = {
     "load_result": "exfit.results.io",
     "profile": "exfit.workflows",
     "rank": "exfit.fleet.ranking",
+    "read_fleet": "exfit.fleet.folder",
     "read_record": "exfit.workflows",
     "run": "exfit.programme.run",
     "saturation_curve": "exfit.analysis.steady.saturation",

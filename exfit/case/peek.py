@@ -50,21 +50,25 @@ def keys_of(file: Path) -> frozenset[str]:
     return frozenset(map(str, _content(file)))
 
 
-def section_of(text: str, case: Path, key: str) -> Any:
-    """Return what the text of a case has under a key of its top; None where there is nothing."""
+def content_of(text: str, case: Path) -> Mapping[str, Any]:
+    """Return what the text of a case holds; nothing where it cannot be read as YAML."""
     try:
         root, _ = read_yaml(text, case)
     except CaseError:
-        return None
-    return root.value.get(key)
+        return {}
+    return root.value if isinstance(root.value, Mapping) else {}
+
+
+def section_of(text: str, case: Path, key: str) -> Any:
+    """Return what the text of a case has under a key of its top; None where there is nothing."""
+    return content_of(text, case).get(key)
 
 
 def _content(case: Path) -> Mapping[str, Any]:
     try:
-        root, _ = read_yaml(read_text(case), case)
+        return content_of(read_text(case), case)
     except CaseError:
         return {}
-    return root.value if isinstance(root.value, Mapping) else {}
 
 
 def _files(content: Any) -> Iterator[str]:

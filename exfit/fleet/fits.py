@@ -12,6 +12,7 @@ from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.search import checked_search, checked_strategy, fitted
+from exfit.fleet.names import distinct_names, numbered
 from exfit.results.model import FitResult, Iteration
 from exfit.results.side_by_side import outcome_of
 from exfit.util.typed import plain
@@ -155,7 +156,7 @@ def planned(
         for name, case in zip(names, read, strict=True)
         for strategy in strategies or [case.estimate.strategy]
     ]
-    runs = _numbered([f"{name}-{strategy}" for name, _, strategy in combinations])
+    runs = numbered([f"{name}-{strategy}" for name, _, strategy in combinations])
     return tuple(
         PlannedFit(*combination, search, run)
         for combination, run in zip(combinations, runs, strict=True)
@@ -190,32 +191,6 @@ def run_all(
     return FitSeries(
         tuple(runs), failed, tuple(fit.name for fit in plan if fit.name not in done), interrupted
     )
-
-
-def distinct_names(paths: Sequence[Path]) -> list[str]:
-    """Return the stem of each path, behind the name of its folder where several have one stem.
-
-    What is the same even so is numbered; capitals make no difference, as on some disks.
-    """
-    stems = Counter(path.stem.casefold() for path in paths)
-    return _numbered(
-        f"{path.absolute().parent.name}-{path.stem}"
-        if stems[path.stem.casefold()] > 1
-        else path.stem
-        for path in paths
-    )
-
-
-def _numbered(names: Iterable[str]) -> list[str]:
-    """Return names with a number behind each that repeats an earlier one."""
-    taken: dict[str, str] = {}
-    for name in names:
-        candidate, number = name, 1
-        while candidate.casefold() in taken:
-            number += 1
-            candidate = f"{name}-{number}"
-        taken[candidate.casefold()] = candidate
-    return [*taken.values()]
 
 
 def _ready(case: Case) -> Case:

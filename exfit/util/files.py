@@ -26,20 +26,30 @@ def write_whole(path: Path, data: bytes) -> None:
     with deferred_interrupts():
         path.parent.mkdir(parents=True, exist_ok=True)
         remove_abandoned(path.parent)
-        beside = _temporary(path.parent)
-        try:
-            _write_new(beside, data)
-            beside.replace(path)
-        except OSError:
-            with suppress(OSError):
-                beside.unlink()
-            raise
+        _write_and_rename(path, data)
 
 
 def write(path: Path, content: str | bytes) -> None:
     """Write a file, whole or not at all; raises ExfitError where the place cannot be written."""
     try:
         write_whole(path, content.encode() if isinstance(content, str) else content)
+    except OSError as fault:
+        raise ExfitError(_message(path, fault)) from fault
+
+
+def write_each(folder: Path, contents: Mapping[str, str]) -> None:
+    """Write small files of a folder, each whole or not at all, in little time for many.
+
+    Raises ExfitError where one cannot be written. What killed runs have left there is removed.
+    """
+    path = folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        remove_abandoned(folder)
+        for name, content in contents.items():
+            path = folder / name
+            with deferred_interrupts():
+                _write_and_rename(path, content.encode())
     except OSError as fault:
         raise ExfitError(_message(path, fault)) from fault
 
@@ -118,6 +128,17 @@ def _runs(process: int) -> bool:
     except OSError:
         return True
     return True
+
+
+def _write_and_rename(path: Path, data: bytes) -> None:
+    beside = _temporary(path.parent)
+    try:
+        _write_new(beside, data)
+        beside.replace(path)
+    except OSError:
+        with suppress(OSError):
+            beside.unlink()
+        raise
 
 
 def _write_new(path: Path, data: bytes) -> None:

@@ -10,7 +10,8 @@ from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 
 import exfit
 from exfit.errors import CaseError
-from exfit.fleet.fits import distinct_names, fit_all, planned, run_all
+from exfit.fleet.fits import fit_all, planned, run_all
+from exfit.fleet.names import distinct_names
 from exfit.results.side_by_side import parameters_beside, results_table
 
 STRATEGIES = ("dgn", "lm")

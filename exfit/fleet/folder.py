@@ -1,0 +1,239 @@
+"""The folder of a batch: a folder for each fit, an index of the cases, and both read as a fleet.
+
+    <key>/result.json   a fit with its tables: there, and whole, once it is done
+    <key>/summary.json  its row of the table, made again from result.json where it is missing
+    <key>/failed.json   in place of both: why there is no fit
+    index/<hash>.json   for each case its path, and its key or the reason why it has none
+
+Parts of a batch, and batches one after the other, need no coordination but this.
+"""
+
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from exfit.errors import ExfitError
+from exfit.fleet.names import distinct_names
+from exfit.fleet.summary import CaseFacts, CaseStatus, CaseSummary, FailureKind, summary_of
+from exfit.util.files import write, write_each, write_together
+from exfit.util.text import to_json
+from exfit.util.typed import FormError, Reader, plain
+
+INDEX, CASES = "index", "cases"
+RESULT, SUMMARY, FAILED = "result.json", "summary.json", "failed.json"
+VERSION = 1  # of a summary; one of another version is made again
+KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
+
+Content = TypeVar("Content")
+
+
+@dataclass(frozen=True)
+class IndexEntry:
+    """A case of a batch: its path, and its key or, in ``status`` and ``reason``, why it has none.
+
+    The path is relative to the folder of the batch where there is a way.
+    """
+
+    case: str
+    key: str = ""
+    status: CaseStatus = "not run"
+    reason: str = ""
+    facts: CaseFacts = field(default_factory=CaseFacts)
+
+    @property
+    def file(self) -> str:
+        """The name of its file in the index."""
+        return f"{hashlib.sha256(self.case.encode()).hexdigest()[:KEY_DIGITS]}.json"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no fit of a case, and the processor time that was spent, s."""
+
+    kind: FailureKind
+    reason: str
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class CaseOutcome:
+    """What a worker makes of a case: the files of its fit by name with their summary, or a failure.
+
+    Neither: the case, or a file of it, was changed meanwhile, in the way that ``changed`` says.
+    """
+
+    files: Mapping[str, str] = field(default_factory=dict)
+    summary: CaseSummary | None = None
+    failure: Failure | None = None
+    changed: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Fleet:
+    """All cases of a batch's folder, in the order of their names.
+
+    ``interrupted``: by Ctrl-C, which left some of them out.
+    """
+
+    folder: Path
+    cases: tuple[CaseSummary, ...]
+    interrupted: bool = False
+
+    @property
+    def counts(self) -> dict[CaseStatus, int]:
+        """How many cases there are of each status."""
+        return dict(Counter(case.status for case in self.cases))
+
+    def path_of(self, case: CaseSummary) -> Path:
+        """Return the path of the file of a case."""
+        return case_path(self.folder, case.case)
+
+    def folder_of(self, case: CaseSummary) -> Path | None:
+        """Return the folder of the fit of a case; None where there is none."""
+        return self.folder / case.key if case.status == "done" else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all but the curves as plain data, as ``exfit batch --json`` prints it."""
+        return {
+            "folder": str(self.folder),
+            "counts": dict(self.counts),
+            "cases": [plain(case) for case in self.cases],
+            "interrupted": self.interrupted,
+        }
+
+
+def case_name(folder: Path, case: Path) -> str:
+    """Return the path of a case as the index has it."""
+    path = case.parent.resolve() / case.name
+    try:
+        return Path(os.path.relpath(path, folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return path.as_posix()
+
+
+def case_path(folder: Path, case: str) -> Path:
+    """Return the path of a case that the index has."""
+    return Path(os.path.normpath(folder.absolute() / case))
+
+
+def is_done(folder: Path, key: str) -> bool:
+    """Return whether the fit of a key is done."""
+    return (folder / key / RESULT).is_file()
+
+
+def failure_of(folder: Path, key: str) -> Failure | None:
+    """Return why the fit of a key failed; None where it did not, or was not run."""
+    return _read(folder / key / FAILED, Failure)
+
+
+def write_outcome(folder: Path, key: str, outcome: CaseOutcome) -> None:
+    """Write what a case came to under its key; raises ExfitError where that is not possible."""
+    if outcome.summary is not None:
+        summary = _summary_text(outcome.summary)
+        files = {name: text for name, text in outcome.files.items() if name != RESULT}
+        contents = {**files, SUMMARY: summary, RESULT: outcome.files[RESULT]}
+        write_together(folder / key, contents, [FAILED])
+    elif outcome.failure is not None:
+        write(folder / key / FAILED, to_json(plain(outcome.failure)))
+
+
+def write_entries(folder: Path, entries: Iterable[IndexEntry]) -> None:
+    """Write entries of the index; raises ExfitError where that is not possible."""
+    write_each(folder / INDEX, {entry.file: to_json(plain(entry)) for entry in entries})
+
+
+def entries_of(folder: Path) -> dict[str, IndexEntry]:
+    """Return the index by the paths of the cases; a damaged entry is missing until its next run."""
+    entries = (_read(file, IndexEntry) for file in sorted((folder / INDEX).glob("*.json")))
+    return {entry.case: entry for entry in entries if entry is not None}
+
+
+def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
+    """Return all cases of a folder that ``exfit batch`` writes, as they are now.
+
+    Raises ExfitError where it is no such folder.
+
+    Example:
+        >>> fleet = exfit.read_fleet("fleet")
+        >>> [case.name for case in fleet.cases if not case.holds]
+    """
+    place = Path(folder)
+    if not (place / INDEX).is_dir():
+        raise ExfitError(f"{place}: not the folder of a batch: {INDEX} is missing")
+    entries = [*entries_of(place).values()]
+    names = distinct_names([case_path(place, entry.case) for entry in entries])
+    rows = [
+        replace(_row(place, entry), name=name, case=entry.case)
+        for name, entry in zip(names, entries, strict=True)
+    ]
+    return Fleet(place, tuple(sorted(rows, key=lambda row: (row.name.casefold(), row.name))))
+
+
+def state_of(folder: Path) -> frozenset[tuple[str, int, int]]:
+    """Return what changes in a folder when a case is added or comes to an end."""
+    return frozenset(_stamps(folder))
+
+
+def _stamps(folder: Path) -> Iterator[tuple[str, int, int]]:
+    for entry in (folder / INDEX).glob("*.json"):
+        yield from _stamp(entry)
+    for outcome in (RESULT, FAILED):
+        for file in folder.glob(f"*/{outcome}"):
+            yield from _stamp(file)
+
+
+def _stamp(file: Path) -> Iterator[tuple[str, int, int]]:
+    try:
+        status = file.stat()
+    except OSError:  # replaced or removed meanwhile
+        return
+    yield str(file), status.st_mtime_ns, status.st_size
+
+
+def _row(folder: Path, entry: IndexEntry) -> CaseSummary:
+    row = CaseSummary(
+        "", entry.case, entry.key, entry.status, entry.reason, **entry.facts._asdict()
+    )
+    if not entry.key:
+        return row
+    if is_done(folder, entry.key):
+        try:
+            return _summary(folder, entry.key)
+        except ExfitError as fault:
+            return replace(row, status="failed", reason=str(fault))
+    failure = failure_of(folder, entry.key)
+    if failure is None:
+        return replace(row, status="not run")
+    return replace(row, status=failure.kind, reason=failure.reason, seconds=failure.seconds)
+
+
+def _summary(folder: Path, key: str) -> CaseSummary:
+    """Return the summary of a fit that is done; raises ExfitError where it cannot be read."""
+    summary = _read(folder / key / SUMMARY, CaseSummary, VERSION)
+    if summary is not None:
+        return summary
+    from exfit.results.io import load_result
+
+    result = load_result(folder / key)
+    return summary_of(result, key, result.seconds)
+
+
+def _summary_text(summary: CaseSummary) -> str:
+    return to_json({"version": VERSION, **plain(summary, whole=True)})
+
+
+def _read(file: Path, kind: type[Content], version: int | None = None) -> Content | None:
+    """Return the content of a file, None where there is none of this form and version."""
+    try:
+        data = json.loads(file.read_bytes())
+        if version is not None and data.get("version") != version:
+            return None
+        content: Content = Reader().read(kind, data)
+    except (FormError, OSError, ValueError, AttributeError, RecursionError):
+        return None
+    return content
