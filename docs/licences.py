@@ -2,8 +2,9 @@
 
     pip install ".[records,pdf,cluster,test,docs,develop]" && python docs/licences.py
 
-writes licences.md: of what is installed with exfit and with each of its extras also what those
-packages need in turn, on Linux, macOS and Windows; of the tools of its developers themselves.
+writes the tables of licences.md. What is installed with exfit, and with each of its extras, is
+listed with all that it needs in turn on Linux, macOS and Windows; of the tools of developers only
+what exfit itself names.
 """
 
 import re
@@ -29,35 +30,22 @@ LONGEST = 60  # characters: more is the text of a licence, not its name
 
 Rows = dict[str, tuple[str, str]]  # package: why it is there, and its licence
 
-HEAD = """\
-# Licences
-
-exfit itself is under the MIT licence, see `LICENSE`. This page lists the licences of the packages that `pip` installs with it,
-as their own metadata name them; exfit contains no code of theirs. `python docs/licences.py` writes it.
-
-A wheel may contain libraries of others beside its own code, with their licences in its `dist-info` folder: those of NumPy and
-SciPy contain OpenBLAS (BSD) and the runtime of GNU Fortran (GPL with the exception for runtime libraries), that of llvmlite
-contains LLVM (Apache-2.0 with the LLVM exception).
-
-## What lies inside the files that exfit writes
-
-| file | of others | licence, and where its notice is |
-|---|---|---|
-| `report.html` | the scripts of BokehJS, as the package bokeh brings them | BSD-3-Clause; the whole notice is the first comment of each script |
-| | in BokehJS: numbro 1.6.2, jQuery Mousewheel 3.1.13 | MIT; comments in the script |
-| `report.pdf` | subsets of fonts of the system that prints it, such as DejaVu Sans | those of the fonts; PDF files may contain all that usual systems bring |
-| figures as PNG | shapes of the letters of DejaVu Sans, which Matplotlib brings | Bitstream Vera and Arev, free to embed |
-
-The page of a report contains no fonts, and fetches none: its rules of security (CSP) forbid it.
-"""
+BEGIN, END = "<!-- packages -->", "<!-- /packages -->"
 
 
-def page() -> str:
-    """Return the page as Markdown."""
+def with_tables(page: str) -> str:
+    """Return a page with the tables between their marks."""
+    before, _, rest = page.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n\n{tables()}\n\n{END}{after}"
+
+
+def tables() -> str:
+    """Return the tables of the packages as Markdown."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = {name: _direct(name, project) for name in project["optional-dependencies"]}
     base = _with_needed(map(Requirement, project["dependencies"]))
-    parts = [HEAD, f"## Installed with exfit\n\n{_table(base)}"]
+    parts = [f"## Installed with exfit\n\n{_table(base)}"]
     for name, requirements in extras.items():
         if name not in TOOLS and requirements:
             further = _with_needed(requirements)
@@ -69,7 +57,7 @@ def page() -> str:
         for requirement in extras[name]
     }
     parts.append(f"## Tools of the developers\n\n{_table(tools)}")
-    return "\n\n".join(part.strip() for part in parts) + "\n"
+    return "\n\n".join(parts)
 
 
 def _direct(extra: str, project: Mapping[str, object]) -> list[Requirement]:
@@ -120,8 +108,8 @@ def licence(name: str) -> str:
 
 def _named(metadata: PackageMetadata) -> str:
     """Return the licence that metadata name: as an expression, in words, or by its class."""
-    expression = metadata["License-Expression"] if "License-Expression" in metadata else ""
-    words = " ".join((metadata["License"] if "License" in metadata else "").split())
+    expression = metadata.get("License-Expression", "")
+    words = " ".join(metadata.get("License", "").split())
     classes = [
         text.rpartition(" :: ")[2]
         for text in metadata.get_all("Classifier") or []
@@ -142,4 +130,5 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8", newline="\n")
+    text = with_tables(PAGE.read_text(encoding="utf-8"))
+    PAGE.write_text(text, encoding="utf-8", newline="\n")
