@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, takewhile
 from math import isnan
+from pathlib import Path
 
 import numpy as np
 
@@ -96,7 +97,8 @@ def _case_before(case: Case, section: AsFoundSection) -> Case:
     """Return the case with the exciter of the planner's base."""
     if section.model is None:
         return case
-    model = find(section.model, case.folder)
+    # a name of the catalogue, as the check of the case read it: no file beside the case is run
+    model = find(section.model.removesuffix(".py"), Path())
     if case.parts.exciter is not None and model.name == case.parts.exciter.name:
         return case
     from exfit.case.other_model import with_exciter  # what `new` needs, a fit mostly does not

@@ -61,6 +61,11 @@ def read_text(path: Path) -> str:
         data = on_disk(path).read_bytes()
     except OSError as error:
         raise CaseError([f"{path}: cannot be read: {error.strerror}"]) from None
+    return decoded(data, path)
+
+
+def decoded(data: bytes, path: Path) -> str:
+    """Return the text that the bytes of a file are; raises CaseError where they are not UTF-8."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -111,14 +111,21 @@ def facts_of(content: Mapping[str, Any]) -> CaseFacts:
     bus, machine_id = as_found.get("bus"), as_found.get("id")
     bus = bus if isinstance(bus, int) and not isinstance(bus, bool) else None
     machine_id = None if machine_id is None else str(machine_id)
-    about = {str(key).casefold(): fact for key, fact in _mapping(content.get("about")).items()}
     return CaseFacts(
-        unit=_text(about.get("unit")) or _place(bus, machine_id),
+        unit=_unit(_mapping(content.get("about")), bus, machine_id),
         bus=bus,
         machine_id=machine_id,
         model=_text(content.get("model")),
         machine_model=_text(plant.get("machine")),
     )
+
+
+def _unit(about: Mapping[Any, Any], bus: int | None, machine_id: str | None) -> str:
+    """Return what a case calls its unit, else its place in the planner's file in words."""
+    named = {str(key).casefold(): fact for key, fact in about.items()}
+    machine = None if machine_id is None else f"machine {machine_id}"
+    place = filter(None, (None if bus is None else f"bus {bus}", machine))
+    return _text(named.get("unit")) or ", ".join(place)
 
 
 def _mapping(content: Any) -> Mapping[Any, Any]:
@@ -127,12 +134,6 @@ def _mapping(content: Any) -> Mapping[Any, Any]:
 
 def _text(content: Any) -> str:
     return str(content) if isinstance(content, str | int | float) else ""
-
-
-def _place(bus: int | None, machine_id: str | None) -> str:
-    """Return the place of a unit in the planner's file in words."""
-    machine = None if machine_id is None else f"machine {machine_id}"
-    return ", ".join(filter(None, (None if bus is None else f"bus {bus}", machine)))
 
 
 def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
@@ -163,10 +164,10 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
 
 
 def _facts_of_result(result: "FitResult") -> CaseFacts:
-    from exfit.case.peek import content_of
-
-    facts = facts_of({**content_of(result.case_text, result.case), "about": result.about})
-    return facts._replace(model=result.model, machine_model=result.machine_model or "")
+    found = result.as_found
+    bus, machine_id = (None, None) if found is None else (found.bus, found.machine_id)
+    unit = _unit(result.about, bus, machine_id)
+    return CaseFacts(unit, bus, machine_id, result.model, result.machine_model or "")
 
 
 def _largest_rmse(comparisons: "Sequence[Comparison]") -> dict[str, float]:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -12,21 +12,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.schema import SINGLE
 from exfit.errors import ExfitError
 from exfit.output import run_figures
 from exfit.output.figure_files import FigureFiles
 from exfit.results.comparisons import Comparison
-from exfit.results.io import WHOLE_FIT, result_text
+from exfit.results.fit_files import (
+    HISTORY,
+    ITERATIONS,
+    PARAMETERS,
+    RESPONSE,
+    SENSITIVITIES,
+    comparison_files,
+    files_of_fit,
+)
+from exfit.results.io import WHOLE_FIT
 from exfit.results.model import FitResult
 from exfit.results.tables import (
     DIGITS,
-    comparison_table,
     effects_table,
-    history_table,
-    iteration_responses_table,
     parameter_file,
-    phase_end_file,
     table,
     whole_table,
 )
@@ -50,10 +54,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-PARAMETERS = "parameters.yaml"
-ITERATIONS, SENSITIVITIES = "iterations.csv", "sensitivities.csv"
 VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
-INSPECTION, RESPONSE, AGREEMENT = "inspect.json", "response.csv", "compare.json"
+INSPECTION, AGREEMENT = "inspect.json", "compare.json"
 SERIES, AT_RECORD = "fits.json", "compare-record.csv"
 TRANSLATION, RANKING = "translation.json", "rank.json"
 MAIN_FILES = (
@@ -74,7 +76,7 @@ NUMBERS = {
     "fit": (
         PARAMETERS,
         *PHASE_PARAMETERS,
-        "history.csv",
+        HISTORY,
         RESPONSE,
         ITERATIONS,
         SENSITIVITIES,
@@ -141,7 +143,7 @@ def write_fit(result: FitResult, folder: Path) -> FigureFiles:
     the numbers are whole then.
     """
     with deferred_interrupts():
-        numbers = dict(_numbers_of_fit(result))
+        numbers = dict(files_of_fit(result))
         write_together(folder, numbers, {*FILES_OF_FIT, *_of_records(folder / WHOLE_FIT)})
         with suppress(ExfitError):  # a cache that cannot be written keeps nothing
             write(_last_parameters(result.case), numbers[PARAMETERS])
@@ -178,32 +180,6 @@ def write_ranking(ranking: "Ranking", folder: Path) -> FigureFiles:
     return FigureFiles.beside(folder / RANKING, partial(run_figures.of_ranking, ranking))
 
 
-def _numbers_of_fit(result: FitResult) -> Iterator[tuple[str, str]]:
-    """Yield the names and contents of a fit's tables, and last of its result."""
-    yield PARAMETERS, parameter_file(result)
-    for end in result.phase_ends:
-        yield f"parameters_{end.phase}.yaml", phase_end_file(result, end)
-    yield "history.csv", history_table(result)
-    if result.comparison.name == SINGLE:
-        yield RESPONSE, comparison_table(result.comparison)
-    else:
-        yield from _tables(result.comparisons)
-    yield from _tables(result.validation)
-    for match in result.comparisons:
-        if match.iteration_responses is not None:
-            name = ITERATIONS if match.name == SINGLE else f"{match.name}-{ITERATIONS}"
-            yield name, iteration_responses_table(match.iteration_responses)
-    if result.knowledge is not None:
-        yield SENSITIVITIES, effects_table(result.knowledge.effects)
-    yield WHOLE_FIT, result_text(result)
-
-
-def _tables(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, str]]:
-    """Yield the samples of each comparison under its name."""
-    for match in comparisons:
-        yield f"{match.name}.csv", comparison_table(match)
-
-
 def _of_records(main: Path) -> set[str]:
     """Return the names of the files that a former run wrote for its records, by its main file."""
     try:
@@ -230,7 +206,7 @@ def write_validation(comparisons: Sequence[Comparison], folder: Path) -> FigureF
     main = folder / VALIDATION
     content = {"validation": [plain(match) for match in comparisons]}
     with deferred_interrupts():
-        numbers = {**dict(_tables(comparisons)), VALIDATION: to_json(content)}
+        numbers = {**dict(comparison_files(comparisons)), VALIDATION: to_json(content)}
         write_together(folder, numbers, _of_records(main))
     return FigureFiles.beside(main, partial(run_figures.of_comparisons, comparisons))
 

@@ -57,6 +57,12 @@ def test_another_exciter_may_have_been_in_the_planner_s_base(tmp_path):
     assert len(match.time) == len(TIME)
 
 
+def test_a_file_of_python_that_is_called_like_a_model_is_not_run(tmp_path):
+    (tmp_path / "SEXS.py").write_text("raise SystemExit")
+    result = fitted(tmp_path, as_found={"model": "SEXS.py", "parameters": {"K": 50.0}})
+    assert (result.as_found.model, result.as_found.why) == ("SEXS", "")
+
+
 def test_a_model_that_has_no_state_of_rest_is_reported_with_its_reason(tmp_path):
     result = fitted(tmp_path, as_found={"parameters": {"VRMAX": 0.1}})
     assert result.as_found.comparisons == ()

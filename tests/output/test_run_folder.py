@@ -18,6 +18,7 @@ from exfit.case.load import load_case
 from exfit.errors import CaseError, ExfitError
 from exfit.fitting.overrides import read_parameters
 from exfit.output import figure_files, plots, run_folder
+from exfit.results import fit_files
 from exfit.results.tables import DIGITS, parameter_file, table
 from exfit.util.files import write
 from exfit.util.text import to_json
@@ -325,13 +326,13 @@ def test_an_interruption_while_drawing_leaves_the_numbers_and_nothing_half(twice
 def test_an_interruption_while_the_numbers_are_made_waits_for_all_of_them(twice, monkeypatch):
     result, folder = twice
     former = signal.signal(signal.SIGINT, signal.default_int_handler)
-    make = run_folder.history_table
+    make = fit_files.history_table
 
     def interrupted(result):
         signal.raise_signal(signal.SIGINT)
         return make(result)
 
-    monkeypatch.setattr(run_folder, "history_table", interrupted)
+    monkeypatch.setattr(fit_files, "history_table", interrupted)
     try:
         with pytest.raises(KeyboardInterrupt):
             run_folder.write_fit(result, folder).draw()
