@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.results.facts import UNIT, Facts, stated
 from exfit.util.typed import IN_FILE
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class CaseSummary:
     one. ``reason`` says why it is not done, or is the reason of the verdict. ``rmse`` (pu) is by
     signal, the largest over the fitted records; ``parameters`` are all of the unit's, fitted or
     not; ``unresolved`` names those fitted that the records do not determine. ``seconds`` is
-    processor time.
+    processor time; ``about`` are the facts that the case of a fit states of its unit and test.
     """
 
     name: str
@@ -103,6 +104,7 @@ class CaseSummary:
     curves: tuple[SummaryCurve, ...] = field(default=(), metadata=IN_FILE)
     seconds: float = 0.0
     notes: tuple[str, ...] = ()
+    about: Facts = field(default_factory=dict)
 
 
 def facts_of(content: Mapping[str, Any]) -> CaseFacts:
@@ -122,10 +124,10 @@ def facts_of(content: Mapping[str, Any]) -> CaseFacts:
 
 def _unit(about: Mapping[Any, Any], bus: int | None, machine_id: str | None) -> str:
     """Return what a case calls its unit, else its place in the planner's file in words."""
-    named = {str(key).casefold(): fact for key, fact in about.items()}
+    facts = {str(key): _text(fact) for key, fact in about.items()}
     machine = None if machine_id is None else f"machine {machine_id}"
     place = filter(None, (None if bus is None else f"bus {bus}", machine))
-    return _text(named.get("unit")) or ", ".join(place)
+    return stated(facts, UNIT) or ", ".join(place)
 
 
 def _mapping(content: Any) -> Mapping[Any, Any]:
@@ -160,6 +162,7 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
         curves=tuple(curve for match in result.comparisons for curve in _curves(match)),
         seconds=round(seconds, 3),
         notes=(*result.notes, *(note for match in result.comparisons for note in match.notes)),
+        about=result.about,
     )
 
 

@@ -64,6 +64,7 @@ def test_a_fleet_has_a_row_for_every_case_of_the_index(folder, result):
     }
     done, slow = rows["cases-one"], rows["slow"]
     assert (done.unit, done.model, done.seconds) == ("Unit 3", "FIRST_ORDER", 1.5)
+    assert done.about == ABOUT["about"]
     assert done.parameters["k"].value == result.parameters["k"].value
     assert done.parameters["k"][1:3] == result.parameters["k"].interval
     assert done.parameters["k"].source == "fitted"
@@ -143,6 +144,7 @@ def test_the_path_of_a_case_is_relative_to_the_folder(tmp_path, monkeypatch):
     [
         ({"about": {"unit": 3}, "model": "AC8B", "plant": {"machine": "GENSAL"}},
          CaseFacts("3", model="AC8B", machine_model="GENSAL")),
+        ({"about": {"Generator": "G2"}}, CaseFacts("G2")),
         ({"as_found": {"bus": 101, "id": "1"}}, CaseFacts("bus 101, machine 1", 101, "1")),
         ({"as_found": {"bus": True, "id": 7}, "about": [1]}, CaseFacts("machine 7", None, "7")),
         ({"as_found": "x", "plant": 1, "model": ["y"]}, CaseFacts()),

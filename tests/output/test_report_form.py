@@ -8,13 +8,14 @@ from records import TEST, TIME, case_of, config, one, synthetic
 
 import exfit
 from exfit import workflows
-from exfit.output.report import facts, html
+from exfit.output.report import html
 from exfit.output.report.programme_page import programme_page
 from exfit.output.report.sections import SECTIONS
 from exfit.output.report.sections.as_found import as_found
 from exfit.output.report.sections.form import form, rated
 from exfit.output.report.sections.signatures import signatures
 from exfit.output.report.sections.usability import usability
+from exfit.results import facts
 
 QUICK = ("first_order", "machine_playback")  # the others are fitted in the long run
 SAMPLES = [

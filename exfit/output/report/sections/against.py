@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from exfit.dsp.decimation import envelope
 from exfit.output.report.charts import Chart, Panel, Series
-from exfit.output.report.facts import PLANT, REVISION, UNIT, stated
 from exfit.output.report.layout import BINS, TALL, TIME
 from exfit.results.comparisons import Comparison
 from exfit.results.criteria import judged_by_criteria
+from exfit.results.facts import PLANT, REVISION, UNIT, stated
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import ParameterValue, outcome_of, parameters_beside
 from exfit.signals import label_of

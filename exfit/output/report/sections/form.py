@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from exfit.models.families import family_of
-from exfit.output.report import facts
-from exfit.output.report.facts import AskedFact, Facts, answer, stated
 from exfit.output.report.sections.usability import UsabilityCheck, no_usability, usability
 from exfit.programme.result import ProgrammeResult
+from exfit.results import facts
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import PartDescription
+from exfit.results.facts import AskedFact, Facts, answer, stated
 from exfit.results.model import FitResult
 from exfit.util.sources import NOT_STATED, by_source
 from exfit.util.text import rounded, show

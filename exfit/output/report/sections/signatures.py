@@ -2,7 +2,8 @@
 
 from typing import NamedTuple
 
-from exfit.output.report.facts import (
+from exfit.programme.result import ProgrammeResult
+from exfit.results.facts import (
     APPROVED,
     CHANGES,
     CHECKED,
@@ -14,7 +15,6 @@ from exfit.output.report.facts import (
     answer,
     stated,
 )
-from exfit.programme.result import ProgrammeResult
 from exfit.results.model import FitResult
 
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from exfit.output.report.facts import Facts
 from exfit.programme.result import ProgrammeResult
 from exfit.results.description import RecordedTest
+from exfit.results.facts import Facts
 from exfit.results.model import FitResult
 from exfit.util.text import show
 

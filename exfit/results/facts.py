@@ -1,4 +1,4 @@
-"""The facts that a report asks for by name: keys of the section ``about`` of a case.
+"""The facts that reports and fleets ask for by name: keys of the section ``about`` of a case.
 
 Upper and lower case, blanks and hyphens are the same. What is not stated is reported as such; any
 other fact of a case is shown, too.
