@@ -85,7 +85,8 @@ def export(
     try:
         records = exported(fit, bus, machine_id, model)
     except ExfitError as fault:
-        raise ExfitError(f"{source}: {fault}") from None
+        texts = (f"{source}: {text}" for text in str(fault).splitlines())
+        raise ExfitError("\n".join(texts)) from None
     write_text(records.text, output, [f"{source}: {text}" for text in records.warnings])
     if output is not None:
         click.echo(f"written to {output}")

@@ -1,7 +1,6 @@
 """The files that a run leaves behind: its numbers, written together; its figures come after."""
 
 import hashlib
-import json
 import os
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -37,6 +36,7 @@ from exfit.results.tables import (
 from exfit.util.cache import cache_folder
 from exfit.util.files import write, write_together
 from exfit.util.interrupts import deferred_interrupts
+from exfit.util.json_files import read_json
 from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
 from exfit.util.typed import plain
@@ -183,10 +183,10 @@ def write_ranking(ranking: "Ranking", folder: Path) -> FigureFiles:
 def _of_records(main: Path) -> set[str]:
     """Return the names of the files that a former run wrote for its records, by its main file."""
     try:
-        content = json.loads(main.read_bytes())
+        content = read_json(main)
         matches = [*content.get("records", ()), *content.get("validation", ())]
         names = [Path(match["name"]).name for match in matches]
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+    except (ExfitError, LookupError, TypeError, AttributeError):
         return set()  # there is none, or it is not ours
     return _named_after(names)
 

@@ -5,7 +5,8 @@ from pathlib import Path
 from exfit.analysis.translation.steps import network_of
 from exfit.case.starting.suggestion import relative
 from exfit.case.translated_case import translated_case
-from exfit.exchange.psse.export import export
+from exfit.errors import ExfitError
+from exfit.exchange.psse.export import comment_lines, export
 from exfit.exchange.psse.records import alternatives
 from exfit.models.sheet import Model
 from exfit.plants import INFINITE_BUS, MACHINE, NETWORK, OPEN_CIRCUIT
@@ -30,8 +31,17 @@ def files_of_translation(
         "translation.csv": responses_table(translation),
     }
     if alternatives(model):
-        files[f"{own}.dyr"] = export(result, 1, "1", translation=translation).text
+        files[f"{own}.dyr"] = records_of_translation(translation, result)
     return files
+
+
+def records_of_translation(translation: Translation, result: FitResult) -> str:
+    """Return the PSS/E records of a translation, or a comment that says why there are none."""
+    try:
+        return export(result, 1, "1", translation=translation).text
+    except ExfitError as fault:
+        texts = [f"No record is written: {text}." for text in str(fault).splitlines()]
+        return "\n".join([*(line for text in texts for line in comment_lines(text)), ""])
 
 
 def responses_table(translation: Translation) -> str:

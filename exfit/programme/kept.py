@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,15 @@ from exfit.programme.result import (
 )
 from exfit.programme.steps import ProgrammeStep
 from exfit.records.reading import file_hash
+from exfit.results.consistency import steady_contradictions
 from exfit.results.description import UnitDescription
 from exfit.results.io import WHOLE_FIT, WHOLE_PROGRAMME, load_result, result_text
 from exfit.results.model import FitResult
 from exfit.results.saturation import SaturationResult
 from exfit.results.v_curve import VCurve
 from exfit.util.files import write
-from exfit.util.text import to_json
+from exfit.util.json_files import read_json
+from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
 KEY = "test"  # the label of the key among the inputs of a fit
@@ -32,6 +35,31 @@ RESULTS: Mapping[str, type[SaturationResult] | type[VCurve]] = {
     "saturation": SaturationResult,
     "steady": VCurve,
 }
+
+
+@dataclass(frozen=True)
+class KeptTest:
+    """A test as programme.json names it: its folder, its kind, its tests, the key of its result."""
+
+    name: str
+    kind: str
+    tests: tuple[str, ...]
+    key: str
+
+
+@dataclass(frozen=True)
+class KeptSummary:
+    """What programme.json holds beside its version; ``programme`` is the file that was run."""
+
+    tests: tuple[KeptTest, ...]
+    programme: Path
+    about: Mapping[str, float | str]
+    values: tuple[EnteredValue, ...]
+    failed: Mapping[str, str]
+    not_run: tuple[str, ...]
+    interrupted: bool
+    unit: UnitDescription
+
 
 Keep = Callable[[FinishedTest, Path], None]
 
@@ -62,13 +90,13 @@ def result_kept(step: ProgrammeStep, key: str, folder: Path) -> StepResult | Non
         if step.kind not in RESULTS:
             fit = load_result(file)
             return fit if fit.inputs.get(KEY) == key else None
-        content = json.loads(file.read_bytes())
+        content = read_json(file)
         if content["key"] != key or content["version"] != VERSION:
             return None
-        result: StepResult = Reader().read(RESULTS[step.kind], content["result"])
-    except (ExfitError, FormError, OSError, ValueError, LookupError, TypeError):
+        result: SaturationResult | VCurve = Reader().read(RESULTS[step.kind], content["result"])
+    except (ExfitError, LookupError):
         return None  # there is none, or it is not ours
-    return result
+    return None if any(steady_contradictions(result)) else result
 
 
 def text_of(test: FinishedTest) -> str:
@@ -86,20 +114,18 @@ def keep(test: FinishedTest, folder: Path) -> None:
 
 def summary_text(result: ProgrammeResult) -> str:
     """Return the text of programme.json: all of a programme but the results of its tests."""
-    tests = [
-        {"name": test.name, "kind": test.kind, "tests": list(test.tests), "key": test.key}
-        for test in result.tests
-    ]
-    others = {
-        "programme": str(result.path),
-        "about": plain(result.about),
-        "values": plain(result.values),
-        "failed": plain(result.failed),
-        "not_run": list(result.not_run),
-        "interrupted": result.interrupted,
-        "unit": plain(result.unit, whole=True),
-    }
-    return to_json({"version": VERSION, "tests": tests, **others})
+    tests = tuple(KeptTest(test.name, test.kind, test.tests, test.key) for test in result.tests)
+    summary = KeptSummary(
+        tests=tests,
+        programme=result.path,
+        about=result.about,
+        values=result.values,
+        failed=result.failed,
+        not_run=result.not_run,
+        interrupted=result.interrupted,
+        unit=result.unit,
+    )
+    return to_json({"version": VERSION, **plain(summary, whole=True)})
 
 
 def load_summary(folder: Path) -> ProgrammeResult:
@@ -108,26 +134,30 @@ def load_summary(folder: Path) -> ProgrammeResult:
     Raises ExfitError where it cannot be read, or has changed since.
     """
     source = folder / WHOLE_PROGRAMME
+    content = read_json(source)
     try:
-        content = json.loads(source.read_bytes())
-        steps = [
-            (ProgrammeStep(test["name"], test["kind"], tuple(test["tests"])), test["key"])
-            for test in content["tests"]
-        ]
-        values = Reader().read(tuple[EnteredValue, ...], content["values"])
-        unit = Reader().read(UnitDescription, content.get("unit", {}))  # older ones have none
-        others = {key: content[key] for key in ("about", "failed", "interrupted")}
-        path, not_run = Path(content["programme"]), tuple(content["not_run"])
-    except OSError as error:
-        raise ExfitError(f"{source}: cannot be read: {error.strerror}") from None
-    except (ExfitError, ValueError, LookupError, TypeError) as error:
-        raise ExfitError(f"{source}: not the result of a programme: {error}; run again") from None
+        if content.get("version") != VERSION:
+            raise FormError(f"version: {show_value(content.get('version'))} is not {VERSION}")
+        summary: KeptSummary = Reader().read(KeptSummary, content)
+        for at, test in enumerate(summary.tests):
+            if Path(test.name).name != test.name:
+                raise FormError(f"tests[{at}].name: {show_value(test.name)} is not that of a test")
+    except FormError as fault:
+        raise ExfitError(f"{source}: not the result of a programme: {fault}; run again") from None
     tests = []
-    for step, key in steps:
-        result = result_kept(step, key, folder)
+    for test in summary.tests:
+        step = ProgrammeStep(test.name, test.kind, test.tests)
+        result = result_kept(step, test.key, folder)
         if result is None:
             raise ExfitError(f"{folder / step.name}: not the result of this programme; run again")
-        tests.append(FinishedTest(step.name, step.kind, step.tests, key, result, kept=True))
+        tests.append(FinishedTest(step.name, step.kind, step.tests, test.key, result, kept=True))
     return ProgrammeResult(
-        path, tests=tuple(tests), values=values, not_run=not_run, unit=unit, **others
+        summary.programme,
+        summary.about,
+        tests=tuple(tests),
+        values=summary.values,
+        failed=summary.failed,
+        not_run=summary.not_run,
+        interrupted=summary.interrupted,
+        unit=summary.unit,
     )

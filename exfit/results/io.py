@@ -1,16 +1,16 @@
 """The file of a fit, result.json: written and read by the description that its classes are."""
 
-import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from exfit.errors import ExfitError
 from exfit.results.consistency import contradictions
 from exfit.results.description import PartDescription
 from exfit.results.model import PARTS, FitResult
 from exfit.results.thinning import thinned
+from exfit.util.json_files import read_json
 from exfit.util.sources import FITTED, TYPICAL
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
@@ -37,7 +37,8 @@ def load_result(path: str | PathLike[str]) -> FitResult:
         raise ExfitError(f"{source}: version: {show_value(version)} is not a version of results")
     if version > VERSION:
         raise ExfitError(
-            f"{source}: version {version}: written by a later exfit; this one reads up to {VERSION}"
+            f"{source}: version {show_value(version)}: written by a later exfit; "
+            f"this one reads up to {VERSION}"
         )
     whole = {**content, "parts": _parts_of(content)} if version == 1 else content
     if version < VERSION and "sources" not in whole:
@@ -57,19 +58,10 @@ def result_file(path: Path) -> Path:
 
 
 def _content(source: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(source.read_bytes(), parse_constant=_refuse_constant)
-    except OSError as error:
-        raise ExfitError(f"{source}: cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise ExfitError(f"{source}: not JSON: {error}") from None
-    if not isinstance(content, dict) or not {"model", "parameters", "fixed"} <= content.keys():
+    content = read_json(source)
+    if not {"model", "parameters", "fixed"} <= content.keys():
         raise ExfitError(f"{source}: not the result of a fit: model, parameters or fixed missing")
     return content
-
-
-def _refuse_constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is not a number of JSON")
 
 
 def _sources_of(content: Mapping[str, Any]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files that are read up to a size, and that appear whole or not at all."""
 
 import os
 import re
@@ -15,6 +15,19 @@ from exfit.util.root import on_disk
 # of a file that is still to be renamed: computer, process, and which of its files
 TEMPORARY = re.compile(r"\.exfit-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}\.tmp")
 ABANDONED = 86_400.0  # s: so old, a temporary file of any computer is of a run that was killed
+
+
+def read_limited(path: Path, most: int) -> bytes:
+    """Return the bytes of a file; raises ExfitError for more than ``most``, or one not readable."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+    except (OSError, ValueError) as fault:  # ValueError: a name with a null character
+        why = fault.strerror if isinstance(fault, OSError) else fault
+        raise ExfitError(f"{path}: cannot be read: {why}") from None
+    if len(data) > most:
+        raise ExfitError(f"{path}: larger than {most / 1e6:g} MB, the limit of such a file")
+    return data
 
 
 def write_whole(path: Path, data: bytes) -> None:

@@ -23,6 +23,7 @@ STORED = "stored"
 IN_FILE: Mapping[str, bool] = {STORED: True}  # metadata of a field that is only in a file
 KEY = "key"  # in the metadata of a field: its name in the data
 LARGEST = float(np.finfo(float).max)  # a whole number beyond has no double
+LARGEST_INTEGER = 2**53  # a larger one is no count
 FORMS = {int: "a whole number", bool: "true or false", str: "a text"}
 
 
@@ -201,9 +202,13 @@ def _scalar(kind: Any, data: Any, place: Place) -> Any:
         return complex(pair[0], pair[1])
     if kind is Path:
         return Path(_scalar(str, data, place))
-    if kind is int and isinstance(data, bool):
+    if kind is int and (isinstance(data, bool) or _is_too_large(data)):
         raise FormError(f"{dotted(place)}: {show_value(data)} is not {FORMS[int]}")
     return _of_type(kind, data, place, FORMS[kind])
+
+
+def _is_too_large(data: Any) -> bool:
+    return isinstance(data, int) and abs(data) > LARGEST_INTEGER
 
 
 def _number(data: Any, place: Place) -> float:

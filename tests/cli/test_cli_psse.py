@@ -288,6 +288,26 @@ def test_a_fit_comes_back_from_its_export_with_every_digit(run, fitted):
     assert of_part(load_case(Path("again.yaml")), "") == unit.exciter.values
 
 
+@pytest.mark.parametrize(
+    ("section", "name", "value", "words"),
+    [
+        ("parameters", "KA", -5.0, "ESAC1A: KA: -5 lies outside 0.01 ... "),
+        ("fixed", "VRMAX", -15.0, "ESAC1A: VRMIN: -14.5 is not below VRMAX = -15"),
+        ("machine", "Tpd0", -5.0, "GENROU: machine.Tpd0: -5 lies outside "),
+        ("machine", "Xpd", 5.0, "GENROU: machine.Xd: 1.8 is not above Xpd = 5"),
+    ],
+)
+def test_a_value_outside_its_data_sheet_is_not_exported(run, fitted, section, name, value, words):
+    stored = result_of(fitted)
+    entry = {**stored[section][name], "value": value} if section == "parameters" else value
+    stored[section][name] = entry
+    Path("changed.json").write_text(json.dumps(stored))
+    code, out, err = run("export", "changed.json", "-o", "out.dyr")
+    assert (code, out) == (1, "")
+    assert f"Error: changed.json: {words}" in err
+    assert not Path("out.dyr").exists()
+
+
 def test_a_result_or_its_folder_gives_the_same_on_the_terminal(run, fitted):
     code, out, _ = run("export", fitted)
     assert code == 0
@@ -388,8 +408,8 @@ def test_a_result_that_cannot_be_written_is_reported(run, fitted, workplace, cha
     ("content", "words"),
     [
         (b"{", "not JSON"),
-        (b"\xff\xfe\x00", "not JSON"),
-        (b"[1]", "not the result of a fit"),
+        (b"\xff\xfe\x00", "not UTF-8 text"),
+        (b"[1]", "not a mapping"),
         (b'{"validation": []}', "not the result of a fit"),
         (b"[" * 100_000, "not JSON"),
         (None, "No such file"),

@@ -17,7 +17,7 @@ from records import TIME as SAMPLES
 from rich.console import Console
 
 from exfit.case.case import Case
-from exfit.errors import CaseError
+from exfit.errors import CaseError, ExfitError
 from exfit.exchange.psse.export import export
 from exfit.fitting.build import build_experiments
 from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
@@ -176,11 +176,11 @@ def test_a_start_of_zero_given_beside_the_case_is_refused_where_it_gives_no_size
         fit(case)
 
 
-def test_the_file_for_psse_warns_of_what_is_not_physical(found):
+def test_no_file_for_psse_has_what_is_not_physical(found):
     _, _, result = found
-    (warning,) = [text for text in export(result, 1, "1").warnings if "not physical" in text]
-    assert "KD -0.3" in warning
-    assert "TE" not in warning
+    with pytest.raises(ExfitError, match=r"KD: -0\.3.* lies outside 0 \.\.\. ") as refused:
+        export(result, 1, "1")
+    assert "TE" not in str(refused.value)
 
 
 def test_a_profile_goes_where_the_bounds_would_have_stopped_it(found):

@@ -11,9 +11,10 @@ from programmes import OF_MACHINE, TRUTH, programme_content, written
 import exfit
 from exfit import workflows
 from exfit.case.programme import load_programme
-from exfit.errors import CaseError
+from exfit.errors import CaseError, ExfitError
 from exfit.programme import run as running
-from exfit.programme.kept import load_summary, summary_text
+from exfit.programme.kept import load_summary, result_kept, summary_text
+from exfit.programme.steps import ProgrammeStep
 from exfit.results.verdict import NOT_CONVERGED
 from exfit.util.files import write
 
@@ -280,3 +281,58 @@ def test_the_summary_is_read_back_as_it_was_written(folder, whole, tmp_path):
     saturation = read.results["saturation"]
     assert np.array_equal(saturation.ifd, whole.results["saturation"].ifd)
     assert json.dumps(read.to_dict()["values"]) == json.dumps(whole.to_dict()["values"])
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        (["about"], 3, "about: 3 is not a mapping"),
+        (["interrupted"], "no", "interrupted: 'no' is not true or false"),
+        (["failed", "up"], ["x"], "failed.up: a list is not a text"),
+        (["tests", 0, "name"], "../run", r"tests\[0\].name: '../run' is not that of a test"),
+        (["values", 0, "value"], 10**309, r"values\[0\].value: 10{59}\.{3} is not a number"),
+        (["version"], 99, "version: 99 is not 1"),
+        (["tests"], None, "tests: None is not a list"),
+    ],
+)
+def test_a_damaged_summary_is_refused_with_its_place(folder, whole, place, value, words):
+    content = json.loads(summary_text(whole))
+    section = content
+    for key in place[:-1]:
+        section = section[key]
+    section[place[-1]] = value
+    write(folder / "run" / "programme.json", json.dumps(content))
+    with pytest.raises(ExfitError, match=f"not the result of a programme: {words}"):
+        load_summary(folder / "run")
+
+
+@pytest.mark.parametrize(
+    ("test", "place"),
+    [
+        ("saturation", ["vt"]),
+        ("saturation", ["curves", 0, "low"]),
+        ("saturation", ["curves"]),
+        ("v-curve", ["q"]),
+        ("v-curve", ["levels", 0, "it"]),
+    ],
+)
+def test_a_result_at_rest_whose_parts_do_not_fit_together_is_none(folder, whole, test, place):
+    file = folder / "run" / test / "result.json"
+    text = file.read_text(encoding="utf-8")
+    (finished,) = (each for each in whole.tests if each.name == test)
+    step = ProgrammeStep(finished.name, finished.kind, finished.tests)
+    assert result_kept(step, finished.key, folder / "run") is not None
+    content = json.loads(text)
+    section = content["result"]
+    for key in place[:-1]:
+        section = section[key]
+    if place == ["curves"]:
+        section["curves"] = [
+            curve for curve in section["curves"] if curve["form"] != section["form"]
+        ]
+    else:
+        section[place[-1]].pop()
+    file.write_text(json.dumps(content), encoding="utf-8")
+    damaged = result_kept(step, finished.key, folder / "run")
+    file.write_text(text, encoding="utf-8")
+    assert damaged is None

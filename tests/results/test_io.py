@@ -145,7 +145,7 @@ def test_no_damage_ends_in_a_traceback(saved):
     path, _ = saved
     whole = path.read_text(encoding="utf-8")
     draw = random.Random(1)
-    others = [None, True, -1, 1e999, 10**400, "x", [], {}, [[1.0], [1.0, 2.0]]]
+    others = [None, True, -1, 1e999, 10**400, "x", "\0", [], {}, [[1.0], [1.0, 2.0]]]
     refused = 0
     for _ in range(DAMAGES):
         content = json.loads(whole)
@@ -162,6 +162,40 @@ def test_no_damage_ends_in_a_traceback(saved):
         assert _refused(path)
     path.write_bytes(b"\xff\xfe{}")
     assert _refused(path)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ('"cost": ', '"cost": 1.0, "cost": ', "not JSON: duplicate key 'cost'"),
+        ('"cost": ', '"cost": NaN, "other": ', "not JSON: NaN is not a number"),
+        ('"cost": ', f'"cost": {"9" * 400}, "other": ', r"cost: 9{60}\.\.\. is not a number"),
+        ('"cost": ', f'"cost": {"9" * 5000}, "other": ', r"cost: '9{59}\.\.\. is not a number"),
+        ('"nfev": ', f'"nfev": {"9" * 400}, "other": ', r"nfev: 9{60}\.\.\. is not a whole number"),
+        (f'"version": {VERSION}', f'"version": {"9" * 400}', r"version 9{60}\.\.\.: written by"),
+        ('"FIRST_ORDER"', '"\\ud800"', "half a character"),
+        ('"cost": ', f'"other": {"[" * 10**5}, "cost": ', "nested too deep"),
+        ('"cost": ', f'"other": [{"[]," * 2 * 10**6}[]], "cost": ', "more than 2,000,000 texts"),
+    ],
+)
+def test_what_no_exfit_writes_into_a_file_is_refused_in_one_message(saved, before, after, words):
+    path, _ = saved
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace(before, after, 1), encoding="utf-8")
+    with pytest.raises(ExfitError, match=words) as refused:
+        load_result(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert len(str(refused.value)) < 300
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-32", "latin-1"])
+def test_a_file_in_another_encoding_is_refused(saved, encoding):
+    path, content = saved
+    text = json.dumps({**content, "case": "é"}, ensure_ascii=False)
+    path.write_bytes(text.encode(encoding, "replace"))
+    with pytest.raises(ExfitError, match=r"not UTF-8 text: line 1: byte 0x"):
+        load_result(path)
 
 
 def _refused(path):

@@ -11,8 +11,10 @@ from exfit.exchange.psse.records import (
     WIDTH,
     Definition,
     alternatives,
+    contradictions,
     definition_of,
     definitions,
+    outside,
     record_text,
 )
 from exfit.models import MODELS
@@ -53,7 +55,7 @@ def export(
     """Return the PSS/E records of a fit, of its exciter as its ``translation`` has it.
 
     ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
-    model has no record.
+    model has no record, or a value is missing or lies outside the range of its data sheet.
     """
     origin = [*_origin(result)]
     if translation is not None:
@@ -72,7 +74,7 @@ def export(
         warnings += _warnings(record)
     comments = [*origin, *(f"{text}." for text in _of_fit(result))]
     comments += [text for record in written for text in _comments(record)]
-    lines = [line for text in comments for line in _wrapped(text)]
+    lines = [line for text in comments for line in comment_lines(text)]
     lines += [record_text(entry.definition, entry.values, bus, machine_id) for entry in written]
     return Exported("\n".join(lines) + "\n", tuple(warnings))
 
@@ -96,9 +98,6 @@ def _of_fit(result: FitResult) -> Iterator[str]:
     """Yield what of the fit itself the reader must know."""
     if not result.holds:
         yield f"the fit does not hold: {outcome_of(result)}: {explanation_of(result)}"
-    outside = [f"{name} {p.value:.4g}" for name, p in result.parameters.items() if not p.physical]
-    if outside:
-        yield f"not physical, outside the range of the data sheet: {', '.join(outside)}"
     weighty = [*by_weight(result.typical_values)]
     if weighty:
         yield f"what was fitted depends on typical values: {first_of(weighty)}"
@@ -158,16 +157,21 @@ def _stabiliser(result: FitResult, warnings: list[str]) -> Iterator[Written]:
 
 
 def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
-    """Return a record with the values of a result; raises ExfitError where one is missing."""
+    """Return a record with the values of a result.
+
+    Raises ExfitError where one is missing, outside its data sheet's range, or contradicts others.
+    """
     values = result.values_of(prefix)
-    missing = [row.symbol for row in definition.model.sheet if row.symbol not in values]
+    sheet = definition.model.sheet
+    missing = [row.symbol for row in sheet if row.symbol not in values]
     if missing:
         names = ", ".join(prefix + symbol for symbol in missing)
         raise ExfitError(f"{definition.record.name}: no value of {names} in the result")
-    own = {
-        row.symbol: result.sources.get(prefix + row.symbol, NOT_STATED)
-        for row in definition.model.sheet
-    }
+    faults = [*outside(sheet, values)] or [*contradictions(definition.model, values)]
+    if faults:
+        texts = (f"{definition.record.name}: {prefix}{symbol}: {text}" for symbol, text in faults)
+        raise ExfitError("\n".join(texts))
+    own = {row.symbol: result.sources.get(prefix + row.symbol, NOT_STATED) for row in sheet}
     written = [name for name in definition.names if name in own]
     return Written(definition, values, by_source(written, own))
 
@@ -210,8 +214,8 @@ def _comments(entry: Written) -> Iterator[str]:
         yield f"{warning}."
 
 
-def _wrapped(text: str) -> list[str]:
-    """Return a comment in lines; what is not ASCII is not sure to be read."""
+def comment_lines(text: str) -> list[str]:
+    """Return a comment of a dynamics file in lines; what is not ASCII is not sure to be read."""
     plain = "".join(letter if " " <= letter <= "~" else "?" for letter in text)
     return textwrap.wrap(
         plain, WIDTH, initial_indent="// ", subsequent_indent="//   ", break_on_hyphens=False

@@ -104,7 +104,7 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     if all(of_sheet.get(name) == 0.0 for name in UNSATURATED):
         of_sheet |= UNSATURATED  # the voltages say nothing
     values = {**typical(rows), **of_sheet}
-    wrong = [*unreadable, *_outside(rows, of_sheet)]
+    wrong = [*unreadable, *outside(rows, of_sheet)]
     wrong = wrong or [*contradictions(definition.model, values)]
     doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
     lacking = [
@@ -172,7 +172,7 @@ def _unmodelled(
             yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
 
 
-def _outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+def outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) for each value that its data sheet excludes."""
     for row in rows:
         value = values.get(row.symbol, row.low)
