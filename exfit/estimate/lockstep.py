@@ -6,7 +6,6 @@ next. Several threads each have some searches of their own, so that the Python o
 the machine code of another; a search goes the same way whatever others it is advanced with.
 """
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
@@ -28,6 +27,7 @@ from exfit.estimate.requests import (
     Steps,
     TriangleOf,
 )
+from exfit.util.threads import processors
 
 Done = TypeVar("Done")
 
@@ -59,7 +59,7 @@ def finish_all(
     whose ends are received as well; those not begun are dropped. Any other exception ends all and
     is raised. None takes as many threads as there are processors.
     """
-    count = min(workers or os.cpu_count() or 1, len(searches))
+    count = min(workers or processors(), len(searches))
     waiting, stop = Shared(enumerate(searches)), Event()
     if count <= 1:
         return Group(waiting, ABREAST, receive).advance(stop)

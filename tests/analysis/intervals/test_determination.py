@@ -221,7 +221,7 @@ def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
 
 
 def test_an_interruption_of_the_profiles_keeps_the_intervals_that_are_whole(monkeypatch):
-    monkeypatch.setattr("os.cpu_count", lambda: 1)  # another thread might be done with its sides
+    monkeypatch.setenv("EXFIT_THREADS", "1")  # another thread might be done with its sides
 
     def watch(progress):
         if progress.stage == "profiling" and progress.done == 3:
