@@ -50,12 +50,13 @@ class CaseTask:
     further: tuple[FurtherFiles, ...] = ()
 
 
-def key_of(files: Sequence[Path], settings: FitSettings) -> str:
+def key_of(files: Sequence[Path], settings: FitSettings, case: bytes | None = None) -> str:
     """Return the key of a case: the hash of its files, the settings and the version of exfit.
 
-    A file that is missing or cannot be read counts as such; ``files`` are in the order of the case.
+    A file that is missing or cannot be read counts as such. ``files`` are the case and those that
+    it names, in its order; ``case`` is the content of the first where it has been read already.
     """
-    return _key([_digest(file) for file in files], settings)
+    return _key(_digests(files, case), settings)
 
 
 def run_case(task: CaseTask) -> CaseOutcome:
@@ -99,12 +100,12 @@ def _case_of(task: CaseTask) -> "Case | None":
     from exfit.case.load import parse_case
     from exfit.case.yaml import decoded
 
-    path, *others = task.files
+    path = task.files[0]
     try:
         data = on_disk(path).read_bytes()
     except OSError:
         return None
-    digests = [hashlib.sha256(data).hexdigest(), *map(_digest, others)]
+    digests = _digests(task.files, data)
     if _key(digests, task.settings) != task.key:
         return None
     code = (digest for file, digest in zip(task.files, digests, strict=True) if file.suffix == CODE)
@@ -114,6 +115,11 @@ def _case_of(task: CaseTask) -> "Case | None":
 def _key(digests: Sequence[str | None], settings: FitSettings) -> str:
     content = {"exfit": __version__, "files": digests, **settings._asdict()}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:KEY_DIGITS]
+
+
+def _digests(files: Sequence[Path], case: bytes | None) -> list[str | None]:
+    first = _digest(files[0]) if case is None else hashlib.sha256(case).hexdigest()
+    return [first, *map(_digest, files[1:])]
 
 
 def _digest(file: Path) -> str | None:
