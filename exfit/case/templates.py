@@ -25,6 +25,11 @@ def commented(text: str, comment: str) -> str:
     return f"{text:{MEANING_AT}}# {comment}" if len(text) < MEANING_AT else f"{text}  # {comment}"
 
 
+def in_comment(text: str) -> str:
+    """Return a text that fits into a comment: in one line, of characters that YAML allows."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
 def source_lines(sources: Mapping[str, str], indent: str) -> Iterator[str]:
     """Yield the lines that say where values come from, as far as that is stated."""
     stated = [f"{name}: {word}" for name, word in sources.items() if word in SOURCES]

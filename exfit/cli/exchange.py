@@ -7,6 +7,7 @@ import click
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, write_text
 from exfit.errors import ExfitError
+from exfit.util.text import printable
 
 BUSES = click.IntRange(1, 999_999)
 
@@ -35,7 +36,7 @@ def import_(
     file = relative(unit, Path() if output is None else output.parent)
     write_text(case_text(imported, file), output, located(imported.warnings, str(unit)))
     if output is not None:
-        click.echo(f"written to {output}; next: exfit simulate {output}")
+        click.echo(printable(f"written to {output}; next: exfit simulate {output}"))
 
 
 @click.command(short_help="Write the result of a fit as PSS/E records.")
@@ -89,7 +90,7 @@ def export(
         raise ExfitError("\n".join(texts)) from None
     write_text(records.text, output, [f"{source}: {text}" for text in records.warnings])
     if output is not None:
-        click.echo(f"written to {output}")
+        click.echo(printable(f"written to {output}"))
 
 
 def _machine_id(value: str) -> str:

@@ -19,6 +19,7 @@ from exfit.cli.options import (
 )
 from exfit.cli.several_fits import fit_several
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
+from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
@@ -97,7 +98,7 @@ def fit(
 
     loaded = given.load(case)
     for warning in case_warnings(loaded):
-        click.echo(f"warning: {warning}", err=True)
+        click.echo(printable(f"warning: {warning}"), err=True)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
         result = fit_live(loaded, folder, strategy, search, output)

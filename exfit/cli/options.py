@@ -12,6 +12,7 @@ import click
 from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.errors import ExfitError
+from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
@@ -124,7 +125,7 @@ class Refusal(click.ClickException):
     def show(self, file: Any = None) -> None:
         """Print the message, all faults of a case under each other."""
         lines = self.message.splitlines()
-        click.echo("Error: " + "\n       ".join(lines), err=True, file=file)
+        click.echo(printable("Error: " + "\n       ".join(lines)), err=True, file=file)
 
 
 class Interruption(click.ClickException):
@@ -134,7 +135,7 @@ class Interruption(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print the message below the terminal's own ^C."""
-        line = ": ".join(filter(None, ("Interrupted", self.message)))
+        line = printable(": ".join(filter(None, ("Interrupted", self.message))))
         click.echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
 
 
@@ -210,7 +211,7 @@ def write_text(text: str, output: Path | None, warnings: Iterable[str]) -> None:
     from exfit.util.files import write
 
     if output is None:  # a file that a shell makes of it is UTF-8, as exfit reads it
-        click.echo(text if sys.stdout.isatty() else text.encode(), nl=False)
+        click.echo(printable(text) if sys.stdout.isatty() else text.encode(), nl=False)
     else:
         write(output, text)
     warn(warnings)
@@ -218,16 +219,17 @@ def write_text(text: str, output: Path | None, warnings: Iterable[str]) -> None:
 
 def print_json(content: Mapping[str, Any]) -> None:
     """Write JSON to standard output, which may be unable to hold every character as it is."""
-    from exfit.util.text import to_json
+    from exfit.util.text import CONTROLS, to_json
 
     encoding = str(sys.stdout.encoding or "")
-    click.echo(to_json(content, ascii_only=not encoding.lower().startswith("utf")), nl=False)
+    text = to_json(content, ascii_only=not encoding.lower().startswith("utf"))
+    click.echo(CONTROLS.sub(lambda control: f"\\u{ord(control[0]):04x}", text), nl=False)
 
 
 def warn(texts: Iterable[str]) -> None:
     """Write what went wrong beside a result to standard error."""
     for text in texts:
-        click.echo(f"Warning: {text}", err=True)
+        click.echo(printable(f"Warning: {text}"), err=True)
 
 
 def assignments(texts: tuple[str, ...], option: str) -> dict[str, float]:

@@ -6,6 +6,7 @@ import click
 
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import force_option
+from exfit.util.text import printable
 
 
 @click.command(short_help="Make a verification report of a fit.")
@@ -34,4 +35,4 @@ def report(result: Path, output: Path | None, pdf: bool, against: Path | None, f
     """
     from exfit.output.report import write_report
 
-    click.echo(f"written to {write_report(result, output, force, pdf, against)}")
+    click.echo(printable(f"written to {write_report(result, output, force, pdf, against)}"))

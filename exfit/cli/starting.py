@@ -13,6 +13,7 @@ from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
 from exfit.cli.records import inspected, sheet_option, time_option, unit_option
 from exfit.errors import ExfitError
+from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.open_values import OpenValue
@@ -252,7 +253,7 @@ def _asked(text: str) -> str:
 
     given = {}
     for value in open_values(text):
-        answer = click.prompt(_question(value), default="", show_default=False, err=True)
+        answer = click.prompt(printable(_question(value)), default="", show_default=False, err=True)
         if answer.strip():
             given[value] = _answer(answer.strip(), value.place)
     return filled(text, given)
@@ -280,6 +281,6 @@ def _report(text: str, output: Path) -> None:
     """Say where the case is, what is still open, and what comes next."""
     from exfit.case.open_values import open_values
 
-    click.echo(f"written to {output}; next: exfit check {output}")
+    click.echo(printable(f"written to {output}; next: exfit check {output}"))
     for value in open_values(text):
-        click.echo(f"to be filled in: {_question(value)}, line {value.line}")
+        click.echo(printable(f"to be filled in: {_question(value)}, line {value.line}"))

@@ -1,6 +1,7 @@
 """Words and numbers as messages and files have them."""
 
 import json
+import re
 from collections.abc import Callable, Iterable, Mapping
 from math import floor, isfinite, log10
 from types import NoneType
@@ -19,6 +20,8 @@ def to_json(content: Mapping[str, Any], ascii_only: bool = False) -> str:
 
 
 NUMBERS = {int, float, NoneType, bool}
+# what a terminal obeys, or turns text around by: C0 but newline and tab, C1, bidirectional controls
+CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 
 def _json(content: Any, encode: Callable[[Any], str], line: str) -> str:
@@ -71,6 +74,11 @@ def near(word: str, names: Iterable[str]) -> str:
     folded = {name.casefold(): name for name in names}
     close = difflib.get_close_matches(word.casefold(), folded, n=1)
     return f"did you mean {folded[close[0]]}?" if close else f"known: {', '.join(folded.values())}"
+
+
+def printable(text: str) -> str:
+    """Return a text with codes, as \\x1b, in place of what would control a terminal."""
+    return CONTROLS.sub(lambda control: control[0].encode("unicode_escape").decode(), text)
 
 
 def dotted(place: Place) -> str:

@@ -20,7 +20,7 @@ from exfit.case.starting.suggestion import (
     weights_section,
     window_lines,
 )
-from exfit.case.templates import commented, parameter_line, source_lines
+from exfit.case.templates import commented, in_comment, parameter_line, source_lines
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.field_base import shows_power
 from exfit.records.inspection import Inspection
@@ -66,7 +66,7 @@ def _heading(unit: UnitData, tests: Sequence[StartingTest]) -> Iterator[str]:
     exciter = unit.exciter.model
     inspections = list({test.inspection.path: test.inspection for test in tests}.values())
     records = "the record" if len(inspections) == 1 else "the records"
-    files = ", ".join(_plain(inspection.path.name) for inspection in inspections)
+    files = ", ".join(in_comment(inspection.path.name) for inspection in inspections)
     yield from _wrapped(f"{exciter.name} on {records} {files}: a case to start from.")
     yield from _advice(unit)
     for inspection in inspections:
@@ -181,13 +181,13 @@ def _plant(unit: UnitData, inspection: Inspection) -> Iterator[str]:
         return
     power, sources = inspection.channel_of("p"), dict[str, str]()
     if power is not None and shows_power(power):
-        yield commented("  type: infinite-bus", f"{_plain(power.name)} shows power")
+        yield commented("  type: infinite-bus", f"{in_comment(power.name)} shows power")
         yield from _network(inspection)
         sources = _network_sources(inspection)
     else:
         yield commented("  type: open-circuit", "the breaker is open, at rated speed")
     origin = machine.origin or machine.model.title
-    yield commented(f"  machine: {machine.model.name}", _plain(origin))
+    yield commented(f"  machine: {machine.model.name}", in_comment(origin))
     yield "  parameters:"
     for row in machine.model.sheet:
         yield parameter_line(row, yaml_number(machine.values[row.symbol]), "    ")
@@ -198,7 +198,7 @@ def _stabiliser(part: PartData | None) -> Iterator[str]:
     if part is None:
         return
     yield "stabiliser:"
-    yield commented(f"  model: {part.model.name}", _plain(part.origin))
+    yield commented(f"  model: {part.model.name}", in_comment(part.origin))
     yield "  parameters:"
     for row in part.model.sheet:
         yield parameter_line(row, yaml_number(part.values[row.symbol]), "    ")
@@ -212,7 +212,8 @@ def _wrapped(text: str) -> list[str]:
 
 def _note(text: str) -> list[str]:
     """Return a note as lines of comment."""
-    return wrap(f"# note: {_plain(text)}.", WIDTH, subsequent_indent="#   ", break_long_words=False)
+    note = f"# note: {in_comment(text)}."
+    return wrap(note, WIDTH, subsequent_indent="#   ", break_long_words=False)
 
 
 def _network(inspection: Inspection) -> Iterator[str]:
@@ -265,8 +266,3 @@ def _parameters(exciter: PartData) -> Iterator[str]:
 
 def _short(value: float) -> str:
     return yaml_number(float(f"{value:.6g}"))
-
-
-def _plain(text: str) -> str:
-    """Return a text that fits into a comment."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)

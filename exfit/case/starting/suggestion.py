@@ -11,7 +11,7 @@ import yaml
 
 from exfit.case.open_values import FILL_IN
 from exfit.case.starting.bases import Base
-from exfit.case.templates import commented
+from exfit.case.templates import commented, in_comment
 from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
 from exfit.records.channel_recognition import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
@@ -80,10 +80,10 @@ def _voltage_lines(inspection: Inspection, base: Base | None) -> Iterator[str]:
     if inspection.channel_of("vt") is not None:
         return
     for group in inspection.phases[:1]:
-        yield from (f"    # {line}" for line in _about_phases(inspection, group))
+        yield from (f"    # {in_comment(line)}" for line in _about_phases(inspection, group))
         yield f"    vt: {_phases(inspection, group, base)}"
     if not inspection.phases:
-        columns = ", ".join(channel.name for channel in inspection.channels[:COLUMNS_LISTED])
+        columns = ", ".join(plain_text(c.name) for c in inspection.channels[:COLUMNS_LISTED])
         more = ", ..." if len(inspection.channels) > COLUMNS_LISTED else ""
         yield "    # the terminal voltage: which column is it?"
         yield f"    # {columns}{more}"
@@ -107,7 +107,7 @@ def _channel_lines(
         mark = "" if drives or compared else "# "
         base = bases.get(str(channel.signal))
         scale = None if base is not None else scale_to_find(channel, inspection.channels)
-        about = _about(channel, scale, loaded)
+        about = in_comment(_about(channel, scale, loaded))
         yield from wrap(about, WIDTH, initial_indent="    # ", subsequent_indent="    #   ")
         yield f"    {mark}{channel.signal}: {_channel(channel, drives, base, scale)}"
 
@@ -315,7 +315,13 @@ def plain_text(name: str) -> str:
     plain = re.fullmatch(r"[A-Za-zäöüÄÖÜß./][\w./ -]*", name) and name == name.strip()
     if plain and yaml.safe_load(name) == name:
         return name
-    return json.dumps(name, ensure_ascii=False)
+    text = json.dumps(name, ensure_ascii=False)
+    return "".join(letter if letter.isprintable() else _code(letter) for letter in text)
+
+
+def _code(letter: str) -> str:
+    """Return the code of a letter between quotes in YAML, which does not allow every letter."""
+    return f"\\U{ord(letter):08x}"
 
 
 def relative(file: Path, folder: Path) -> str:

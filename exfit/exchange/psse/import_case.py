@@ -7,6 +7,7 @@ from exfit.case.templates import (
     PlannerUnit,
     as_found_lines,
     commented,
+    in_comment,
     parameter_line,
     source_lines,
 )
@@ -60,7 +61,7 @@ def as_found(unit: Unit, file: str) -> Iterator[str]:
         for row in part.definition.model.sheet
         if row.symbol in part.definition.names
     }
-    source = PlannerUnit(unit.bus, _plain(unit.id), file)
+    source = PlannerUnit(unit.bus, in_comment(unit.id), file)
     yield from as_found_lines(source, unit.exciter.definition.model.name, values)
 
 
@@ -70,10 +71,10 @@ def _prefix(part: UnitPart) -> str:
 
 
 def _heading(unit: Unit, file: str) -> Iterator[str]:
-    name = _plain(Path(file).name)
-    yield f"# Unit {_plain(unit.id)} at bus {unit.bus} of {name}, on open circuit."
+    name = in_comment(Path(file).name)
+    yield f"# Unit {in_comment(unit.id)} at bus {unit.bus} of {name}, on open circuit."
     for line, text in unit.warnings:
-        yield f"# Line {line}: {_plain(text)}."
+        yield f"# Line {line}: {in_comment(text)}."
 
 
 def _exciter_name(exciter: UnitPart) -> Iterator[str]:
@@ -107,8 +108,3 @@ def _sources(part: UnitPart) -> Iterator[str]:
 
 def _origin(part: UnitPart) -> str:
     return f"{part.definition.record.name} on line {part.line}"
-
-
-def _plain(text: str) -> str:
-    """Return a text that fits into a comment."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -1,5 +1,6 @@
 """A block diagram as SVG, in the colours of the page that it stands on."""
 
+import re
 from collections.abc import Iterator
 from html import escape
 
@@ -7,6 +8,7 @@ from exfit.output.drawings.formulas import SIZE, SMALL, Styled
 from exfit.output.drawings.layout import Picture, PlacedPart, Point, Stroke, Word
 from exfit.output.drawings.parts import CLIP
 
+NOT_IN_AN_ID = re.compile(r"[^\w.-]+")
 FONT = "'STIX Two Typeset','Times New Roman','Liberation Serif','DejaVu Serif Condensed',serif"
 HEAD, HALF_HEAD = 8.0, 3.2  # px: of an arrow
 BASELINE = 0.33  # of the size: from the middle of letters down to the line that they stand on
@@ -21,7 +23,8 @@ CHARACTERISTIC = "M{x:.1f} {y:.1f}h6l10 -14h6"
 
 
 def svg(picture: Picture, key: str, title: str, description: str) -> str:
-    """Return a picture; ``key`` begins the ids of its title and description."""
+    """Return a picture; ``key`` begins the ids of its title and description, less what ids lack."""
+    key = NOT_IN_AN_ID.sub("-", key)
     (left, top), (right, bottom) = picture.corners
     width, height = right - left, bottom - top
     return "\n".join(

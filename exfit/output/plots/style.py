@@ -1,10 +1,12 @@
 """How all figures look, and how one becomes a file."""
 
+import warnings
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from exfit.output.plots.axes import QuickAxes
@@ -43,8 +45,15 @@ def png(figure: Figure) -> bytes:
 
 
 def drawn(figure: Figure) -> NDArray[np.uint8]:
-    """Return the pixels of a figure: rows of red, green, blue and opacity."""
-    return pixels(figure, DPI)
+    """Return the pixels of a figure: rows of red, green, blue and opacity.
+
+    Dollar signs in names make no formulas; letters that the font lacks are boxes.
+    """
+    for text in figure.findobj(Text):
+        text.set_parse_math("$" not in text.get_text())
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
+        return pixels(figure, DPI)
 
 
 def encoded(picture: NDArray[np.uint8]) -> bytes:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.cells import cell_len, set_cell_size
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment, Segments
 from rich.table import Column, Table
 from rich.text import Text
 
 from exfit.inference import Interval, Uncertainty
-from exfit.util.text import rounded
+from exfit.util.text import printable, rounded
 
 if TYPE_CHECKING:
     from exfit.output.run_figures import PlannedFigures
@@ -30,15 +30,26 @@ UNBROKEN = re.compile(  # commands, ranges, and figures with their units
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
+class GuardedConsole(Console):
+    """A console that texts of files cannot control: names, units and remarks come from others."""
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterator[Segment]:
+        """Yield what is shown, with codes in place of control characters that it did not add."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=printable(segment.text))
+
+
 def console() -> Console:
     """Return the terminal, or a file or pipe: as wide as COLUMNS says.
 
     Without COLUMNS the tables of a file are as on a narrow terminal, and no sentence is wrapped.
     """
-    terminal = Console(highlight=False)
+    terminal = GuardedConsole(highlight=False)
     if wraps(terminal):
         return terminal
-    return Console(highlight=False, width=NARROW, soft_wrap=True)
+    return GuardedConsole(highlight=False, width=NARROW, soft_wrap=True)
 
 
 def wraps(console: Console) -> bool:

@@ -1,0 +1,114 @@
+"""Names that would control a terminal, in files that commands are given, are shown as codes."""
+
+import csv
+import json
+import shutil
+
+import numpy as np
+import pytest
+import yaml
+from cases import FIRST_ORDER, TIME, TRUTH
+from mutant_runs import CONTROL
+from payloads import CONTROL_TEXT, MARKUP
+from places import ROOT
+
+NAME = f"<b>U{CONTROL_TEXT}[bold]"
+FACT = f"{' '.join(MARKUP)}{CONTROL_TEXT}"
+UNIT = f"k{CONTROL_TEXT}V"
+MODEL = ROOT / "exfit" / "models" / "exciters" / "first_order.py"
+RECORD, CASE, RUN = "<b>[red]up.csv", "<i>[bold]case.yaml", "run"
+
+
+@pytest.fixture
+def hostile(empty_folder):
+    """A case in the current folder whose names, facts, units and model hold what does harm."""
+    source = MODEL.read_text(encoding="utf-8")
+    for word in ("a check with a known response", '"gain"', '"pole"'):
+        assert word in source
+    source = source.replace("a check with a known response", "[/] <script>alert(1)</script>")
+    source = source.replace('"gain"', repr(FACT)).replace('"pole"', repr(NAME))
+    (empty_folder / "mine.py").write_text(source, encoding="utf-8")
+    noisy = 10.0 * (TRUTH + 1e-3 * np.random.default_rng(1).standard_normal(len(TIME)))
+    with (empty_folder / RECORD).open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([("t", NAME), *zip(TIME, noisy, strict=True)])
+    channel = {"column": NAME, "unit": UNIT, "base": 10.0}
+    content = FIRST_ORDER | {
+        "model": "mine.py",
+        "record": {"file": RECORD, "time": "t", "channels": {"vt": channel}},
+        "about": {FACT: FACT, NAME: 1, "Unit": FACT},
+        "as_found": {"source": FACT, "parameters": {"k": 2.0}},
+    }
+    (empty_folder / CASE).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return empty_folder
+
+
+def is_guarded(ran):
+    assert not CONTROL.search(ran.out)
+    assert not CONTROL.search(ran.err)
+
+
+def test_every_command_shows_hostile_names_as_codes(run, hostile):
+    fitted = run("fit", CASE, "-o", RUN, "--no-plots")
+    assert fitted.code == 0, fitted.err
+    is_guarded(fitted)
+    for arguments in (
+        ("fit", CASE, "-o", RUN, "--no-plots", "--json"),
+        ("check", CASE),
+        ("simulate", CASE, "-o", "simulated", "--no-plots"),
+        ("identify", CASE, "-o", "identified", "--no-plots"),
+        ("inspect", RECORD, "-o", "inspected", "--no-plots"),
+        ("inspect", RECORD, "-o", "inspected", "--no-plots", "--json"),
+        ("new", "--model", "AC1A", "--record", RECORD, "-o", f"{NAME}.yaml"),
+        ("report", RUN),
+        ("compare", RUN, RUN),
+    ):
+        ran = run(*arguments)
+        assert ran.code in (0, 3), ran
+        is_guarded(ran)
+    # what a terminal obeys is escaped in JSON too, and read back as it was
+    printed = run("inspect", RECORD, "-o", "inspected", "--no-plots", "--json").out
+    assert NAME in {channel["name"] for channel in json.loads(printed)["channels"]}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"model": f"{NAME}.py"},
+        {"model": NAME},
+        {NAME: 1.0},
+        {"plant": {"type": NAME}},
+        {"test": {"vt0": NAME}},
+        {"record": {"file": f"{NAME}.csv", "time": "t", "channels": {"vt": "v"}}},
+        {"record": {"file": RECORD, "time": NAME, "channels": {"vt": "v" + NAME}}},
+        {"about": {NAME: [NAME]}},
+        {"parameters": {"free": {NAME: 1.0}, "fixed": {"a": NAME}}},
+    ],
+    ids=lambda change: next(iter(change)).strip(NAME) or "key",
+)
+def test_a_refusal_quotes_hostile_names_as_codes(run, hostile, change):
+    content = yaml.safe_load((hostile / CASE).read_text(encoding="utf-8")) | change
+    file = f"{NAME}.yaml"
+    (hostile / file).write_text(yaml.safe_dump(content), encoding="utf-8")
+    ran = run("fit", file)
+    assert ran.code == 1
+    is_guarded(ran)
+    assert r"\x1b]0;owned\x07" in ran.err
+
+
+def test_tables_of_a_run_have_a_cell_for_each_column(run, hostile):
+    assert run("fit", CASE, "-o", RUN, "--no-plots").code == 0
+    files = [*(hostile / RUN).glob("*.csv")]
+    assert files
+    for path in files:
+        assert not CONTROL.search(path.read_text(encoding="utf-8"))
+        with path.open(newline="", encoding="utf-8") as file:
+            assert len({len(row) for row in csv.reader(file)}) == 1
+
+
+def test_figures_draw_hostile_names(run, hostile):
+    """A dollar sign begins a formula in a figure, unless it is escaped."""
+    shutil.copy(hostile / RECORD, hostile / "$\\frac{$.csv")
+    ran = run("inspect", "$\\frac{$.csv", "-o", "drawn")
+    assert ran.code == 0
+    assert not ran.err
+    assert (hostile / "drawn" / "inspect.png").stat().st_size > 0

@@ -1,0 +1,181 @@
+"""Run exfit on mutants of files, and list what is neither done nor refused with a message.
+
+Run it as ``python tests/studies/fuzz.py [MUTANTS] [--seed S] [--kinds case,mat,...] [--first N]``;
+``--one KIND SEED NUMBER`` makes one mutant again, leaves it in a folder and shows what exfit says.
+The mutants of a kind run one after the other in a process of their own, which may take 1 GB more
+than before a mutant; where it dies or hangs a new one goes on with the next mutant. What is wrong
+is listed once for each place in exfit.
+"""
+
+import argparse
+import faulthandler
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
+os.environ["COLUMNS"] = "80"
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+
+from mutant_files import KINDS, mutant
+from mutant_runs import Finding, findings
+
+MUTANTS, SEED = 100_000, 1
+IN_A_PROCESS = 2500  # mutants, then a new one begins with an empty memory
+HANGS = 60.0  # s by the clock of a busy computer; of processor time 20 are allowed
+GIGABYTE = 1 << 30
+MOST_MEMORY = GIGABYTE  # more than before a mutant
+MOST_ADDRESSES = 4 * GIGABYTE  # then an allocation fails
+TAIL = 1500  # characters of a text that are kept
+
+
+def work(kind: str, seed: int, first: int, end: int, log: Path) -> None:
+    """Run mutants and note each, before and after, in a file."""
+    with tempfile.TemporaryDirectory() as name, log.open("a", buffering=1) as notes:
+        for number in range(first, end):
+            faulthandler.dump_traceback_later(HANGS, exit=True)
+            one = mutant(kind, seed, number)
+            notes.write(json.dumps({"start": number, "mutant": str(one)[:TAIL]}) + "\n")
+            before = limit_memory()
+            wrong = findings(one, Path(name))
+            grown = peak_memory() - before
+            if grown > MOST_MEMORY:
+                wrong.append(Finding("memory", kind, f"{grown / GIGABYTE:.2f} GB"))
+            for each in wrong:
+                entry = {**each._asdict(), "number": number, "mutant": str(one)[:TAIL]}
+                notes.write(json.dumps(entry | {"text": each.text[-TAIL:]}) + "\n")
+            if grown > MOST_MEMORY:
+                break  # its peak hides that of the next
+        os.chdir("/")
+
+
+def limit_memory() -> int:
+    """Let this process allocate so much more than now; return what it has had at most, bytes."""
+    try:
+        import resource
+
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except (ImportError, OSError):
+        return 0  # this system has no such limit
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + MOST_ADDRESSES, hard))
+    return peak_memory()
+
+
+def peak_memory() -> int:
+    """Return the most memory that this process has had, bytes; 0 where the system does not say."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def worked(kind: str, seed: int, first: int, end: int, folder: Path) -> Iterator[dict]:
+    """Yield what workers note about the mutants of a kind; one that dies is a note of its own."""
+    while first < end:
+        log, errors = folder / f"{kind}-{first}.jsonl", folder / f"{kind}-{first}.txt"
+        stop = min(first + IN_A_PROCESS, end)
+        arguments = [sys.executable, __file__, "--work", kind, *map(str, (seed, first, stop, log))]
+        with errors.open("wb") as stream:
+            code = subprocess.run(arguments, stderr=stream, stdout=stream, check=False).returncode
+        lines = log.read_text().splitlines() if log.exists() else []
+        notes = [json.loads(line) for line in lines]
+        yield from notes
+        begun = [note for note in notes if "start" in note]
+        last = begun[-1]["start"] if begun else first
+        tail = errors.read_text(errors="replace")
+        if code:
+            yield {
+                "kind": "hang" if "Timeout" in tail else "death",
+                "place": place_of_death(tail),
+                "text": f"exit code {code}\n{tail[:TAIL]}",
+                "number": last,
+                "mutant": begun[-1]["mutant"] if begun else "not made",
+            }
+        elif "panicked" in tail:
+            yield {"kind": "leak", "place": kind, "text": tail[:TAIL], "number": last, "mutant": ""}
+        first = last + 1
+
+
+def place_of_death(text: str) -> str:
+    """Return the innermost place in exfit that a traceback of the interpreter names."""
+    own = [
+        line.strip() for line in text.splitlines() if f"exfit{os.sep}" in line and "File" in line
+    ]
+    own = [line for line in own if f"{os.sep}tests{os.sep}" not in line]
+    return own[0].rpartition(f"exfit{os.sep}")[2] if own else text.strip()[:80]
+
+
+def show(places: dict[tuple[str, str, str], list[dict]]) -> None:
+    """Print what is wrong, once for each place."""
+    for (kind, what, place), notes in sorted(places.items(), key=lambda item: -len(item[1])):
+        first = notes[0]
+        print(f"{kind}: {what}: {place}: {len(notes)} times")
+        print(f"    {first['mutant'][:300]}")
+        print("    " + first["text"].strip()[-600:].replace("\n", "\n    "))
+
+
+def again(kind: str, seed: int, number: int) -> None:
+    """Make one mutant again, leave it in a folder, and print what is wrong with it."""
+    folder = Path(tempfile.mkdtemp(prefix="mutant-"))
+    one = mutant(kind, seed, number)
+    print(one, folder / "mutant", sep="\n")
+    for finding in findings(one, folder):
+        print(finding.kind, finding.place, finding.text, sep="\n")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("mutants", type=int, nargs="?", default=MUTANTS)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--kinds", default=",".join(KINDS))
+    parser.add_argument("--one", nargs=3)
+    parser.add_argument("--work", nargs=5)
+    given = parser.parse_args()
+    if given.work:
+        kind, seed, first, end, log = given.work
+        work(kind, int(seed), int(first), int(end), Path(log))
+        return
+    if given.one:
+        kind, seed, number = given.one
+        again(kind, int(seed), int(number))
+        return
+    kinds = given.kinds.split(",")
+    places: dict[tuple[str, str, str], list[dict]] = {}
+    counts: Counter[str] = Counter()
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in kinds:
+            end = given.first + given.mutants // len(kinds)
+            for note in worked(kind, given.seed, given.first, end, Path(folder)):
+                if "start" in note:
+                    counts[kind] += 1
+                    continue
+                key = kind, note["kind"], note["place"]
+                places.setdefault(key, []).append(note)
+            wrong = sum(len(notes) for key, notes in places.items() if key[0] == kind)
+            text = f"{counts[kind]} mutants, {wrong} findings"
+            minutes = (time.monotonic() - began) / 60.0
+            print(f"{minutes:6.1f} min  {kind}: {text}", flush=True)
+            show({key: notes for key, notes in places.items() if key[0] == kind})
+    used = os.times()
+    seconds = used.user + used.system + used.children_user + used.children_system
+    wrong = sum(map(len, places.values()))
+    wrong = sum(map(len, places.values()))
+    print(
+        f"{counts.total()} mutants of {len(kinds)} kinds: {wrong} findings at {len(places)} places"
+    )
+    print(f"{seconds / 60.0:.1f} min of processor time")
+
+
+if __name__ == "__main__":
+    main()
