@@ -6,35 +6,81 @@ import click
 
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, write_text
+from exfit.cli.planner import OfRecords, import_every_unit
+from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.errors import ExfitError
 from exfit.util.text import printable
 
 BUSES = click.IntRange(1, 999_999)
 
 
-@click.command("import", short_help="Make a case from a PSS/E dynamics file.")
-@click.argument("unit", type=GivenFile(Kind.DYNAMICS))
+@click.command("import", short_help="Make cases from a PSS/E dynamics file.")
+@click.argument("dyr", type=GivenFile(Kind.DYNAMICS), metavar="UNIT")
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit.")
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
-@file_option
+@click.option("--all", "every", is_flag=True, help="Make a case of every unit, in the folder -o.")
+@click.option(
+    "--records",
+    type=click.Path(path_type=Path, exists=True),
+    metavar="DIR|TABLE",
+    help="With --all: records named by bus and id, or a table of them.",
+)
+@steps_option
+@bases_option
+@time_option
+@unit_option
+@sheet_option
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File to write, with --all a folder; without it, to the terminal.",
+)
 @force_option
 def import_(
-    unit: Path, bus: int | None, machine_id: str | None, output: Path | None, force: bool
+    dyr: Path,
+    bus: int | None,
+    machine_id: str | None,
+    every: bool,
+    records: Path | None,
+    sizes: tuple[str, ...],
+    bases: tuple[str, ...],
+    clock: tuple[str, ...],
+    unit: str | None,
+    sheet: str | None,
+    output: Path | None,
+    force: bool,
 ) -> None:
     """Make a case from the machine, exciter and stabiliser in UNIT, a PSS/E .dyr file.
 
     The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
-    holds several units, --bus and --id choose one.
+    holds several units, --bus and --id choose one, and --all makes a case of each. With --records
+    a case has the tests of its records, as `exfit new` makes it.
     """
+    given = OfRecords(records, sizes, bases, clock, unit, sheet)
+    if every:
+        if bus is not None or machine_id is not None:
+            raise click.UsageError("--bus and --id: not allowed with --all.")
+        import_every_unit(dyr, given, output, force)
+        return
+    given.refuse_without_all()
+    _import_one(dyr, bus, machine_id, output, force)
+
+
+def _import_one(
+    dyr: Path, bus: int | None, machine_id: str | None, output: Path | None, force: bool
+) -> None:
+    """Write the case of one unit."""
     from exfit.case.starting.suggestion import relative
     from exfit.exchange.psse.fields import located
     from exfit.exchange.psse.import_case import case_text, import_unit
 
     if output is not None:
         refuse_existing(output, force)
-    imported = import_unit(unit, bus, machine_id)
-    file = relative(unit, Path() if output is None else output.parent)
-    write_text(case_text(imported, file), output, located(imported.warnings, str(unit)))
+    imported = import_unit(dyr, bus, machine_id)
+    file = relative(dyr, Path() if output is None else output.parent)
+    write_text(case_text(imported, file), output, located(imported.warnings, str(dyr)))
     if output is not None:
         click.echo(printable(f"written to {output}; next: exfit simulate {output}"))
 

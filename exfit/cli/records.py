@@ -24,6 +24,16 @@ unit_option = click.option(
     type=click.Choice(("s", "ms", "us", "min")),
     help="Unit of the time's numbers. Default: as the file says, else s.",
 )
+steps_option = click.option(
+    "--step",
+    "sizes",
+    multiple=True,
+    metavar="[TEST=]PU",
+    help="Size of the steps: 0.05; of one test: up=0.05, at-312s=0.02.",
+)
+bases_option = click.option(
+    "--base", "bases", multiple=True, metavar="SIGNAL=VALUE", help="Value of 1 pu: vt=15.75kV."
+)
 sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel file.")
 
 

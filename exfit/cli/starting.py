@@ -11,29 +11,16 @@ from exfit.cli import completion
 from exfit.cli.exchange import BUSES
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
-from exfit.cli.records import inspected, sheet_option, time_option, unit_option
+from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.errors import ExfitError
 from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.open_values import OpenValue
     from exfit.case.starting.bases import Base
+    from exfit.case.starting.record_settings import RecordSettings
     from exfit.case.starting.starting_tests import StartingTest
-    from exfit.case.starting.starting_unit import PartData, UnitData
-    from exfit.records.inspection import Inspection
-
-
-@dataclass(frozen=True)
-class RecordReading:
-    """How the files of a new case are read."""
-
-    clock: tuple[str, ...]
-    unit: str | None
-    sheet: str | None
-
-    def inspect(self, file: Path) -> "Inspection":
-        """Return what a recorder's file holds."""
-        return inspected(file, self.clock, self.unit, self.sheet)
+    from exfit.case.starting.starting_unit import UnitData
 
 
 @dataclass(frozen=True)
@@ -68,13 +55,7 @@ class UnitSources:
     metavar="FILE",
     help="Record of one or several bump tests.",
 )
-@click.option(
-    "--step",
-    "sizes",
-    multiple=True,
-    metavar="[TEST=]PU",
-    help="Size of the steps: 0.05; of one test: up=0.05, at-312s=0.02.",
-)
+@steps_option
 @click.option(
     "--tests",
     "table",
@@ -82,9 +63,7 @@ class UnitSources:
     metavar="CSV",
     help="Table of tests: file, at, step, base, validates.",
 )
-@click.option(
-    "--base", "bases", multiple=True, metavar="SIGNAL=VALUE", help="Value of 1 pu: vt=15.75kV."
-)
+@bases_option
 @click.option(
     "--dyr",
     type=GivenFile(Kind.DYNAMICS),
@@ -132,6 +111,7 @@ def new(
     asked on a terminal, or left as "?", and the case is refused until it is filled in.
     """
     from exfit.case.starting.bases import bases_of
+    from exfit.case.starting.record_settings import RecordSettings
     from exfit.case.starting.starting_case import starting_case
     from exfit.case.starting.starting_tests import doubtful_bases
 
@@ -140,7 +120,7 @@ def new(
     folder = Path() if output is None else output.parent
     sources = UnitSources(model, machine, dyr, bus, machine_id, machine_from)
     data = _unit(sources, folder)
-    reading = RecordReading(clock, unit, sheet)
+    reading = RecordSettings(clock, unit, sheet)
     tests = _tests(file, table, sizes, bases_of(bases), reading)
     warn(doubtful_bases(tests))
     text = starting_case(data, tests, folder, _facts(facts))
@@ -161,7 +141,7 @@ def _tests(
     table: Path | None,
     sizes: tuple[str, ...],
     bases: "dict[str, Base]",
-    reading: RecordReading,
+    reading: "RecordSettings",
 ) -> "tuple[StartingTest, ...]":
     """Return the tests of a record, or those that a table names."""
     from exfit.case.starting.starting_tests import starting_tests
@@ -170,7 +150,7 @@ def _tests(
     if table is None:
         if file is None:
             raise click.UsageError("Missing option '--record', or '--tests'.")
-        return starting_tests(reading.inspect(file), sizes, bases)
+        return starting_tests([reading.inspect(file)], sizes, bases)
     if sizes:
         raise click.UsageError("--step: not allowed with --tests, which has a column step.")
     rows = [row if row.file else row._replace(file=file) for row in read_test_table(table)]
@@ -185,19 +165,13 @@ def _unit(given: UnitSources, folder: Path) -> "UnitData":
     """Return the data of the unit: typical, a planner's, with the machine of another case."""
     from dataclasses import replace
 
-    from exfit.case.starting.starting_unit import PartData, UnitData, machine_of_case
-    from exfit.models.machines import find_machine
+    from exfit.case.starting.starting_unit import machine_of_case, unit_with
 
     _refuse_unused(given)
+    planner = None
     if given.dyr is not None:
-        data = _planner(given.dyr, given.bus, given.machine_id, folder)
-        if given.model is not None:
-            name, exciter = _exciter(given.model, folder)
-            same = exciter.model is data.exciter.model
-            data = data if same else replace(data, name=name, exciter=exciter)
-    else:
-        machine = PartData.typical(find_machine(given.machine or "GENROU"))
-        data = UnitData(*_exciter(str(given.model), folder), machine)
+        planner = _planner(given.dyr, given.bus, given.machine_id, folder)
+    data = unit_with(given.model, given.machine, planner, folder)
     if given.machine_from is not None:
         data = replace(data, machine=machine_of_case(given.machine_from))
     return data
@@ -211,17 +185,6 @@ def _refuse_unused(given: UnitSources) -> None:
         raise click.UsageError("--machine: not allowed with --dyr or --machine-from.")
     if given.dyr is None and (given.bus is not None or given.machine_id is not None):
         raise click.UsageError("--bus and --id: only with --dyr.")
-
-
-def _exciter(model: str, folder: Path) -> "tuple[str, PartData]":
-    """Return an exciter with its typical data, behind the name that a case in a folder gives it."""
-    from exfit.case.starting.starting_unit import PartData
-    from exfit.case.starting.suggestion import relative
-    from exfit.models import find
-
-    exciter = find(model, Path())
-    name = relative(Path(model), folder) if model.endswith(".py") else exciter.name
-    return name, PartData.typical(exciter)
 
 
 def _planner(dyr: Path, bus: int | None, machine_id: str | None, folder: Path) -> "UnitData":

@@ -69,11 +69,18 @@ LONGEST_VALUE = 60  # characters of a wrong value
 
 def near(word: str, names: Iterable[str]) -> str:
     """Return a hint at the name that is meant by a word, or at all names."""
+    all_names = list({name.casefold(): name for name in names}.values())
+    meant = closest(word, all_names)
+    return f"known: {', '.join(all_names)}" if meant is None else f"did you mean {meant}?"
+
+
+def closest(word: str, names: Iterable[str], cutoff: float = 0.6) -> str | None:
+    """Return the name that is nearly a word, None where none is by a share of ``cutoff``."""
     import difflib
 
     folded = {name.casefold(): name for name in names}
-    close = difflib.get_close_matches(word.casefold(), folded, n=1)
-    return f"did you mean {folded[close[0]]}?" if close else f"known: {', '.join(folded.values())}"
+    close = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=cutoff)
+    return folded[close[0]] if close else None
 
 
 def printable(text: str) -> str:

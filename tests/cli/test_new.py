@@ -59,7 +59,9 @@ def record(tmp_path):
 def text_of(name, inspection, folder, machine="GENROU", sizes=()):
     """Return the text of the case that a model with typical data and a record begin with."""
     exciter, around = PartData.typical(MODELS[name]), PartData.typical(MACHINES[machine])
-    return starting_case(UnitData(name, exciter, around), starting_tests(inspection, sizes), folder)
+    return starting_case(
+        UnitData(name, exciter, around), starting_tests([inspection], sizes), folder
+    )
 
 
 def started(name, table, folder, machine="GENROU", step=STEP):

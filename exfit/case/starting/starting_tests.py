@@ -34,36 +34,54 @@ class StartingTest:
 
 
 def starting_tests(
-    inspection: Inspection,
+    inspections: Sequence[Inspection],
     sizes: Sequence[str] = (),
     bases: Mapping[str, Base] | None = None,
 ) -> tuple[StartingTest, ...]:
-    """Return the tests of a record: every other one, from the second on, validates.
+    """Return the tests of records: every other one, from the second on, validates.
 
     ``sizes`` (pu) are texts as 0.05 for all tests or up=0.05 for those whose names have that word;
-    they are amounts, or have the sign of the step. Of a record without steps it is one test.
+    they are amounts, or have the sign of the step. Of a single record without steps it is one test.
 
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
-    and for a record in which the breaker opens.
+    for a record in which the breaker opens, and for one of several that shows no step.
     """
-    if inspection.opening is not None:
-        _refuse_rejection(inspection, inspection.opening)
-    recorded, given = tests_of(inspection), bases or {}
-    if not recorded:
+    for inspection in inspections:
+        if inspection.opening is not None:
+            _refuse_rejection(inspection, inspection.opening)
+    recorded = [(inspection, test) for inspection in inspections for test in tests_of(inspection)]
+    given = bases or {}
+    if not recorded and len(inspections) == 1:
         _refuse_unused(sizes, [])
-        return (StartingTest("fit", inspection, (), bases=given),)
-    names = unique_names([test.name() for test in recorded], recorded)
-    by_name = _sizes_by_name(sizes, names)
-    for test, name in zip(recorded, names, strict=True):
-        if len(recorded) > 1 and name in by_name and by_name[name].of_all:
-            _refuse_impossible(f"{inspection.path}: --step", by_name[name].amount)
-            _refuse_other_size(inspection, test, by_name[name].amount)
-    amounts = [by_name[name].amount if name in by_name else None for name in names]
-    tests = [
+        return (StartingTest("fit", inspections[0], (), bases=given),)
+    _refuse_without_steps(inspections)
+    made = [
         started(inspection, test, amount, given, k % 2 == 1)
-        for k, (test, amount) in enumerate(zip(recorded, amounts, strict=True))
+        for k, ((inspection, test), amount) in enumerate(
+            zip(recorded, _amounts(recorded, sizes), strict=True)
+        )
     ]
-    return renamed(tests, recorded)
+    return renamed(made, [test for _, test in recorded])
+
+
+def _amounts(
+    recorded: Sequence[tuple[Inspection, DetectedTest]], sizes: Sequence[str]
+) -> list[float | None]:
+    """Return the size (pu) of each test, None where it is not given; raises ExfitError."""
+    tests = [test for _, test in recorded]
+    names = unique_names([test.name() for test in tests], tests)
+    by_name = _sizes_by_name(sizes, names)
+    for (inspection, test), name in zip(recorded, names, strict=True):
+        if len(recorded) > 1 and name in by_name and by_name[name].of_all:
+            refuse_other_size(inspection, test, by_name[name].amount)
+    return [by_name[name].amount if name in by_name else None for name in names]
+
+
+def sizes_in_use(texts: Sequence[str], inspections: Sequence[Inspection]) -> list[str]:
+    """Return the sizes, texts as 0.05 or up=0.05, that are of a test of some records."""
+    tests = [test for inspection in inspections for test in tests_of(inspection)]
+    names = unique_names([test.name() for test in tests], tests)
+    return [text for text in texts if _named(text, names)]
 
 
 def doubtful_bases(tests: Sequence[StartingTest]) -> list[str]:
@@ -151,8 +169,9 @@ def _refuse_impossible(place: str, amount: float) -> None:
         raise ExfitError(f"{place}: {text}")
 
 
-def _refuse_other_size(inspection: Inspection, test: DetectedTest, amount: float) -> None:
-    """Raise ExfitError where a size that all tests share is not that of this one."""
+def refuse_other_size(inspection: Inspection, test: DetectedTest, amount: float) -> None:
+    """Raise ExfitError where a size (pu) that all tests share is not that of this one."""
+    _refuse_impossible(f"{inspection.path}: --step", amount)
     change = test.changes[0]
     if change is None or len(test.steps) > 1:
         return
@@ -181,11 +200,28 @@ def _sizes_by_name(texts: Sequence[str], names: Sequence[str]) -> dict[str, Step
             amount = float(number)
         except ValueError:
             raise ExfitError(f"--step {text}: not of the form 0.05 or up=0.05") from None
-        named = [name for name in names if f"-{words}-" in f"-{name}-" or not words]
+        named = _named(text, names)
         sizes |= dict.fromkeys(named, StepAmount(amount, not words))
         unused += [] if named else [text]
     _refuse_unused(unused, names)
     return sizes
+
+
+def _named(text: str, names: Sequence[str]) -> list[str]:
+    """Return the names of the tests that a size is of."""
+    words = text.rpartition("=")[0]
+    return [name for name in names if f"-{words}-" in f"-{name}-" or not words]
+
+
+def _refuse_without_steps(inspections: Sequence[Inspection]) -> None:
+    """Raise ExfitError for records, of several, that show no step."""
+    faults = [
+        f"{inspection.path}: shows no step; a table of tests can say where it is"
+        for inspection in inspections
+        if not tests_of(inspection)
+    ]
+    if faults:
+        raise ExfitError("\n".join(faults))
 
 
 def _refuse_unused(texts: Sequence[str], names: Sequence[str]) -> None:

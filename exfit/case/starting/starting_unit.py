@@ -1,12 +1,14 @@
 """The data of a new case: models with their values, typical or taken from elsewhere."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from exfit.case.load import load_case
-from exfit.errors import CaseError
-from exfit.models.machines import Machine
+from exfit.case.starting.suggestion import relative
+from exfit.errors import CaseError, ExfitError
+from exfit.models import find
+from exfit.models.machines import Machine, find_machine
 from exfit.models.sheet import Model, typical
 from exfit.plants import MACHINE
 from exfit.util.sources import TYPICAL
@@ -42,6 +44,32 @@ class UnitData:
     machine: PartData
     stabiliser: PartData | None = None
     as_found: tuple[str, ...] = ()
+
+
+def unit_with(
+    model: str | None, machine: str | None, planner: UnitData | None, folder: Path
+) -> UnitData:
+    """Return a unit with typical data, or a planner's, with another exciter where one is given.
+
+    A ``model`` that is a file is named as a case in a folder does. Raises ExfitError for a model or
+    a machine that is not in the catalogue, and where neither a model nor a planner's unit is given.
+    """
+    if planner is not None:
+        if model is None:
+            return planner
+        name, exciter = _exciter(model, folder)
+        same = exciter.model is planner.exciter.model
+        return planner if same else replace(planner, name=name, exciter=exciter)
+    if model is None:
+        raise ExfitError("model: missing; the exciter is not known")
+    return UnitData(*_exciter(model, folder), PartData.typical(find_machine(machine or "GENROU")))
+
+
+def _exciter(model: str, folder: Path) -> tuple[str, PartData]:
+    """Return an exciter with its typical data, behind the name that a case in a folder gives it."""
+    exciter = find(model, Path())
+    name = relative(Path(model), folder) if model.endswith(".py") else exciter.name
+    return name, PartData.typical(exciter)
 
 
 def machine_of_case(path: Path) -> PartData:

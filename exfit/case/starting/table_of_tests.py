@@ -1,20 +1,23 @@
 """A table of tests: when each was made in which record, how large it was, whether it validates."""
 
-import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from exfit.case.starting.bases import Base, base_of
+from exfit.case.starting.cells import Cells, read_cells
 from exfit.case.starting.starting_tests import StartingTest, renamed, started
 from exfit.errors import ExfitError
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, tests_of
-from exfit.util.text import near
 
 COLUMNS = ("file", "at", "step", "base", "validates")
 YES, NO = ("yes", "y", "x", "1", "true"), ("", "no", "n", "0", "false", "-")
 NEAREST = 5.0  # s: how far a noted instant may be from the step that the record shows
+
+
+Value = TypeVar("Value")
 
 
 class TableRow(NamedTuple):
@@ -29,48 +32,15 @@ class TableRow(NamedTuple):
 
 
 def read_test_table(path: Path) -> tuple[TableRow, ...]:
-    """Return the rows of a CSV file with columns file, at (s), step (pu), base, validates.
+    """Return the rows of a CSV file or workbook: columns file, at (s), step (pu), base, validates.
 
     All may be missing; files are relative to the table's folder. Raises ExfitError with all faults.
     """
-    names, table = _cells(path)
-    unknown = [name for name in names if name not in COLUMNS]
-    if unknown:
-        raise ExfitError(f"{path}:1: column {', '.join(unknown)}; {near(unknown[0], COLUMNS)}")
-    rows, faults = list[TableRow](), list[str]()
-    for place, cells in table:
-        try:
-            rows.append(_row(cells, place, path.parent))
-        except ExfitError as fault:
-            faults.append(str(fault))
-    if faults or not rows:
-        raise ExfitError("\n".join(faults) or f"{path}: no row below the names of the columns")
+    faults = list[str]()
+    rows = [table_row(row, path.parent, faults) for row in read_cells(path, COLUMNS)]
+    if faults:
+        raise ExfitError("\n".join(faults))
     return tuple(rows)
-
-
-def _cells(path: Path) -> tuple[list[str], list[tuple[str, dict[str, str]]]]:
-    """Return the names of the columns, and the cells of each row by name, behind its place."""
-    lines = _lines(path)
-    separator = ";" if ";" in lines[0] else ","
-    reader = csv.DictReader(lines, delimiter=separator, skipinitialspace=True, restval="")
-    names = reader.fieldnames = [name.strip().lower() for name in reader.fieldnames or ()]
-    return names, [
-        (f"{path}:{reader.line_num}", {name: cells[name].strip() for name in names})
-        for cells in reader
-    ]
-
-
-def _lines(path: Path) -> list[str]:
-    """Return the lines of a table; raises ExfitError where it cannot be read or is empty."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as fault:
-        raise ExfitError(f"{path}: cannot be read: {fault.strerror}") from None
-    except UnicodeDecodeError:
-        raise ExfitError(f"{path}: cannot be read: not UTF-8 text") from None
-    if not lines:
-        raise ExfitError(f"{path}: the file is empty; columns: {', '.join(COLUMNS)}")
-    return lines
 
 
 def tests_of_table(
@@ -99,32 +69,46 @@ def tests_of_table(
     return renamed(tests, recorded)
 
 
-def _row(cells: Mapping[str, str], place: str, folder: Path) -> TableRow:
-    numbers = dict(_numbers(cells, place))
+def table_row(row: Cells, folder: Path, faults: list[str]) -> TableRow:
+    """Return a row with the files of a folder; add all that is wrong with it."""
+    place, cells = row
+    base = checked(row, "base", lambda text: base_of(text, f"{place}: base"), faults)
     word = cells.get("validates", "").lower()
     if word not in (*YES, *NO):
-        raise ExfitError(f"{place}: validates: {word!r} is neither yes nor no")
-    base = cells.get("base", "")
+        faults.append(f"{place}: validates: {word!r} is neither yes nor no")
     return TableRow(
         place,
         folder / cells["file"] if cells.get("file") else None,
-        numbers.get("at"),
-        numbers.get("step"),
-        base_of(base, f"{place}: base") if base else None,
+        number_in(row, "at", faults),
+        number_in(row, "step", faults),
+        base,
         word in YES if "validates" in cells else None,
     )
 
 
-def _numbers(cells: Mapping[str, str], place: str) -> Iterator[tuple[str, float]]:
-    """Yield the numbers that are given; raises ExfitError for what is none."""
-    for name in ("at", "step"):
-        text = cells.get(name, "")
-        if not text:
-            continue
+def number_in(row: Cells, name: str, faults: list[str]) -> float | None:
+    """Return the number in a column, None where it is blank; add what is wrong with it."""
+
+    def number(text: str) -> float:
         try:
-            yield name, float(text)
+            value = float(text)
         except ValueError:
-            raise ExfitError(f"{place}: {name}: {text!r} is not a number") from None
+            raise ExfitError(f"{row.place}: {name}: {text!r} is not a number") from None
+        if not isfinite(value):
+            raise ExfitError(f"{row.place}: {name}: {text!r} is not a finite number")
+        return value
+
+    return checked(row, name, number, faults)
+
+
+def checked(row: Cells, name: str, read: Callable[[str], Value], faults: list[str]) -> Value | None:
+    """Return what a cell holds, None where it is blank; add what is wrong with it."""
+    text = row.by_name.get(name, "")
+    try:
+        return read(text) if text else None
+    except ExfitError as fault:
+        faults.append(str(fault))
+        return None
 
 
 def _nearest(row: TableRow, tests: Sequence[DetectedTest]) -> DetectedTest:

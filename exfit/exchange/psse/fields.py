@@ -4,7 +4,7 @@ What follows the '/' on its line is comment, and so are lines that begin with //
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from math import isfinite
 from typing import NamedTuple
 
@@ -25,6 +25,7 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eEdD][-+]?[0-9]+)?")
 WHOLE = re.compile(r"[-+]?[0-9]{1,9}")
 REPEATED = re.compile(r"[0-9]+\*.*")
 BYTE_ORDER = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+END_OF_LINE = re.compile(r"\r\n|\r|\n")
 END_OF_FILE = "\x1a"  # as DOS wrote it
 
 
@@ -36,11 +37,16 @@ class DynamicsFault(NamedTuple):
 
 
 class Field(NamedTuple):
-    """One field: its text without quotes and blanks around it, and its line."""
+    """One field: its text without quotes and blanks around it, its line, and where it stands.
+
+    ``start`` and ``end`` bound its letters, quotes among them, in the text of the file.
+    """
 
     text: str
     line: int
     quoted: bool = False
+    start: int = 0
+    end: int = 0
 
 
 class Fields(NamedTuple):
@@ -48,6 +54,13 @@ class Fields(NamedTuple):
 
     line: int
     fields: tuple[Field, ...]
+
+
+class FileRecords(NamedTuple):
+    """The records of a file that have an end, and what is wrong with the others."""
+
+    records: list[Fields]
+    faults: list[DynamicsFault]
 
 
 class _Line(NamedTuple):
@@ -60,42 +73,58 @@ class _Line(NamedTuple):
 
 
 def text_of(data: bytes, file: str) -> str:
-    """Return the text of a file: UTF-8, or else Latin-1; raises DynamicsError where it is none."""
-    try:
-        text = data.decode(BYTE_ORDER.get(data[:2], BYTE_ORDER.get(data[:3], "utf-8")))
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip(END_OF_FILE)
+    """Return the text of a file, its ends of line as they are: UTF-8, or else Latin-1.
+
+    Raises DynamicsError where it is none.
+    """
+    text = data.decode(encoding_of(data))
     if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
+        line = len(END_OF_LINE.findall(text, 0, text.index("\0"))) + 1
         raise DynamicsError([f"{file}:{line}: not a text file: it holds a byte 0x00"])
     return text
 
 
+def encoding_of(data: bytes) -> str:
+    """Return how the text of a file is encoded."""
+    encoding = BYTE_ORDER.get(data[:2], BYTE_ORDER.get(data[:3], "utf-8"))
+    try:
+        data.decode(encoding)
+    except UnicodeDecodeError:
+        return "latin-1"
+    return encoding
+
+
 def read_records(text: str, file: str) -> list[Fields]:
     """Return the records of a text; raises DynamicsError where one has no end."""
+    records, faults = sound_records(text)
+    refuse(faults, file)
+    return records
+
+
+def sound_records(text: str) -> FileRecords:
+    """Return the records of a text that have an end and closed quotes, and the other's faults."""
     records: list[Fields] = []
     open_: tuple[Field, ...] = ()
     faults: list[DynamicsFault] = []
     after_comma = True  # a comma here has nothing before it
-    for number, line in enumerate(text.split("\n"), start=1):
+    unclosed = False
+    for number, (start, line) in enumerate(_lines(text), start=1):
         if line.lstrip().startswith(COMMENTS):
             continue
         if open_ and HEAD.match(line):
             faults.append(_endless(open_, f"before the next one on line {number}"))
-            open_ = ()
-        read = _line(line, number, after_comma)
+            open_, unclosed = (), False
+        read = _line(line, number, start, after_comma)
         if read.unclosed:
             faults.append(DynamicsFault(number, "a quote is opened and not closed on the line"))
-        open_ += read.fields
+        open_, unclosed = open_ + read.fields, unclosed or read.unclosed
         after_comma = read.after_comma
         if read.ended:
-            records += [Fields(open_[0].line, open_)] if open_ else []
-            open_, after_comma = (), True
+            records += [Fields(open_[0].line, open_)] if open_ and not unclosed else []
+            open_, after_comma, unclosed = (), True, False
     if open_:
         faults.append(_endless(open_, "before the end of the file"))
-    refuse(faults, file)
-    return records
+    return FileRecords(records, faults)
 
 
 def refuse(faults: list[DynamicsFault], file: str) -> None:
@@ -130,17 +159,30 @@ def whole(field: Field) -> int:
     return int(field.text)
 
 
-def _line(line: str, number: int, after_comma: bool) -> _Line:
-    """Return what a line holds up to the '/', an empty field for each comma after a comma."""
+def _lines(text: str) -> Iterator[tuple[int, str]]:
+    """Yield each line of a text behind where it starts, without its end."""
+    start, whole = 0, len(text.rstrip(END_OF_FILE))
+    for end in END_OF_LINE.finditer(text, 0, whole):
+        yield start, text[start : end.start()]
+        start = end.end()
+    yield start, text[start:whole]
+
+
+def _line(line: str, number: int, start: int, after_comma: bool) -> _Line:
+    """Return what a line holds up to the '/', an empty field for each comma after a comma.
+
+    ``start`` is where it starts in the text of the file.
+    """
     fields: list[Field] = []
     for match in FIELD.finditer(line):
         kind, text = match.lastgroup, match[match.lastgroup or 0]
         if kind in ("end", "open"):
             return _Line(tuple(fields), after_comma, ended=kind == "end", unclosed=kind == "open")
         if kind != "comma":
-            fields.append(Field(text.strip(), number, quoted=kind != "plain"))
+            begin, end = (start + place for place in match.span())
+            fields.append(Field(text.strip(), number, kind != "plain", begin, end))
         elif after_comma:
-            fields.append(Field("", number))
+            fields.append(Field("", number, False, start + match.start(), start + match.start()))
         after_comma = kind == "comma"
     return _Line(tuple(fields), after_comma)
 

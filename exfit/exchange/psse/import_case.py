@@ -28,11 +28,15 @@ test:                   # a 5 % step; a record takes the place of the duration
 
 def import_unit(path: Path, bus: int | None = None, machine_id: str | None = None) -> Unit:
     """Return a unit of a file as ``read_unit`` does; raises DynamicsError."""
+    return read_unit(text_of(read_file(path), str(path)), str(path), bus, machine_id)
+
+
+def read_file(path: Path) -> bytes:
+    """Return the content of a dynamics file; raises DynamicsError where it cannot be read."""
     try:
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise DynamicsError([f"{path}: cannot be read: {error.strerror}"]) from None
-    return read_unit(text_of(data, str(path)), str(path), bus, machine_id)
 
 
 def case_text(unit: Unit, file: str) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from exfit.errors import DynamicsError
-from exfit.exchange.psse.fields import DynamicsFault, Field, Fields, read_records, refuse
+from exfit.exchange.psse.fields import DynamicsFault, Field, Fields, located, read_records, refuse
 from exfit.exchange.psse.records import Definition, definition_of, definitions, read_values
 from exfit.util.text import near, show_value
 
@@ -43,11 +43,15 @@ class Head(NamedTuple):
 
 @dataclass(frozen=True)
 class UnitPart:
-    """A model of the unit with the values of its record, which begins on ``line``."""
+    """A model of the unit with the values of its record, which begins on ``line``.
+
+    ``fields`` are those behind the id, one for each name of the definition.
+    """
 
     definition: Definition
     line: int
     values: Mapping[str, float]
+    fields: tuple[Field, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -70,22 +74,51 @@ def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | No
     knows.
     """
     faults: list[DynamicsFault] = []
-    heads = [head for record in read_records(text, file) for head in _heads(record, faults)]
+    heads = [head for record in read_records(text, file) for head in heads_of(record, faults)]
     refuse(faults, file)
-    chosen = _chosen(heads, file, bus, machine_id)
-    left_out = tuple(head for head in chosen if definition_of(head.name) is None)
+    chosen = _chosen(by_unit(heads), file, bus, machine_id)
+    unit, faults = unit_of(chosen)
+    if unit is None:
+        left_out = [head for head in chosen if definition_of(head.name) is None]
+        faults += _missing(missing_kinds(chosen), chosen, left_out)
+        raise DynamicsError(located(faults, file))
+    return unit
+
+
+def unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
+    """Return the unit of its records, and their faults, with which it is None.
+
+    It is None, too, where it has no machine or exciter that exfit knows.
+    """
+    faults: list[DynamicsFault] = []
+    left_out = [head for head in heads if definition_of(head.name) is None]
     warnings = [DynamicsFault(head.line, _left_out(head)) for head in left_out]
-    parts = _parts(chosen, faults, warnings)
-    faults += _missing(parts, chosen, left_out)
-    refuse(faults, file)
-    return Unit(
-        chosen[0].bus,
-        chosen[0].id,
+    parts = _parts(heads, faults, warnings)
+    if faults or not parts.keys() >= {*NEEDED}:
+        return None, faults
+    unit = Unit(
+        heads[0].bus,
+        heads[0].id,
         parts["machine"],
         parts["exciter"],
         parts.get("stabiliser"),
         tuple(sorted(warnings, key=lambda warning: warning.line)),
     )
+    return unit, []
+
+
+def missing_kinds(heads: Iterable[Head]) -> list[str]:
+    """Return what a unit needs and none of its records is: machine, exciter."""
+    known = {definition.kind for head in heads if (definition := definition_of(head.name))}
+    return [kind for kind in NEEDED if kind not in known]
+
+
+def by_unit(heads: Iterable[Head]) -> dict[tuple[int, str], list[Head]]:
+    """Return the records of each unit by its bus and its id in capitals."""
+    units: dict[tuple[int, str], list[Head]] = {}
+    for head in heads:
+        units.setdefault((head.bus, head.id.upper()), []).append(head)
+    return units
 
 
 def _parts(
@@ -106,11 +139,11 @@ def _parts(
         reading = read_values(definition, head.line, head.fields)
         faults += reading.faults
         warnings += reading.warnings
-        parts[kind] = UnitPart(definition, head.line, reading.values)
+        parts[kind] = UnitPart(definition, head.line, reading.values, head.fields)
     return parts
 
 
-def _heads(record: Fields, faults: list[DynamicsFault]) -> Iterator[Head]:
+def heads_of(record: Fields, faults: list[DynamicsFault]) -> Iterator[Head]:
     """Yield the head of a record that belongs to a unit; add a fault where it has none."""
     line, fields = record
     if len(fields) < 3 or not fields[1].text[:1].isalpha():
@@ -147,11 +180,10 @@ def _label(fields: Sequence[Field]) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in label).upper()
 
 
-def _chosen(heads: list[Head], file: str, bus: int | None, machine_id: str | None) -> list[Head]:
+def _chosen(
+    units: Mapping[tuple[int, str], list[Head]], file: str, bus: int | None, machine_id: str | None
+) -> list[Head]:
     """Return the records of one unit; raises DynamicsError where it is not exactly one."""
-    units: dict[tuple[int, str], list[Head]] = {}
-    for head in heads:
-        units.setdefault((head.bus, head.id.upper()), []).append(head)
     meant = {
         key: records
         for key, records in units.items()
@@ -183,13 +215,12 @@ def _list(units: Mapping[tuple[int, str], list[Head]]) -> Iterator[str]:
 
 
 def _missing(
-    parts: Mapping[str, UnitPart], chosen: Sequence[Head], left_out: Iterable[Head]
+    missing: Sequence[str], chosen: Sequence[Head], left_out: Iterable[Head]
 ) -> Iterator[DynamicsFault]:
     """Yield a fault for each record that may be the machine or exciter that is missing."""
-    missing = [kind for kind in NEEDED if kind not in parts]
     unknown = [head for head in left_out if head.name not in OTHERS]
     for kind in missing:
-        names = _names_of(kind)
+        names = names_of(kind)
         candidates = [head for head in unknown if len(missing) == 1 or _looks_like(head) == kind]
         for head in candidates:
             text = f"exfit has no {kind} of that name; {near(head.name, names)}"
@@ -199,7 +230,7 @@ def _missing(
             yield DynamicsFault(chosen[0].line, f"{unit}: has no {kind}; known: {', '.join(names)}")
 
 
-def _names_of(kind: str) -> list[str]:
+def names_of(kind: str) -> list[str]:
     """Return the names by which a file may have a machine or an exciter."""
     return sorted(
         definition.record.name

@@ -68,6 +68,15 @@ def read_excel(path: Path, sheet: str | None = None) -> Table:
     return _columns(path, hashlib.sha256(data).hexdigest(), tables[0], sheet is not None)
 
 
+def sheets_of(path: Path) -> dict[str, list[Row]]:
+    """Return the cells of all sheets by name, those of a table of words among them.
+
+    Raises RecordError for a file that is damaged.
+    """
+    book = _workbook(path, read_bytes(path))
+    return {name: sound(path, WORKBOOK, partial(_rows, book, name)) for name in book.sheet_names}
+
+
 def _workbook(path: Path, data: bytes) -> "CalamineWorkbook":
     try:
         from python_calamine import CalamineWorkbook

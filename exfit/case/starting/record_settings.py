@@ -1,0 +1,24 @@
+"""How the record of a new case is read."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from exfit.records.formats import open_table
+from exfit.records.inspection import Inspection, inspect
+
+
+@dataclass(frozen=True)
+class RecordSettings:
+    """Columns of the time of a record and their unit, its sheet, the column of its voltage.
+
+    What is empty or None is as the file shows it.
+    """
+
+    clock: tuple[str, ...] = ()
+    unit: str | None = None
+    sheet: str | None = None
+    voltage: str | None = None
+
+    def inspect(self, file: Path) -> Inspection:
+        """Return what a recorder's file holds; raises RecordError where it is none."""
+        return inspect(open_table(file, self.sheet), self.clock or None, self.unit)

@@ -1,0 +1,119 @@
+"""The commands import and export for all units of a planner's file."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli.options import warn
+from exfit.errors import ExfitError
+
+if TYPE_CHECKING:
+    from exfit.exchange.psse.import_all import ImportedUnit, ImportPlan, RecordOptions
+
+UNITS = "units.csv"
+MOST_LISTED = 20  # units, records, in a terminal; the table has all
+
+
+@dataclass(frozen=True)
+class OfRecords:
+    """The options of records, as they are given."""
+
+    records: Path | None
+    sizes: tuple[str, ...]
+    bases: tuple[str, ...]
+    clock: tuple[str, ...]
+    unit: str | None
+    sheet: str | None
+
+    def refuse_without_all(self) -> None:
+        """Raise UsageError where one is given: they need --all."""
+        if any((self.records, self.sizes, self.bases, self.clock, self.unit, self.sheet)):
+            raise click.UsageError(
+                "--records, --step, --base, --time, --time-unit and --sheet: only with --all; "
+                "exfit new makes a case of one record."
+            )
+
+    def parsed(self) -> "RecordOptions":
+        """Return them as a case takes them; raises ExfitError, UsageError where they cannot be."""
+        from exfit.case.starting.bases import bases_of
+        from exfit.case.starting.record_settings import RecordSettings
+        from exfit.exchange.psse.import_all import RecordOptions
+
+        others = (self.sizes, self.bases, self.clock, self.unit, self.sheet)
+        if self.records is None and any(others):
+            raise click.UsageError(
+                "--step, --base, --time, --time-unit and --sheet: only with --records."
+            )
+        in_table = (self.sizes, self.clock, self.unit, self.sheet)
+        if self.records is not None and not self.records.is_dir() and any(in_table):
+            raise click.UsageError(
+                "--step, --time, --time-unit and --sheet: not allowed with a table, which has "
+                "columns for them."
+            )
+        settings = RecordSettings(self.clock, self.unit, self.sheet)
+        return RecordOptions(self.sizes, bases_of(self.bases), settings)
+
+
+def import_every_unit(dyr: Path, given: OfRecords, folder: Path | None, force: bool) -> None:
+    """Write a case for every unit of a dynamics file, and a table of all units."""
+    from exfit.exchange.psse.import_all import import_all, plan_import, units_table
+    from exfit.util.files import write_each
+
+    if folder is None:
+        raise click.UsageError("Missing option '-o': the folder of the cases.")
+    options = given.parsed()
+    plan = plan_import(dyr, given.records)
+    if not force:
+        _refuse_existing(folder, [*plan.names, UNITS])
+    imported = import_all(plan, folder, options)
+    if imported.unused:
+        raise ExfitError(f"--step {imported.unused[0]}: no test of that name in any record")
+    write_each(folder, {**imported.texts, UNITS: units_table(imported.units)})
+    warn(_first(imported.doubts))
+    _report(plan, imported.units, folder)
+
+
+def _refuse_existing(folder: Path, names: Sequence[str]) -> None:
+    """Raise ExfitError where files would be lost."""
+    existing = [str(folder / name) for name in names if (folder / name).exists()]
+    if existing:
+        listed = "\n".join(_first(existing))
+        raise ExfitError(f"{listed}\nexist already; --force writes over them")
+
+
+def _report(plan: "ImportPlan", units: "Sequence[ImportedUnit]", folder: Path) -> None:
+    """Say what was written and what was not; raises ExfitError where something was refused."""
+    from exfit.exchange.psse.import_all import NO_MODEL, RECORDED, REFUSED
+
+    recorded = _lines_of(units, RECORDED)
+    cases = [unit.case for unit in units if unit.case]
+    counts = f"cases: {len(cases)}, with records: {len(recorded)}"
+    click.echo(f"written to {folder}; {counts}; all units: {UNITS}")
+    for path in _first([str(path) for path in plan.others]):
+        click.echo(f"not joined to a unit: {path}: its name does not begin with a bus", err=True)
+    for line in _first(_lines_of(units, NO_MODEL)):
+        click.echo(f"no model: {line}", err=True)
+    refused = [*_lines_of(units, REFUSED), *plan.faults]
+    if refused:
+        raise ExfitError("\n".join(_first(refused)))
+    if not cases:
+        raise ExfitError(f"{plan.dyr}: no unit can be imported")
+
+
+def _lines_of(units: "Sequence[ImportedUnit]", status: str) -> list[str]:
+    """Return the units of a status, with what there is to know of each."""
+    return [
+        f"bus {unit.bus}, machine {unit.id}: {unit.notes}"
+        for unit in units
+        if unit.status == status
+    ]
+
+
+def _first(texts: Iterable[str]) -> list[str]:
+    """Return the first texts, with the number of the others."""
+    listed = list(texts)
+    more = len(listed) - MOST_LISTED
+    return listed if more <= 0 else [*listed[:MOST_LISTED], f"... and {more} more"]

@@ -1,0 +1,88 @@
+"""All units of a dynamics file at once: each as it is read alone, whatever is wrong with others."""
+
+import numpy as np
+import pytest
+from dynamics import SOUND, garbage, replaced
+
+from exfit.errors import DynamicsError
+from exfit.exchange.psse.fields import sound_records, text_of
+from exfit.exchange.psse.unit import read_unit
+from exfit.exchange.psse.units import read_units
+
+BUSES = range(101, 109)
+
+
+def at_bus(bus, text=SOUND):
+    """Return the records of the sound unit at another bus."""
+    return text.replace("1 GENROU", f"{bus} GENROU").replace("1 ESAC1A", f"{bus} ESAC1A")
+
+
+def test_every_unit_is_read_as_it_is_alone():
+    text = "".join(at_bus(bus) for bus in BUSES)
+    units = read_units(text)
+    assert [unit.bus for unit in units.units] == [*BUSES]
+    assert (units.refused, units.faults) == ((), ())
+    assert units.units == tuple(read_unit(text, "unit.dyr", bus) for bus in BUSES)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (" 766 ", " x ", "ESAC1A: KA: 'x' is not a number"),
+        (" 766 ", " -1 ", "ESAC1A: KA: -1 lies outside"),
+        (" 766 ", " ", "ESAC1A: 18 values after the id"),
+        (".4 /", ".4 / \n103 GENSAL 1 /", "GENSAL: a second machine; GENROU is on line"),
+    ],
+)
+def test_a_fault_of_one_unit_leaves_the_others(old, new, words):
+    text = at_bus(102) + at_bus(103, replaced(old, new)) + at_bus(104)
+    units = read_units(text)
+    assert [unit.bus for unit in units.units] == [102, 104]
+    (refused,) = units.refused
+    assert (refused.bus, refused.modelled) == (103, True)
+    assert words in "\n".join(fault.text for fault in refused.faults)
+    assert {fault.line for fault in refused.faults} <= {5, 6, 7, 8, 9}
+
+
+@pytest.mark.parametrize("damaged", ["-14.5 /", ".4 /"])
+def test_a_record_without_an_end_leaves_the_other_units(damaged):
+    whole = at_bus(103)
+    text = at_bus(102) + replaced(damaged, damaged[:-1], whole) + at_bus(104)
+    units = read_units(text)
+    assert [unit.bus for unit in units.units] == [102, 104]
+    assert "has no '/' before the next one" in units.faults[0].text
+
+
+def test_a_unit_without_a_model_is_named_with_its_records():
+    text = SOUND + "7 GENCLS 1 3 0 /\n8 GENROU 1 1 /\n8 'IEEEG1' 1 0 /\n9 ESACA1A 1 3 /\n"
+    no_model = {unit.bus: unit for unit in read_units(text).refused}
+    assert [unit.modelled for unit in no_model.values()] == [False] * 3
+    assert "no machine and no exciter of the catalogue: GENCLS" in no_model[7].faults[0].text
+    assert "no exciter of the catalogue: GENROU, IEEEG1" in no_model[8].faults[0].text + (
+        no_model[8].faults[1].text
+    )
+    assert no_model[9].faults[1].text == "ESACA1A: did you mean ESAC1A?"
+    assert len(no_model[7].faults) == 1
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_damage_to_a_file_of_units_is_reported_or_harmless(seed):
+    random = np.random.default_rng(seed)
+    sound = "".join(at_bus(bus) for bus in BUSES)
+    try:
+        text = text_of(garbage(sound.encode(), random), "unit.dyr")
+    except DynamicsError:
+        return
+    units = read_units(text)
+    whole = [unit for unit in units.units if unit.bus in BUSES]
+    # a damage hurts a record, or joins it to the next; only what is cut off takes more with it
+    assert len(whole) >= len(BUSES) - 2 or len(text) < len(sound)
+    reported = units.refused or units.faults
+    assert reported or len(units.units) == len(BUSES) or len(text) < len(sound)
+
+
+def test_a_field_stands_where_it_says():
+    text = "// naïve\r\n1 'ESAC1A'\t\"1 \" 0,0 ,1 // x\r2 GENROU 1 /\n"
+    for record in sound_records(text).records:
+        for field in record.fields:
+            assert text[field.start : field.end].strip("'\"").strip() == field.text
