@@ -19,6 +19,7 @@ from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
+from exfit.util.file_names import folded
 
 Values = Mapping[str, float]
 
@@ -85,7 +86,7 @@ def _in_place_of(recording: Recording, record: Record | Path | str, taken: set[s
     """Return a recording with another record, whole: windows and masks are those of its own."""
     file = record.source if isinstance(record, Record) else Path(record)
     update = {"file": str(file.absolute()), "window": None, "mask": ()}
-    name = file.name if file.stem in taken else file.stem
+    name = file.name if folded(file.stem) in map(folded, taken) else file.stem
     section = recording.record.model_copy(update=update)
     return recording.model_copy(update={"name": name, "record": section})
 

@@ -9,7 +9,7 @@ from exfit.case.assembly import CheckedContent, validated_document
 from exfit.case.case import Case
 from exfit.case.checks.content import contradictions
 from exfit.case.checks.node import ContentNode
-from exfit.case.checks.record import repeated_names
+from exfit.case.checks.record import name_faults
 from exfit.case.checks.saturation_test import saturation_test_faults
 from exfit.case.checks.steady_test import steady_test_faults
 from exfit.case.load import faults_with_lines, parse_case
@@ -163,7 +163,7 @@ def programme_faults(content: Content, folder: Path) -> Iterator[Fault]:
         if key in content:
             yield top.at(key).fault("not allowed with tests: each of them has its own")
     tests = top.at(TESTS).entries
-    yield from repeated_names(tests)
+    yield from name_faults(tests)
     yield from _use_faults(tests)
     if any(test.at("kind").text == SATURATION for test in tests):
         content = with_bases(content, BASES_TO_COME)

@@ -34,6 +34,7 @@ from exfit.results.tables import (
     whole_table,
 )
 from exfit.util.cache import cache_folder
+from exfit.util.file_names import files_named_after
 from exfit.util.files import write, write_together
 from exfit.util.interrupts import deferred_interrupts
 from exfit.util.json_files import read_json
@@ -193,9 +194,7 @@ def _of_records(main: Path) -> set[str]:
 
 def _named_after(records: Iterable[str]) -> set[str]:
     """Return the names of the files that are named after records."""
-    phases = (f"-{phase}.png" for phase in PHASES)
-    endings = (".csv", ".png", f"-{ITERATIONS}", *phases)
-    return {name + ending for name in records if name for ending in endings}
+    return {file for name in records if name for file in files_named_after(name)}
 
 
 def write_validation(comparisons: Sequence[Comparison], folder: Path) -> FigureFiles:

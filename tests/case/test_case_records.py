@@ -299,6 +299,14 @@ MEANING = {
         "'up' is taken by 'up'",
     ),
     "name of a file": (("records", 1, "name"), "fit", ("records", 1, "name"), "'fit' is taken"),
+    "name of a device": (("records", 1, "name"), "con", ("records", 1, "name"), "is a device of W"),
+    "name with a dot": (("records", 1, "name"), "up2.", ("records", 1, "name"), "ends with a dot"),
+    "name of a table": (
+        ("validate", 0, "name"),
+        "up-iterations",
+        ("validate", 0, "name"),
+        "'up-iterations' is taken by 'up': the file up-iterations.csv would be of both",
+    ),
     "name of a part": (("records", 1, "name"), "machine", ("records", 1, "name"), "is taken"),
     "beginning of a part": (
         ("records", 1, "name"),

@@ -103,6 +103,8 @@ def test_a_case_is_the_programme_of_one_test(loaded):
         (("tests", 1, "kind"), "bmp", "tests[1].kind: 'bmp' is not possible; did you mean bump?"),
         (("tests", 1, "name"), "DOWN", "tests[1].name: 'DOWN' is taken by 'down'"),
         (("tests", 3, "name"), "fit", "tests[3].name: 'fit' is taken by a file of every run"),
+        (("tests", 3, "name"), "lpt1.a", "tests[3].name: 'lpt1.a' is a device of Windows"),
+        (("tests", 3, "name"), "report", "tests[3].name: 'report' is taken by a file of every"),
         (("tests", 3, "free"), {}, "tests[3].free: 0 entries; at least 1 needed"),
         (("tests", 3, "free"), None, "tests[3].free: is missing"),
         (("tests", 3, "free", "Tpd0", "start"), 50.0, "tests[3].free.Tpd0.start: 50 lies outside"),

@@ -12,9 +12,9 @@ from exfit.case.checks.nuisance import nuisance_faults
 from exfit.case.checks.plant import model_faults, plants_of_records_faults, stabiliser_faults
 from exfit.case.checks.record import (
     channels_faults,
+    name_faults,
     noise_faults,
     record_faults,
-    repeated_names,
     weight_faults,
 )
 from exfit.case.checks.recorded_reference import recorded_reference_faults
@@ -56,7 +56,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from noise_faults(driven)
     if content.at("estimate").content.get("weights") == "balanced":
         yield from weight_faults([content, *content.at("records").entries])
-    yield from repeated_names(several)
+    yield from name_faults(several)
     yield from _estimate_faults(content)
     yield from _starts_faults(content, parts)
     yield from as_found_faults(content, parts)

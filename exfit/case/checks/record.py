@@ -7,21 +7,9 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
 from exfit.records.units import needs_base
+from exfit.util.file_names import taken_names
 from exfit.util.text import show
 
-FILES_OF_A_RUN = (
-    "fit",
-    "response",
-    "history",
-    "overlay",
-    "iterations",
-    "convergence",
-    "trajectories",
-    "sensitivity",
-    "correlation",
-    "profile",
-    "starts",
-)
 BEFORE_RECORD = (
     "leave this step out, then the simulation begins at rest from the level that the record has "
     "there; or, if the unit had not settled, give begin before this step, and vt0 at that time"
@@ -180,18 +168,12 @@ def _missing_noise(channels: Sequence[ContentNode]) -> Iterator[Fault]:
                 yield channel.at("noise").fault("is missing: other channels have it")
 
 
-def repeated_names(recordings: Sequence[ContentNode]) -> Iterator[Fault]:
-    """Yield the names of records that are taken: files and values are named after them."""
-    taken = dict.fromkeys(FILES_OF_A_RUN, "a file of every run")
-    for recording in recordings:
-        name = recording.at("name").text
-        if name is None:
-            continue
-        folded = name.casefold()
-        if folded.partition(".")[0] in PREFIXES_OF_PARTS:
-            text = f"{name!r} is taken: names of a part of the plant begin with it"
-            yield recording.at("name").fault(text)
-        elif folded in taken:
-            text = f"{name!r} is taken by {taken[folded]}: files are named after it"
-            yield recording.at("name").fault(text)
-        taken.setdefault(folded, repr(name))
+def name_faults(recordings: Sequence[ContentNode]) -> Iterator[Fault]:
+    """Yield the names of records that cannot be used: files and values are named after them."""
+    names = [recording.at("name") for recording in recordings]
+    for index, reason in taken_names([name.text for name in names]):
+        yield names[index].fault(f"{names[index].text!r} {reason}")
+    for name in names:
+        if name.text is not None and name.text.casefold().partition(".")[0] in PREFIXES_OF_PARTS:
+            text = f"{name.text!r} is taken: names of a part of the plant begin with it"
+            yield name.fault(text)

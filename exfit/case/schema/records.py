@@ -19,6 +19,7 @@ from exfit.case.schema.plants import AloneOnLoad, OffLine, OnLine
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Count, Findable, Number, Positive, Section, Text, thawed
 from exfit.signals import RECORDED
+from exfit.util.file_names import LONGEST_NAME
 
 if TYPE_CHECKING:
     RecordedSignal = str
@@ -168,7 +169,7 @@ class Recording(Section):
 
     name: str = Field(
         pattern=FILE_NAME,
-        max_length=100,
+        max_length=LONGEST_NAME,
         description="Name of letters, digits, - _ . and %; files are named after it.",
     )
     plant: Annotated[OffLine | OnLine | AloneOnLoad, Field(discriminator="type")] | None = Field(

@@ -10,6 +10,7 @@ from exfit.case.messages import FILE_NAME
 from exfit.case.schema.plants import SaturationName
 from exfit.case.schema.values import Number, Positive, Section, Text, nothing, thawed
 from exfit.signals import FIELDS
+from exfit.util.file_names import LONGEST_NAME
 
 MOST_POINTS = 1000  # of a list; a longer one is a file
 CURVE_SIGNALS = ("vt", *FIELDS)
@@ -66,7 +67,7 @@ class SaturationTest(Section):
     kind: Literal["saturation"] = Field(description="Kind of test.")
     name: str = Field(
         pattern=FILE_NAME,
-        max_length=100,
+        max_length=LONGEST_NAME,
         description="Name of letters, digits, - _ and .; files are named after it.",
     )
     file: Text | None = Field(

@@ -20,6 +20,7 @@ from exfit.case.schema.values import (
     thawed,
 )
 from exfit.signals import FIELDS, TERMINALS
+from exfit.util.file_names import LONGEST_NAME
 
 MOST_POINTS = 1000  # of a list; a longer one is a file
 POINT_SIGNALS = (*TERMINALS, *FIELDS)
@@ -65,7 +66,7 @@ class SteadyTest(Section):
     kind: Literal["steady"] = Field(description="Kind of test.")
     name: str = Field(
         pattern=FILE_NAME,
-        max_length=100,
+        max_length=LONGEST_NAME,
         description="Name of letters, digits, - _ and .; files are named after it.",
     )
     file: Text | None = Field(
