@@ -55,18 +55,20 @@ class PlannerUnit:
 def as_found_lines(unit: PlannerUnit, model: str, values: Mapping[str, float]) -> Iterator[str]:
     """Yield the section that says what was in the planner's base, by the names of the system."""
     yield "as_found:               # in the planner's base; a report compares it"
-    yield f"  source: {_quoted(str(unit))}"
+    yield f"  source: {quoted(str(unit))}"
     yield f"  bus: {unit.bus}"
-    yield f"  id: {_quoted(unit.id)}"
-    yield f"  file: {_quoted(unit.file)}"
+    yield f"  id: {quoted(unit.id)}"
+    yield f"  file: {quoted(unit.file)}"
     yield f"  model: {model}"
     yield "  parameters:"
     pairs = [f"{name}: {yaml_number(value)}" for name, value in values.items()]
     yield from _flow_mapping(pairs, "    ")
 
 
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+def quoted(text: str) -> str:
+    """Return a text between quotes in YAML, with codes for letters that it does not allow."""
+    letters = json.dumps(text, ensure_ascii=False)
+    return "".join(x if x.isprintable() else f"\\U{ord(x):08x}" for x in letters)
 
 
 def _flow_mapping(pairs: Iterable[str], indent: str) -> Iterator[str]:

@@ -2,7 +2,9 @@
 
 import csv
 import json
+import os
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -93,6 +95,32 @@ def test_a_refusal_quotes_hostile_names_as_codes(run, hostile, change):
     assert ran.code == 1
     is_guarded(ran)
     assert r"\x1b]0;owned\x07" in ran.err
+
+
+@pytest.mark.parametrize("name", ["a\nmodel: x", NAME, "c\\ 'x' \"", "d: {#", "e\u2028\x85"])
+def test_a_case_made_of_files_with_hostile_names_names_them_as_they_are(run, empty_folder, name):
+    samples = ROOT / "sample_data"
+    shutil.copy(samples / "unit.dyr", f"{name}.dyr")
+    shutil.copy(samples / "ac1a_up.csv", f"{name}.csv")
+    assert run("import", f"{name}.dyr", "-o", "imported.yaml").code == 0
+    assert run("simulate", "imported.yaml", "--no-plots").code == 0
+    options = ("--dyr", f"{name}.dyr", "--step", "0.05", "-o", "new.yaml")
+    assert run("new", "--record", f"{name}.csv", *options).code == 0
+    content = yaml.safe_load((empty_folder / "new.yaml").read_text(encoding="utf-8"))
+    assert content["record"]["file"] == f"{name}.csv"
+    assert content["as_found"]["file"] == f"{name}.dyr"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux alone")
+@pytest.mark.parametrize(
+    "command", [("inspect",), ("new", "--model", "AC1A", "--record"), ("fit",)]
+)
+def test_a_name_that_is_not_text_is_refused(run, empty_folder, command):
+    name = os.fsdecode(b"\xff.csv")
+    (empty_folder / name).write_text("t,vt\n0,1\n1,1\n")
+    ran = run(*command, name)
+    assert ran.code == 1
+    assert "not UTF-8 text" in ran.err
 
 
 def test_tables_of_a_run_have_a_cell_for_each_column(run, hostile):

@@ -207,7 +207,8 @@ def _stabiliser(part: PartData | None) -> Iterator[str]:
 
 def _wrapped(text: str) -> list[str]:
     """Return a text as lines of comment."""
-    return wrap(f"# {text}", WIDTH, subsequent_indent="# ", break_long_words=False)
+    comment = f"# {in_comment(text)}"
+    return wrap(comment, WIDTH, subsequent_indent="# ", break_long_words=False)
 
 
 def _note(text: str) -> list[str]:

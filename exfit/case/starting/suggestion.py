@@ -1,6 +1,5 @@
 """The sections of a case that an inspected record suggests: record and test, with what to check."""
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ import yaml
 
 from exfit.case.open_values import FILL_IN
 from exfit.case.starting.bases import Base
-from exfit.case.templates import commented, in_comment
+from exfit.case.templates import commented, in_comment, quoted
 from exfit.records.channel_inspection import SPIKE_LIMIT, InspectedChannel, InspectedPhases
 from exfit.records.channel_recognition import connection_of
 from exfit.records.field_base import FIELD, ScaleRange, is_on_load, scale_to_find
@@ -315,13 +314,7 @@ def plain_text(name: str) -> str:
     plain = re.fullmatch(r"[A-Za-zäöüÄÖÜß./][\w./ -]*", name) and name == name.strip()
     if plain and yaml.safe_load(name) == name:
         return name
-    text = json.dumps(name, ensure_ascii=False)
-    return "".join(letter if letter.isprintable() else _code(letter) for letter in text)
-
-
-def _code(letter: str) -> str:
-    """Return the code of a letter between quotes in YAML, which does not allow every letter."""
-    return f"\\U{ord(letter):08x}"
+    return quoted(name)
 
 
 def relative(file: Path, folder: Path) -> str:
