@@ -45,6 +45,7 @@ def test_a_breaker_opens_with_and_without_a_record(plant):
         (PLAYED, {"breaker": {"opens": 1.0}, "steady_until": 0.5}, ("vt", "efd"),
          "test.breaker: not allowed with plant machine-playback"),
         (ALONE, LENGTH, (), "no step: give one of breaker"),
+        (ALONE, {}, ("vt",), "test.breaker: is missing: nothing else acts"),
         (ALONE, {"vref": [{"at": 1.0, "step": 0.1}], **LENGTH}, (),
          "test.vref: not allowed with plant machine-on-load"),
         (ALONE, {"breaker": {"opens": 6.0}, **LENGTH}, (),

@@ -5,7 +5,7 @@ import json
 
 import pytest
 from mutant_runs import CONTROL
-from payloads import HARMLESS, HOSTILE, MARKUP, Structure, renamed, texts_of, with_text
+from payloads import HARMLESS, HOSTILE, MARKUP, Structure, with_texts
 from records import config
 
 from exfit import workflows
@@ -17,8 +17,6 @@ from exfit.output.report import html
 from exfit.output.terminal.terminal import GuardedConsole
 from exfit.results.io import load_result, result_text
 
-# keys of texts that must be one of a few words, and of one that is drawn: its form is its picture
-WORDS = ("interval_method", "method", "verdict", "drawing")
 SHAPES = {"svg", "title", "desc", "path", "g", "text", "tspan"}
 
 
@@ -42,12 +40,9 @@ def results(tmp_path_factory):
     case = load_case(path)
     saved = json.loads(result_text(workflows.fit(case)))
     file = folder / "result.json"
-    free = [place for place in texts_of(saved) if place[-1] not in WORDS]
-    names = [*saved["parameters"], *saved["about"]]
-    names += [match["name"] for match in saved["validation"]]
     read = []
     for text in (HOSTILE, HARMLESS):
-        file.write_text(json.dumps(renamed(with_text(saved, free, text), names, text)))
+        file.write_text(json.dumps(with_texts(saved, text)))
         read.append(load_result(file))
     return read
 

@@ -14,6 +14,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from payloads import HOSTILE, with_texts
 from records import config, recording, several
 
 from exfit import workflows
@@ -276,6 +277,22 @@ def test_a_report_prints_to_pages_with_its_drawings_and_whole_history(opened, tm
     page.set_viewport_size({"width": 680, "height": 1000})
     wide = page.evaluate("document.documentElement.scrollWidth")
     assert wide <= 680
+
+
+def test_no_text_of_a_result_acts_in_a_browser(browser, report, tmp_path):
+    saved = json.loads((report("several").parent / "result.json").read_text(encoding="utf-8"))
+    (tmp_path / "result.json").write_text(json.dumps(with_texts(saved, HOSTILE)))
+    page = browser.new_page()
+    acts = []
+    page.on("dialog", lambda dialog: (acts.append(dialog.message), dialog.dismiss()))
+    page.on("pageerror", lambda fault: acts.append(str(fault)))
+    page.on("request", lambda request: acts.append(request.url))
+    page.goto(write_report(tmp_path).as_uri())
+    page.wait_for_selector("html[data-ready]", timeout=60_000)
+    page.mouse.move(*middle(page))
+    page.wait_for_timeout(200)
+    page.close()
+    assert acts == [(tmp_path / "report.html").as_uri()]
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -2,11 +2,10 @@
 
 import copy
 import json
-from collections.abc import Iterable
 from html.parser import HTMLParser
 from typing import Any
 
-from mutants import CONTROL_TEXT, Place, at_place, places_of
+from mutants import CONTROL_TEXT, at_place, places_of
 
 MARKUP = (
     "<script>alert(1)</script>",
@@ -19,6 +18,8 @@ MARKUP = (
 )
 HOSTILE = " ".join(MARKUP) + CONTROL_TEXT + "two\nlines"
 HARMLESS = "harmless words `code` of the same\nplaces"
+# keys of texts that must be one of a few words, and of one that is drawn: its form is its picture
+WORDS = ("interval_method", "method", "verdict", "ways", "drawing")
 
 
 class Structure(HTMLParser):
@@ -50,22 +51,16 @@ class Structure(HTMLParser):
         self.tags.append(("comment",))
 
 
-def texts_of(tree: Any) -> list[Place]:
-    """Return the places of all texts of a tree."""
-    return [place for place in places_of(tree) if isinstance(at_place(tree, place), str)]
-
-
-def with_text(tree: Any, places: Iterable[Place], text: str) -> Any:
-    """Return a tree with a text at places, behind what stands there."""
-    changed = copy.deepcopy(tree)
-    for place in places:
-        at_place(changed, place[:-1])[place[-1]] += text
-    return changed
-
-
-def renamed(tree: Any, names: Iterable[str], text: str) -> Any:
-    """Return a tree with a text behind names, wherever they are keys or values."""
-    source = json.dumps(tree)
+def with_texts(saved: dict[str, Any], text: str) -> Any:
+    """Return a result with a text behind each of its texts and names, as far as they are free."""
+    changed = copy.deepcopy(saved)
+    for place in places_of(saved):
+        key = next(part for part in reversed(place) if isinstance(part, str))
+        if isinstance(at_place(saved, place), str) and key not in WORDS:
+            at_place(changed, place[:-1])[place[-1]] += text
+    names = [*saved["parameters"], *saved["about"]]
+    names += [match["name"] for match in (*saved["records"], *saved["validation"])]
+    source = json.dumps(changed)
     for name in names:
         source = source.replace(json.dumps(name), json.dumps(name + text))
     return json.loads(source)

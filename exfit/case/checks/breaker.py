@@ -12,9 +12,15 @@ from exfit.util.text import show
 
 def breaker_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield the faults of a breaker that opens, beside the rest of its test and its record."""
+    if test.at(BREAKER).is_section:
+        yield from _opening_faults(test, record, kind)
+    elif test.value == {} and kind.events == (BREAKER,):
+        yield test.at(BREAKER).fault(f"is missing: nothing else acts with plant {kind.name}")
+
+
+def _opening_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield the faults of an opening that is given."""
     breaker, channels = test.at(BREAKER), record.at("channels")
-    if not breaker.is_section:
-        return
     driving = driving_signals(test, record, kind)
     if breaker.at("speed").text == "recorded" and SPEED not in channels:
         yield breaker.at("speed").fault("recorded needs the channel speed in the record")
