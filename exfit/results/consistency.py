@@ -44,6 +44,8 @@ def _of_search(result: FitResult) -> Iterator[str]:
 def _of_comparison(match: Comparison) -> Iterator[str]:
     if not match.channels:
         yield "channels: empty"
+    if not _increases(match.time):
+        yield "time: does not increase"
     for signal, overlay in match.overlays.items():
         lines = [overlay.measured, overlay.simulated, overlay.start]
         if signal not in match.channels:
@@ -55,6 +57,8 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
         shape = (len(responses.numbers), len(responses.time))
         if responses.samples.shape != shape or responses.measured.shape != shape[1:]:
             yield "iteration_responses: not one sample for each instant"
+        if not _increases(responses.time):
+            yield "iteration_responses: time: does not increase"
 
 
 def _of_uncertainty(uncertainty: UncertaintyAnalysis) -> Iterator[str]:
@@ -65,6 +69,8 @@ def _of_uncertainty(uncertainty: UncertaintyAnalysis) -> Iterator[str]:
     for channel in uncertainty.sensitivity:
         if any(line.shape != channel.time.shape for line in channel.moved.values()):
             yield f"sensitivity: {channel.label}: not one sample for each instant"
+        if not _increases(channel.time):
+            yield f"sensitivity: {channel.label}: time: does not increase"
 
 
 def _of_behaviour(behaviour: Behaviour) -> Iterator[str]:
@@ -109,6 +115,10 @@ def _of_points_on_load(result: VCurve) -> Iterator[str]:
             yield f"levels: {level.p:g} pu: not one value for each point of its curve"
         if any(not 0 <= point < len(result.p) for point in level.points):
             yield f"levels: {level.p:g} pu: not a point of the test"
+
+
+def _increases(time: Array) -> bool:
+    return time.ndim == 1 and bool(np.all(np.diff(time) > 0.0))
 
 
 def _alike(rows: Iterable[Array]) -> bool:

@@ -9,7 +9,7 @@ is written and never read.
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
@@ -23,6 +23,7 @@ STORED = "stored"
 IN_FILE: Mapping[str, bool] = {STORED: True}  # metadata of a field that is only in a file
 KEY = "key"  # in the metadata of a field: its name in the data
 LARGEST = float(np.finfo(float).max)  # a whole number beyond has no double
+LARGEST_SAMPLE = 1e150  # of those in arrays: the square of a larger one is infinite
 LARGEST_INTEGER = 2**53  # a larger one is no count
 FORMS = {int: "a whole number", bool: "true or false", str: "a text"}
 
@@ -238,6 +239,9 @@ def _array(data: Any, place: Place, null: float = np.nan) -> Any:
     else:
         each = enumerate(items)
         samples = np.array([np.nan if x is None else _number(x, (*place, k)) for k, x in each])
-    if np.isinf(samples).any():
-        _number(inf, (*place, int(np.argmax(np.isinf(samples)))))
+    beyond = np.abs(samples) > LARGEST_SAMPLE
+    if beyond.any():
+        at = int(np.argmax(beyond))
+        value = show_value(items[at])
+        raise FormError(f"{dotted((*place, at))}: {value} is beyond {LARGEST_SAMPLE:g}")
     return np.where(np.isnan(samples), null, samples)

@@ -249,6 +249,27 @@ def test_what_does_not_fit_together_is_refused(saved, place, words):
         load_result(path)
 
 
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        (("records", 0, "time", 3), 0.0, "records: fit: time: does not increase"),
+        (("knowledge", "sensitivity", 0, "time", 3), 0.0, "vt: time: does not increase"),
+        (("records", 0, "iteration_responses", "time", 3), 0.0, "time: does not increase"),
+        (("records", 0, "overlays", "vt", "simulated", 2), 1e200, r"1e\+200 is beyond 1e\+150"),
+        (("knowledge", "sensitivity", 0, "moved", "a", 1), -1e308, r"beyond 1e\+150"),
+    ],
+)
+def test_samples_that_cannot_be_drawn_are_refused(saved, place, value, words):
+    path, content = saved
+    section = content
+    for key in place[:-1]:
+        section = section[key]
+    section[place[-1]] = value
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(ExfitError, match=words):
+        load_result(path)
+
+
 def test_long_samples_are_thinned_and_keep_their_extremes(texts):
     from dataclasses import replace
 

@@ -11,6 +11,7 @@ import argparse
 import faulthandler
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -111,7 +112,7 @@ def place_of_death(text: str) -> str:
         line.strip() for line in text.splitlines() if f"exfit{os.sep}" in line and "File" in line
     ]
     own = [line for line in own if f"{os.sep}tests{os.sep}" not in line]
-    return own[0].rpartition(f"exfit{os.sep}")[2] if own else text.strip()[:80]
+    return own[0].rpartition(f"exfit{os.sep}")[2] if own else re.sub(r"\d+", "N", text)[:80]
 
 
 def show(places: dict[tuple[str, str, str], list[dict]]) -> None:

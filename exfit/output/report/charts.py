@@ -19,6 +19,8 @@ WIDE, SMALL = 560.0, 300.0  # units of a drawing: few, so that its text is read 
 ROOM = 0.06  # of the range, above and below the lines
 NARROW = 0.05  # of its level: the range of a signal that rests
 RESTS = 1e-6  # of its level: a signal that moves by less would fill its axis with rounding errors
+LARGEST = 1e150  # a larger value is off every axis: the length of one to it would be infinite
+LEAST_SPAN = 1e-250  # of a smaller range no tick could be computed
 LEAST_LEVEL = 0.1  # pu: the level of a signal that rests at zero
 PER_TICK = (80.0, 22.0)  # of an axis, across and upward: closer labels would touch
 UNIT_STEPS = (1.0, 2.0, 5.0, 10.0)  # of ticks, times a power of ten
@@ -144,7 +146,8 @@ class Axis:
     def places(self, values: Array) -> Array:
         """Return how far from the low end values lie on the drawing."""
         placed = _log(values) if self.logarithmic else values
-        return np.asarray((placed - self.low) / (self.high - self.low) * self.length)
+        with np.errstate(over="ignore"):
+            return np.asarray((placed - self.low) / (self.high - self.low) * self.length)
 
     def place(self, value: float) -> float:
         """Return how far from the low end a value lies on the drawing."""
@@ -234,14 +237,14 @@ def _span(lines: Iterable[Array], logarithmic: bool) -> Range:
     """Return the range of some lines, of their log10 on a logarithmic axis."""
     values = np.concatenate([*lines, np.zeros(0)])
     values = _log(values) if logarithmic else values
-    values = values[np.isfinite(values)]
+    values = values[np.abs(values) <= LARGEST]
     if not len(values):
         return 0.0, 1.0
     low, high = float(values.min()), float(values.max())
     level = max(abs(low), abs(high))
     if logarithmic and high - low < 1.0:
         return floor(low), floor(low) + max(1.0, ceil(high) - floor(low))
-    if high - low <= RESTS * level or high == low:
+    if high - low <= max(RESTS * level, LEAST_SPAN):
         around = NARROW * max(level, LEAST_LEVEL)
         return low - around, high + around
     return low, high
