@@ -15,6 +15,7 @@ def test_a_voltage_that_is_found_is_not_held_against_its_start(tmp_path):
     assert not [cause for cause in found.verdict.causes if cause.cause.startswith("vt0")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("at", "step", "drift", "noted"),
     [
@@ -33,6 +34,7 @@ def test_an_error_far_above_the_noise_has_causes(tmp_path, at, step, drift, note
     assert bool(found.verdict.causes) == noted
 
 
+@pytest.mark.long
 def test_spikes_that_a_robust_loss_bears_are_no_misfit(tmp_path):
     shown = synthetic(tmp_path, TEST, TIME)["vt"]
     shown[::40] += 0.02

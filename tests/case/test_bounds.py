@@ -69,6 +69,7 @@ def test_a_time_constant_that_starts_from_zero_is_held_there_and_said_to_be(tmp_
     assert "held at 0 and not fitted" in note
 
 
+@pytest.mark.long
 def test_a_fit_that_holds_it_is_that_of_a_case_which_fixes_it(tmp_path):
     result = fit(ac8b(tmp_path, {"start": 0}))
     assert any(note.startswith("TA = 0") for note in result.notes)

@@ -64,6 +64,7 @@ FLOATS = ("0.5", "2.0", "3.25", "1e-3", ".1", "1e150")
 ANY = expressions(FLOATS, "+-*/", "+-", ("2", "-1", "0.5", "-1.5", "0", "3.0"))
 
 
+@pytest.mark.long
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(ANY, st.tuples(*(st.floats(-10.0, 10.0) for _ in NAMES)))
 def test_a_value_is_to_the_last_bit_what_python_makes_of_the_text(body, numbers):
@@ -88,6 +89,7 @@ QUOTIENTS = expressions(("0.5", "1.5", "2", "3"), "+*/", "", ("-2", "-1", "0", "
 STEP = Fraction(1, 10**30)  # in rational numbers the difference errs by its square only
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bodies", [POLYNOMIALS, QUOTIENTS], ids=["polynomials", "quotients"])
 def test_slopes_are_the_differences_of_exact_rational_values(bodies):
     @settings(max_examples=200, deadline=None, derandomize=True)

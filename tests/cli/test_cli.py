@@ -866,6 +866,7 @@ def own_case(text):
     )
 
 
+@pytest.mark.long
 def test_a_model_of_the_user_s_own_gives_the_same_fit(run):
     builtin = case_file(changed(MACHINE_CASE, ("estimate", {"iterations": 2})))
     found = json.loads(run("fit", builtin, "--no-plots", "--json").out)
@@ -1077,6 +1078,7 @@ def test_a_record_with_fewer_samples_than_unknowns_is_refused(run):
     assert "4 samples for 7 free parameters" in ran.err
 
 
+@pytest.mark.long
 def test_a_fit_no_better_than_a_constant_ends_with_3_and_says_why(run):
     """The step is given with the wrong sign: every value runs to a bound, and none helps."""
     wrong = changed(MACHINE_CASE, ("test.vref.0.step", -0.05), ("estimate", {"iterations": 5}))

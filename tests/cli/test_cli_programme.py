@@ -43,6 +43,7 @@ def test_a_programme_leaves_a_folder_for_each_test_and_one_report(run, place):
         assert heading in report
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("columns", [80, 60])
 def test_its_table_has_a_line_for_each_test_and_fits_the_terminal(run, place, columns, monkeypatch):
     run("run", place, *OUT)
@@ -56,6 +57,7 @@ def test_its_table_has_a_line_for_each_test_and_fits_the_terminal(run, place, co
         assert words in ran.out
 
 
+@pytest.mark.long
 def test_json_is_one_document_and_quiet_is_silent(run, place):
     run("run", place, *OUT)
     ran = run("run", place, *OUT, "--json")

@@ -25,6 +25,7 @@ def workplace(empty_folder, monkeypatch):
     return empty_folder
 
 
+@pytest.mark.long
 def test_the_table_the_files_and_the_figure_are_of_all_models(run, monkeypatch):
     monkeypatch.setattr(plots.style, "DPI", 40)
     ran = run("rank", CASE, *TWO)
@@ -48,6 +49,7 @@ def test_the_table_the_files_and_the_figure_are_of_all_models(run, monkeypatch):
     assert (folder / "SEXS" / "overlay.png").is_file()
 
 
+@pytest.mark.long
 def test_json_is_one_document(run):
     ran = run("rank", CASE, *TWO, "--json", "--no-plots", "-o", "out")
     assert ran.code == 0

@@ -43,6 +43,7 @@ def case_file(name, **changes):
     return path
 
 
+@pytest.mark.long
 def test_each_fit_has_its_folder_and_all_have_one_table_and_one_figure(run):
     cases = [case_file("one/unit.yaml"), case_file("two/unit.yaml", estimate={"iterations": 1})]
     ran = run("fit", *cases, *BOTH)

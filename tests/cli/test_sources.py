@@ -38,6 +38,7 @@ def new_case(run, empty_folder):
     return path
 
 
+@pytest.mark.long
 def test_what_a_new_case_fills_in_stays_typical_up_to_the_planners_file(run, new_case):
     text = new_case.read_text()
     new_case.write_text(text.replace("VRMAX: typical", "VRMAX: nameplate"))
@@ -87,6 +88,7 @@ def test_the_values_of_a_planners_file_are_its_own_and_what_is_filled_in_is_typi
     assert "ESAC1A: fitted: KA." in comments
 
 
+@pytest.mark.long
 def test_what_a_fit_found_is_fitted_where_it_comes_back(run, new_case):
     run("fit", str(new_case), *FIT)
     parameters = "runs/unit-fit/parameters.yaml"
@@ -109,6 +111,7 @@ def test_what_a_fit_found_is_fitted_where_it_comes_back(run, new_case):
     assert "parameters.yaml: sources.KA: 'guessed' is not a source; known: nameplate" in err
 
 
+@pytest.mark.long
 def test_a_translated_case_keeps_the_sources_of_the_fit(run, new_case):
     text = new_case.read_text().replace("Tpd0: typical", "Tpd0: test report")
     new_case.write_text(text)

@@ -17,6 +17,7 @@ def white(seed):
     return np.random.default_rng(seed).standard_normal(SAMPLES)
 
 
+@pytest.mark.long
 def test_white_noise_has_as_large_a_line_as_often_as_the_test_says():
     rng = np.random.default_rng(3)
     samples, draws = 60, 300

@@ -37,6 +37,7 @@ def noisy(noise, seed):
     return response(TIME) + noise * np.random.default_rng(seed).standard_normal(len(TIME))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("guide", GUIDES)
 @pytest.mark.parametrize("noise", [1e-4, 5e-4])
 def test_the_stated_error_holds_the_truth_in_95_of_100_records(guide, noise):
@@ -52,6 +53,7 @@ def test_the_stated_error_holds_the_truth_in_95_of_100_records(guide, noise):
     assert all(len(values) > 0.9 * SEEDS for values in held.values())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [1e-4, 5e-4])
 def test_the_overshoot_of_noisy_records_is_not_biased(noise):
     records = [noisy(noise, seed) for seed in range(SEEDS)]

@@ -24,6 +24,7 @@ def on_certified_sets(method):
     return certified_ends(by_method(method))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", CERTIFIED_METHODS)
 def test_finds_six_certified_digits_from_nearly_every_start(method):
     enough = [end.digits >= WANTED_DIGITS for end in on_certified_sets(method).values()]
@@ -50,6 +51,7 @@ def test_scipy_needs_no_fewer_evaluations_for_as_many_digits():
     assert calls[0] <= calls[1]
 
 
+@pytest.mark.long
 def test_lm_ends_at_a_minimum_from_nearly_every_start_of_the_textbook():
     ends = published_ends(by_method("lm"))
     assert [start for start, end in ends.items() if end.wrong] == []

@@ -54,6 +54,7 @@ def test_the_weights_do_not_depend_on_the_first_ones():
         assert first.weight == pytest.approx(second.weight, rel=0.04)  # twice their tolerance
 
 
+@pytest.mark.long
 def test_the_noise_of_each_channel_is_reported_as_that_of_its_residuals():
     result = exfit.fit(three_channels(weights="balanced", ripple=0.06))
     for noise in result.knowledge.confidence.noise:
@@ -65,6 +66,7 @@ def test_the_noise_of_each_channel_is_reported_as_that_of_its_residuals():
         assert rmse > 0.0
 
 
+@pytest.mark.long
 def test_balanced_weights_lessen_the_errors_of_uneven_channels():
     plain = [rms(errors_of(exfit.fit(three_channels(seed)))) for seed in (1, 2, 3)]
     weighted = [

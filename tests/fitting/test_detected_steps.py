@@ -30,6 +30,7 @@ def test_auto_starts_where_the_record_shows_the_step(tmp_path, unit, direction):
     assert step.start == pytest.approx(STEP[direction], rel=0.06)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("direction", STEP)
 @pytest.mark.parametrize("unit", UNITS)
 def test_auto_ends_where_other_starts_end(tmp_path, unit, direction):

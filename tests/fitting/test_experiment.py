@@ -143,6 +143,7 @@ def test_what_is_drawn_is_what_is_compared(tmp_path):
     assert np.array_equal(vt.start, first, equal_nan=True)
 
 
+@pytest.mark.long
 def test_one_record_that_is_not_described_is_not_made_up_for_by_another(tmp_path):
     """Its step is given the wrong way round; as it hardly counts, the other one fits well."""
     wrong = recording("down", step=0.05, channels={"vt": {"column": "vt", "weight": 0.01}})

@@ -66,6 +66,7 @@ def both():
     return [fit(case, values=ASTRAY, search=search) for search in ("local", "global")]
 
 
+@pytest.mark.long
 def test_a_search_leaves_a_false_minimum_by_a_path_that_is_whole(both):
     local, whole = both
     known = fit(local_case("ac1a_typical"))

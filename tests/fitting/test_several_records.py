@@ -82,6 +82,7 @@ def test_the_order_of_the_records_does_not_matter(tmp_path):
     assert [one.name for one in ends[0].comparisons] == ["up", "down"]
 
 
+@pytest.mark.long
 def test_two_records_are_the_sum_of_their_costs(tmp_path):
     found = fit(both(tmp_path))
     assert found.cost == pytest.approx(sum(one.cost for one in found.comparisons), rel=1e-12)
@@ -171,6 +172,7 @@ def on_and_off_line(tmp_path):
     return content, free, truth
 
 
+@pytest.mark.long
 def test_tests_on_line_and_off_line_find_the_same_exciter(tmp_path):
     content, free, truth = on_and_off_line(tmp_path)
     content["parameters"]["free"] = free
@@ -277,6 +279,7 @@ def test_what_follows_a_value_that_is_set_keeps_to_its_data_sheet(tmp_path):
         changed_values(case, {"VAMAX": -15.0, "VAMIN": -20.0}, "--set")
 
 
+@pytest.mark.long
 def test_a_parameters_file_gives_the_fit_back(tmp_path):
     """Helpers, tied parameters and what was found about the records take part."""
     content = three_free(
@@ -326,6 +329,7 @@ def with_prior(name, mean, std):
     return content
 
 
+@pytest.mark.long
 def test_a_sharp_prior_holds_a_parameter_and_a_dull_one_does_nothing(tmp_path):
     free = fit(case_of(single(), tmp_path))
     held = fit(case_of(with_prior("TF", NEAR, 1e-7), tmp_path))
@@ -396,6 +400,7 @@ def test_a_robust_loss_bears_spikes(tmp_path, clean, loss):
     assert max(away(found, clean).values()) < 2.0
 
 
+@pytest.mark.long
 def test_least_squares_do_not_bear_spikes_unless_they_are_left_out(tmp_path, clean):
     content = {**config("ac1a_typical"), "validate": []}
     content["record"]["file"] = spiked(tmp_path)

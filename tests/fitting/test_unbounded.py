@@ -99,6 +99,7 @@ def test_it_says_what_is_not_physical(found):
     assert any("TA, TE and KD may leave the range" in note for note in result.notes)
 
 
+@pytest.mark.long
 def test_bounds_within_the_data_sheet_need_no_word(found):
     folder, content, _ = found
     bounded = {**content, "parameters": {**content["parameters"]}}

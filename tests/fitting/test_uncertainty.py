@@ -207,6 +207,7 @@ STD = 0.02  # pu, one percent: far from linear it is not
 COVERED = binom.ppf([5e-4, 1.0 - 5e-4], RECORDS, LEVEL)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("given", [None, STD])
 def test_intervals_of_a_fit_hold_the_truth_as_often_as_they_promise(given):
     exact, rng = first_order(), np.random.default_rng(1)

@@ -39,6 +39,7 @@ def case_file(name, **changes):
     return path
 
 
+@pytest.mark.long
 def test_every_case_is_fitted_with_every_strategy_as_it_is_alone():
     cases = [case_file("a.yaml"), case_file("b.yaml", estimate={"iterations": 2})]
     series = fit_all(cases, STRATEGIES)

@@ -50,6 +50,7 @@ def test_models_that_cannot_be_planned_are_refused(case):
             planned_models(exfit.load_case(CONFIGS / f"{name}.yaml"))
 
 
+@pytest.mark.long
 def test_the_models_of_a_record_are_ranked_and_the_true_one_is_found(case):
     """The record is one of AC8B: SEXS is the simplest of all, and another one in its place."""
     plain = replace(case, validations=())

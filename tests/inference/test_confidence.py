@@ -118,6 +118,7 @@ def test_a_logarithmic_interval_holds_the_truth_as_often():
     assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
 
 
+@pytest.mark.long
 def test_intervals_are_widened_for_noise_that_is_not_white():
     noise = 0.3 * autoregressive(np.random.default_rng(4), 0.7, (PROBLEMS, 200))
     known = [confidence(lin) for lin in lines(noise)]
@@ -178,6 +179,7 @@ def test_where_the_record_is_silent_the_prior_speaks():
     assert std_errors(known)[1] == pytest.approx(0.3)
 
 
+@pytest.mark.long
 def test_each_channel_brings_its_own_noise():
     rng = np.random.default_rng(7)
     levels = np.repeat([1.0, 0.05], 100)
@@ -199,6 +201,7 @@ def test_each_channel_brings_its_own_noise():
     assert [one.std for one in known.noise] == pytest.approx([1.0, 0.05], rel=0.3)
 
 
+@pytest.mark.long
 def test_a_robust_fit_knows_how_well_it_does_on_outliers():
     rng = np.random.default_rng(8)
     limit = 1.345
@@ -457,6 +460,7 @@ def test_samples_that_repeat_each_other_ask_for_students_t():
     assert widths == pytest.approx([student.ppf(0.975, worth - 2.0)] * 2)
 
 
+@pytest.mark.long
 def test_a_given_noise_is_not_rejected_for_being_correlated():
     noise = autoregressive(np.random.default_rng(17), 0.9, (200, len(T)))
     given = (ResidualBlock("vt", slice(0, len(T)), 1.0),)
@@ -530,6 +534,7 @@ def test_a_value_that_the_bounds_keep_from_zero_is_its_own_measure(through_zero)
         )
 
 
+@pytest.mark.long
 def test_the_interval_holds_the_truth_as_often_where_the_recorder_rounds_coarsely():
     """The signal settles within a step of the recorder: one error of its rounding counts most."""
     rng, step, noise, covered, plain = np.random.default_rng(23), 0.5, 0.1, [], []
@@ -565,6 +570,7 @@ def two_channels(noise, conflict=0.0):
     return linearised(fitted, rows @ fitted - truth, rows, channels=both)
 
 
+@pytest.mark.long
 def test_an_error_that_another_channel_causes_is_no_noise_of_a_fine_one():
     rng = np.random.default_rng(24)
     noise = rng.standard_normal((PROBLEMS, 2, len(T))) * np.array([0.01, 1.0])[:, None]

@@ -51,6 +51,7 @@ def st7b(p, vt):
 DIAGRAMS = {"ST1A": st1a, "EXST1": exst1, "ST5B": st5b, "ST6B": st6b, "ST7B": st7b}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", STATIC)
 def test_a_small_step_of_the_reference_is_that_of_the_block_diagram(name, seed):
@@ -62,6 +63,7 @@ def test_a_small_step_of_the_reference_is_that_of_the_block_diagram(name, seed):
     assert np.abs(efd - expected).max() < 1e-6 * np.abs(expected - 1.3).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", STATIC)
 def test_a_small_step_of_the_voltage_is_that_of_the_block_diagram(name, seed):
@@ -165,6 +167,7 @@ def test_exst1_winds_up_behind_its_clamp_and_st1a_does_not():
     assert time_at_the_ceiling("ST1A", **limits) < 0.01
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "factor"), [("ST1A", 1.0), ("ST6B", 1.0577)])
 def test_a_field_current_beyond_its_limit_takes_the_field_down(name, factor):
     values = typical_values(name)

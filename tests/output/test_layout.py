@@ -81,6 +81,7 @@ def faults(texts, size):
             yield f"{one!r} and {other!r} lie on each other"
 
 
+@pytest.mark.long
 def test_no_text_leaves_its_figure_or_lies_on_another(result, noted):
     figures = run_figures.of_fit(result)
     figures |= {"long.png": run_figures.of_fit(with_long_names(result))["trajectories.png"]}

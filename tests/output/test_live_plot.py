@@ -172,10 +172,11 @@ def test_drawing_takes_no_more_than_its_share_of_the_time(monkeypatch):
     assert "iteration 899" in watch.picture().plain
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("jacobian", ["exact", pytest.param("central", marks=pytest.mark.long)])
 def test_a_look_sees_what_each_iteration_led_to_and_is_not_counted(monkeypatch, tmp_path, jacobian):
     content = config("ac1a_typical")
-    content["estimate"]["jacobian"] = jacobian
+    content["estimate"] |= {"jacobian": jacobian, "search": "local"}
     channel = {"column": "vt", "weight": 3.0, "scale": 2.0, "offset": -1.0}
     content["record"]["channels"] = {"vt": channel}
     content["test"]["vt0"] = 1.0

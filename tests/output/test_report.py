@@ -160,6 +160,7 @@ def rounding_error(parameter):
     return (high - low) / 3.92
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", EVERY)
 def test_every_fitted_parameter_is_reported_with_its_interval_or_the_reason_why_there_is_none(
     fits, pages, name
@@ -275,6 +276,7 @@ def test_the_base_of_each_signal_is_reported_and_a_step_that_the_fit_found(tmp_p
     assert float(half) < 0.01
 
 
+@pytest.mark.long
 def test_a_signal_with_a_wrong_base_stands_in_the_verdict(tmp_path):
     shown = synthetic(tmp_path, TEST, OF_UNIT, signals=("vt", "ifd"))
     write(tmp_path / "record.csv", t=OF_UNIT, vt=shown["vt"], i=550.0 * shown["ifd"])
@@ -597,6 +599,7 @@ def titles(outline):
     return [entry.title for entry in outline if not isinstance(entry, list)]
 
 
+@pytest.mark.long
 def test_a_pdf_has_a_bookmark_for_each_section_and_its_number_on_each_page(printed, pages):
     page = pages("first order")
     labels = [attrs["aria-labelledby"] for tag, attrs in page.tags if tag == "section"]
@@ -641,6 +644,7 @@ def test_a_heading_is_on_the_page_of_what_follows_it(fits, printed, pages):
         assert record["name"] in lines
 
 
+@pytest.mark.long
 def test_a_pdf_is_replaced_and_another_file_is_not(fits, printed, tmp_path):
     assert write_report(fits("first order"), pdf=True).name == "report.pdf"
     other = tmp_path / "letter.pdf"

@@ -86,6 +86,7 @@ def test_the_recorded_field_voltage_gives_the_recorded_voltage(tmp_path):
     assert found.overlays["ifd"].max_error < 1e-4
 
 
+@pytest.mark.long
 def test_the_time_constant_and_the_saturation_are_found_through_noise(noisy, tmp_path):
     found = fit(case_of(MACHINE, tmp_path, noisy))
     values = {name: one.value for name, one in found.parameters.items()}
@@ -97,6 +98,7 @@ def test_the_time_constant_and_the_saturation_are_found_through_noise(noisy, tmp
     assert NOISE < found.comparison.rmse < 2.0 * NOISE
 
 
+@pytest.mark.long
 def test_an_offset_of_the_recorded_field_voltage_does_no_harm(noisy, tmp_path):
     shifted = MACHINE.replace("efd: efd", "efd: {column: efd, offset: 0.3}")
     one, other = (fit(case_of(text, tmp_path, noisy)) for text in (MACHINE, shifted))
@@ -104,6 +106,7 @@ def test_an_offset_of_the_recorded_field_voltage_does_no_harm(noisy, tmp_path):
         assert other.parameters[name].value == pytest.approx(found.value, rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("base", [0.4, -0.4])
 def test_the_scale_of_a_relative_field_voltage_is_found_with_the_time_constant(base, tmp_path):
     """In pu of another base: its scale and T'd0 both show in how vt and ifd move, at no noise."""
@@ -139,6 +142,7 @@ def test_the_recorded_voltage_and_field_current_give_the_recorded_field_voltage(
     assert np.abs(found.overlays["efd"].error[away]).max() < 2e-3
 
 
+@pytest.mark.long
 def test_a_gain_is_found_from_what_drives_the_exciter(tmp_path):
     free = "  free:\n    KA: {start: 200, min: 20, max: 2000}\nsimulation"
     text = exciter(text=EXCITER.replace("simulation", free)).replace("KA: 364.1523, ", "")
@@ -212,6 +216,7 @@ def test_what_a_playback_lacks_or_cannot_have_is_reported(tmp_path, text, old, n
     assert says in str(refused.value)
 
 
+@pytest.mark.long
 def test_a_steady_part_that_is_none_is_refused_or_reported(tmp_path):
     beyond = MACHINE.replace("steady_until: 1.0", "steady_until: 100")
     with pytest.raises(RecordError, match=r"ends at 20 s, before test\.steady_until = 100 s"):
@@ -226,6 +231,7 @@ def test_a_steady_part_behind_noise_is_not_complained_of(noisy, tmp_path):
     assert not any("at rest" in cause.cause for cause in found.verdict.causes)
 
 
+@pytest.mark.long
 def test_a_signal_on_another_base_is_reported(noisy, tmp_path):
     """Field current relative to rated, as recorders give it."""
     scaled = MACHINE.replace("{column: ifd,", "{column: ifd, scale: 0.46,")

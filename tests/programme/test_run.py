@@ -53,6 +53,7 @@ def again(folder, whole, monkeypatch, tmp_path):
     return run
 
 
+@pytest.mark.long
 def test_what_measures_the_machine_comes_before_what_needs_it(whole):
     assert [test.name for test in whole.tests] == ORDER
     assert whole.tests[-1].tests == ("up", "down")
@@ -118,6 +119,7 @@ def test_the_bump_tests_are_one_fit_with_its_validation(whole):
     assert [match.name for match in whole.fit.validation] == ["down"]
 
 
+@pytest.mark.long
 def test_a_case_is_the_programme_of_one_test(folder):
     content = programme_content()
     up = next(test for test in content.pop("tests") if test["name"] == "up")
@@ -140,6 +142,7 @@ def test_what_is_kept_is_not_run_again_and_is_the_same(again, whole):
     assert [test.kept for test in result.tests] == [True] * len(ORDER)
 
 
+@pytest.mark.long
 def test_again_runs_all(again):
     _, ran = again(programme_content(), again=True)
     assert ran == ORDER
@@ -175,6 +178,7 @@ def test_a_record_that_changes_is_a_reason(again, tmp_path):
     assert ran == ["fit"]
 
 
+@pytest.mark.long
 def test_a_value_of_a_better_source_stays_and_what_excludes_it_is_reported(again):
     content = programme_content()
     content["plant"]["sources"]["Xd"] = "maker"
@@ -187,6 +191,7 @@ def test_a_value_of_a_better_source_stays_and_what_excludes_it_is_reported(again
     assert result.warnings[0].startswith("machine.Xd: 1.9 in the file (maker) lies outside 1.77")
 
 
+@pytest.mark.long
 def test_a_base_that_the_file_gives_stays(again):
     content = programme_content()
     content["tests"][1]["columns"]["ifd"]["base"] = 900.0
@@ -196,6 +201,7 @@ def test_a_base_that_the_file_gives_stays(again):
     assert any(text.startswith("ifd.base: 900 in the file") for text in result.warnings)
 
 
+@pytest.mark.long
 def test_a_test_that_is_not_matched_gives_nothing(again):
     content = programme_content()
     content["tests"][1]["accept"] = {"rmse": 1e-9}
@@ -236,6 +242,7 @@ def test_an_interruption_keeps_what_is_done_and_the_next_run_goes_on(
     assert second.fit.values == whole.fit.values
 
 
+@pytest.mark.long
 def test_a_fit_that_was_interrupted_is_not_done(folder, tmp_path):
     path = written(programme_content(), folder)
 

@@ -516,6 +516,7 @@ def test_a_channel_that_returns_while_others_still_move_shows_no_second_step():
     assert len(combined_steps({"efd": kick})) == 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("with_reference", [False, True])
 def test_the_stated_error_holds_the_instant_of_synthetic_records(with_reference):
     """tests/studies/instants.py counts it over more of them."""

@@ -93,6 +93,7 @@ def test_rms_values_of_phases_become_one_voltage(tmp_path, connection, over):
     assert not record.averaged
 
 
+@pytest.mark.long
 def test_a_slower_clock_leads_to_the_same_unit(tmp_path):
     """Its filter leaves a twentieth of the samples, and as little of the noise."""
     synthetic(tmp_path, TEST, TIME)
@@ -192,6 +193,7 @@ def test_a_voltage_that_no_machine_has_is_refused_with_its_value_and_limits(tmp_
         build_experiments(case_of(content, tmp_path))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("connection", ["phase-to-ground", "phase-to-phase"])
 def test_a_voltage_off_by_the_connection_is_noted(tmp_path, connection):
     vt = synthetic(tmp_path, TEST, TIME)["vt"]

@@ -140,6 +140,7 @@ def test_a_result_of_the_version_before_has_no_verdict(saved):
     assert load_result(written((path, content), version=4)).verdict is None
 
 
+@pytest.mark.long
 def test_no_damage_ends_in_a_traceback(saved):
     """Values of another kind, missing keys, cut files: ExfitError with the file, or no harm."""
     path, _ = saved
@@ -291,6 +292,7 @@ def test_long_samples_are_thinned_and_keep_their_extremes(texts):
     assert kept.channels == match.channels
 
 
+@pytest.mark.long
 def test_a_validation_holds_what_it_found_about_its_own_record(tmp_path):
     import yaml
 

@@ -472,6 +472,7 @@ def test_a_simulator_made_from_another_keeps_its_steps_and_its_delay():
 # --- limits ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_lag_meets_and_leaves_its_limits_when_a_run_of_tiny_steps_does():
     """The lag of AC1A, driven by what it saw, against Euler's method with tiny steps.
 

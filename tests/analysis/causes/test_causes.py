@@ -13,6 +13,7 @@ LINES = 2  # in which the cause stands
 COARSE, STATIC = (15, 1, 7), (16, 1, 7)  # seeds: AC8B every 20 ms, ST1A with efd
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "seed"),
     [
@@ -60,6 +61,7 @@ def test_a_time_column_in_another_unit_is_asked_for(factor):
         fit(case.with_record(other))
 
 
+@pytest.mark.long
 def test_a_drift_is_named_with_its_sign():
     fault = drawn("drift", (2026, 16, 7))  # -1.0e-3 pu, ten times the noise
     first = fit(fault.faulty, search="local").verdict.causes[0].cause

@@ -38,6 +38,7 @@ def holds(interval, truth):
     return (low is None or low <= truth) and (high is None or truth <= high)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     ["coarse", *(pytest.param(name, marks=pytest.mark.long) for name in ("ac1a_limit", "st3a"))],

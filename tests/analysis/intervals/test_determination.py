@@ -136,6 +136,7 @@ def test_where_the_response_is_linear_no_interval_changes():
         assert parameter.interval == pytest.approx(local.parameters[name].interval, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_parameter_on_its_bound_and_those_that_lean_on_it_are_profiled(unit2):
     residuals, minima, linear, uncertainty = unit2
     names = not_served_by_linear_theory(residuals, minima[0].x, linear, ())

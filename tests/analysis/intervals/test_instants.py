@@ -43,6 +43,7 @@ def test_beside_an_instant_between_the_wrong_samples_a_lower_minimum_is_found(re
     assert lowest.cost < problem.compressed.costs([truth])[0]
 
 
+@pytest.mark.long
 def test_an_instant_that_one_sample_decides_is_said_to_be_so_and_has_no_interval(record):
     case, setups, problem = record
     options = case.estimate

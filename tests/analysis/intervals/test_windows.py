@@ -21,6 +21,7 @@ def moving(tmp_path_factory):
     return fitted(tmp_path_factory.mktemp("moving"), 4.9, 5.3)
 
 
+@pytest.mark.long
 def test_a_time_constant_that_moves_after_the_step_down_is_found_by_the_windows(moving):
     up, down = (window for window in moving.windows.windows if window.kind == "step")
     assert up.start < UP < up.end < DOWN < down.end

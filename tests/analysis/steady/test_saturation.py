@@ -212,6 +212,7 @@ def test_two_points_and_the_line_give_the_ratios_of_field_currents():
         assert at_120 / (1.2 * 263.0) - 1.0 == pytest.approx(3.0 * S10)
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth_about_as_often_as_they_say():
     random = np.random.default_rng(2)
     hits = [hits_of(drawn_curve(form, random)) for form in FORMS for _ in range(4)]

@@ -60,6 +60,7 @@ def test_noise_alone_is_good_whatever_is_done_to_the_channel(tmp_path, changes):
     assert verdict(one(TEST, channels, FREE), tmp_path).verdict == GOOD
 
 
+@pytest.mark.long
 def test_a_noise_that_the_case_gives_hides_no_misfit(tmp_path):
     synthetic(tmp_path, {**TEST, "vref": [{"at": 1.0, "step": 0.04}]}, TIME)
     for noise in (1e-4, 1e-2):
@@ -67,6 +68,7 @@ def test_a_noise_that_the_case_gives_hides_no_misfit(tmp_path):
         assert verdict(content, tmp_path).verdict == MISSES
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("at", "step", "drift", "missed"),
     [
@@ -93,6 +95,7 @@ def test_what_is_masked_does_not_count(tmp_path):
     assert verdict(one(TEST, free=FREE, mask=[[2.99, 3.51]]), tmp_path).verdict == GOOD
 
 
+@pytest.mark.long
 def test_spikes_are_no_misfit_to_a_robust_loss_yet_no_noise_to_a_plain_one(tmp_path):
     shown = synthetic(tmp_path, TEST, TIME, seed=1)["vt"]
     shown[::40] += 0.02
@@ -103,10 +106,12 @@ def test_spikes_are_no_misfit_to_a_robust_loss_yet_no_noise_to_a_plain_one(tmp_p
     assert robust.verdict in (GOOD, MATCHES)
 
 
+@pytest.mark.long
 def test_a_robust_loss_does_not_take_another_model_for_spikes(tmp_path):
     assert verdict({**sexs_on_ac8b(), "estimate": {"loss": "huber"}}, tmp_path).verdict == MISSES
 
 
+@pytest.mark.long
 def test_the_worst_channel_is_named(tmp_path):
     """Field current in another base: vt is matched as before."""
     shown = synthetic(tmp_path, TEST, TIME, signals=("vt", "ifd"))
@@ -117,6 +122,7 @@ def test_the_worst_channel_is_named(tmp_path):
     assert "ifd" in found.reason
 
 
+@pytest.mark.long
 def test_an_inverted_channel_is_no_match(tmp_path):
     shown = synthetic(tmp_path, TEST, TIME, signals=("vt", "ifd"))
     write(tmp_path / "record.csv", t=TIME, vt=shown["vt"], ifd=-shown["ifd"])
@@ -134,6 +140,7 @@ def test_what_is_not_determined_is_not_good(tmp_path):
     assert all(test.are_noise for test in found.residuals)
 
 
+@pytest.mark.long
 def test_a_search_that_is_cut_short_is_not_converged(tmp_path):
     synthetic(tmp_path, TEST, TIME, seed=1)
     content = one(TEST, free=FREE)
@@ -142,6 +149,7 @@ def test_a_search_that_is_cut_short_is_not_converged(tmp_path):
     assert found.verdict == NOT_CONVERGED
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("stop", "verdict_of_it"),
     [(Stop.STALLED, MISSES), (Stop.ITERATIONS, NOT_CONVERGED), (Stop.LOST, NOT_CONVERGED)],
@@ -161,6 +169,7 @@ def test_a_search_that_stalled_where_a_misfit_is_seen_misses(
     assert verdict(one(TEST, free=["TE"]), tmp_path).verdict == NOT_CONVERGED
 
 
+@pytest.mark.long
 def test_what_drives_carries_its_noise_into_the_response(tmp_path):
     """The field voltage's own noise, integrated by the machine, is no error of the model."""
     content = config("machine_playback")

@@ -57,6 +57,7 @@ def test_chi_square_is_by_how_much_the_value_set_free_lowers_the_cost(evidence):
     assert np.exp(score.change) == pytest.approx(trial.values[TPD0] / value, rel=0.2)
 
 
+@pytest.mark.long
 def test_the_scores_of_noise_are_chi_square(evidence):
     """Of two signals, one much noisier; the mean of 4000 has a standard error of 0.022."""
     fitted = evidence(drawn("ripple", (16, 1, 7)).sound)

@@ -142,6 +142,7 @@ def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
     assert squares[0] == pytest.approx(squares[1], rel=1e-12)
 
 
+@pytest.mark.long
 def test_sensitivities_are_at_the_instants_of_the_record(tmp_path):
     """A recorder's delay is in them, too."""
     case = dense_case(tmp_path, {"delay": 0.2})

@@ -58,6 +58,7 @@ def of_record(result):
     return {name: each for name, each in result.parameters.items() if each.of_record}
 
 
+@pytest.mark.long
 def test_a_sway_is_found_and_its_parameters_are_far_nearer_the_truth(response):
     rng = np.random.default_rng(8)
     errors = {"without": [], "with": []}
@@ -90,6 +91,7 @@ def test_white_residuals_have_no_line_and_coloured_ones_none_that_is_fitted(resp
         assert words in note
 
 
+@pytest.mark.long
 def test_a_line_is_found_within_the_range_that_the_case_gives(response):
     rng = np.random.default_rng(9)
     vt = response + white(rng) + sway(rng) + 2.0 * sway(rng, 7.1)
