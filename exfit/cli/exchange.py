@@ -8,8 +8,8 @@ from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, write_text
 from exfit.cli.planner import OfRecords, import_every_unit
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
+from exfit.cli.streams import echo
 from exfit.errors import ExfitError
-from exfit.util.text import printable
 
 BUSES = click.IntRange(1, 999_999)
 
@@ -82,7 +82,7 @@ def _import_one(
     file = relative(dyr, Path() if output is None else output.parent)
     write_text(case_text(imported, file), output, located(imported.warnings, str(dyr)))
     if output is not None:
-        click.echo(printable(f"written to {output}; next: exfit simulate {output}"))
+        echo(f"written to {output}; next: exfit simulate {output}")
 
 
 @click.command(short_help="Write the result of a fit as PSS/E records.")
@@ -136,7 +136,7 @@ def export(
         raise ExfitError("\n".join(texts)) from None
     write_text(records.text, output, [f"{source}: {text}" for text in records.warnings])
     if output is not None:
-        click.echo(printable(f"written to {output}"))
+        echo(f"written to {output}")
 
 
 def _machine_id(value: str) -> str:

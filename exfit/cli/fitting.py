@@ -18,8 +18,8 @@ from exfit.cli.options import (
     set_option,
 )
 from exfit.cli.several_fits import fit_several
+from exfit.cli.streams import echo
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
-from exfit.util.text import printable
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
@@ -98,7 +98,7 @@ def fit(
 
     loaded = given.load(case)
     for warning in case_warnings(loaded):
-        click.echo(printable(f"warning: {warning}"), err=True)
+        echo(f"warning: {warning}", err=True)
     folder = output.folder_of(loaded, "fit")
     if output.shown:
         result = fit_live(loaded, folder, strategy, search, output)

@@ -11,6 +11,7 @@ import click
 
 from exfit.cli import completion
 from exfit.cli.given_files import GivenFile, Kind
+from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 from exfit.util.text import printable
 
@@ -125,7 +126,7 @@ class Refusal(click.ClickException):
     def show(self, file: Any = None) -> None:
         """Print the message, all faults of a case under each other."""
         lines = self.message.splitlines()
-        click.echo(printable("Error: " + "\n       ".join(lines)), err=True, file=file)
+        echo("Error: " + "\n       ".join(lines), err=True, file=file)
 
 
 class Interruption(click.ClickException):
@@ -135,8 +136,8 @@ class Interruption(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print the message below the terminal's own ^C."""
-        line = printable(": ".join(filter(None, ("Interrupted", self.message))))
-        click.echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
+        line = ": ".join(filter(None, ("Interrupted", self.message)))
+        echo(f"\n{line}" if sys.stderr.isatty() else line, err=True, file=file)
 
 
 def refuse_own_files(case: "Case", folder: Path, command: str) -> None:
@@ -229,7 +230,7 @@ def print_json(content: Mapping[str, Any]) -> None:
 def warn(texts: Iterable[str]) -> None:
     """Write what went wrong beside a result to standard error."""
     for text in texts:
-        click.echo(printable(f"Warning: {text}"), err=True)
+        echo(f"Warning: {text}", err=True)
 
 
 def assignments(texts: tuple[str, ...], option: str) -> dict[str, float]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli.options import warn
+from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 
 if TYPE_CHECKING:
@@ -91,11 +92,11 @@ def _report(plan: "ImportPlan", units: "Sequence[ImportedUnit]", folder: Path) -
     recorded = _lines_of(units, RECORDED)
     cases = [unit.case for unit in units if unit.case]
     counts = f"cases: {len(cases)}, with records: {len(recorded)}"
-    click.echo(f"written to {folder}; {counts}; all units: {UNITS}")
+    echo(f"written to {folder}; {counts}; all units: {UNITS}")
     for path in _first([str(path) for path in plan.others]):
-        click.echo(f"not joined to a unit: {path}: its name does not begin with a bus", err=True)
+        echo(f"not joined to a unit: {path}: its name does not begin with a bus", err=True)
     for line in _first(_lines_of(units, NO_MODEL)):
-        click.echo(f"no model: {line}", err=True)
+        echo(f"no model: {line}", err=True)
     refused = [*_lines_of(units, REFUSED), *plan.faults]
     if refused:
         raise ExfitError("\n".join(_first(refused)))

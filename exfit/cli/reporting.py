@@ -6,7 +6,7 @@ import click
 
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import force_option
-from exfit.util.text import printable
+from exfit.cli.streams import echo
 
 
 @click.command(short_help="Make a verification report of a fit.")
@@ -35,4 +35,4 @@ def report(result: Path, output: Path | None, pdf: bool, against: Path | None, f
     """
     from exfit.output.report import write_report
 
-    click.echo(printable(f"written to {write_report(result, output, force, pdf, against)}"))
+    echo(f"written to {write_report(result, output, force, pdf, against)}")

@@ -12,6 +12,7 @@ from exfit.cli.exchange import BUSES
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
+from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 from exfit.util.text import printable
 
@@ -244,6 +245,6 @@ def _report(text: str, output: Path) -> None:
     """Say where the case is, what is still open, and what comes next."""
     from exfit.case.open_values import open_values
 
-    click.echo(printable(f"written to {output}; next: exfit check {output}"))
+    echo(f"written to {output}; next: exfit check {output}")
     for value in open_values(text):
-        click.echo(printable(f"to be filled in: {_question(value)}, line {value.line}"))
+        echo(f"to be filled in: {_question(value)}, line {value.line}")

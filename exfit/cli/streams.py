@@ -10,6 +10,8 @@ from typing import Any, TextIO
 
 import click
 
+from exfit.util.text import printable
+
 FAILED = 1
 CLOSED = (errno.EPIPE, errno.EINVAL)  # what a pipe without a reader is called, here and on Windows
 
@@ -39,6 +41,11 @@ class Outlet(io.RawIOBase):
             else:
                 return count
         return len(data)
+
+
+def echo(text: str, err: bool = False, file: Any = None) -> None:
+    """Print a text, in which codes stand for what would control the terminal: names may hold it."""
+    click.echo(printable(text), err=err, file=file)
 
 
 @contextmanager
@@ -75,7 +82,7 @@ def _reported(code: Any) -> Any:
     closed = fault.errno in CLOSED
     kind = "Warning" if closed else "Error"
     text = f"{kind}: standard output: {fault.strerror}: not all of it was written"
-    click.echo(text, err=True)
+    echo(text, err=True)
     return code if closed else code or FAILED
 
 

@@ -140,3 +140,10 @@ def test_figures_draw_hostile_names(run, hostile):
     assert ran.code == 0
     assert not ran.err
     assert (hostile / "drawn" / "inspect.png").stat().st_size > 0
+
+
+def test_commands_print_by_echo_which_guards_the_terminal():
+    """But for bytes of files and JSON, which options.py escapes itself."""
+    files = (ROOT / "exfit" / "cli").glob("*.py")
+    own = {path.stem for path in files if "click.echo(" in path.read_text(encoding="utf-8")}
+    assert own == {"streams", "options"}, "exfit.cli.streams.echo in place of click.echo"
