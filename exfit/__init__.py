@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from exfit.analysis.steady.saturation import saturation_curve
     from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
+    from exfit.fleet.batch import batch
     from exfit.fleet.fits import fit_all
     from exfit.fleet.folder import read_fleet
     from exfit.fleet.ranking import rank
@@ -56,6 +57,7 @@ __all__ = [
     "RecordError",
     "SimulationError",
     "__version__",
+    "batch",
     "check",
     "fit",
     "fit_all",
@@ -77,6 +79,7 @@ _MODULES = {
     "Case": "exfit.case.case",
     "FitResult": "exfit.results.model",
     "Record": "exfit.records.record",
+    "batch": "exfit.fleet.batch",
     "check": "exfit.workflows",
     "fit": "exfit.workflows",
     "fit_all": "exfit.fleet.fits",

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from exfit.cli.batch import batch
 from exfit.cli.catalogue import models, schema
 from exfit.cli.comparing import compare
 from exfit.cli.exchange import export, import_
@@ -64,7 +65,7 @@ def main() -> None:
 
 
 OF_RECORDS = (inspect_, new)
-OF_CASES = (fit, run, rank, simulate, validate, check, profile, identify)
+OF_CASES = (fit, batch, run, rank, simulate, validate, check, profile, identify)
 OF_RESULTS = (report, compare, translate, import_, export)
 COMMANDS = (*OF_RECORDS, *OF_CASES, *OF_RESULTS, models, schema)
 for command in COMMANDS:

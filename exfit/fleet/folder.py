@@ -12,7 +12,8 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +21,7 @@ from typing import Any, TypeVar
 from exfit.errors import ExfitError
 from exfit.fleet.names import distinct_names
 from exfit.fleet.summary import CaseFacts, CaseStatus, CaseSummary, FailureKind, summary_of
-from exfit.util.files import write, write_each, write_together
+from exfit.util.files import prepare, write, write_quickly, write_together
 from exfit.util.text import to_json
 from exfit.util.typed import FormError, Reader, plain
 
@@ -77,12 +78,19 @@ class CaseOutcome:
 class Fleet:
     """All cases of a batch's folder, in the order of their names.
 
-    ``interrupted``: by Ctrl-C, which left some of them out.
+    After a run ``run`` holds the paths of its cases, as the rows have them; it was ``interrupted``
+    by Ctrl-C, which may have left some of them out.
     """
 
     folder: Path
     cases: tuple[CaseSummary, ...]
+    run: frozenset[str] = frozenset()
     interrupted: bool = False
+
+    @property
+    def of_run(self) -> tuple[CaseSummary, ...]:
+        """The cases of the run; all of them where it is not known."""
+        return tuple(case for case in self.cases if not self.run or case.case in self.run)
 
     @property
     def counts(self) -> dict[CaseStatus, int]:
@@ -142,9 +150,23 @@ def write_outcome(folder: Path, key: str, outcome: CaseOutcome) -> None:
         write(folder / key / FAILED, to_json(plain(outcome.failure)))
 
 
-def write_entries(folder: Path, entries: Iterable[IndexEntry]) -> None:
-    """Write entries of the index; raises ExfitError where that is not possible."""
-    write_each(folder / INDEX, {entry.file: to_json(plain(entry)) for entry in entries})
+def prepare_folder(folder: Path) -> None:
+    """Make the folder of a batch; raises ExfitError where it cannot be written."""
+    prepare(folder / INDEX)
+
+
+def write_entry(folder: Path, entry: IndexEntry) -> None:
+    """Write an entry of the index; raises ExfitError where that is not possible."""
+    text = to_json(plain(entry))
+    with suppress(OSError):
+        if (folder / INDEX / entry.file).read_bytes() == text.encode():
+            return
+    write_quickly(folder / INDEX / entry.file, text)
+
+
+def has_entry(folder: Path, case: str) -> bool:
+    """Return whether the index has an entry of a case."""
+    return (folder / INDEX / IndexEntry(case).file).is_file()
 
 
 def entries_of(folder: Path) -> dict[str, IndexEntry]:
@@ -168,7 +190,7 @@ def read_fleet(folder: str | os.PathLike[str]) -> Fleet:
     entries = [*entries_of(place).values()]
     names = distinct_names([case_path(place, entry.case) for entry in entries])
     rows = [
-        replace(_row(place, entry), name=name, case=entry.case)
+        _row(place, entry).named(name, entry.case)
         for name, entry in zip(names, entries, strict=True)
     ]
     return Fleet(place, tuple(sorted(rows, key=lambda row: (row.name.casefold(), row.name))))
@@ -195,10 +217,23 @@ def _stamp(file: Path) -> Iterator[tuple[str, int, int]]:
     yield str(file), status.st_mtime_ns, status.st_size
 
 
-def _row(folder: Path, entry: IndexEntry) -> CaseSummary:
+def row_of(entry: IndexEntry, failure: Failure | None = None) -> CaseSummary:
+    """Return the row of a case without a fit: for the reason of its failure, or of its entry."""
     row = CaseSummary(
-        "", entry.case, entry.key, entry.status, entry.reason, **entry.facts._asdict()
+        name=Path(entry.case).stem,
+        case=entry.case,
+        key=entry.key,
+        status=entry.status,
+        reason=entry.reason,
+        **entry.facts._asdict(),
     )
+    if failure is None:
+        return row
+    return replace(row, status=failure.kind, reason=failure.reason, seconds=failure.seconds)
+
+
+def _row(folder: Path, entry: IndexEntry) -> CaseSummary:
+    row = row_of(entry)
     if not entry.key:
         return row
     if is_done(folder, entry.key):
@@ -206,10 +241,7 @@ def _row(folder: Path, entry: IndexEntry) -> CaseSummary:
             return _summary(folder, entry.key)
         except ExfitError as fault:
             return replace(row, status="failed", reason=str(fault))
-    failure = failure_of(folder, entry.key)
-    if failure is None:
-        return replace(row, status="not run")
-    return replace(row, status=failure.kind, reason=failure.reason, seconds=failure.seconds)
+    return row_of(entry, failure_of(folder, entry.key))
 
 
 def _summary(folder: Path, key: str) -> CaseSummary:

@@ -1,7 +1,7 @@
 """A row of the table of a batch: what a case came to, in figures and small curves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -106,6 +106,10 @@ class CaseSummary:
     notes: tuple[str, ...] = ()
     about: Facts = field(default_factory=dict)
 
+    def named(self, name: str, case: str) -> "CaseSummary":
+        """Return the summary for another case of equal content."""
+        return replace(self, name=name, case=case)
+
 
 def facts_of(content: Mapping[str, Any]) -> CaseFacts:
     """Return what the content of a case file, faulty or not, says of its unit."""
@@ -162,7 +166,7 @@ def summary_of(result: "FitResult", key: str, seconds: float) -> CaseSummary:
         curves=tuple(curve for match in result.comparisons for curve in _curves(match)),
         seconds=round(seconds, 3),
         notes=(*result.notes, *(note for match in result.comparisons for note in match.notes)),
-        about=result.about,
+        about=dict(result.about),
     )
 
 

@@ -4,7 +4,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from traceback import extract_tb
 from typing import TYPE_CHECKING, NamedTuple
@@ -69,10 +69,18 @@ def run_case(task: CaseTask) -> CaseOutcome:
     try:
         return _outcome(task, began)
     except ExfitError as fault:
-        failure = Failure("failed", str(fault))
+        return CaseOutcome(failure=Failure("failed", str(fault), _seconds(began)))
     except (Exception, SystemExit) as fault:
-        failure = Failure("crashed", _place_of(fault))
-    return CaseOutcome(failure=replace(failure, seconds=_seconds(began)))
+        return crash(fault, _seconds(began))
+
+
+def crash(fault: BaseException, seconds: float = 0.0) -> CaseOutcome:
+    """Return the outcome of a case in which happened what should not, after processor time in s."""
+    frames = extract_tb(fault.__traceback__)
+    place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
+    return CaseOutcome(
+        failure=Failure("crashed", f"{type(fault).__name__}: {fault}{place}", seconds)
+    )
 
 
 def _outcome(task: CaseTask, began: float) -> CaseOutcome:
@@ -132,10 +140,3 @@ def _digest(file: Path) -> str | None:
 
 def _seconds(began: float) -> float:
     return round(time.process_time() - began, 3)
-
-
-def _place_of(fault: BaseException) -> str:
-    """Return what happened that should not, and where."""
-    frames = extract_tb(fault.__traceback__)
-    place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
-    return f"{type(fault).__name__}: {fault}{place}"

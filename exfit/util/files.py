@@ -50,19 +50,39 @@ def write(path: Path, content: str | bytes) -> None:
         raise ExfitError(_message(path, fault)) from fault
 
 
+def prepare(folder: Path) -> None:
+    """Make a folder, and remove what killed runs have left in it.
+
+    Raises ExfitError where it cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        remove_abandoned(folder)
+        beside = _temporary(folder)
+        _write_new(beside, b"")
+        beside.unlink()
+    except OSError as fault:
+        raise ExfitError(_message(folder, fault)) from fault
+
+
 def write_each(folder: Path, contents: Mapping[str, str]) -> None:
     """Write small files of a folder, each whole or not at all, in little time for many.
 
     Raises ExfitError where one cannot be written. What killed runs have left there is removed.
     """
-    path = folder
+    prepare(folder)
+    for name, content in contents.items():
+        write_quickly(folder / name, content)
+
+
+def write_quickly(path: Path, content: str) -> None:
+    """Write one of many small files of a folder that is there, whole or not at all.
+
+    What killed runs have left is not looked for. Raises ExfitError where it cannot be written.
+    """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        remove_abandoned(folder)
-        for name, content in contents.items():
-            path = folder / name
-            with deferred_interrupts():
-                _write_and_rename(path, content.encode())
+        with deferred_interrupts():
+            _write_and_rename(path, content.encode())
     except OSError as fault:
         raise ExfitError(_message(path, fault)) from fault
 

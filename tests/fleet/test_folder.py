@@ -14,9 +14,10 @@ from exfit.fleet.folder import (
     IndexEntry,
     case_name,
     entries_of,
+    prepare_folder,
     read_fleet,
     state_of,
-    write_entries,
+    write_entry,
     write_outcome,
 )
 from exfit.fleet.summary import MOST_POINTS, CaseFacts, facts_of, summary_of
@@ -48,7 +49,9 @@ def folder(tmp_path, result):
         IndexEntry("cases/own.yaml", status="refused", reason="avr.py"),
         IndexEntry("cases/later.yaml", "c" * 32),
     ]
-    write_entries(tmp_path, entries)
+    prepare_folder(tmp_path)
+    for entry in entries:
+        write_entry(tmp_path, entry)
     return tmp_path
 
 

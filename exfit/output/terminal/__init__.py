@@ -1,6 +1,7 @@
 """What the terminal shows: tables and lines, with rich."""
 
 from exfit.output.terminal.agreement import agreement
+from exfit.output.terminal.batch import BatchProgress, batch
 from exfit.output.terminal.catalogue import catalogue, model
 from exfit.output.terminal.checks import check
 from exfit.output.terminal.comparisons import comparisons, validation
@@ -23,12 +24,14 @@ from exfit.output.terminal.translations import translation
 from exfit.output.terminal.uncertainty import design, profiles
 
 __all__ = [
+    "BatchProgress",
     "LiveIterations",
     "ProgrammeProgress",
     "ProgressBar",
     "SeriesProgress",
     "again",
     "agreement",
+    "batch",
     "catalogue",
     "check",
     "checked_step",

@@ -1,0 +1,176 @@
+"""The command batch."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from exfit.cli.options import NOT_CONVERGED, Interruption, print_json
+from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
+
+if TYPE_CHECKING:
+    from exfit.fleet.folder import Fleet
+    from exfit.fleet.observer import BatchObserver
+    from exfit.fleet.task import FurtherFiles
+
+FAILED = 1  # the exit code where cases are without a fit
+WITHOUT_FIT = ("failed", "timed out", "crashed", "refused", "not run")
+
+
+def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
+    """Return the number of a part and how many there are, of a text such as 3/40."""
+    number, _slash, parts = value.partition("/")
+    if not (number.isdecimal() and parts.isdecimal()):
+        raise click.BadParameter(f"{value}: not of the form 3/40")
+    if not 1 <= int(number) <= int(parts):
+        raise click.BadParameter(f"{value}: must be 1/{parts} ... {parts}/{parts}")
+    return int(number), int(parts)
+
+
+@click.command(short_help="Fit many cases, and make a table of all.")
+@click.argument("cases", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="CASES")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("fleet"),
+    metavar="DIR",
+    help="Folder for the results (default: fleet).",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes at work, with one thread each (default: as many as there are processors).",
+)
+@click.option(
+    "--part",
+    callback=_part,
+    default="1/1",
+    metavar="3/40",
+    help="Fit this share of the cases only: 1/40 to 40/40, on any computers that see DIR, fit all.",
+)
+@click.option(
+    "--retry",
+    type=click.Choice(["failed"]),
+    help="Fit again what failed, crashed or exceeded the time limit in an earlier run.",
+)
+@click.option("--trust", is_flag=True, help="Run the Python code that cases name as their model.")
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=3600.0,
+    metavar="S",
+    help="Time that a case may take, s (default: 3600).",
+)
+@click.option("--reports", is_flag=True, help="Write the report of each fit, too.")
+@click.option(
+    "--strategy",
+    type=click.Choice([*STRATEGIES]),
+    help=f"Strategy in place of that of the cases. {EXPLAINED}.",
+)
+@click.option(
+    "--search",
+    type=click.Choice([*SEARCHES]),
+    help=f"How far to search, in place of what the cases say. {SEARCHES_EXPLAINED}.",
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON and nothing else.")
+def batch(
+    cases: tuple[Path, ...],
+    output: Path,
+    workers: int | None,
+    part: tuple[int, int],
+    retry: str | None,
+    trust: bool,
+    time_limit: float,
+    reports: bool,
+    strategy: str | None,
+    search: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Fit all CASES: case files, and folders with case files (*.yaml) in them or below.
+
+    Each case is fitted as `exfit fit` does it, in worker processes. Its files lie in a folder of
+    DIR that is named after a hash of all that goes into the fit: the case, its records, its model
+    file, the options, the version of exfit. What is there is not fitted again, so that the same
+    command goes on after an interruption, whatever it was, and with what has changed. Ctrl-C stops
+    all at once and keeps what is done.
+
+    A case that cannot be read, fails, crashes or does not end is a row with its reason, and the
+    others go on; it is tried again with --retry failed. A case whose model is a file of Python is
+    run with --trust only.
+
+    fleet.csv and fleet.html in DIR are the table of all cases that have been given for DIR. Exit
+    code 0: every case that has a record matches it; 1: some have no fit; 3: some do not match, or
+    Ctrl-C ended the command with some done.
+    """
+    from exfit.fleet.batch import batch as fit_all
+    from exfit.output.fleet_folder import write_tables
+
+    fleet = fit_all(
+        cases,
+        output,
+        workers=workers,
+        part=part,
+        retry_failed=retry is not None,
+        trust=trust,
+        time_limit=time_limit,
+        strategy=strategy,
+        search=search,
+        observer=None if quiet or as_json else _observer(),
+        further=_reports() if reports else (),
+        write_tables=write_tables,
+    )
+    if reports:
+        _write_missing_reports(fleet)
+    if as_json:
+        print_json(fleet.to_dict())
+    elif not quiet:
+        _show(fleet)
+    _exit(fleet)
+
+
+def _observer() -> "BatchObserver":
+    from exfit.output import terminal
+
+    return terminal.BatchProgress(terminal.console())
+
+
+def _reports() -> "Sequence[FurtherFiles]":
+    from exfit.output.fleet_folder import report_file
+
+    return (report_file,)
+
+
+def _write_missing_reports(fleet: "Fleet") -> None:
+    """Write the reports of fits that an earlier run has made without."""
+    from exfit.output.fleet_folder import REPORT
+
+    folders = [fleet.folder_of(case) for case in fleet.of_run]
+    missing = [folder for folder in folders if folder and not (folder / REPORT).is_file()]
+    for folder in dict.fromkeys(missing):
+        from exfit.output.report import write_report
+
+        write_report(folder)
+
+
+def _show(fleet: "Fleet") -> None:
+    from exfit.output import terminal
+
+    terminal.batch(terminal.console(), fleet)
+
+
+def _exit(fleet: "Fleet") -> None:
+    """Raise SystemExit or Interruption where not all cases of the run are done and well."""
+    rows = fleet.of_run
+    if fleet.interrupted:
+        if not any(row.status == "done" for row in rows):
+            raise Interruption("no case is done")
+        raise SystemExit(NOT_CONVERGED)
+    if any(row.status in WITHOUT_FIT for row in rows):
+        raise SystemExit(FAILED)
+    if not all(row.holds for row in rows if row.status == "done"):
+        raise SystemExit(NOT_CONVERGED)
