@@ -42,7 +42,8 @@ class CaseFacts(NamedTuple):
 class SummaryParameter(NamedTuple):
     """A value of the unit, with its 95 % interval where it was fitted.
 
-    A side of the interval without a limit is None; ``source`` says where the value comes from.
+    A side of the interval without a limit is None; ``source`` says where the value comes from,
+    which is an earlier fit where it is "fitted" and the parameter is not ``fitted`` here.
     """
 
     value: Annotated[float, nan]
@@ -50,6 +51,7 @@ class SummaryParameter(NamedTuple):
     high: float | None
     source: str
     unit: str
+    fitted: bool
 
 
 class SummaryValidation(NamedTuple):
@@ -109,6 +111,11 @@ class CaseSummary:
     def named(self, name: str, case: str) -> "CaseSummary":
         """Return the summary for another case of equal content."""
         return replace(self, name=name, case=case)
+
+    @property
+    def fitted(self) -> dict[str, SummaryParameter]:
+        """The parameters that the fit of this case determined, or should have."""
+        return {name: value for name, value in self.parameters.items() if value.fitted}
 
 
 def facts_of(content: Mapping[str, Any]) -> CaseFacts:
@@ -217,7 +224,9 @@ def _parameters(result: "FitResult") -> dict[str, SummaryParameter]:
             fitted = result.parameters.get(name)
             low, high = (None, None) if fitted is None else fitted.interval or (None, None)
             unit = units.get(name, "") if fitted is None else fitted.unit
-            parameters[name] = SummaryParameter(value, low, high, result.source_of(name), unit)
+            source = result.source_of(name)
+            free = fitted is not None
+            parameters[name] = SummaryParameter(value, low, high, source, unit, free)
     return parameters
 
 
