@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exfit.fleet.summary import CaseSummary, SummaryParameter
-from exfit.inference.outliers import FEWEST, LEVEL, Estimates, deviations
+from exfit.inference.outliers import FEWEST, Estimates, deviations
 from exfit.results.facts import MAKER, MODEL, PLANT, RATED, TYPE, UNIT, stated
 
 ERRORS_IN_HALF = NormalDist().inv_cdf(0.975)  # standard errors in half of a 95 % interval
@@ -92,7 +92,7 @@ class SisterGroup:
 
 
 def sisters(cases: Iterable[CaseSummary]) -> tuple[SisterGroup, ...]:
-    """Return the units that have sisters, by what they share, and their parameters beside each other.
+    """Return the units that have sisters, by what they share, with their parameters.
 
     Of a unit with several cases the first that matches its records counts. With four sisters or
     more outliers are found by `exfit.inference.outliers`; of fewer only those are named whose 95 %
@@ -200,6 +200,3 @@ def _apart(one: SisterValue, other: SisterValue) -> bool:
         a.high is not None and b.low is not None and a.high < b.low
         for a, b in ((one, other), (other, one))
     )
-
-
-__all__ = ["LEVEL", "SisterGroup", "SisterParameter", "SisterValue", "sisters"]

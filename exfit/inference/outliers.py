@@ -57,7 +57,7 @@ class _Deleted(NamedTuple):
 
 
 def deviations(estimates: Estimates) -> Deviations:
-    """Return how far each of at least FEWEST estimates lies from the others, and which are outliers.
+    """Return how far each of FEWEST estimates or more lies from the others, and the outliers.
 
     Where all are alike but for a spread that is normal, the probability that any is called an
     outlier is LEVEL at most.

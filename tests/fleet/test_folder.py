@@ -70,7 +70,7 @@ def test_a_fleet_has_a_row_for_every_case_of_the_index(folder, result):
     assert done.about == ABOUT["about"]
     assert done.parameters["k"].value == result.parameters["k"].value
     assert done.parameters["k"][1:3] == result.parameters["k"].interval
-    assert (done.parameters["k"].source, [*done.fitted]) == ("fitted", ["k"])
+    assert (done.parameters["k"].source, [*done.fitted]) == ("fitted", ["k", "a"])
     assert done.rmse == {"vt": result.rmse}
     assert (slow.unit, slow.bus, slow.reason) == ("bus 101, machine 1", 101, "no end after 60 s")
     assert read_fleet(folder).counts["done"] == 2
