@@ -26,6 +26,7 @@ from exfit.cli.streams import unfailing_output
 from exfit.cli.translating import translate
 from exfit.cli.uncertainty import identify, profile
 from exfit.errors import ExfitError
+from exfit.util.interrupts import SIGNALLED, endings_as_interruptions
 
 # before NumPy is imported: starting its threads costs more than they gain on matrices this small
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -42,11 +43,12 @@ class Commands(click.Group):
 
     def main(self, *arguments: Any, **settings: Any) -> Any:
         """Run as a program: no output that fails keeps a command from its files."""
-        with unfailing_output() as exit_code:
+        with unfailing_output() as exit_code, endings_as_interruptions() as signals:
             try:
                 return super().main(*arguments, **settings)
             except SystemExit as ended:
-                raise SystemExit(exit_code(ended.code)) from None
+                code = exit_code(ended.code)
+                raise SystemExit(SIGNALLED + signals[0] if signals else code) from None
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command, and turn what is wrong with its input into a message."""
@@ -54,8 +56,22 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except ExfitError as fault:
             raise Refusal(str(fault)) from fault
+        except OSError as fault:
+            raise Refusal(_of_system(fault)) from fault
         except KeyboardInterrupt as interruption:
             raise Interruption(str(interruption)) from None
+
+
+def _of_system(fault: OSError) -> str:
+    """Return what the system refuses: a name that is too long, a folder that may not be read.
+
+    Raises the fault again where it has nothing to do with a file that somebody named.
+    """
+    if fault.filename is not None:
+        return f"{fault.filename}: {fault.strerror}"
+    if isinstance(fault, FileNotFoundError):
+        return "the working folder has been removed"
+    raise fault
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -134,7 +134,7 @@ def new(
 
 def is_terminal() -> bool:
     """Return whether someone sits at the keyboard who can be asked."""
-    return sys.stdin.isatty()
+    return sys.stdin is not None and sys.stdin.isatty()
 
 
 def _tests(

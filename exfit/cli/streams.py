@@ -13,6 +13,7 @@ import click
 from exfit.util.text import printable
 
 FAILED = 1
+UNABLE = ("strict", "surrogateescape")  # what Python has for streams: in the locale C the latter
 CLOSED = (errno.EPIPE, errno.EINVAL)  # what a pipe without a reader is called, here and on Windows
 
 
@@ -92,7 +93,7 @@ def _unfailing(stream: TextIO | None) -> TextIO:
         return open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123
     if not isinstance(stream, io.TextIOWrapper):
         return stream  # not the system's: a notebook's, a test's
-    errors = "replace" if stream.errors == "strict" else stream.errors
+    errors = "replace" if stream.errors in UNABLE else stream.errors
     if stream.isatty():
         stream.reconfigure(errors=errors)
         return stream

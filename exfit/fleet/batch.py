@@ -26,7 +26,7 @@ from exfit.fleet.local import Compute, local_workers
 from exfit.fleet.observer import BatchObserver, Unobserved
 from exfit.fleet.plan import BatchSettings, PlannedCase, Share, case_files, planned_case, share_of
 from exfit.fleet.task import FitSettings, FurtherFiles
-from exfit.util.interrupts import terminations_as_interrupts
+from exfit.util.interrupts import endings_as_interruptions
 from exfit.util.strategies import SEARCHES, STRATEGIES
 from exfit.util.text import near
 from exfit.util.threads import processors
@@ -134,7 +134,7 @@ class BatchRun:
         """Fit the cases that are not done; return whether an interruption ended it."""
         prepare_folder(self.folder)
         self.observer.begun(len(self.files), workers)
-        with terminations_as_interrupts():
+        with endings_as_interruptions():
             try:
                 compute(self._to_fit(), self._begin, self._end)
             except KeyboardInterrupt:

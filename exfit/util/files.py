@@ -2,9 +2,11 @@
 
 import os
 import re
+import stat
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from errno import ENOTDIR
 from pathlib import Path
 from zlib import crc32
 
@@ -37,15 +39,22 @@ def write_whole(path: Path, data: bytes) -> None:
     interruption. What killed runs have left there is removed.
     """
     with deferred_interrupts():
-        path.parent.mkdir(parents=True, exist_ok=True)
+        _make_folder(path.parent)
         remove_abandoned(path.parent)
         _write_and_rename(path, data)
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file, whole or not at all; raises ExfitError where the place cannot be written."""
+    """Write a file, whole or not at all; raises ExfitError where the place cannot be written.
+
+    Where a link leads to a file, that is replaced, not the link; a device or a pipe is written to.
+    """
+    data = content.encode() if isinstance(content, str) else content
     try:
-        write_whole(path, content.encode() if isinstance(content, str) else content)
+        if _takes_bytes(path):
+            path.write_bytes(data)
+        else:
+            write_whole(path.resolve() if path.is_symlink() else path, data)
     except OSError as fault:
         raise ExfitError(_message(path, fault)) from fault
 
@@ -56,11 +65,12 @@ def prepare(folder: Path) -> None:
     Raises ExfitError where it cannot be made or written.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        _make_folder(folder)
         remove_abandoned(folder)
         beside = _temporary(folder)
-        _write_new(beside, b"")
-        beside.unlink()
+        with deferred_interrupts():
+            _write_new(beside, b"")
+            beside.unlink()
     except OSError as fault:
         raise ExfitError(_message(folder, fault)) from fault
 
@@ -100,7 +110,7 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
     beside: dict[Path, Path] = {}
     with deferred_interrupts():
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            _make_folder(folder)
             remove_abandoned(folder)
             for name, content in contents.items():
                 beside[folder / name] = _temporary(folder)
@@ -137,6 +147,22 @@ def remove_abandoned(folder: Path) -> None:
                 old = time.time() - entry.stat().st_mtime > ABANDONED
                 if old or (here and not _runs(int(name[2]))):
                     Path(entry).unlink()
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as fault:
+        raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR), str(folder)) from fault
+
+
+def _takes_bytes(path: Path) -> bool:
+    """Return whether a path leads to what is no file that could be replaced, as /dev/stdout."""
+    try:
+        kind = path.stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
 
 
 def _temporary(folder: Path) -> Path:

@@ -1,9 +1,19 @@
-"""What an interruption (Ctrl-C) may not cut in two."""
+"""What an interruption (Ctrl-C) may not cut in two, and signals that interrupt as Ctrl-C does."""
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
+
+# how systems end a program: kill, a scheduler's time limit, a closed terminal, Ctrl-Break
+ENDING = tuple(
+    signal.Signals[name]
+    for name in ("SIGTERM", "SIGHUP", "SIGBREAK")
+    if name in signal.Signals.__members__
+)
+SIGNALLED = 128  # exit codes of programs that a signal ended are its number and this, for shells
 
 
 @contextmanager
@@ -13,43 +23,59 @@ def deferred_interrupts() -> Iterator[None]:
     Where that ends with an exception, this one counts. Other threads than the main one are never
     interrupted, and nothing is done in them; nor where interruptions are ignored.
     """
-    former = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(former):
+    if threading.current_thread() is threading.main_thread():
+        with _deferred(signal.SIGINT, *ENDING):
+            yield
+    else:
         yield
-        return
-    pending: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: pending.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, former)
-    if pending:
-        signal.raise_signal(signal.SIGINT)
 
 
 @contextmanager
-def terminations_as_interrupts() -> Iterator[None]:
-    """Let SIGTERM, and the end of the terminal, interrupt what is inside as Ctrl-C does.
-
-    One that is ignored stays so. In another thread than the main one nothing is done.
-    """
-    numbers = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
-    former = {number: signal.getsignal(number) for number in numbers if number is not None}
-    taken = [number for number, action in former.items() if action is signal.SIG_DFL]
-    if threading.current_thread() is not threading.main_thread():
-        taken = []
-    try:
-        for number in taken:
-            signal.signal(number, _interrupt)
+def _deferred(*numbers: signal.Signals) -> Iterator[None]:
+    """Defer signals: one inside the other, so that each is restored whatever the others raise."""
+    if not numbers:
         yield
+        return
+    first, *others = numbers
+    former = signal.getsignal(first)
+    if not callable(former):
+        with _deferred(*others):
+            yield
+        return
+    pending: list[int] = []
+    signal.signal(first, lambda number, _: pending.append(number))
+    try:
+        with _deferred(*others):
+            yield
     finally:
-        for number in taken:
-            signal.signal(number, former[number])
+        signal.signal(first, former)
+    if pending:
+        signal.raise_signal(first)
 
 
-def _interrupt(*_: object) -> None:
-    """Interrupt as Ctrl-C does, which may be deferred, or ignored by what a script started."""
-    if callable(signal.getsignal(signal.SIGINT)):
-        signal.raise_signal(signal.SIGINT)
-    else:
+@contextmanager
+def endings_as_interruptions() -> Iterator[list[int]]:
+    """Have signals that end a program interrupt what is inside, as Ctrl-C does.
+
+    What is given holds the numbers of those that came. Those that are ignored, as by nohup, stay
+    so; other threads than the main one get none.
+    """
+    received: list[int] = []
+    program = os.getpid()
+
+    def interrupt(number: int, _: FrameType | None) -> None:
+        if os.getpid() != program:  # a process that was forked from this one ends as others do
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        received.append(number)
         raise KeyboardInterrupt
+
+    main = threading.current_thread() is threading.main_thread()
+    replaced = [it for it in ENDING if main and signal.getsignal(it) is signal.SIG_DFL]
+    try:
+        for number in replaced:
+            signal.signal(number, interrupt)
+        yield received
+    finally:
+        for number in replaced:
+            signal.signal(number, signal.SIG_DFL)

@@ -139,6 +139,21 @@ def test_an_encoding_that_lacks_characters_ends_no_command(run, name, encoding):
     assert out.getvalue().decode(encoding)
 
 
+@pytest.mark.parametrize("name", ["models", "check"])
+def test_the_locale_c_ends_no_command(run, name):
+    """There Python gives streams an error handler that knows undecodable names only."""
+    out = io.BytesIO()
+    stream = io.TextIOWrapper(out, "ascii", errors="surrogateescape")
+    assert run(stream, words(name) if name != "models" else ["models", "AC1A"]) == (0, "")
+    assert b"?" in out.getvalue() or name == "check"
+
+
+def test_nobody_is_asked_where_standard_input_is_closed(run, monkeypatch):
+    monkeypatch.setattr(sys, "stdin", None)
+    assert run(io.TextIOWrapper(io.BytesIO(), "utf-8"), words("new")) == (0, "")
+    assert "?" in Path("new.yaml").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii", "utf-8"])
 def test_json_holds_every_character_in_every_encoding(run, encoding):
     name, out = "試 ä.csv", io.BytesIO()

@@ -139,6 +139,33 @@ def test_a_name_as_long_as_names_may_be_can_be_written(tmp_path):
     assert [*contents(tmp_path).values()] == ["new"]
 
 
+def test_the_file_that_a_link_leads_to_is_replaced_not_the_link(tmp_path):
+    (tmp_path / "folder").mkdir()
+    link, target = tmp_path / "link.dyr", tmp_path / "folder" / "target.dyr"
+    try:
+        link.symlink_to(target)
+    except OSError:
+        pytest.skip("links need a right here")
+    for content in ("first", "second"):  # the first makes the file
+        write(link, content)
+        assert link.is_symlink()
+        assert contents(tmp_path / "folder") == {"target.dyr": content}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such files there")
+def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
+    """As /dev/stdout, which a file in its place would take from all programs."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        write(pipe, "new")
+        assert os.read(reader, 10) == b"new"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()
+
+
 def test_files_get_the_rights_that_the_user_gives_new_files(tmp_path):
     (tmp_path / "by-hand").write_text("")
     write(tmp_path / "table.csv", "new")

@@ -1,11 +1,12 @@
-"""An interruption waits for what may not be cut in two."""
+"""An interruption waits for what may not be cut in two; what ends a program interrupts it."""
 
+import os
 import signal
 import threading
 
 import pytest
 
-from exfit.util.interrupts import deferred_interrupts
+from exfit.util.interrupts import ENDING, deferred_interrupts, endings_as_interruptions
 
 
 @pytest.fixture(autouse=True)
@@ -71,3 +72,72 @@ def test_other_threads_do_what_is_inside_and_leave_interruptions_alone():
     thread.start()
     thread.join()
     assert handlers == [signal.default_int_handler]
+
+
+def ended(number, steps):
+    """Take a step that a signal may not cut in two, and another one."""
+    with deferred_interrupts():
+        signal.raise_signal(number)
+        steps.append("whole")
+    steps.append("behind")
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_what_ends_a_program_interrupts_it_as_ctrl_c_does(number):
+    former, steps = signal.getsignal(number), []
+    with pytest.raises(KeyboardInterrupt), endings_as_interruptions() as received:
+        ended(number, steps)
+    assert (received, steps) == ([number], ["whole"])
+    assert signal.getsignal(number) is former is signal.SIG_DFL
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_what_is_ignored_ends_nothing(number):
+    former, steps = signal.signal(number, signal.SIG_IGN), []
+    try:
+        with endings_as_interruptions() as received:
+            ended(number, steps)
+        assert signal.getsignal(number) is signal.SIG_IGN
+    finally:
+        signal.signal(number, former)
+    assert (received, steps) == ([], ["whole", "behind"])
+
+
+def together(numbers):
+    """Raise signals where they may not cut anything in two."""
+    with endings_as_interruptions(), deferred_interrupts():
+        for number in numbers:
+            signal.raise_signal(number)
+
+
+@pytest.mark.parametrize("numbers", [(signal.SIGINT, ENDING[0]), (ENDING[0], signal.SIGINT)])
+def test_all_handlers_are_restored_where_several_signals_come_at_once(numbers):
+    with pytest.raises(KeyboardInterrupt):
+        together(numbers)
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, *ENDING)]
+    assert handlers == [signal.default_int_handler, *[signal.SIG_DFL] * len(ENDING)]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes are forked there")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_process_that_was_forked_ends_as_others_do():
+    with endings_as_interruptions():
+        child = os.fork()
+        if not child:
+            signal.raise_signal(signal.SIGTERM)
+            os._exit(0)
+        _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == -signal.SIGTERM
+
+
+def test_other_threads_get_no_handlers():
+    handlers = []
+
+    def work():
+        with endings_as_interruptions():
+            handlers.append(signal.getsignal(signal.SIGTERM))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert handlers == [signal.SIG_DFL]

@@ -46,15 +46,23 @@ def console() -> Console:
 
     Without COLUMNS the tables of a file are as on a narrow terminal, and no sentence is wrapped.
     """
-    terminal = GuardedConsole(highlight=False)
+    sized = {name: text for name, text in os.environ.items() if not _is_no_size(name, text)}
+    terminal = GuardedConsole(highlight=False, _environ=sized)
     if wraps(terminal):
         return terminal
     return GuardedConsole(highlight=False, width=NARROW, soft_wrap=True)
 
 
+def _is_no_size(name: str, text: str) -> bool:
+    """Return whether a variable says that the terminal has no columns, or no lines."""
+    return name in ("COLUMNS", "LINES") and text.isdigit() and int(text) == 0
+
+
 def wraps(console: Console) -> bool:
     """Return whether sentences are wrapped: a person reads them, or COLUMNS is given."""
-    return console.is_terminal or "COLUMNS" in os.environ
+    columns = os.environ.get("COLUMNS")
+    given = columns is not None and not _is_no_size("COLUMNS", columns)
+    return console.is_terminal or given
 
 
 def show_table(console: Console, table: Table, expendable: Sequence[str] = ()) -> None:
