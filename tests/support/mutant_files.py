@@ -113,6 +113,38 @@ def _of_a_programme() -> Mapping[str, bytes]:
     return {"programme.json": read.pop("programme.json"), **read}
 
 
+@cache
+def _of_a_batch() -> Mapping[str, bytes]:
+    """Return what a batch of a case that is done, one that failed and one refused leaves."""
+    from exfit.fleet.folder import CaseOutcome, Failure, IndexEntry, write_entries, write_outcome
+    from exfit.fleet.summary import summary_of
+    from exfit.results.io import load_result
+
+    done, failed = "0" * 31 + "1", "0" * 31 + "2"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        text = _of_a_fit()["result.json"]
+        (folder / "result.json").write_bytes(text)
+        summary = summary_of(load_result(folder), done, 1.0)
+        (folder / "result.json").unlink()
+        files = {"result.json": text.decode()}
+        write_outcome(folder, done, CaseOutcome(files, summary))
+        write_outcome(folder, failed, CaseOutcome(failure=Failure("crashed", "why", 2.0)))
+        entries = [IndexEntry("../a.yaml", done), IndexEntry("../b.yaml", failed)]
+        entries.append(IndexEntry("../c.yaml", "", "refused", "c.yaml:1: model: is missing"))
+        write_entries(folder, entries)
+        paths = sorted(path for path in folder.rglob("*.json") if path.is_file())
+        return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
+def _batch(rng: Random, changes: Changes) -> Files:
+    files = dict(_of_a_batch())
+    name = rng.choice([*files])
+    changes.append(name)
+    files[name] = _json(rng, files[name], files[rng.choice([*files])], changes)
+    return files
+
+
 def _json(rng: Random, one: bytes, other: bytes, changes: Changes) -> bytes:
     if rng.random() < TREE:
         return json_bytes(mutated_tree(rng, json.loads(one), json.loads(other), changes))
@@ -512,6 +544,17 @@ def _table_of_tests(rng: Random, changes: Changes) -> Files:
     return {"tests.csv": mutated_bytes(rng, rng.choice((TESTS, other)), other, changes, text=True)}
 
 
+CASES = b"""bus,id,file,at,step,base,validates,name,about.Plant
+101,1,../sample_data/ac1a_up.csv,1.0,0.05,15.75kV,no,unit,Sample
+101,1,../sample_data/ac1a_down.csv,1.0,-0.05,15.75kV,yes,unit,Sample
+7,G2,../sample_data/ac8b_unit1_up.csv,,0.05,,,,
+"""
+
+
+def _table_of_cases(rng: Random, changes: Changes) -> Files:
+    return {"cases.csv": _damaged(rng, CASES, changes, text=True), "unit.dyr": UNITS}
+
+
 KINDS: Mapping[str, Callable[[Random, Changes], Files]] = {
     "case": _case,
     "programme": _programme,
@@ -525,6 +568,8 @@ KINDS: Mapping[str, Callable[[Random, Changes], Files]] = {
     "comtrade": _comtrade,
     "dyr": _dyr,
     "tests": _table_of_tests,
+    "cases": _table_of_cases,
+    "batch": _batch,
 }
 
 

@@ -314,8 +314,7 @@ def _changed(rng: random.Random, tree: Any, other: Any) -> str:
 
 
 def mutated_tree(rng: random.Random, tree: Any, other: Any, changes: list[str]) -> Any:
-    """Return a tree after one to four changes; ``other`` is one that parts are taken from."""
-    tree = copy.deepcopy(tree)
+    """Change a tree one to four times; ``other`` is one that parts are taken from. Return it."""
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         changes.append(_changed(rng, tree, other))
     return tree
