@@ -11,6 +11,7 @@ Parts of a batch, and batches one after the other, need no coordination but this
 import hashlib
 import json
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -29,6 +30,7 @@ INDEX, CASES = "index", "cases"
 RESULT, SUMMARY, FAILED = "result.json", "summary.json", "failed.json"
 VERSION = 1  # of a summary; one of another version is made again
 KEY_DIGITS = 32  # hexadecimal, of the SHA-256 of all that goes into a fit
+KEY = re.compile(rf"[0-9a-f]{{{KEY_DIGITS}}}")
 
 Content = TypeVar("Content")
 
@@ -172,7 +174,12 @@ def has_entry(folder: Path, case: str) -> bool:
 def entries_of(folder: Path) -> dict[str, IndexEntry]:
     """Return the index by the paths of the cases; a damaged entry is missing until its next run."""
     entries = (_read(file, IndexEntry) for file in sorted((folder / INDEX).glob("*.json")))
-    return {entry.case: entry for entry in entries if entry is not None}
+    return {entry.case: entry for entry in entries if entry is not None and _is_of_batch(entry)}
+
+
+def _is_of_batch(entry: IndexEntry) -> bool:
+    """Return whether the key of an entry is one: the name of a folder here, no way out of it."""
+    return not entry.key or KEY.fullmatch(entry.key) is not None
 
 
 def read_fleet(folder: str | os.PathLike[str]) -> Fleet:

@@ -110,6 +110,12 @@ def test_a_damaged_entry_of_the_index_hides_no_other(folder):
     assert len(entries_of(folder)) == 4
 
 
+@pytest.mark.parametrize("key", ["../outside", "9" * 400, "a" * 31, "A" * 32, "a\0"])
+def test_an_entry_whose_key_is_none_leads_nowhere(folder, key):
+    write_entry(folder, IndexEntry("cases/hostile.yaml", key))
+    assert len(read_fleet(folder).cases) == 5
+
+
 def test_another_folder_is_refused(tmp_path):
     with pytest.raises(ExfitError, match="not the folder of a batch: index is missing"):
         read_fleet(tmp_path)

@@ -116,7 +116,14 @@ def _of_a_programme() -> Mapping[str, bytes]:
 @cache
 def _of_a_batch() -> Mapping[str, bytes]:
     """Return what a batch of a case that is done, one that failed and one refused leaves."""
-    from exfit.fleet.folder import CaseOutcome, Failure, IndexEntry, write_entries, write_outcome
+    from exfit.fleet.folder import (
+        CaseOutcome,
+        Failure,
+        IndexEntry,
+        prepare_folder,
+        write_entry,
+        write_outcome,
+    )
     from exfit.fleet.summary import summary_of
     from exfit.results.io import load_result
 
@@ -132,7 +139,9 @@ def _of_a_batch() -> Mapping[str, bytes]:
         write_outcome(folder, failed, CaseOutcome(failure=Failure("crashed", "why", 2.0)))
         entries = [IndexEntry("../a.yaml", done), IndexEntry("../b.yaml", failed)]
         entries.append(IndexEntry("../c.yaml", "", "refused", "c.yaml:1: model: is missing"))
-        write_entries(folder, entries)
+        prepare_folder(folder)
+        for entry in entries:
+            write_entry(folder, entry)
         paths = sorted(path for path in folder.rglob("*.json") if path.is_file())
         return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
