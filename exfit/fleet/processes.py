@@ -14,6 +14,7 @@ from threading import Thread
 from typing import Any, NamedTuple
 
 from exfit.fleet.plan import PlannedCase
+from exfit.util.interrupts import ENDING
 from exfit.util.threads import THREADS
 
 # the worker finds exfit where this process has found it
@@ -130,17 +131,17 @@ def _signal_name(number: int) -> str:
 
 @contextmanager
 def signals_held_back() -> Iterator[None]:
-    """Let processes that are started inside have Ctrl-C and SIGTERM held back, for good.
+    """Let processes that are started inside have what interrupts a program held back, for good.
 
-    A terminal sends Ctrl-C to all of its processes; only the batch shall act on it. Windows has no
-    such mask: there the process is in a group of its own, which Ctrl-C does not reach.
+    A terminal sends Ctrl-C, and its own end, to all of its processes; only the batch shall act on
+    it. Windows has no such mask: there the process is in a group of its own, which Ctrl-C does not
+    reach.
     """
-    mask = getattr(signal, "pthread_sigmask", None)
-    if mask is None:
+    if sys.platform == "win32":
         yield
         return
-    former = mask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    former = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *ENDING})
     try:
         yield
     finally:
-        mask(signal.SIG_SETMASK, former)
+        signal.pthread_sigmask(signal.SIG_SETMASK, former)

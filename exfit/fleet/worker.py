@@ -14,13 +14,15 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any, BinaryIO
 
+from exfit.util.interrupts import ENDING
+
 READY, BEGUN = "ready", "begun"  # what a worker answers beside outcomes
 
 
 def main() -> None:
     """Fit the cases that the batch gives, until there are no more."""
-    # Ctrl-C reaches all processes of a terminal; it is the batch that ends its workers
-    for number in (signal.SIGINT, signal.SIGTERM):
+    # Ctrl-C and the end of a terminal reach all its processes; the batch ends its workers
+    for number in (signal.SIGINT, *ENDING):
         signal.signal(number, signal.SIG_IGN)
     tasks_from, answers_to = _channels()
     tasks: SimpleQueue[Any] = SimpleQueue()
