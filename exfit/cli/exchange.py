@@ -1,17 +1,22 @@
 """The commands import and export."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, write_text
-from exfit.cli.planner import OfRecords, import_every_unit
+from exfit.cli.planner import OfRecords, export_every_unit, import_every_unit
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 
-BUSES = click.IntRange(1, 999_999)
+if TYPE_CHECKING:
+    from exfit.results.model import FitResult
+
+MOST_BUSES = 999_999
+BUSES = click.IntRange(1, MOST_BUSES)
 
 
 @click.command("import", short_help="Make cases from a PSS/E dynamics file.")
@@ -88,20 +93,28 @@ def _import_one(
 @click.command(short_help="Write the result of a fit as PSS/E records.")
 @click.argument("result", type=GivenFile(Kind.RESULT))
 @click.option(
+    "--all", "every", is_flag=True, help="RESULT is the folder of a batch: all verified units."
+)
+@click.option(
+    "--dyr",
+    type=GivenFile(Kind.DYNAMICS),
+    metavar="FILE",
+    help="With --all: the planner's file to change (default: that of the cases).",
+)
+@click.option(
     "--format",
     "_format",
     type=click.Choice(["dyr"]),
     default="dyr",
     help="Kind of file: dyr, a PSS/E dynamics file (default).",
 )
-@click.option("--bus", type=BUSES, metavar="N", default=1, help="Bus of the unit (default: 1).")
+@click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit (default: as found, else 1).")
 @click.option(
     "--id",
     "machine_id",
     metavar="ID",
-    default="1",
     callback=lambda _, __, value: _machine_id(value),
-    help="Machine id of the unit (default: 1).",
+    help="Machine id of the unit (default: as found, else 1).",
 )
 @click.option(
     "--model", metavar="NAME", help="Another record of the exciter's model, such as ESAC8B."
@@ -110,9 +123,11 @@ def _import_one(
 @force_option
 def export(
     result: Path,
+    every: bool,
+    dyr: Path | None,
     _format: str,
-    bus: int,
-    machine_id: str,
+    bus: int | None,
+    machine_id: str | None,
     model: str | None,
     output: Path | None,
     force: bool,
@@ -121,7 +136,29 @@ def export(
 
     RESULT is the result.json of a fit, or the folder that holds it. What a PSS/E record cannot
     hold, and what is uncertain, is reported.
+
+    With --all RESULT is the folder of a batch, and the planner's file is written with the values of
+    the units whose fits hold; every other byte of it stays as it is.
     """
+    if every:
+        if bus is not None or machine_id is not None or model is not None:
+            raise click.UsageError("--bus, --id and --model: not allowed with --all.")
+        export_every_unit(result, dyr, output, force)
+        return
+    if dyr is not None:
+        raise click.UsageError("--dyr: only with --all.")
+    _export_one(result, bus, machine_id, model, output, force)
+
+
+def _export_one(
+    result: Path,
+    bus: int | None,
+    machine_id: str | None,
+    model: str | None,
+    output: Path | None,
+    force: bool,
+) -> None:
+    """Write the records of one fit, at the bus that is given, or where they were found."""
     from exfit.exchange.psse.export import export as exported
     from exfit.results.io import load_result, result_file
 
@@ -129,8 +166,9 @@ def export(
         refuse_existing(output, force)
     source = result_file(result)
     fit = load_result(source)
+    own_bus, own_id = _place_as_found(fit, source)
     try:
-        records = exported(fit, bus, machine_id, model)
+        records = exported(fit, bus or own_bus, machine_id or own_id, model)
     except ExfitError as fault:
         texts = (f"{source}: {text}" for text in str(fault).splitlines())
         raise ExfitError("\n".join(texts)) from None
@@ -139,7 +177,27 @@ def export(
         echo(f"written to {output}")
 
 
-def _machine_id(value: str) -> str:
-    if not (1 <= len(value) <= 2 and value.isascii() and value.isalnum()):
+def _place_as_found(fit: "FitResult", source: Path) -> tuple[int, str]:
+    """Return the bus and the machine id of a unit where it was found, 1 where that is not said.
+
+    Raises ExfitError for what no record can hold.
+    """
+    found = fit.as_found
+    place = (None, None) if found is None else (found.bus, found.machine_id)
+    bus, machine_id = (1 if place[0] is None else place[0]), place[1] or "1"
+    if not 1 <= bus <= MOST_BUSES or not _is_machine_id(machine_id):
+        raise ExfitError(
+            f"{source}: as_found: bus {bus}, id {machine_id!r} are not those of a record; "
+            "give them with --bus and --id"
+        )
+    return bus, machine_id
+
+
+def _is_machine_id(text: str) -> bool:
+    return 1 <= len(text) <= 2 and text.isascii() and text.isalnum()
+
+
+def _machine_id(value: str | None) -> str | None:
+    if value is not None and not _is_machine_id(value):
         raise click.BadParameter(f"{value!r} is not one or two letters or digits.")
     return value

@@ -1,18 +1,22 @@
 """The commands import and export for all units of a planner's file."""
 
+import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from exfit.cli.options import warn
+from exfit.cli.options import refuse_existing, warn
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
+from exfit.util.sources import FITTED
 
 if TYPE_CHECKING:
+    from exfit.exchange.psse.fitted_file import ChangedValue, FittedUnit, LeftUnit
     from exfit.exchange.psse.import_all import ImportedUnit, ImportPlan, RecordOptions
+    from exfit.fleet.folder import Fleet
 
 UNITS = "units.csv"
 MOST_LISTED = 20  # units, records, in a terminal; the table has all
@@ -118,3 +122,87 @@ def _first(texts: Iterable[str]) -> list[str]:
     listed = list(texts)
     more = len(listed) - MOST_LISTED
     return listed if more <= 0 else [*listed[:MOST_LISTED], f"... and {more} more"]
+
+
+def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force: bool) -> None:
+    """Write a planner's file with the values of all verified units of a batch."""
+    from exfit.exchange.psse.fitted_file import changes_table, fitted_file
+    from exfit.exchange.psse.import_case import read_file
+    from exfit.fleet.folder import read_fleet
+    from exfit.util.files import write
+
+    if output is None:
+        raise click.UsageError("Missing option '-o': the file to write.")
+    table = output.with_suffix(".csv")
+    for path in (output, table):
+        refuse_existing(path, force)
+    fits, others = _fits_of(read_fleet(fleet))
+    original = dyr or _original(fits)
+    if output.exists() and original.exists() and output.samefile(original):
+        raise ExfitError(f"{output}: is the planner's own file: name another one with -o")
+    fitted = fitted_file(read_file(original), str(original), fits)
+    left = [*fitted.left, *others]
+    if not fitted.changes:
+        listed = [f"{unit.name}: {unit.reason}" for unit in left]
+        raise ExfitError("\n".join([*_first(listed), f"{original}: no unit to change"]))
+    write(output, fitted.data)
+    write(table, changes_table(fitted.changes))
+    _report_export(output, table, fitted.changes, left)
+
+
+def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
+    """Return the fits of a batch that are done, and why the other cases are not."""
+    from exfit.exchange.psse.fitted_file import FittedUnit, LeftUnit
+    from exfit.results.io import load_result
+
+    fits, others = list[FittedUnit](), list[LeftUnit]()
+    for case in fleet.cases:
+        folder = fleet.folder_of(case)
+        if folder is None:
+            if case.status != "no record":
+                others.append(LeftUnit(case.name, f"{case.status}: {case.reason}", False))
+            continue
+        try:
+            # a fit of equal content stands under one key: each case has its own path
+            result = replace(load_result(folder), case=fleet.path_of(case))
+            fits.append(FittedUnit(case.name, result))
+        except ExfitError as fault:
+            others.append(LeftUnit(case.name, str(fault), verified=True))
+    return fits, others
+
+
+def _original(fits: "Sequence[FittedUnit]") -> Path:
+    """Return the file that all cases were made of; raises ExfitError where it is not one alone."""
+    files = {
+        os.path.normpath(result.case.parent / found.file): None
+        for _, result in fits
+        if (found := result.as_found) is not None and found.file is not None
+    }
+    if len(files) != 1:
+        named = ", ".join(_first(files)) or "none"
+        raise ExfitError(f"--dyr: missing; files that the cases name: {named}")
+    return Path(next(iter(files)))
+
+
+def _report_export(
+    output: Path, table: Path, changes: "Sequence[ChangedValue]", left: "Sequence[LeftUnit]"
+) -> None:
+    """Say what was changed and what was not; raises ExfitError where a verified unit was left."""
+    units = {(change.bus, change.id.upper()) for change in changes}
+    echo(f"written to {output}; units changed: {len(units)}, values: {len(changes)}")
+    echo(f"what was changed: {table}")
+    warn(_first(_undetermined(changes)))
+    for line in _first([f"{unit.name}: {unit.reason}" for unit in left if not unit.verified]):
+        echo(f"left as it was: {line}", err=True)
+    refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]
+    if refused:
+        raise ExfitError("\n".join(_first(refused)))
+
+
+def _undetermined(changes: "Sequence[ChangedValue]") -> list[str]:
+    """Return the cases with the values that they were written for without being determined."""
+    names: dict[str, list[str]] = {}
+    for change in changes:
+        if change.source == FITTED and None in (change.low, change.high):
+            names.setdefault(change.case, []).append(change.parameter)
+    return [f"{case}: not determined: {', '.join(own)}" for case, own in names.items()]

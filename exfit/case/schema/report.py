@@ -2,7 +2,16 @@
 
 from pydantic import Field
 
-from exfit.case.schema.values import Bus, Frozen, Number, Positive, Section, Text, nothing
+from exfit.case.schema.values import (
+    Bus,
+    Frozen,
+    MachineId,
+    Number,
+    Positive,
+    Section,
+    Text,
+    nothing,
+)
 from exfit.util.criteria import Criteria
 
 DEFAULTS = Criteria()
@@ -17,7 +26,9 @@ class AsFoundSection(Section):
     bus: Bus | None = Field(
         default=None, description="Bus of the unit there; an export finds its records by it."
     )
-    id: Text | None = Field(default=None, description='Machine id of the unit there, such as "1".')
+    id: MachineId | None = Field(
+        default=None, description='Machine id of the unit there, such as "1".'
+    )
     file: Text | None = Field(
         default=None, description="The PSS/E file that it is from; path, relative to the case file."
     )

@@ -42,6 +42,7 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Text = Annotated[str, Strict(), Field(min_length=1)]
+MachineId = Annotated[str, Strict(), Field(min_length=1, max_length=2)]
 Bus = Annotated[int, Strict(), Field(ge=1, le=999_999)]  # as PSS/E numbers them
 Frozen = Annotated[Mapping[str, Value], AfterValidator(MappingProxyType), WrapSerializer(thawed)]
 

@@ -25,6 +25,7 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eEdD][-+]?[0-9]+)?")
 WHOLE = re.compile(r"[-+]?[0-9]{1,9}")
 REPEATED = re.compile(r"[0-9]+\*.*")
 BYTE_ORDER = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+WITHOUT_MARK = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 END_OF_LINE = re.compile(r"\r\n|\r|\n")
 END_OF_FILE = "\x1a"  # as DOS wrote it
 
@@ -92,6 +93,14 @@ def encoding_of(data: bytes) -> str:
     except UnicodeDecodeError:
         return "latin-1"
     return encoding
+
+
+def encoded(text: str, like: bytes) -> bytes:
+    """Return a text in the encoding of another file, with its byte order mark if it has one."""
+    encoding = encoding_of(like)
+    if encoding == "utf-16":
+        return like[:2] + text.encode(WITHOUT_MARK[like[:2]])
+    return text.encode(encoding)
 
 
 def read_records(text: str, file: str) -> list[Fields]:
