@@ -4,20 +4,21 @@ Run it as ``python tests/studies/fuzz.py [MUTANTS] [--seed S] [--kinds case,mat,
 ``--one KIND SEED NUMBER`` makes one mutant again, leaves it in a folder and shows what exfit says.
 The mutants of a kind run one after the other in a process of their own, which may take 1 GB more
 than before a mutant; where it dies or hangs a new one goes on with the next mutant. What is wrong
-is listed once for each place in exfit.
+is listed once for each place in exfit; at the end stands the table of docs/robustness.md.
 """
 
 import argparse
 import faulthandler
 import json
+import math
 import os
 import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
@@ -25,12 +26,12 @@ os.environ["COLUMNS"] = "80"
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
 from mutant_files import KINDS, mutant
-from mutant_runs import Finding, findings
+from mutant_runs import Finding, tried
 
 MUTANTS, SEED = 100_000, 1
 IN_A_PROCESS = 2500  # mutants, then a new one begins with an empty memory
 HANGS = 60.0  # s by the clock of a busy computer; of processor time 20 are allowed
-GIGABYTE = 1 << 30
+MEGABYTE, GIGABYTE = 1 << 20, 1 << 30
 MOST_MEMORY = GIGABYTE  # more than before a mutant
 MOST_ADDRESSES = 4 * GIGABYTE  # then an allocation fails
 TAIL = 1500  # characters of a text that are kept
@@ -44,13 +45,16 @@ def work(kind: str, seed: int, first: int, end: int, log: Path) -> None:
             one = mutant(kind, seed, number)
             notes.write(json.dumps({"start": number, "mutant": str(one)[:TAIL]}) + "\n")
             before = limit_memory()
-            wrong = findings(one, Path(name))
+            result = tried(one, Path(name))
+            wrong = result.wrong
             grown = peak_memory() - before
             if grown > MOST_MEMORY:
                 wrong.append(Finding("memory", kind, f"{grown / GIGABYTE:.2f} GB"))
             for each in wrong:
                 entry = {**each._asdict(), "number": number, "mutant": str(one)[:TAIL]}
                 notes.write(json.dumps(entry | {"text": each.text[-TAIL:]}) + "\n")
+            end = {"end": number, "refused": result.refused, "seconds": result.seconds}
+            notes.write(json.dumps(end | {"grown": grown}) + "\n")
             if grown > MOST_MEMORY:
                 break  # its peak hides that of the next
         os.chdir("/")
@@ -115,9 +119,9 @@ def place_of_death(text: str) -> str:
     return own[0].rpartition(f"exfit{os.sep}")[2] if own else re.sub(r"\d+", "N", text)[:80]
 
 
-def show(places: dict[tuple[str, str, str], list[dict]]) -> None:
+def show(kind: str, places: dict[tuple[str, str], list[dict]]) -> None:
     """Print what is wrong, once for each place."""
-    for (kind, what, place), notes in sorted(places.items(), key=lambda item: -len(item[1])):
+    for (what, place), notes in sorted(places.items(), key=lambda item: -len(item[1])):
         first = notes[0]
         print(f"{kind}: {what}: {place}: {len(notes)} times")
         print(f"    {first['mutant'][:300]}")
@@ -129,8 +133,37 @@ def again(kind: str, seed: int, number: int) -> None:
     folder = Path(tempfile.mkdtemp(prefix="mutant-"))
     one = mutant(kind, seed, number)
     print(one, folder / "mutant", sep="\n")
-    for finding in findings(one, folder):
+    for finding in tried(one, folder).wrong:
         print(finding.kind, finding.place, finding.text, sep="\n")
+
+
+@dataclass
+class Tally:
+    """What came of the mutants of a kind."""
+
+    mutants: int = 0
+    refused: int = 0
+    slowest: float = 0.0
+    most_grown: int = 0
+    wrong: dict[tuple[str, str], list[dict]] = field(default_factory=dict)
+
+    def add(self, note: dict) -> None:
+        """Count what a worker noted."""
+        if "start" in note:
+            self.mutants += 1
+        elif "end" in note:
+            self.refused += note["refused"]
+            self.slowest = max(self.slowest, note["seconds"])
+            self.most_grown = max(self.most_grown, note["grown"])
+        else:
+            self.wrong.setdefault((note["kind"], note["place"]), []).append(note)
+
+    def row(self, kind: str) -> str:
+        """Return the row of a kind in the table of the documentation."""
+        count, share = self.mutants, 100.0 * self.refused / max(self.mutants, 1)
+        found = sum(map(len, self.wrong.values()))
+        grown = f"{self.most_grown / MEGABYTE:.0f} MB"
+        return f"| {kind} | {count:,} | {share:.0f} % | {self.slowest:.1f} s | {grown} | {found} |"
 
 
 def main() -> None:
@@ -145,37 +178,32 @@ def main() -> None:
     if given.work:
         kind, seed, first, end, log = given.work
         work(kind, int(seed), int(first), int(end), Path(log))
-        return
-    if given.one:
+    elif given.one:
         kind, seed, number = given.one
         again(kind, int(seed), int(number))
-        return
-    kinds = given.kinds.split(",")
-    places: dict[tuple[str, str, str], list[dict]] = {}
-    counts: Counter[str] = Counter()
-    began = time.monotonic()
+    else:
+        study(given.kinds.split(","), given.mutants, given.seed, given.first)
+
+
+def study(kinds: list[str], mutants: int, seed: int, first: int) -> None:
+    """Run mutants of all kinds alike, and print what is wrong and the table."""
+    tallies, began = {kind: Tally() for kind in kinds}, time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        for kind in kinds:
-            end = given.first + given.mutants // len(kinds)
-            for note in worked(kind, given.seed, given.first, end, Path(folder)):
-                if "start" in note:
-                    counts[kind] += 1
-                    continue
-                key = kind, note["kind"], note["place"]
-                places.setdefault(key, []).append(note)
-            wrong = sum(len(notes) for key, notes in places.items() if key[0] == kind)
-            text = f"{counts[kind]} mutants, {wrong} findings"
+        for kind, tally in tallies.items():
+            end = first + math.ceil(mutants / len(kinds))
+            for note in worked(kind, seed, first, end, Path(folder)):
+                tally.add(note)
             minutes = (time.monotonic() - began) / 60.0
-            print(f"{minutes:6.1f} min  {kind}: {text}", flush=True)
-            show({key: notes for key, notes in places.items() if key[0] == kind})
+            print(f"{minutes:6.1f} min  {tally.row(kind)}", flush=True)
+            show(kind, tally.wrong)
+    print("| kind | mutants | refused | longest | most memory | findings |")
+    print("|---|---|---|---|---|---|")
+    for kind, tally in tallies.items():
+        print(tally.row(kind))
     used = os.times()
     seconds = used.user + used.system + used.children_user + used.children_system
-    wrong = sum(map(len, places.values()))
-    wrong = sum(map(len, places.values()))
-    print(
-        f"{counts.total()} mutants of {len(kinds)} kinds: {wrong} findings at {len(places)} places"
-    )
-    print(f"{seconds / 60.0:.1f} min of processor time")
+    total = sum(tally.mutants for tally in tallies.values())
+    print(f"{total:,} mutants, {seconds / 60.0:.1f} min of processor time")
 
 
 if __name__ == "__main__":

@@ -529,10 +529,11 @@ def _comtrade(rng: Random, changes: Changes) -> Files:
 
 UNITS = b"""/ two units
 101 'GENROU' 1 6.0 0.035 0.5 0.077 3.25 0.0 1.8 1.7 0.3 0.55 0.25 0.2 0.12 0.4 /
-101 'ESAC8B' 1 0.0 84.0 5.0 10.0 0.1 35.0 -35.0 1.0 0.01 1.3 99.0 0.0 1.0 0.5 1.1 6.5 0.3 9 3 /
+101 'ESAC8B' 1 0.0 84.0 5.0 10.0 0.1 1.0 0.0 35.0 -35.0 1.3 1.0 6.5 0.3 9.0 3.0 /
 101 'PSS2A' 1 1 0 3 0 5 1 10 10 0 0 10 10 7 1 0.5 0.1 8 0.2 0.02 0.2 0.02 0.1 -0.1 /
 7 'GENSAL' 'G2' 5.0 0.05 0.06 3.0 0.0 1.1 0.7 0.25 0.2 0.15 0.11 0.4 /
 7 'SEXS' 'G2' 0.1 10.0 100.0 0.1 -5.0 5.0 /
+7 'STAB1' 'G2' 20.0 5.0 2.0 0.02 3.0 0.02 0.1 /
 """
 
 
@@ -543,8 +544,8 @@ def _dyr(rng: Random, changes: Changes) -> Files:
 
 
 TESTS = b"""file,at,step,base,validates
-../sample_data/ac1a_up.csv,1.0,0.05,15.75 kV,no
-../sample_data/ac1a_down.csv,1.0,-0.05,15.75 kV,yes
+../sample_data/ac1a_up.csv,1.0,0.05,,no
+../sample_data/ac1a_down.csv,1.0,-0.05,,yes
 """
 
 
@@ -554,8 +555,8 @@ def _table_of_tests(rng: Random, changes: Changes) -> Files:
 
 
 CASES = b"""bus,id,file,at,step,base,validates,name,about.Plant
-101,1,../sample_data/ac1a_up.csv,1.0,0.05,15.75kV,no,unit,Sample
-101,1,../sample_data/ac1a_down.csv,1.0,-0.05,15.75kV,yes,unit,Sample
+101,1,../sample_data/ac1a_up.csv,1.0,0.05,,no,unit,Sample
+101,1,../sample_data/ac1a_down.csv,1.0,-0.05,,yes,unit,Sample
 7,G2,../sample_data/ac8b_unit1_up.csv,,0.05,,,,
 """
 

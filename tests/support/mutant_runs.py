@@ -86,7 +86,8 @@ def commands(mutant: Mutant, folder: Path) -> Iterator[tuple[str, ...]]:
         yield ("simulate", "record.yaml", "-o", OUT, "--no-plots")
     elif mutant.kind == "dyr":
         yield ("import", main, "-o", f"{OUT}/unit.yaml")
-        yield ("import", main, "--bus", "101", "--id", "1", "-o", f"{OUT}/unit_101.yaml")
+        bus, machine = ("101", "1") if mutant.number % 2 else ("7", "G2")
+        yield ("import", main, "--bus", bus, "--id", machine, "-o", f"{OUT}/unit_{bus}.yaml")
         yield ("import", main, "--all", "-o", f"{OUT}/cases")
     elif mutant.kind == "cases":
         yield ("import", "unit.dyr", "--all", "--records", main, "-o", f"{OUT}/cases")
@@ -104,11 +105,16 @@ def prepared(workplace: Path) -> Path:
     return workplace / "mutant"
 
 
-def findings(mutant: Mutant, workplace: Path) -> list[Finding]:
-    """Return all that is wrong with what exfit does with a mutant; works in a folder of its own.
+class Tried(NamedTuple):
+    """What came of a mutant: all that is wrong, whether each command refused it, seconds taken."""
 
-    The current folder of the process is changed to it.
-    """
+    wrong: list[Finding]
+    refused: bool
+    seconds: float
+
+
+def tried(mutant: Mutant, workplace: Path) -> Tried:
+    """Return what exfit does with a mutant; works in a folder of its own, the current one then."""
     folder = prepared(workplace)
     shutil.rmtree(folder, ignore_errors=True)
     for name, data in mutant.files.items():
@@ -117,12 +123,15 @@ def findings(mutant: Mutant, workplace: Path) -> list[Finding]:
         path.write_bytes(data)
     os.chdir(folder)
     wrong: list[Finding] = []
+    codes, seconds = [], 0.0
     for arguments in commands(mutant, folder):
         before = _listing(folder)
         ran = run(arguments)
         wrong += judged(ran)
         wrong += written(ran, folder, before)
-    return wrong
+        codes.append(ran.code)
+        seconds += ran.seconds
+    return Tried(wrong, all(code in REFUSED for code in codes), seconds)
 
 
 def run(arguments: Sequence[str]) -> Ran:
@@ -138,7 +147,7 @@ def run(arguments: Sequence[str]) -> Ran:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             if arguments[0] == READ_FLEET:
-                print(to_json(read_fleet(arguments[1]).to_dict()))
+                print(to_json(read_fleet(arguments[1]).to_dict(), ascii_only=True))
                 code = 0
             else:
                 cli.main(args=list(arguments), prog_name="exfit")
@@ -196,6 +205,8 @@ def place_of(fault: BaseException) -> str:
     """Return the innermost place in exfit at which an exception was raised."""
     frames = traceback.extract_tb(fault.__traceback__)
     own = [frame for frame in frames if f"{Path('exfit')}/" in frame.filename.replace("\\", "/")]
+    if not frames:
+        return ""
     frame = own[-1] if own else frames[-1]
     tail = "/".join(Path(frame.filename).parts[-2:])
     return f"{tail}:{frame.lineno} {frame.name}"

@@ -1,0 +1,28 @@
+"""Texts for a terminal: what would control it is shown as a code, all else as it is."""
+
+import codecs
+import re
+
+from hypothesis import given
+from hypothesis import strategies as st
+from mutant_runs import CONTROL
+
+from exfit.util.text import printable
+
+TEXTS = st.text(st.one_of(st.characters(), st.sampled_from("\x00\x1b\x7f\x9b\u202e\u2066\r\n\t\\")))
+
+
+@given(TEXTS)
+def test_a_text_for_a_terminal_has_codes_in_place_of_controls(text):
+    shown = printable(text)
+    assert not CONTROL.search(shown)
+    assert printable(shown) == shown
+    if not CONTROL.search(text):
+        assert shown == text
+
+
+@given(TEXTS.filter(lambda text: "\\" not in text))
+def test_the_codes_say_what_was_there(text):
+    shown = printable(text)
+    code = r"\\x[0-9a-f]{2}|\\u[0-9a-f]{4}|\\r"
+    assert re.sub(code, lambda c: codecs.decode(c[0], "unicode_escape"), shown) == text
