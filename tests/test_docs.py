@@ -39,7 +39,10 @@ README = PAGES["README.md"]
 NOTEBOOK = DOCS / "tutorial.ipynb"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 WITH_SESSIONS = [name for name, page in PAGES.items() if "```console" in page]
-OF_OTHERS = {"--array", "--strict", "--models", "--kinds", "--seed", "--one"}  # of mypy and tests
+OF_OTHERS = {  # options of mypy, of the tests and studies, of SLURM and of Dask
+    "--array", "--strict", "--models", "--kinds", "--seed", "--one", "--port", "--nthreads",
+    "--nworkers", "--memory-limit",
+}  # fmt: skip
 WIDTH = 120  # of the terminal: no table of a page is cut off
 
 MACHINE = "model: AC1A\nplant: {type: open-circuit, machine: GENROU}\n"

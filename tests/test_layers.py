@@ -52,6 +52,8 @@ ONLY_IN = {  # where a library may be imported, inside functions too
     "weasyprint": {"output"},
     "click": {"cli"},
     "llvmlite": {"engine"},
+    "distributed": {"fleet"},
+    "dask": {"fleet"},
 }
 AT_ONCE = {"numpy", "matplotlib", "scipy", "pydantic", "rich", "llvmlite", "yaml"}
 

@@ -45,6 +45,11 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     help="Processes at work, with one thread each (default: as many as there are processors).",
 )
 @click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Fit on the Dask cluster of this scheduler, such as tcp://10.0.0.1:8786, instead.",
+)
+@click.option(
     "--part",
     callback=_part,
     default="1/1",
@@ -81,6 +86,7 @@ def batch(
     cases: tuple[Path, ...],
     output: Path,
     workers: int | None,
+    scheduler: str | None,
     part: tuple[int, int],
     retry: str | None,
     trust: bool,
@@ -103,10 +109,15 @@ def batch(
     others go on; it is tried again with --retry failed. A case whose model is a file of Python is
     run with --trust only.
 
+    With --scheduler the workers of a Dask cluster fit the cases: they need exfit in the versions of
+    this computer, but none of its files. The package distributed comes with exfit[cluster].
+
     fleet.csv and fleet.html in DIR are the table of all cases that have been given for DIR. Exit
     code 0: every case that has a record matches it; 1: some have no fit; 3: some do not match, or
     Ctrl-C ended the command with some done.
     """
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("--workers and --scheduler exclude each other.")
     from exfit.fleet.batch import batch as fit_all
     from exfit.output.fleet_folder import write_tables
 
@@ -114,6 +125,7 @@ def batch(
         cases,
         output,
         workers=workers,
+        scheduler=scheduler,
         part=part,
         retry_failed=retry is not None,
         trust=trust,

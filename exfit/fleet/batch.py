@@ -1,12 +1,14 @@
 """Many cases fitted by many workers: what is done is kept in a folder, and not done again."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from math import inf
 from os import PathLike
 from pathlib import Path
 
 from exfit.errors import ExfitError
+from exfit.fleet.dispatch import cluster_workers
 from exfit.fleet.folder import (
     CaseOutcome,
     Fleet,
@@ -44,6 +46,7 @@ def batch(
     folder: str | PathLike[str] = "fleet",
     *,
     workers: int | None = None,
+    scheduler: str | None = None,
     part: tuple[int, int] = (1, 1),
     retry_failed: bool = False,
     trust: bool = False,
@@ -66,6 +69,8 @@ def batch(
         cases: case files, and folders with such files in them or below.
         folder: keeps the results; that of an earlier batch is gone on with.
         workers: processes at work; None: as many as there are processors.
+        scheduler: the address of that of a Dask cluster, whose workers fit the cases in place of
+            processes of this computer; the contents of all files travel to them.
         part: (number, of): only every such share of the cases, so that several computers that see
             the folder have all of them, each once.
         retry_failed: fits again what failed, crashed, or took too long.
@@ -80,7 +85,8 @@ def batch(
         write_tables: called with the fleet at the end, and again if the folder has changed since.
 
     A KeyboardInterrupt ends all workers at once: what is done is kept, and the fleet is
-    ``interrupted``. Raises ExfitError where there are no cases, or the folder cannot be written.
+    ``interrupted``. Raises ExfitError where there are no cases, the folder cannot be written, or
+    the cluster cannot be used or is lost: what is done is kept then, too.
 
     Example:
         >>> fleet = exfit.batch(["cases"], "fleet", workers=4)
@@ -93,7 +99,14 @@ def batch(
     settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
     count = min(workers or processors(), max(1, len(files)))
     run = BatchRun(files, place, settings, observer or Unobserved())
-    interrupted = run.fit_all(compute or local_workers(count, time_limit), count)
+    if scheduler is not None:
+        compute, count = cluster_workers(scheduler, time_limit), 0
+    try:
+        interrupted = run.fit_all(compute or local_workers(count, time_limit), count)
+    except ExfitError:
+        with suppress(ExfitError):  # the first fault is reported
+            tables_of(place, write_tables)
+        raise
     fleet = tables_of(place, write_tables)
     names = frozenset(case_name(place, file) for file in files)
     return replace(fleet, run=names, interrupted=interrupted)
@@ -140,6 +153,10 @@ class BatchRun:
             except KeyboardInterrupt:
                 self._note_the_others()
                 return True
+            except ExfitError:  # without workers nothing goes on
+                with suppress(ExfitError):
+                    self._note_the_others()
+                raise
         return False
 
     def _to_fit(self) -> Iterator[PlannedCase]:
@@ -184,7 +201,7 @@ class BatchRun:
         self.observer.finished(row)
 
     def _note_the_others(self) -> None:
-        """Enter the cases that were not even planned when the run was interrupted."""
+        """Enter the cases that were not even planned when the run came to an early end."""
         for file in self.files:
             name = case_name(self.folder, file)
             if not has_entry(self.folder, name):

@@ -2,15 +2,18 @@
 
 import hashlib
 import os
+import sys
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from exfit.case.peek import files_of
 from exfit.errors import ExfitError
+from exfit.fleet.folder import CaseOutcome, Failure
+from exfit.fleet.task import CaseTask, run_case
+from exfit.util.cache import CACHE
 from exfit.util.root import ROOT, below
 
 QUICKLY = 1  # the level of compression: the next ones gain little and take several times as long
@@ -61,14 +64,14 @@ class Bundle:
         return sum(len(file.content) for file in self.files)
 
 
-def bundle_of(case: Path, beside: Iterable[Path] = ()) -> Bundle:
-    """Return a case with all files that it names, and others ``beside`` it.
+def bundle_of(paths: Sequence[Path]) -> Bundle:
+    """Return a case, the first of some paths, with the files that it names, the others.
 
     One that does not exist is left out: the worker reports it as missing. Raises ExfitError for a
     file that cannot be read, and where links make one path of two files.
     """
     files: dict[str, PackedFile] = {}
-    for path in (*files_of(case), *beside):
+    for path in paths:
         place = os.path.normpath(path.absolute())
         try:
             file = PackedFile.of(place, path.read_bytes())
@@ -79,19 +82,23 @@ def bundle_of(case: Path, beside: Iterable[Path] = ()) -> Bundle:
             raise ExfitError(f"{path}: cannot be read: {reason}") from None
         if files.setdefault(place, file) != file:
             raise ExfitError(f"{path}: another file than {place}: a link is before the dots")
-    return Bundle(str(case), str(Path.cwd()), tuple(files.values()))
+    return Bundle(str(paths[0]), str(Path.cwd()), tuple(files.values()))
 
 
 @contextmanager
-def laid_out(bundle: Bundle) -> Iterator[Path]:
+def laid_out(bundle: Bundle, within: Path | None = None) -> Iterator[Path]:
     """Lay the files out in a temporary folder; the process reads them by the user's paths inside.
+
+    The temporary folder is ``within`` another, or where the system has such.
 
     Gives the path of the case as the user gave it. For the time it lasts the folder stands for the
     root of all paths that cases name, and the current folder is that of the user below it: no other
     thread of the process may read cases meanwhile. Raises ExfitError where the files cannot be
     written, or where one arrived damaged.
     """
-    with TemporaryDirectory(prefix="exfit-", ignore_cleanup_errors=True) as temporary:
+    if within is not None:
+        within.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix="exfit-", dir=within, ignore_cleanup_errors=True) as temporary:
         root = Path(temporary).resolve()
         working = _written(bundle, root)
         former_folder, former_root = Path.cwd(), os.environ.get(ROOT)
@@ -107,6 +114,14 @@ def laid_out(bundle: Bundle) -> Iterator[Path]:
                 os.environ[ROOT] = former_root
 
 
+def _keep_places() -> None:
+    """Make absolute what the process finds from its current folder, before it leaves that."""
+    sys.path[:] = [str(Path(path).absolute()) for path in sys.path]
+    cache = os.environ.get(CACHE)
+    if cache:
+        os.environ[CACHE] = str(Path(cache).absolute())
+
+
 def _written(bundle: Bundle, root: Path) -> Path:
     """Write the files below a root; return the user's folder there."""
     working = below(root, Path(bundle.folder))
@@ -119,3 +134,25 @@ def _written(bundle: Bundle, root: Path) -> Path:
     except OSError as fault:
         raise ExfitError(f"temporary folder of the worker: {fault.strerror}") from None
     return working
+
+
+@dataclass(frozen=True, kw_only=True)
+class BundledTask(CaseTask):
+    """A case with its files, which are laid out ``temporary``, in a folder of the worker."""
+
+    bundle: Bundle
+    temporary: Path | None = None
+
+    @classmethod
+    def of(cls, task: CaseTask) -> "BundledTask":
+        """Return a task with its files; raises ExfitError as `bundle_of`."""
+        return cls(**vars(task), bundle=bundle_of(task.files))
+
+    def run(self) -> CaseOutcome:
+        """Fit the case; it reads no file but its own. To be run in a process of its own."""
+        _keep_places()
+        try:
+            with laid_out(self.bundle, self.temporary):
+                return run_case(self)
+        except ExfitError as fault:
+            return CaseOutcome(failure=Failure("failed", str(fault)))

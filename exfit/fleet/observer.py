@@ -13,7 +13,7 @@ class BatchObserver(Protocol):
     """
 
     def begun(self, cases: int, workers: int) -> None:
-        """So many cases are to be done by so many workers."""
+        """So many cases are to be done by so many workers; 0: by those of a cluster."""
 
     def kept(self, case: str) -> None:
         """A case is done already, or failed: by an earlier run, or as another of equal content."""

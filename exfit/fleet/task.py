@@ -49,6 +49,10 @@ class CaseTask:
     group: str = ""
     further: tuple[FurtherFiles, ...] = ()
 
+    def run(self) -> CaseOutcome:
+        """Fit the case, in the process of a worker."""
+        return run_case(self)
+
 
 def key_of(files: Sequence[Path], settings: FitSettings, case: bytes | None = None) -> str:
     """Return the key of a case: the hash of its files, the settings and the version of exfit.

@@ -28,14 +28,14 @@ def main() -> None:
     tasks: SimpleQueue[Any] = SimpleQueue()
     Thread(target=_receive, args=(tasks_from, tasks), daemon=True).start()
 
-    from exfit.fleet.task import crash, run_case
+    from exfit.fleet.task import crash
 
     _import_all()
     _answer(answers_to, READY)
     while True:
         task = tasks.get()
         _answer(answers_to, BEGUN)
-        _answer(answers_to, crash(task) if isinstance(task, Exception) else run_case(task))
+        _answer(answers_to, crash(task) if isinstance(task, Exception) else task.run())
 
 
 def _channels() -> tuple[BinaryIO, BinaryIO]:

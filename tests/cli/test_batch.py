@@ -102,3 +102,14 @@ def test_what_does_not_exist_is_refused(run):
     done = run("batch", "nowhere")
     assert done.code == 1
     assert "nowhere: cannot be read" in done.err
+
+
+def test_a_cluster_that_cannot_be_reached_is_a_line_and_the_table_is_there(run, monkeypatch):
+    monkeypatch.setattr("exfit.fleet.cluster.CONNECTED_WITHIN", 0.2)
+    done = run("batch", "cases", "--scheduler", "127.0.0.1:1", "-q")
+    assert done.code == 1
+    assert done.err == "Error: 127.0.0.1:1: no connection: Connection refused\n"
+    assert {row["status"] for row in rows()} == {"not run"}
+    done = run("batch", "cases", "--scheduler", "127.0.0.1:1", "--workers", "2")
+    assert done.code == 2
+    assert "--workers and --scheduler exclude each other" in done.err

@@ -11,6 +11,7 @@ import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 
 import exfit
+from exfit.case.peek import files_of
 from exfit.errors import CaseError, ExfitError
 from exfit.fleet.bundle import bundle_of, laid_out
 from exfit.models.exciters import first_order
@@ -41,6 +42,10 @@ def case_file(path, file="../records/bump.csv", columns=("t", "v"), **changes):
     return path
 
 
+def bundle_of_case(case):
+    return bundle_of(files_of(case))
+
+
 def fitted(case):
     """Return the file of a fit without its times."""
     return result_text(replace(exfit.fit(case), seconds=0.0))
@@ -48,7 +53,7 @@ def fitted(case):
 
 def travelled(user, case, run):
     """Return what ``run`` gives for a case in another folder, where none of its files is left."""
-    bundle = bundle_of(case)
+    bundle = bundle_of_case(case)
     for folder in ("fleet", "records"):
         (user / folder).rename(user / f"{folder}-gone")
     try:
@@ -95,7 +100,7 @@ def test_a_record_in_two_files_travels_whole(user):
     comtrade(user / "records")
     for file in ("bump.cfg", "bump.DAT"):
         path = case_file(f"{file}.yaml", f"../records/{file}", ("time", "v"))
-        assert len(bundle_of(path).files) == 3
+        assert len(bundle_of_case(path).files) == 3
         assert travelled(user, path, fitted) == fitted(path)
 
 
@@ -107,7 +112,7 @@ def test_a_model_and_the_reference_of_a_file_travel(user):
     reference = {"file": "../records/reference.csv", "time": "t", "column": "r"}
     test = {"vt0": 0.0, "vref": reference}
     path = case_file("a.yaml", model="../records/own.py", test=test)
-    assert len(bundle_of(path).files) == 4
+    assert len(bundle_of_case(path).files) == 4
     assert travelled(user, path, fitted) == fitted(path)
 
 
@@ -146,7 +151,7 @@ def test_messages_name_the_users_paths_and_no_other(user):
 def test_what_lies_at_the_same_path_on_the_workers_own_disk_is_not_read(user):
     there = user / "elsewhere" / "bump.csv"
     path = case_file("a.yaml", there)
-    bundle = bundle_of(path)  # the record does not exist yet
+    bundle = bundle_of_case(path)  # the record does not exist yet
     there.write_text(TEXT)
     with laid_out(bundle) as laid, pytest.raises(ExfitError, match=r"bump.csv: cannot be read"):
         exfit.fit(laid)
@@ -155,7 +160,7 @@ def test_what_lies_at_the_same_path_on_the_workers_own_disk_is_not_read(user):
 
 
 def test_bytes_that_change_on_the_way_are_refused(user):
-    bundle = bundle_of(case_file("a.yaml"))
+    bundle = bundle_of_case(case_file("a.yaml"))
     for at, file in enumerate(bundle.files):
         others = [*bundle.files]
         for content in (file.content[:-1], b"?" + file.content[1:], b""):
@@ -172,7 +177,7 @@ def test_files_are_compressed_where_it_pays(user):
     (user / "records" / "bump.csv").write_text(TEXT * 10)
     (user / "records" / "noise.csv").write_bytes(noise)
     unseen = {"name": "x", "test": FIRST_ORDER["test"], "record": {"file": "../records/noise.csv"}}
-    bundle = bundle_of(case_file("a.yaml", validate=[unseen]))
+    bundle = bundle_of_case(case_file("a.yaml", validate=[unseen]))
     sizes = {Path(file.path).name: len(file.content) for file in bundle.files}
     assert sizes["noise.csv"] == len(noise)
     assert sizes["bump.csv"] < 0.5 * len(TEXT * 10)
@@ -187,13 +192,13 @@ def test_a_link_that_makes_one_path_of_two_files_is_refused(user):
     unseen = {"name": "x", "test": FIRST_ORDER["test"], "record": {"file": "bump.csv"}}
     path = case_file("a.yaml", "link/../bump.csv", validate=[unseen])
     with pytest.raises(ExfitError, match="a link"):
-        bundle_of(path)
+        bundle_of_case(path)
 
 
 def test_a_file_that_cannot_be_read_is_refused_where_it_lies(user):
     with pytest.raises(ExfitError, match=r"records: cannot be read: Is a directory"):
-        bundle_of(case_file("a.yaml", "../records"))
-    missing = bundle_of(Path("none.yaml"))
+        bundle_of_case(case_file("a.yaml", "../records"))
+    missing = bundle_of_case(Path("none.yaml"))
     with laid_out(missing) as path, pytest.raises(CaseError, match=r"none.yaml: cannot be read"):
         exfit.fit(path)
 

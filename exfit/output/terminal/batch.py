@@ -16,7 +16,7 @@ class BatchProgress:
     def begun(self, cases: int, workers: int) -> None:
         """Show how much there is to do."""
         self._cases = cases
-        self._print(f"{cases} cases, {workers} workers")
+        self._print(f"{cases} cases, {f'{workers} workers' if workers else 'a cluster'}")
 
     def kept(self, case: str) -> None:
         """Count a case that is done already."""
