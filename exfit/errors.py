@@ -2,17 +2,19 @@
 
 from collections.abc import Iterable
 
+from exfit.util.text import first_texts
+
 
 class ExfitError(Exception):
     """Input that cannot be used; the message names the place, the value and the limit."""
 
 
 class FileError(ExfitError):
-    """Faults of a file, all of them together."""
+    """Faults of a file, or of several, together: the message has the first, ``faults`` all."""
 
     def __init__(self, faults: Iterable[str]) -> None:
         self.faults = tuple(faults)
-        super().__init__("\n".join(self.faults))
+        super().__init__("\n".join(first_texts(self.faults)))
 
 
 class CaseError(FileError):

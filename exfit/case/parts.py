@@ -141,9 +141,10 @@ def ties_of(data: Data, parts: Parts, faults: list[Fault]) -> Ties:
             faults.append(Fault(place, str(error)))
     names = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
     names += helpers_of(data, parts)
+    known = set(names)
     for name, tie in list(ties.items()):
         for used in tie.names:
-            if used not in names:
+            if used not in known:
                 faults.append(
                     Fault(places[name], f"{used} is not a parameter; {near(used, names)}")
                 )

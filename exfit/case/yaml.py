@@ -1,6 +1,6 @@
 """YAML with the place of every value: what is wrong with a file can be said with its line.
 
-Plain scalars are read as YAML 1.2 does: 1e-8 is a number; 1:30, yes and on are text; 010 is ten.
+Plain scalars are read as YAML 1.2 does: 1e-8 is a number; 1:30, yes, on and 010 are text.
 """
 
 import re
@@ -11,15 +11,18 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from exfit.errors import CaseError
-from exfit.util.root import on_disk
+from exfit.errors import CaseError, ExfitError
+from exfit.util.files import read_limited, utf8
 from exfit.util.text import Place
 
 LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
+LARGEST_FILE = 4_000_000  # bytes; a case has some thousand
+MOST_VALUES = 50_000  # of a file, each as often as aliases repeat it
 MOST_LEVELS = 20  # of nesting; a case file has five
-WHOLE = re.compile(r"[-+]?[0-9]+")
-DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]*)")
+LONGEST_WHOLE = 15  # digits: every whole number of so many is a double
+DECIMAL = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 INFINITE = re.compile(r"([-+]?)\.(inf|Inf|INF)")
 WORDS: dict[str, bool | float | None] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
@@ -58,20 +61,17 @@ class YamlNode:
 def read_text(path: Path) -> str:
     """Return the text of a file; raises CaseError where it cannot be read or is not UTF-8."""
     try:
-        data = on_disk(path).read_bytes()
-    except OSError as error:
-        raise CaseError([f"{path}: cannot be read: {error.strerror}"]) from None
-    return decoded(data, path)
+        return utf8(read_limited(path, LARGEST_FILE), path)
+    except ExfitError as error:
+        raise CaseError([str(error)]) from None
 
 
 def decoded(data: bytes, path: Path) -> str:
     """Return the text that the bytes of a file are; raises CaseError where they are not UTF-8."""
     try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        byte = data[error.start]
-        raise CaseError([f"{path}:{line}: not UTF-8 text: byte 0x{byte:02x}"]) from None
+        return utf8(data, path)
+    except ExfitError as error:
+        raise CaseError([str(error)]) from None
 
 
 def read_yaml(text: str, path: Path) -> tuple[YamlNode, list[Fault]]:
@@ -114,7 +114,8 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self.events: Iterator[Any] = yaml.parse(text, Loader=LOADER)
         self.faults: list[Fault] = []
-        self.anchors: dict[str, YamlNode] = {}
+        self.anchors: dict[str, tuple[YamlNode, int]] = {}  # with the number of its values
+        self.values = 0
 
     def document(self) -> YamlNode | None:
         """Return the node of the only document, None where there is none."""
@@ -133,15 +134,24 @@ class _Reader:
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
                 raise _NoYaml(_line(event), f"*{event.anchor}: no such anchor before it")
-            return self.anchors[event.anchor]
+            node, count = self.anchors[event.anchor]
+            self._count(count, event)
+            return node
         if len(place) > MOST_LEVELS:
             raise _NoYaml(_line(event), f"nested more than {MOST_LEVELS} levels deep")
         if event.tag is not None:
             self.faults.append(Fault(place, f"tag {event.tag} is not used here", _line(event)))
+        before = self.values
+        self._count(1, event)
         node = self._content(event, place)
         if event.anchor is not None:
-            self.anchors[event.anchor] = node
+            self.anchors[event.anchor] = node, self.values - before
         return node
+
+    def _count(self, values: int, event: Any) -> None:
+        self.values += values
+        if self.values > MOST_VALUES:
+            raise _NoYaml(_line(event), f"more than {MOST_VALUES:,} values")
 
     def _content(self, event: Any, place: Place) -> YamlNode:
         if isinstance(event, yaml.MappingStartEvent):
@@ -180,11 +190,11 @@ class _Reader:
 
 
 def scalar(text: str) -> str | bool | int | float | None:
-    """Return the value of a plain scalar; hexadecimal and octal forms stay text."""
+    """Return the value of a plain scalar; hexadecimal and octal forms, as 017, stay text."""
     if text in WORDS:
         return WORDS[text]
     if WHOLE.fullmatch(text):
-        return int(text) if len(text) < 16 else float(text)
+        return int(text) if len(text) <= LONGEST_WHOLE else float(text)
     if DECIMAL.fullmatch(text):
         return float(text)
     if infinite := INFINITE.fullmatch(text):

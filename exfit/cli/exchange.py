@@ -10,7 +10,7 @@ from exfit.cli.options import file_option, force_option, refuse_existing, write_
 from exfit.cli.planner import OfRecords, export_every_unit, import_every_unit
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 
 if TYPE_CHECKING:
     from exfit.results.model import FitResult
@@ -171,7 +171,7 @@ def _export_one(
         records = exported(fit, bus or own_bus, machine_id or own_id, model)
     except ExfitError as fault:
         texts = (f"{source}: {text}" for text in str(fault).splitlines())
-        raise ExfitError("\n".join(texts)) from None
+        raise FileError(texts) from None
     write_text(records.text, output, [f"{source}: {text}" for text in records.warnings])
     if output is not None:
         echo(f"written to {output}")

@@ -1,7 +1,7 @@
 """The commands import and export for all units of a planner's file."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,8 +10,9 @@ import click
 
 from exfit.cli.options import refuse_existing, warn
 from exfit.cli.streams import echo
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.util.sources import FITTED
+from exfit.util.text import first_texts
 
 if TYPE_CHECKING:
     from exfit.exchange.psse.fitted_file import ChangedValue, FittedUnit, LeftUnit
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from exfit.fleet.folder import Fleet
 
 UNITS = "units.csv"
-MOST_LISTED = 20  # units, records, in a terminal; the table has all
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def import_every_unit(dyr: Path, given: OfRecords, folder: Path | None, force: b
     if imported.unused:
         raise ExfitError(f"--step {imported.unused[0]}: no test of that name in any record")
     write_each(folder, {**imported.texts, UNITS: units_table(imported.units)})
-    warn(_first(imported.doubts))
+    warn(first_texts(imported.doubts))
     _report(plan, imported.units, folder)
 
 
@@ -85,7 +85,7 @@ def _refuse_existing(folder: Path, names: Sequence[str]) -> None:
     """Raise ExfitError where files would be lost."""
     existing = [str(folder / name) for name in names if (folder / name).exists()]
     if existing:
-        listed = "\n".join(_first(existing))
+        listed = "\n".join(first_texts(existing))
         raise ExfitError(f"{listed}\nexist already; --force writes over them")
 
 
@@ -97,13 +97,13 @@ def _report(plan: "ImportPlan", units: "Sequence[ImportedUnit]", folder: Path) -
     cases = [unit.case for unit in units if unit.case]
     counts = f"cases: {len(cases)}, with records: {len(recorded)}"
     echo(f"written to {folder}; {counts}; all units: {UNITS}")
-    for path in _first([str(path) for path in plan.others]):
+    for path in first_texts([str(path) for path in plan.others]):
         echo(f"not joined to a unit: {path}: its name does not begin with a bus", err=True)
-    for line in _first(_lines_of(units, NO_MODEL)):
+    for line in first_texts(_lines_of(units, NO_MODEL)):
         echo(f"no model: {line}", err=True)
     refused = [*_lines_of(units, REFUSED), *plan.faults]
     if refused:
-        raise ExfitError("\n".join(_first(refused)))
+        raise FileError(refused)
     if not cases:
         raise ExfitError(f"{plan.dyr}: no unit can be imported")
 
@@ -115,13 +115,6 @@ def _lines_of(units: "Sequence[ImportedUnit]", status: str) -> list[str]:
         for unit in units
         if unit.status == status
     ]
-
-
-def _first(texts: Iterable[str]) -> list[str]:
-    """Return the first texts, with the number of the others."""
-    listed = list(texts)
-    more = len(listed) - MOST_LISTED
-    return listed if more <= 0 else [*listed[:MOST_LISTED], f"... and {more} more"]
 
 
 def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force: bool) -> None:
@@ -144,7 +137,7 @@ def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force:
     left = [*fitted.left, *others]
     if not fitted.changes:
         listed = [f"{unit.name}: {unit.reason}" for unit in left]
-        raise ExfitError("\n".join([*_first(listed), f"{original}: no unit to change"]))
+        raise ExfitError("\n".join([*first_texts(listed), f"{original}: no unit to change"]))
     write(output, fitted.data)
     write(table, changes_table(fitted.changes))
     _report_export(output, table, fitted.changes, left)
@@ -179,7 +172,7 @@ def _original(fits: "Sequence[FittedUnit]") -> Path:
         if (found := result.as_found) is not None and found.file is not None
     }
     if len(files) != 1:
-        named = ", ".join(_first(files)) or "none"
+        named = ", ".join(first_texts([*files])) or "none"
         raise ExfitError(f"--dyr: missing; files that the cases name: {named}")
     return Path(next(iter(files)))
 
@@ -191,12 +184,12 @@ def _report_export(
     units = {(change.bus, change.id.upper()) for change in changes}
     echo(f"written to {output}; units changed: {len(units)}, values: {len(changes)}")
     echo(f"what was changed: {table}")
-    warn(_first(_undetermined(changes)))
-    for line in _first([f"{unit.name}: {unit.reason}" for unit in left if not unit.verified]):
+    warn(first_texts(_undetermined(changes)))
+    for line in first_texts([f"{unit.name}: {unit.reason}" for unit in left if not unit.verified]):
         echo(f"left as it was: {line}", err=True)
     refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]
     if refused:
-        raise ExfitError("\n".join(_first(refused)))
+        raise FileError(refused)
 
 
 def _undetermined(changes: "Sequence[ChangedValue]") -> list[str]:

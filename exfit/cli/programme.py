@@ -14,7 +14,7 @@ from exfit.cli.options import (
     print_json,
     warn,
 )
-from exfit.errors import ExfitError
+from exfit.errors import FileError
 
 if TYPE_CHECKING:
     from exfit.case.programme import Programme
@@ -49,7 +49,7 @@ def run(programme: Path, again: bool, output: Output) -> None:
         raise Interruption("no test is done")
     _write(result, folder, output)
     if result.failed:
-        raise ExfitError("\n".join(f"{name}: {fault}" for name, fault in result.failed.items()))
+        raise FileError(f"{name}: {fault}" for name, fault in result.failed.items())
     if not result.holds:
         raise SystemExit(NOT_CONVERGED)
 

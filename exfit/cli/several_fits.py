@@ -13,7 +13,7 @@ from exfit.cli.options import (
     refuse_own_files,
     warn,
 )
-from exfit.errors import CaseError, ExfitError
+from exfit.errors import CaseError, ExfitError, FileError
 
 if TYPE_CHECKING:
     from exfit.fleet.fits import FitRun, FitSeries, PlannedFit
@@ -59,7 +59,7 @@ def fit_several(
     if output.figures:
         draw_each(figures, output)
     if series.failed:
-        raise ExfitError("\n".join(f"{name}: {fault}" for name, fault in series.failed.items()))
+        raise FileError(f"{name}: {fault}" for name, fault in series.failed.items())
     if not series.all_hold:
         raise SystemExit(NOT_CONVERGED)
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from exfit.case.peek import content_of, files_in
 from exfit.case.yaml import decoded
-from exfit.errors import CaseError, ExfitError
+from exfit.errors import CaseError, ExfitError, FileError
 from exfit.fleet.folder import IndexEntry, case_name
 from exfit.fleet.summary import CaseStatus, facts_of
 from exfit.fleet.task import CODE, CaseTask, FitSettings, FurtherFiles, key_of
@@ -65,7 +65,7 @@ def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
         for file in _cases_below(path, folder) if path.is_dir() else [path]:
             paths.setdefault(case_name(folder, file), file)
     if missing:
-        raise ExfitError("\n".join(missing))
+        raise FileError(missing)
     if not paths:
         raise ExfitError(f"{', '.join(map(str, given))}: no case (*.yaml) in there")
     return tuple(paths.values())

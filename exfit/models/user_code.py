@@ -5,9 +5,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from exfit.errors import ModelError
-from exfit.util.root import on_disk
+from exfit.errors import ExfitError, ModelError
+from exfit.util.files import read_limited
 
+LARGEST_FILE = 4_000_000  # bytes
 HASH_DIGITS = 12  # digits of a hash that distinguish files
 
 
@@ -17,12 +18,10 @@ def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
     Raises ModelError where the file cannot be read or fails, and, before anything of it is run,
     where its hash is not ``sha256``; empty: any hash will do.
     """
-    if not on_disk(path).is_file():
-        raise ModelError(f"{path}: no such file")
     try:
-        code = on_disk(path).read_bytes()
-    except OSError as fault:
-        raise ModelError(f"{path}: cannot be read: {fault.strerror}") from fault
+        code = read_limited(path, LARGEST_FILE)
+    except ExfitError as fault:
+        raise ModelError(str(fault)) from fault
     own = hashlib.sha256(code).hexdigest()
     if sha256 and own != sha256:
         raise ModelError(

@@ -10,7 +10,7 @@ from errno import ENOTDIR
 from pathlib import Path
 from zlib import crc32
 
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.util.interrupts import deferred_interrupts
 from exfit.util.root import on_disk
 
@@ -22,7 +22,7 @@ ABANDONED = 86_400.0  # s: so old, a temporary file of any computer is of a run 
 def read_limited(path: Path, most: int) -> bytes:
     """Return the bytes of a file; raises ExfitError for more than ``most``, or one not readable."""
     try:
-        with path.open("rb") as file:
+        with on_disk(path).open("rb") as file:
             data = file.read(most + 1)
     except (OSError, ValueError) as fault:  # ValueError: a name with a null character
         why = fault.strerror if isinstance(fault, OSError) else fault
@@ -30,6 +30,16 @@ def read_limited(path: Path, most: int) -> bytes:
     if len(data) > most:
         raise ExfitError(f"{path}: larger than {most / 1e6:g} MB, the limit of such a file")
     return data
+
+
+def utf8(data: bytes, path: Path) -> str:
+    """Return the text that the bytes of a file are; raises ExfitError where they are not UTF-8."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        byte = f"byte 0x{data[error.start]:02x}"
+        raise ExfitError(f"{path}:{line}: not UTF-8 text: {byte}") from None
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -128,7 +138,7 @@ def write_together(folder: Path, contents: Mapping[str, str], obsolete: Iterable
                 with suppress(OSError):
                     temporary.unlink(missing_ok=True)
     if faults:
-        raise ExfitError("\n".join(faults))
+        raise FileError(faults)
 
 
 def remove_abandoned(folder: Path) -> None:

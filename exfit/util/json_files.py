@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from exfit.errors import ExfitError
-from exfit.util.files import read_limited
+from exfit.util.files import read_limited, utf8
 
 LARGEST_FILE = 128_000_000  # bytes; a result of a hundred long records has about as many
 MOST_PARTS = 2_000_000  # texts, lists and mappings; a result has some thousand
 LONGEST_INTEGER = 400  # digits; a longer one takes long to read, and no double is as large
-HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
+HALF_CHARACTER = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -20,22 +20,18 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises ExfitError, with the place where there is one, for a file that cannot be read, is too
     large, is no JSON in UTF-8, has a key twice in a mapping, or whose top is no mapping.
     """
-    data = read_limited(path, LARGEST_FILE)
-    if sum(map(data.count, (b'"', b"[", b"{"))) > MOST_PARTS:
+    text = utf8(read_limited(path, LARGEST_FILE), path)
+    if sum(map(text.count, '"[{')) > MOST_PARTS:
         raise ExfitError(f"{path}: more than {MOST_PARTS:,} texts, lists and mappings")
     try:
         content = json.loads(
-            data.decode("utf-8-sig"),
+            text,
             object_pairs_hook=_mapping,
             parse_constant=_refuse_constant,
             parse_int=_integer,
         )
-        if HALF_CHARACTER.search(data):
+        if HALF_CHARACTER.search(text):
             json.dumps(content, ensure_ascii=False).encode()
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        text = f"not UTF-8 text: line {line}: byte 0x{data[error.start]:02x}"
-        raise ExfitError(f"{path}: {text}") from None
     except UnicodeEncodeError:
         raise ExfitError(f"{path}: not JSON: a text with half a character (\\ud8..)") from None
     except RecursionError:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import floor, isfinite, log10
 from types import NoneType
 from typing import Any
@@ -64,14 +64,34 @@ DIGITS = 5  # of a number without an error
 DIGITS_OF_ERROR = 2  # that a number is printed to
 MOST_DIGITS = 7  # of a number whose error is as good as none
 MOST_DECIMALS = 7  # of a number: a smaller one has an exponent
+MOST_TEXTS = 20  # faults or warnings that are listed
+LONGEST_TEXT = 1000  # characters of one of them
+MOST_NAMES = 60  # that are listed
+MOST_COMPARED = 1000  # names among which the nearest is looked for: each word takes a millisecond
 LONGEST_VALUE = 60  # characters of a wrong value
+
+
+def first_texts(texts: Sequence[str]) -> list[str]:
+    """Return the first texts, long ones cut off, and how many more there are."""
+    first = [
+        text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
+        for text in texts[:MOST_TEXTS]
+    ]
+    more = len(texts) - MOST_TEXTS
+    return first if more <= 0 else [*first, f"... and {more:,} more"]
 
 
 def near(word: str, names: Iterable[str]) -> str:
     """Return a hint at the name that is meant by a word, or at all names."""
-    all_names = list({name.casefold(): name for name in names}.values())
-    meant = closest(word, all_names)
-    return f"known: {', '.join(all_names)}" if meant is None else f"did you mean {meant}?"
+    all_names = list(names)
+    meant = None
+    if len(all_names) <= MOST_COMPARED:
+        all_names = list({name.casefold(): name for name in all_names}.values())
+        meant = closest(word, all_names)
+    if meant is not None:
+        return f"did you mean {meant}?"
+    more = len(all_names) - MOST_NAMES
+    return f"known: {', '.join(all_names[:MOST_NAMES])}{f' ... and {more:,} more' * (more > 0)}"
 
 
 def closest(word: str, names: Iterable[str], cutoff: float = 0.6) -> str | None:

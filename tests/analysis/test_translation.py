@@ -238,7 +238,7 @@ def test_a_users_own_model_is_run_only_from_the_file_that_was_fitted(tmp_path):
     with pytest.raises(ModelError, match="not run: the file has changed since the fit"):
         exfit.translate(fit, "SEXS")
     (tmp_path / "own.py").unlink()
-    with pytest.raises(ModelError, match="no such file"):
+    with pytest.raises(ModelError, match="cannot be read: No such file"):
         exfit.translate(fit, "SEXS")
 
 

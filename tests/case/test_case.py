@@ -450,7 +450,12 @@ FORM = {
 
 MEANING = {
     "unknown model": ("AC1A", "AC1B", "model", ["AC1B", "AC1A, ESAC1A, AC2A"]),
-    "missing model file": ("model: AC1A", "model: mine.py", "model", ["mine.py", "no such file"]),
+    "missing model file": (
+        "model: AC1A",
+        "model: mine.py",
+        "model",
+        ["mine.py", "cannot be read: No such file"],
+    ),
     "unknown machine": ("GENROU", "GENRUO", "plant.machine", ["'GENRUO'", "did you mean GENROU?"]),
     "unknown fixed": ("KE: 1.0", "KEE: 1.0", "parameters.fixed.KEE", ["AC1A", "did you mean KE?"]),
     "unknown free": ("TA: {", "Ta: {", "parameters.free.Ta", ["AC1A", "did you mean TA?"]),
@@ -833,7 +838,7 @@ def test_aliases_stand_for_what_they_name(case_file):
 def test_aliases_of_aliases_do_not_explode(case_file):
     levels = [f"a{at}: &a{at} [{', '.join([f'*a{at - 1}'] * 10)}]" for at in range(1, 15)]
     told = faults_of(case_file("a0: &a0 [1]\n" + "\n".join(levels) + "\ntest: *a14\n"))
-    assert any("test: a list is not a mapping" in fault for fault in told)
+    assert [*told] == [f"{case_file('')}:6: more than 50,000 values"]
 
 
 @pytest.mark.parametrize(
@@ -842,7 +847,6 @@ def test_aliases_of_aliases_do_not_explode(case_file):
         ("1", 1),
         ("-0", 0),
         ("+12", 12),
-        ("010", 10),
         ("1e-8", 1e-8),
         ("1.0e+3", 1000.0),
         ("1.", 1.0),
@@ -868,7 +872,7 @@ def test_plain_scalars_are_read_as_yaml_1_2_has_them(text, value):
     "text",
     [
         "1:30", "1:30:00", "2001-01-01", "yes", "no", "on", "off", "y", "1_000", "0x1F", "0o17",
-        "0b1", "e5", "1e", ".", "inf", "nan", "+", "-", "1.2.3", "١",
+        "010", "-007.5", "0b1", "e5", "1e", ".", "inf", "nan", "+", "-", "1.2.3", "١",
     ],
 )  # fmt: skip
 def test_other_plain_scalars_are_text(text):

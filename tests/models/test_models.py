@@ -484,7 +484,7 @@ def test_a_file_that_is_no_model_is_refused_by_name(tmp_path, change, says):
 
 
 def test_a_missing_file_is_refused_by_name(tmp_path):
-    with pytest.raises(ModelError, match=r"none\.py: no such file"):
+    with pytest.raises(ModelError, match=r"none\.py: cannot be read: No such file"):
         find("none.py", tmp_path)
 
 

@@ -21,7 +21,7 @@ from exfit.case.checks.recorded_reference import recorded_reference_faults
 from exfit.case.checks.sources import source_faults
 from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
-from exfit.case.yaml import Fault
+from exfit.case.yaml import LONGEST_WHOLE, Fault
 from exfit.plants import PlantKind
 from exfit.util.strategies import DEFAULT_SEARCH
 
@@ -60,6 +60,15 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from _estimate_faults(content)
     yield from _starts_faults(content, parts)
     yield from as_found_faults(content, parts)
+    yield from _fact_faults(content.at("about"))
+
+
+def _fact_faults(about: ContentNode) -> Iterator[Fault]:
+    """Yield facts that are numbers of more digits than a number keeps, as a serial number."""
+    for key, fact in about.numbers.items():
+        if abs(fact) >= 10.0**LONGEST_WHOLE:
+            text = f"more than {LONGEST_WHOLE} digits are not kept; put the number in quotes"
+            yield about.at(key).fault(text)
 
 
 def _single_record_faults(content: ContentNode) -> Iterator[Fault]:

@@ -7,9 +7,13 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.records.formats import WORKBOOKS
+from exfit.util.files import read_limited, utf8
 from exfit.util.text import near
+
+LARGEST_TABLE = 16_000_000  # bytes
+MOST_COLUMNS = 1000  # of a table
 
 
 class Cells(NamedTuple):
@@ -42,7 +46,7 @@ def read_cells(path: Path, columns: Sequence[str], prefixes: Sequence[str] = ())
         if len(_without_blank_end(cells)) > len(names):
             faults.append(f"{path}:{number}: more cells than columns: {len(cells)}, {len(names)}")
     if faults:
-        raise ExfitError("\n".join(faults))
+        raise FileError(faults)
     table = [
         Cells(
             f"{path}:{number}",
@@ -61,7 +65,10 @@ def read_cells(path: Path, columns: Sequence[str], prefixes: Sequence[str] = ())
 def _wrong_names(
     names: Sequence[str], place: str, columns: Sequence[str], prefixes: Sequence[str]
 ) -> Iterator[str]:
-    """Yield the names of columns that are unknown or repeated."""
+    """Yield the names of columns that are unknown or repeated, or that there are too many."""
+    if len(names) > MOST_COLUMNS:
+        yield f"{place}: {len(names):,} columns; at most {MOST_COLUMNS:,} allowed"
+        return
     known = (*columns, *(f"{prefix}..." for prefix in prefixes))
     for number, name in enumerate(names):
         if name in names[:number]:
@@ -78,7 +85,7 @@ def _without_blank_end(cells: Sequence[str]) -> list[str]:
 
 def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Yield the cells of each row of a CSV file behind the number of its line."""
-    lines = _lines(path)
+    lines = utf8(read_limited(path, LARGEST_TABLE), path).splitlines()
     separator = ";" if lines and ";" in lines[0] else ","
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
     try:
@@ -87,16 +94,6 @@ def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
                 yield reader.line_num, cells
     except csv.Error as fault:
         raise ExfitError(f"{path}:{reader.line_num}: cannot be read: {fault}") from None
-
-
-def _lines(path: Path) -> list[str]:
-    """Return the lines of a table; raises ExfitError where it cannot be read."""
-    try:
-        return path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as fault:
-        raise ExfitError(f"{path}: cannot be read: {fault.strerror}") from None
-    except UnicodeDecodeError:
-        raise ExfitError(f"{path}: cannot be read: not UTF-8 text") from None
 
 
 def _workbook_rows(path: Path) -> Iterator[tuple[int, list[str]]]:

@@ -6,7 +6,7 @@ from math import copysign
 from typing import NamedTuple, NoReturn
 
 from exfit.case.starting.bases import Base
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.records.contradictions import LARGEST_STEP, size_in_words
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, is_whole_record, tests_of, unique_names
@@ -221,7 +221,7 @@ def _refuse_without_steps(inspections: Sequence[Inspection]) -> None:
         if not tests_of(inspection)
     ]
     if faults:
-        raise ExfitError("\n".join(faults))
+        raise FileError(faults)
 
 
 def _refuse_unused(texts: Sequence[str], names: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ from exfit.case.starting.table_of_tests import (
     number_in,
     table_row,
 )
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.records.units import unit_of
 from exfit.util.text import near
 
@@ -73,7 +73,7 @@ def read_case_table(path: Path, dyr: Path | None = None) -> tuple[CaseOfTable, .
     cases = [_case(rows, path.parent, dyr, faults) for rows in by_case.values()]
     faults += _repeated(cases)
     if faults:
-        raise ExfitError("\n".join(dict.fromkeys(faults)))
+        raise FileError(dict.fromkeys(faults))
     return tuple(cases)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeVar
 from exfit.case.starting.bases import Base, base_of
 from exfit.case.starting.cells import Cells, read_cells
 from exfit.case.starting.starting_tests import StartingTest, renamed, started
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.records.inspection import Inspection
 from exfit.records.recorded_tests import DetectedTest, tests_of
 
@@ -39,7 +39,7 @@ def read_test_table(path: Path) -> tuple[TableRow, ...]:
     faults = list[str]()
     rows = [table_row(row, path.parent, faults) for row in read_cells(path, COLUMNS)]
     if faults:
-        raise ExfitError("\n".join(faults))
+        raise FileError(faults)
     return tuple(rows)
 
 

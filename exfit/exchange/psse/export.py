@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 from exfit import __version__
-from exfit.errors import ExfitError
+from exfit.errors import ExfitError, FileError
 from exfit.exchange.psse.records import (
     WIDTH,
     Definition,
@@ -170,7 +170,7 @@ def _written(result: FitResult, definition: Definition, prefix: str) -> Written:
     faults = [*outside(sheet, values)] or [*contradictions(definition.model, values)]
     if faults:
         texts = (f"{definition.record.name}: {prefix}{symbol}: {text}" for symbol, text in faults)
-        raise ExfitError("\n".join(texts))
+        raise FileError(texts)
     own = {row.symbol: result.sources.get(prefix + row.symbol, NOT_STATED) for row in sheet}
     written = [name for name in definition.names if name in own]
     return Written(definition, values, by_source(written, own))

@@ -11,13 +11,15 @@ from exfit.case.templates import (
     parameter_line,
     source_lines,
 )
-from exfit.errors import DynamicsError
+from exfit.errors import DynamicsError, ExfitError
 from exfit.exchange.psse.fields import text_of
 from exfit.exchange.psse.unit import Unit, UnitPart, read_unit
 from exfit.models.sheet import Sheet
+from exfit.util.files import read_limited
 from exfit.util.sources import TYPICAL
 from exfit.util.text import yaml_number
 
+LARGEST_FILE = 32_000_000  # bytes; that of a whole interconnection has fewer
 TEST = """\
 test:                   # a 5 % step; a record takes the place of the duration
   vt0: 1.0
@@ -34,9 +36,9 @@ def import_unit(path: Path, bus: int | None = None, machine_id: str | None = Non
 def read_file(path: Path) -> bytes:
     """Return the content of a dynamics file; raises DynamicsError where it cannot be read."""
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DynamicsError([f"{path}: cannot be read: {error.strerror}"]) from None
+        return read_limited(path, LARGEST_FILE)
+    except ExfitError as error:
+        raise DynamicsError([str(error)]) from None
 
 
 def case_text(unit: Unit, file: str) -> str:
