@@ -1,14 +1,18 @@
 """Count what is left of a folder with a former fit when a signal meets the next one.
 
-Run it as ``python tests/studies/interrupts.py [INTERRUPTIONS [KILLS]]``. Each run fits
+Run it as ``python tests/studies/interrupts.py [INTERRUPTIONS [KILLS [COMMANDS]]]``. Each run fits
 configs/first_order.yaml, figures included, in a process of its own, into a copy of a folder that
-holds another fit; SIGINT or SIGKILL meets it at a random moment between its start and its end. A
-quarter as many meet it in the few milliseconds in which it writes its numbers. Where SIGKILL left
-temporary files, the next fit runs there to its end, and those that it leaves are counted.
+holds another fit; SIGINT, SIGTERM or SIGKILL meets it at a random moment between its start and its
+end. A quarter as many meet it in the few milliseconds in which it writes its numbers. Where SIGKILL
+left temporary files, the next fit runs there to its end, and those that it leaves are counted.
+
+Then as many signals as COMMANDS says, of each kind, meet each of some other commands: a fault is
+an exit code that is none of such an end, a traceback, or a file too many or too few.
 """
 
 import random
 import signal
+import subprocess
 import sys
 import tempfile
 from collections import Counter
@@ -16,9 +20,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
+from ended_commands import ENDS, WITH_SIGNALS, fault_of, undisturbed
 from interrupted_runs import CASE, TEMPORARY, fit, fit_before, met_by, seconds_of_fit
+from writers import FIT_BEFORE, prepare
 
-INTERRUPTIONS, KILLS, SEED = 200, 100, 2026
+INTERRUPTIONS, KILLS, COMMANDS, SEED = 200, 100, 10, 2026
 WRITING = 0.06  # s: about how long the numbers take
 TIMED = 10  # runs until a fit is timed again: other work on the machine slows it down
 LATE = 1.1  # of the time of a fit: some signals come too late
@@ -48,16 +54,34 @@ def study(number, count, while_writing, before, place):
     sys.stdout.flush()
 
 
+def study_commands(count, place):
+    """Send signals of each kind to commands and print what was wrong after them."""
+    prepare(place)
+    subprocess.run(
+        [sys.executable, "-m", "exfit", *FIT_BEFORE], cwd=place, stdout=subprocess.DEVNULL
+    )
+    for name in WITH_SIGNALS:
+        seconds = undisturbed(name, place)
+        for kind in ENDS:
+            rng = random.Random(f"{SEED} {name} {kind}")
+            moments = [rng.uniform(0.0, LATE * seconds) for _ in range(count)]
+            faults = [*filter(None, (fault_of(name, kind, moment, place) for moment in moments))]
+            print(f"{count} {kind} to {name}: {len(faults)} faults", *faults[:3], flush=True)
+
+
 def main():
     """Print what is left after interruptions and kills."""
     given = [int(text) for text in sys.argv[1:]]
-    interruptions, kills = (*given, *(INTERRUPTIONS, KILLS)[len(given) :])
+    interruptions, kills, commands = (*given, *(INTERRUPTIONS, KILLS, COMMANDS)[len(given) :])
     with tempfile.TemporaryDirectory() as place:
         before, seconds = fit_before(Path(place))
         print(f"a fit with figures takes {seconds:.2f} s", flush=True)
-        for number, count in ((signal.SIGINT, interruptions), (signal.SIGKILL, kills)):
+        counts = {signal.SIGINT: interruptions, signal.SIGTERM: kills, signal.SIGKILL: kills}
+        for number, count in counts.items():
             for while_writing, runs in ((False, count), (True, count // 4)):
                 study(number, runs, while_writing, before, Path(place))
+        (Path(place) / "commands").mkdir()
+        study_commands(commands, Path(place) / "commands")
 
 
 if __name__ == "__main__":

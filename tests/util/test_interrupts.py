@@ -2,10 +2,14 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 
+import exfit
 from exfit.util.interrupts import ENDING, deferred_interrupts, endings_as_interruptions
 
 
@@ -141,3 +145,22 @@ def test_other_threads_get_no_handlers():
     thread.start()
     thread.join()
     assert handlers == [signal.SIG_DFL]
+
+
+IN_TEXT = """\
+from exfit.util.interrupts import endings_as_interruptions
+def main():
+    try:
+        with endings_as_interruptions():
+            exec("raise KeyboardInterrupt")
+    except KeyboardInterrupt:
+        raise SystemExit(143) from None
+"""
+
+
+def test_an_interruption_of_code_made_of_text_changes_no_exit_code(tmp_path):
+    (tmp_path / "program.py").write_text(IN_TEXT + "main()\n")
+    root = str(Path(exfit.__file__).parents[1])
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((root, str(tmp_path)))}
+    ran = subprocess.run([sys.executable, "-m", "program"], env=environment, check=False)
+    assert ran.returncode == 143
