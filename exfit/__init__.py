@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from exfit.analysis.steady.saturation import saturation_curve
     from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
+    from exfit.exchange.table_cases import cases_of_table
     from exfit.fleet.batch import batch
     from exfit.fleet.fits import fit_all
     from exfit.fleet.folder import read_fleet
@@ -58,6 +59,7 @@ __all__ = [
     "SimulationError",
     "__version__",
     "batch",
+    "cases_of_table",
     "check",
     "fit",
     "fit_all",
@@ -80,6 +82,7 @@ _MODULES = {
     "FitResult": "exfit.results.model",
     "Record": "exfit.records.record",
     "batch": "exfit.fleet.batch",
+    "cases_of_table": "exfit.exchange.table_cases",
     "check": "exfit.workflows",
     "fit": "exfit.workflows",
     "fit_all": "exfit.fleet.fits",

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 import click
 
 from exfit.cli.options import NOT_CONVERGED, Interruption, print_json
+from exfit.errors import ExfitError
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
+    from exfit.fleet.batch import CaseMaking
     from exfit.fleet.folder import Fleet
     from exfit.fleet.observer import BatchObserver
     from exfit.fleet.task import FurtherFiles
@@ -97,7 +99,10 @@ def batch(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Fit all CASES: case files, and folders with case files (*.yaml) in them or below.
+    """Fit all CASES: case files, folders with case files (*.yaml) in them or below, and tables.
+
+    A table, CSV or a workbook, lists records with what is known of each; the rows of a unit become
+    a case in DIR/cases, as `exfit new` makes it.
 
     Each case is fitted as `exfit fit` does it, in worker processes. Its files lie in a folder of
     DIR that is named after a hash of all that goes into the fit: the case, its records, its model
@@ -121,8 +126,9 @@ def batch(
     from exfit.fleet.batch import batch as fit_all
     from exfit.output.fleet_folder import write_tables
 
+    tables, others = _tables_among(cases)
     fleet = fit_all(
-        cases,
+        others,
         output,
         workers=workers,
         scheduler=scheduler,
@@ -135,6 +141,7 @@ def batch(
         observer=None if quiet or as_json else _observer(),
         further=_reports() if reports else (),
         write_tables=write_tables,
+        made=_cases_of(tables, output),
     )
     if reports:
         _write_missing_reports(fleet)
@@ -143,6 +150,33 @@ def batch(
     elif not quiet:
         _show(fleet)
     _exit(fleet)
+
+
+def _tables_among(given: "Sequence[Path]") -> tuple[list[Path], list[Path]]:
+    """Return the tables of records among what is given, and the rest."""
+    from exfit.case.starting.cells import is_table
+
+    tables = [path for path in given if is_table(path) and not path.is_dir()]
+    return tables, [path for path in given if path not in tables]
+
+
+def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]":
+    """Return what makes the cases of tables; raises ExfitError with the faults of all of them."""
+    from exfit.exchange.table_cases import cases_of_table
+
+    made: dict[Path, CaseMaking] = {}
+    faults = []
+    for table in tables:
+        try:
+            cases = cases_of_table(table, folder)
+        except ExfitError as fault:
+            faults.append(str(fault))
+            continue
+        faults += [f"{table}: {file.stem}: also in another table" for file in made.keys() & cases]
+        made |= cases
+    if faults:
+        raise ExfitError("\n".join(faults))
+    return made
 
 
 def _observer() -> "BatchObserver":

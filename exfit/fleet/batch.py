@@ -1,11 +1,12 @@
 """Many cases fitted by many workers: what is done is kept in a folder, and not done again."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import inf
 from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
 
 from exfit.errors import ExfitError
 from exfit.fleet.dispatch import cluster_workers
@@ -26,7 +27,15 @@ from exfit.fleet.folder import (
 )
 from exfit.fleet.local import Compute, local_workers
 from exfit.fleet.observer import BatchObserver, Unobserved
-from exfit.fleet.plan import BatchSettings, PlannedCase, Share, case_files, planned_case, share_of
+from exfit.fleet.plan import (
+    BatchSettings,
+    PlannedCase,
+    Share,
+    case_files,
+    planned_case,
+    refused_case,
+    share_of,
+)
 from exfit.fleet.task import FitSettings, FurtherFiles
 from exfit.util.interrupts import endings_as_interruptions
 from exfit.util.strategies import SEARCHES, STRATEGIES
@@ -35,6 +44,9 @@ from exfit.util.threads import processors
 
 TIME_LIMIT = 3600.0  # s: of a case
 MOST_TABLES = 5  # until those are left to another run that goes on in the folder
+
+
+CaseMaking = Callable[[], str]  # writes a case and returns "", or why it cannot be made
 
 
 def _no_tables(_: Fleet) -> None:
@@ -57,6 +69,7 @@ def batch(
     further: Sequence[FurtherFiles] = (),
     compute: Compute | None = None,
     write_tables: Callable[[Fleet], None] = _no_tables,
+    made: Mapping[Path, CaseMaking] = MappingProxyType({}),
 ) -> Fleet:
     """Fit many cases in several processes; what the folder has already is not fitted again.
 
@@ -83,6 +96,8 @@ def batch(
             workers they are functions of a module.
         compute: has the cases fitted in another way than in processes of this computer.
         write_tables: called with the fleet at the end, and again if the folder has changed since.
+        made: further cases, by their files, each with the function that makes it when its turn
+            comes: it returns why it cannot, or "".
 
     A KeyboardInterrupt ends all workers at once: what is done is kept, and the fleet is
     ``interrupted``. Raises ExfitError where there are no cases, the folder cannot be written, or
@@ -95,10 +110,11 @@ def batch(
     given = [cases] if isinstance(cases, str | PathLike) else [*cases]
     place, share = Path(folder), Share(*part)
     _refuse(share, workers, time_limit, strategy, search)
-    files = share_of(case_files(map(Path, given), place), share, place)
+    existing = case_files(map(Path, given), place) if given or not made else ()
+    files = share_of(_each_once([*existing, *made], place), share, place)
     settings = BatchSettings(FitSettings(strategy, search), trust, retry_failed, tuple(further))
     count = min(workers or processors(), max(1, len(files)))
-    run = BatchRun(files, place, settings, observer or Unobserved())
+    run = BatchRun(files, place, settings, observer or Unobserved(), made)
     if scheduler is not None:
         compute, count = cluster_workers(scheduler, time_limit), 0
     try:
@@ -110,6 +126,11 @@ def batch(
     fleet = tables_of(place, write_tables)
     names = frozenset(case_name(place, file) for file in files)
     return replace(fleet, run=names, interrupted=interrupted)
+
+
+def _each_once(files: Iterable[Path], folder: Path) -> list[Path]:
+    """Return files without those that are given in another way, too."""
+    return [*{case_name(folder, file): file for file in files}.values()]
 
 
 def _refuse(
@@ -139,7 +160,9 @@ class BatchRun:
         folder: Path,
         settings: BatchSettings,
         observer: BatchObserver,
+        made: Mapping[Path, CaseMaking] = MappingProxyType({}),
     ) -> None:
+        self.made = {case_name(folder, file): make for file, make in made.items()}
         self.files, self.folder, self.settings = files, folder, settings
         self.observer = observer
 
@@ -163,7 +186,7 @@ class BatchRun:
         """Yield the cases that are to be fitted; the others are entered and announced."""
         keys = set[str]()
         for file in self.files:
-            case = planned_case(file, self.folder, self.settings)
+            case = self._planned(file)
             write_entry(self.folder, case.entry)
             key = case.entry.key
             if case.task is None:
@@ -173,6 +196,14 @@ class BatchRun:
             else:
                 keys.add(key)
                 yield case
+
+    def _planned(self, file: Path) -> PlannedCase:
+        """Return a case with its task, made first where it is one of a table."""
+        make = self.made.get(case_name(self.folder, file))
+        reason = "" if make is None else make()
+        if reason:
+            return refused_case(file, self.folder, reason)
+        return planned_case(file, self.folder, self.settings)
 
     def _is_kept(self, key: str) -> bool:
         if is_done(self.folder, key):

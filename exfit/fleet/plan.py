@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from exfit.case.open_values import open_places
 from exfit.case.peek import content_of, files_in
 from exfit.case.yaml import decoded
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.fleet.folder import IndexEntry, case_name
 from exfit.fleet.summary import CaseStatus, facts_of
 from exfit.fleet.task import CODE, CaseTask, FitSettings, FurtherFiles, key_of
+from exfit.util.text import dotted
 
 SUFFIXES = (".yaml", ".yml")
 # what a case has at its top, or a programme; a file of a folder without any of these is neither
@@ -123,15 +125,30 @@ def planned_case(case: Path, folder: Path, settings: BatchSettings) -> PlannedCa
         content = {}
     entry = replace(entry, facts=facts_of(content))
     files = (case, *(file for file in files_in(content, case.parent) if file != case))
-    code = [file.name for file in files if file.suffix == CODE]
-    if code and not settings.trust:
-        reason = f"{', '.join(code)}: code that the case names; it is run with --trust only"
+    reason = _why_refused(content, files, settings.trust)
+    if reason:
         return _without_task(entry, "refused", reason)
     if content and not WITH_RECORD & content.keys():
         return _without_task(entry, "no record", NO_RECORD)
     key = key_of(files, settings.fit, data)
     task = CaseTask(files, key, folder / key, settings.fit, _group(content), settings.further)
     return PlannedCase(replace(entry, key=key), task)
+
+
+def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool) -> str:
+    """Return why a case is not even tried, "" where it is: open values, code without trust."""
+    missing = [dotted(place) for place in open_places(content)]
+    if missing:
+        return f"{files[0]}: to be filled in: {', '.join(missing)}"
+    code = [file.name for file in files if file.suffix == CODE]
+    if code and not trust:
+        return f"{', '.join(code)}: code that the case names; it is run with --trust only"
+    return ""
+
+
+def refused_case(case: Path, folder: Path, reason: str) -> PlannedCase:
+    """Return a case that cannot be made, with the reason."""
+    return _without_task(IndexEntry(case_name(folder, case)), "refused", reason)
 
 
 def _without_task(entry: IndexEntry, status: CaseStatus, reason: str) -> PlannedCase:
