@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.intp]
 
+LOWEST_CUTOFF = 1e-6  # of the sampling rate: the coefficients for a lower one are rounded away
 BUTTERWORTH_ORDER = 2  # of the Butterworth filter, which runs twice
 FEWEST_FILTERED = 10  # samples: the filter starts on a mirror of three times its length
 FEWEST_AVERAGED = 2  # samples of a line
@@ -66,8 +67,8 @@ class Filtering:
 
     Raises:
         ValueError: no sample is kept, the low-pass filter finds uneven sampling, a cutoff that is
-            not between zero and half the sampling rate, or fewer than ten samples, or an average
-            finds fewer than two samples or a window longer than the record.
+            not between a millionth and half of the sampling rate, or fewer than ten samples, or an
+            average finds fewer than two samples or a window longer than the record.
     """
 
     time: Array
@@ -240,10 +241,11 @@ def _check_filter(time: Array, cutoff: float) -> None:
             f"{len(time)} samples: the low-pass filter needs at least {FEWEST_FILTERED}"
         )
     step = even_step(time, "the low-pass filter")
-    if not 0.0 < cutoff < 0.5 / step:
+    lowest = LOWEST_CUTOFF / step
+    if not lowest <= cutoff < 0.5 / step:
         raise ValueError(
-            f"cutoff of {cutoff:g} Hz: it must lie between 0 and half the sampling rate, "
-            f"{0.5 / step:g} Hz"
+            f"cutoff of {cutoff:g} Hz: it must lie between {lowest:g} Hz and half the sampling "
+            f"rate, {0.5 / step:g} Hz"
         )
 
 

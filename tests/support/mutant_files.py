@@ -48,19 +48,72 @@ def _configs(folder: str) -> tuple[tuple[str, bytes], ...]:
     return tuple((file.name, file.read_bytes().replace(up, b"../sample_data")) for file in files)
 
 
+@cache
+def _keys_of_cases() -> tuple[str, ...]:
+    """Return every key that a case file knows."""
+    from exfit.case.json_schema import json_schema
+
+    schema = json_schema()
+    parts = [schema, *schema["$defs"].values()]
+    return tuple(sorted({key for part in parts for key in part.get("properties", ())}))
+
+
+@cache
+def _example() -> bytes:
+    """Return the case of the documentation that has every section."""
+    page = (ROOT / "docs" / "case_file.md").read_text(encoding="utf-8")
+    return page.partition("```yaml\n")[2].partition("```")[0].encode()
+
+
 def _yaml(rng: Random, sources: tuple[bytes, ...], changes: Changes) -> bytes:
     """Return a mutant of one of several YAML files, perhaps with parts of another one."""
     one, other = rng.choice(sources), rng.choice(sources)
     if rng.random() < TREE:
-        tree = mutated_tree(rng, yaml.safe_load(one), yaml.safe_load(other), changes)
-        return yaml_bytes(tree)
+        trees = yaml.safe_load(one), yaml.safe_load(other)
+        return yaml_bytes(mutated_tree(rng, *trees, changes, _keys_of_cases()))
     return mutated_bytes(rng, one, other, changes, text=True)
+
+
+# a case whose channels, steps and estimate have many of their keys
+RICH = b"""model: AC8B
+plant:
+  type: infinite-bus
+  machine: GENROU
+  parameters: {Tpd0: 6.27, Xd: 2.014, Xq: 1.96, Xpd: 0.331, Xppd: 0.2059, Xl: 0.129}
+  network: {f0: 60, R: 0.0, X: 0.3, P: 0.8, E: 1.0}
+stabiliser: {model: PSS1A, parameters: {KS: 5.0}}
+test:
+  vref: [{at: 1.0, step: 0.02, ramp: 0.1}, {at: 4.0, step: -0.01}]
+  E: [{at: 6.0, step: -0.01}]
+  network: [{at: 7.0, X: 0.35}]
+record:
+  file: ../sample_data/ac8b_on_line.csv
+  time: {column: t, unit: s}
+  window: [0.5, 9.5]
+  delay: 0.01
+  resample: 50.0
+  channels:
+    vt: {column: vt, noise: 1.0e-4, filter: {lowpass: 5.0}, outliers: 6, scale: 1.0, offset: 0.0}
+    p: {column: p, noise: 1.0e-3, filter: {median: 3}}
+    efd: {column: efd, noise: 0.01, averaged: 0.05, scale: {start: 1.0, min: 0.9, max: 1.1}}
+parameters:
+  fixed: {KA: 1.0, TA: 0.01, TR: =2*TA, VRMAX: 35.0, VRMIN: 0.0}
+  free:
+    KPR: {start: 60, min: 6, max: 600, prior: {mean: 60, std: 10}}
+    TE: {start: 0.8, min: 0.1, max: 10, scale: linear}
+estimate: {strategy: lm, loss: huber, loss_scale: 1.0, starts: 4, iterations: 50}
+simulation: {step: 0.002, output_step: 0.01}
+as_found: {source: base, parameters: {KPR: 50.0, machine.Xd: 2.0}}
+report: {criteria: {rmse: 5.0}}
+accept: {rmse: 1.0e-3}
+about: {Unit: 1, Rated MVA: 120}
+"""
 
 
 def _case(rng: Random, changes: Changes) -> Files:
     folder = rng.choice(("", "", "models"))
     sources = tuple(data for _, data in _configs(folder))
-    return {"case.yaml": _yaml(rng, sources, changes)}
+    return {"case.yaml": _yaml(rng, (*sources, *(_example(), RICH) * 3), changes)}
 
 
 def _programme(rng: Random, changes: Changes) -> Files:

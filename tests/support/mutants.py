@@ -282,8 +282,8 @@ def _other_value(rng: random.Random, value: Any, other: Any) -> Any:
     return rng.choice(VALUES)
 
 
-def _changed(rng: random.Random, tree: Any, other: Any) -> str:
-    """Change a tree somewhere, and return what was done."""
+def _changed(rng: random.Random, tree: Any, other: Any, names: Sequence[str]) -> str:
+    """Change a tree somewhere, and return what was done; ``names`` are keys that may be added."""
     places = list(places_of(tree))
     if not places:
         return "nothing"
@@ -295,13 +295,20 @@ def _changed(rng: random.Random, tree: Any, other: Any) -> str:
             return f"delete {place}"
         case 1 if isinstance(key, str):
             others = [name for each in places for name in each if isinstance(name, str)]
-            holder[rng.choice((*PAYLOADS, *others, key.upper(), key[:-1]))] = holder.pop(key)
+            holder[rng.choice((*PAYLOADS, *names, *others, key.upper(), key[:-1]))] = holder.pop(
+                key
+            )
             return f"rename {place}"
         case 2:
             second = rng.choice(places)
             value = copy.deepcopy(at_place(tree, second))
             holder[key] = value
             return f"copy {second} to {place}"
+        case 5 | 6 if names and isinstance(holder, dict):
+            name = rng.choice(names)
+            value = rng.choice(VALUES)
+            holder[name] = {rng.choice(names): value} if rng.random() < 0.3 else value
+            return f"add {name} beside {place}"
         case 3 if isinstance(holder, list):
             rng.shuffle(holder)
             return f"shuffle {place[:-1]}"
@@ -313,10 +320,15 @@ def _changed(rng: random.Random, tree: Any, other: Any) -> str:
     return f"change {place}"
 
 
-def mutated_tree(rng: random.Random, tree: Any, other: Any, changes: list[str]) -> Any:
-    """Change a tree one to four times; ``other`` is one that parts are taken from. Return it."""
+def mutated_tree(
+    rng: random.Random, tree: Any, other: Any, changes: list[str], names: Sequence[str] = ()
+) -> Any:
+    """Change a tree one to four times, and return it.
+
+    Parts of ``other`` are taken, and keys of ``names`` added.
+    """
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        changes.append(_changed(rng, tree, other))
+        changes.append(_changed(rng, tree, other, names))
     return tree
 
 
