@@ -23,6 +23,7 @@ CONNECTED_WITHIN = 5.0  # s: what answers at all answers sooner
 ANSWERED_WITHIN = 20.0  # s: a scheduler or a worker that is busy, or imports exfit for a first time
 CLOSED_WITHIN = 2.0  # s
 OF_SYSTEM = re.compile(r"\[Errno -?[0-9]+\] (.+)")
+MISSING = re.compile("No module named '[^']*'")
 LOGGERS = ("distributed", "tornado", "asyncio")
 SETTINGS = {
     "distributed.comm.timeouts.connect": f"{CONNECTED_WITHIN:g}s",
@@ -156,9 +157,10 @@ def answered(worker: str, answer: "Future[Mapping[str, Any]]") -> str | None:
         return None
     if isinstance(there, OSError):
         return None
-    if isinstance(there, ImportError):
-        return f"exfit is missing there, or is an earlier version: {_reason(there)}"
     if isinstance(there, BaseException):
+        missing = MISSING.search(str(there))  # distributed keeps its text, not always its kind
+        if missing is not None:
+            return f"exfit is missing there, or is an earlier version: {missing[0]}"
         return f"{type(there).__name__}: {_reason(there)}"
     return _differences(there, remote.versions())
 

@@ -1,15 +1,18 @@
 """Batches on a Dask cluster: the same files as here, whatever happens to its processes."""
 
 import os
+import signal
 import socket
+import subprocess
 import sys
 import threading
 from concurrent.futures import Future
 from pathlib import Path
 
+import psutil
 import pytest
 from batches import Events, case_file, record_file
-from clusters import running_cluster, without_times
+from clusters import HERE, kill_group, running_cluster, waited, without_times
 
 import exfit
 from exfit.fleet import cluster, remote
@@ -72,6 +75,84 @@ def test_a_cluster_leaves_the_files_that_this_computer_leaves(user):
     found = without_times("there")
     assert {name: found.get(name) for name in expected if "fleet." not in name} == expected
     assert sorted(events.of("started")) == sorted(f"{row.name}.yaml" for row in fleet.cases)
+
+
+class Killer(Events):
+    """An observer that kills a worker when some case has ended, and starts another one."""
+
+    def __init__(self, cluster, moments):
+        super().__init__()
+        self.cluster, self.moments, self.processes = cluster, moments, []
+
+    def finished(self, summary):
+        super().finished(summary)
+        if sum(event[0] == "done" for event in self.events) in self.moments:
+            worker = self.cluster.workers.pop(0)
+            self.processes += psutil.Process(worker.pid).children()
+            worker.kill()  # alone: the process beside it ends by itself
+            self.cluster.add_worker()
+
+
+def processes_of(there):
+    """Return the processes beside the workers of a cluster that fit cases."""
+    return [
+        process
+        for worker in there.workers
+        for process in psutil.Process(worker.pid).children()
+        if "exfit.fleet.worker" in " ".join(process.cmdline())
+    ]
+
+
+def none_runs(processes):
+    running = (process for process in processes if process.is_running())
+    return all(process.status() == psutil.STATUS_ZOMBIE for process in running)
+
+
+@pytest.mark.long
+def test_workers_that_are_killed_lose_nothing_and_blame_no_case(user):
+    folder = cases(12)
+    with running_cluster(user / "cluster") as there:
+        killer = Killer(there, (1, 3, 5))
+        fleet = exfit.batch(folder, "there", scheduler=there.address, observer=killer)
+        assert fleet.counts == {"done": 12}
+        assert sorted(killer.of("done")) == sorted(f"c{number}.yaml" for number in range(12))
+        assert killer.processes
+        waited(lambda: none_runs(killer.processes), "the end of the processes beside")
+        there.add_worker(hidden=True)
+        with connected(there.address) as client:
+            waited(lambda: len(cluster.threads_of(client)) == 3, "a worker without exfit")
+        with pytest.raises(ClusterError, match=r"exfit is missing there, .*No module named"):
+            exfit.batch(folder, "again", scheduler=there.address)
+    assert {case.status for case in exfit.read_fleet("again").cases} == {"not run"}
+
+
+@pytest.mark.long
+def test_an_interruption_ends_all_workers_and_a_lost_scheduler_the_batch(user):
+    folder = cases(3)
+    own_model("hanging", HANGING)
+    with running_cluster(user / "cluster") as there:
+        command = ["batch", str(folder), "--trust", "-q", "--scheduler", there.address]
+        for output, stop, code in (
+            ("interrupted", lambda batch: batch.send_signal(signal.SIGINT), 3),
+            ("lost", lambda _: kill_group(there.scheduler), 1),
+        ):
+            batch = subprocess.Popen(
+                [sys.executable, "-m", "exfit", *command, "-o", output],
+                stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(HERE)}, text=True,
+            )  # fmt: skip
+            waited(lambda: len([*Path(output).glob("*/result.json")]) == 3, "the results")  # noqa: B023
+            beside = processes_of(there)
+            assert beside
+            stop(batch)
+            said = batch.communicate(timeout=60.0)[1]
+            assert batch.returncode == code
+            lost = f"Error: {there.address}: connection to the scheduler lost"
+            assert said.startswith(lost) if code == 1 else said == ""
+            assert len(said.splitlines()) == (code == 1)
+            assert {case.status for case in exfit.read_fleet(output).cases} == {"done", "not run"}
+            assert Path(output, "fleet.csv").is_file()
+            if code == 3:
+                waited(lambda: none_runs(beside), "the end of all fits", within=10.0)  # noqa: B023
 
 
 def free_port():

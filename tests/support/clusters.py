@@ -14,54 +14,58 @@ from pathlib import Path
 import exfit
 
 HERE = Path(exfit.__file__).parents[1]
+HIDING = "raise ModuleNotFoundError(\"No module named 'exfit'\", name='exfit')\n"
 STARTED_WITHIN = 60.0  # s
 TIMES = re.compile(r"\"seconds\": [^,}\n]+")
 
 
 @dataclass
 class Cluster:
-    """A scheduler with workers: each in a folder that nobody else has, none sees this checkout's.
-
-    A scheduler needs no exfit; workers import it from here unless it is ``hidden`` from them.
-    """
+    """A scheduler, from which exfit is hidden, with workers: each in a folder of its own."""
 
     folder: Path
     address: str = ""
+    count: int = 0
     scheduler: subprocess.Popen | None = None
     workers: list[subprocess.Popen] = field(default_factory=list)
 
     def start(self, workers=2, nanny=False):
         self.folder.mkdir(parents=True, exist_ok=True)
+        (self.folder / "hiding").mkdir()
+        (self.folder / "hiding" / "exfit.py").write_text(HIDING)
         file = self.folder / "scheduler.json"
-        self.scheduler = self._run("scheduler", "--scheduler-file", str(file), "--port", "0")
-        waited(file.is_file, "a scheduler")
-        self.address = json.loads(file.read_text())["address"]
+        self.scheduler = self._run(
+            "scheduler", "--scheduler-file", str(file), "--port", "0", "--host", "127.0.0.1"
+        )
+        waited(lambda: address_in(file), "a scheduler")
+        self.address = address_in(file)
         for _ in range(workers):
             self.add_worker(nanny)
 
-    def add_worker(self, nanny=False, threads=1, **environment):
-        place = self.folder / f"worker{len(self.workers)}"
+    def add_worker(self, nanny=False, threads=1, hidden=False):
+        """Start a worker, with exfit of this checkout unless that is ``hidden`` from it."""
+        self.count += 1
+        place = self.folder / f"worker{self.count}"
         place.mkdir()
         worker = self._run(
             "worker", self.address, "--nthreads", str(threads), "--local-directory", str(place),
             "--memory-limit", "0", "--nanny" if nanny else "--no-nanny",
-            place=place, PYTHONPATH=str(HERE), **environment,
+            place=place, hidden=hidden,
         )  # fmt: skip
         self.workers.append(worker)
         return worker
 
-    def _run(self, kind, *arguments, place=None, **environment):
+    def _run(self, kind, *arguments, place=None, hidden=True):
         module = f"distributed.cli.dask_{kind}"
-        plain = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
-        with (self.folder / f"{kind}{len(self.workers)}.log").open("wb") as log:
+        path = self.folder / "hiding" if hidden else HERE
+        with (self.folder / f"{kind}{self.count}.log").open("wb") as log:
             return subprocess.Popen(
-                [sys.executable, "-P", "-m", module, *arguments, "--no-dashboard"]
-                + ([] if kind == "worker" else ["--host", "127.0.0.1"]),
+                [sys.executable, "-P", "-m", module, *arguments, "--no-dashboard"],
                 stdout=log,
                 stderr=log,
                 stdin=subprocess.DEVNULL,
                 cwd=place or self.folder,
-                env={**plain, **environment},
+                env={**os.environ, "PYTHONPATH": str(path)},
                 start_new_session=True,
             )
 
@@ -70,6 +74,14 @@ class Cluster:
             if process is not None:
                 kill_group(process)
                 process.wait()
+
+
+def address_in(file):
+    """Return the address in the file of a scheduler, "" while it is not there and whole."""
+    try:
+        return json.loads(file.read_text())["address"]
+    except (OSError, ValueError):
+        return ""
 
 
 def kill_group(process):
