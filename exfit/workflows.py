@@ -213,6 +213,7 @@ def read_record(
     missing: bool = False,
     sheet: str | None = None,
     resample: float | None = None,
+    memory: float | None = None,
 ) -> Record:
     """Return the record of a recorder's file of any supported format, per unit.
 
@@ -225,9 +226,9 @@ def read_record(
         missing: whether a sample may be missing: it becomes nan.
         sheet: of a workbook.
         resample: rate of a slower, even clock, Hz.
+        memory: what reading may take, GB; default: 1, or four times the file's size up to 4.
 
-    Raises CaseError for columns and units that are not given rightly, RecordError for a file that
-    cannot be read.
+    Raises CaseError for columns and units that are not given rightly, RecordError for the file.
 
     Example:
         >>> volts = {"column": "Ugen", "unit": "kV", "base": 15.75}
@@ -243,6 +244,7 @@ def read_record(
         "gaps": "skip" if missing else "refuse",
         "sheet": sheet,
         "resample": resample,
+        "memory": memory,
     }
     given = {key: value for key, value in section.items() if value is not None}
     return read_section(record_section(given), Path(), per_unit=True)

@@ -1,15 +1,11 @@
 """The command inspect, and the options of commands that inspect a record."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import Output, output_options, print_json
-
-if TYPE_CHECKING:
-    from exfit.records.inspection import Inspection
 
 time_option = click.option(
     "--time",
@@ -35,6 +31,12 @@ bases_option = click.option(
     "--base", "bases", multiple=True, metavar="SIGNAL=VALUE", help="Value of 1 pu: vt=15.75kV."
 )
 sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel file.")
+memory_option = click.option(
+    "--memory",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="GB",
+    help="Memory that reading a file may take. Default: 1, or four times the file's size up to 4.",
+)
 
 
 @click.command("inspect", short_help="Show the content of a recorder's file.")
@@ -42,12 +44,14 @@ sheet_option = click.option("--sheet", metavar="NAME", help="Sheet of an Excel f
 @time_option
 @unit_option
 @sheet_option
+@memory_option
 @output_options
 def inspect_(
     file: Path,
     clock: tuple[str, ...],
     unit: str | None,
     sheet: str | None,
+    memory: float | None,
     output: Output,
 ) -> None:
     """Show the content of FILE, a record: channels, sampling, gaps, noise, spikes, steps.
@@ -55,12 +59,13 @@ def inspect_(
     Suggests the record, test and estimate sections of a case; guesses are marked. Writes
     inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
+    from exfit.case.starting.record_settings import RecordSettings
     from exfit.case.starting.suggestion import bump_section, record_section, weights_section
     from exfit.output import run_folder
 
     # files of one record in several formats have one stem
     folder = output.folder(f"{file.name}-inspect")
-    inspection = inspected(file, clock, unit, sheet)
+    inspection = RecordSettings(clock, unit, sheet, memory=memory).inspect(file)
     figures = run_folder.write_inspection(inspection, folder)
     if output.as_json:
         print_json(inspection.as_json())
@@ -79,13 +84,3 @@ def inspect_(
         )
         terminal.written(console, folder)
     output.draw(figures)
-
-
-def inspected(
-    file: Path, clock: tuple[str, ...], unit: str | None, sheet: str | None
-) -> "Inspection":
-    """Return what a recorder's file holds; raises RecordError where it is none."""
-    from exfit.records.formats import open_table
-    from exfit.records.inspection import inspect
-
-    return inspect(open_table(file, sheet), clock or None, unit)

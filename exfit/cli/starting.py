@@ -11,7 +11,14 @@ from exfit.cli import completion
 from exfit.cli.exchange import BUSES
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, warn, write_text
-from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
+from exfit.cli.records import (
+    bases_option,
+    memory_option,
+    sheet_option,
+    steps_option,
+    time_option,
+    unit_option,
+)
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 from exfit.util.text import printable
@@ -85,6 +92,7 @@ class UnitSources:
 @time_option
 @unit_option
 @sheet_option
+@memory_option
 @file_option
 @force_option
 def new(
@@ -102,6 +110,7 @@ def new(
     clock: tuple[str, ...],
     unit: str | None,
     sheet: str | None,
+    memory: float | None,
     output: Path | None,
     force: bool,
 ) -> None:
@@ -121,7 +130,7 @@ def new(
     folder = Path() if output is None else output.parent
     sources = UnitSources(model, machine, dyr, bus, machine_id, machine_from)
     data = _unit(sources, folder)
-    reading = RecordSettings(clock, unit, sheet)
+    reading = RecordSettings(clock, unit, sheet, memory=memory)
     tests = _tests(file, table, sizes, bases_of(bases), reading)
     warn(doubtful_bases(tests))
     text = starting_case(data, tests, folder, _facts(facts))

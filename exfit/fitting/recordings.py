@@ -103,6 +103,7 @@ def read_section(file: RecordFile, folder: Path, per_unit: bool) -> Record:
             for signal, channel in file.channels.items()
             if per_unit and standing_alone(channel)
         ),
+        file.memory,
     )
 
 

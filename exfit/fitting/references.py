@@ -204,6 +204,7 @@ def _read(case: Case, signal: str, given: ReferenceFile, span: Span) -> Record:
         {signal: column},
         sheet=given.sheet,
         per_unit=frozenset({signal} if alone else ()),
+        memory=given.memory,
     )
     first, last = float(record.time[0]), float(record.time[-1])
     if not first <= span[0] <= span[1] <= last:

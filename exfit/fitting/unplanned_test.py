@@ -125,7 +125,8 @@ def _built(case: Case, recording: Recording, values: Values, test: Test) -> Expe
 def _inspected(file: RecordFile, folder: Path) -> Inspection:
     """Return what all channels of a file show: more than those that the case names."""
     clock = clock_of(file.time)
-    return inspect(open_table(folder / file.file, file.sheet), clock.columns, clock.unit)
+    table = open_table(folder / file.file, file.sheet, file.memory)
+    return inspect(table, clock.columns, clock.unit)
 
 
 def _with_own_reference(recording: Recording, inspection: Inspection | None) -> Recording:

@@ -24,6 +24,7 @@ from exfit.records.channel_recognition import guess_signals, three_phases
 from exfit.records.clock import Clock, check_finite
 from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
+from exfit.records.formats.memory import TooLargeError
 from exfit.records.formats.table import Table, listed, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
@@ -44,7 +45,8 @@ REFERENCE = "vref"
 class Inspection:
     """What a file holds; ``unreadable`` says by column why it has no numbers.
 
-    ``opening`` is that of the breaker in a load rejection.
+    ``opening`` is that of the breaker in a load rejection, ``memory`` what the user allowed for
+    reading, GB.
 
     ``time`` (M,) in s and ``samples``, each (M,), are those whose time increases.
     """
@@ -61,6 +63,7 @@ class Inspection:
     time: Array
     samples: Mapping[str, Array]
     opening: BreakerOpening | None = None
+    memory: float | None = None
 
     def channel_of(self, signal: str) -> InspectedChannel | None:
         """Return the channel that seems to be a signal, None without one."""
@@ -191,6 +194,8 @@ def _columns_of_numbers(
     refused: dict[str, str] = {}
     try:
         columns = _numbers(table, names, clock, stamps)
+    except TooLargeError:
+        raise
     except RecordError:
         columns = {}
         for name in names:

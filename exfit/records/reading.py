@@ -80,6 +80,7 @@ def read_record(
     sheet: str | None = None,
     rate: float | None = None,
     per_unit: frozenset[str] = NONE,
+    memory: float | None = None,
 ) -> Record:
     """Return the record of a file: each signal is ``column / base * scale + offset``.
 
@@ -95,14 +96,15 @@ def read_record(
         sheet: of a workbook.
         rate: Hz, of a slower, even clock; None: the record's own.
         per_unit: signals whose columns are taken for per unit: the file must not say otherwise.
+        memory: what reading may take, GB; None: 1, or four times the file's size up to 4.
 
     Raises:
-        RecordError: a file that cannot be read, a column that is missing, in another unit or of
-            another length than the time, a cell that is no finite number, time that does not
-            increase, fewer than two samples, a signal without any, waveforms that are none, or a
-            record that cannot be resampled.
+        RecordError: a file that cannot be read or needs more memory, a column that is missing, in
+            another unit or of another length than the time, a cell that is no finite number, time
+            that does not increase, fewer than two samples, a signal without any, waveforms that
+            are none, or a record that cannot be resampled.
     """
-    table = open_table(path, sheet)
+    table = open_table(path, sheet, memory)
     _check_units(table, channels, per_unit)
     time = table.instants(clock.columns, clock.unit)
     check_finite(time, clock.label, table.place)

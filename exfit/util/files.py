@@ -6,7 +6,7 @@ import stat
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from errno import ENOTDIR
+from errno import EINVAL, EISDIR, ENOTDIR
 from pathlib import Path
 from zlib import crc32
 
@@ -17,6 +17,26 @@ from exfit.util.root import on_disk
 # of a file that is still to be renamed: computer, process, and which of its files
 TEMPORARY = re.compile(r"\.exfit-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}\.tmp")
 ABANDONED = 86_400.0  # s: so old, a temporary file of any computer is of a run that was killed
+
+
+def regular_size(path: Path) -> int:
+    """Return the size of a file in bytes.
+
+    Raises OSError for what is missing and for what is no file: a folder, or a pipe or device, which
+    may never end.
+    """
+    status = on_disk(path).stat()
+    if stat.S_ISDIR(status.st_mode):
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(EINVAL, "a pipe or a device, not a file")
+    return status.st_size
+
+
+def read_regular(path: Path) -> bytes:
+    """Return the bytes of a file; raises OSError where it cannot be read or is none."""
+    regular_size(path)
+    return on_disk(path).read_bytes()
 
 
 def read_limited(path: Path, most: int) -> bytes:

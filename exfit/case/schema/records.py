@@ -158,6 +158,11 @@ class RecordFile(Section):
         description="Sampling rate to which the record is reduced through an anti-alias filter, "
         "Hz; default: as recorded.",
     )
+    memory: Positive | None = Field(
+        default=None,
+        description="Memory that reading the file may take, GB; default: 1, or four times the size "
+        "of the file, at most 4.",
+    )
     delay: Findable = Field(
         default=0.0,
         description="Delay of the recorder, s; or {start, min, max} to fit it.",

@@ -66,6 +66,10 @@ class ReferenceFile(Section):
 
     file: Text = Field(description="Path, relative to the case file.")
     sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    memory: Positive | None = Field(
+        default=None,
+        description="Memory that reading the file may take, GB, given like record.memory.",
+    )
     time: Time = Field(description="Column with the time, given like record.time.")
     column: Text = Field(
         description="Name of the column; column / base * scale is in pu, of which only changes act."

@@ -1,6 +1,6 @@
 """How the record of a new case is read."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from exfit.records.formats import open_table
@@ -11,14 +11,16 @@ from exfit.records.inspection import Inspection, inspect
 class RecordSettings:
     """Columns of the time of a record and their unit, its sheet, the column of its voltage.
 
-    What is empty or None is as the file shows it.
+    ``memory`` (GB) is what reading may take. What is empty or None is as the file shows it.
     """
 
     clock: tuple[str, ...] = ()
     unit: str | None = None
     sheet: str | None = None
     voltage: str | None = None
+    memory: float | None = None
 
     def inspect(self, file: Path) -> Inspection:
         """Return what a recorder's file holds; raises RecordError where it is none."""
-        return inspect(open_table(file, self.sheet), self.clock or None, self.unit)
+        table = open_table(file, self.sheet, self.memory)
+        return replace(inspect(table, self.clock or None, self.unit), memory=self.memory)

@@ -12,6 +12,7 @@ from exfit.case.starting.suggestion import (
     channel_lines,
     clock_text,
     gap_lines,
+    memory_lines,
     number_text,
     plain_text,
     record_section,
@@ -154,7 +155,11 @@ def _several(
         lines += ["record:", f"  file: {plain_text(names[test.inspection.path])}"]
         lines += [f"  time: {clock_text(test.inspection)}"]
         lines += _channels_once(test, anchors)
-        lines += [*window_lines(test.window), *gap_lines(test.inspection)]
+        lines += [
+            *window_lines(test.window),
+            *gap_lines(test.inspection),
+            *memory_lines(test.inspection),
+        ]
         entry = [f"  - {lines[0]}", *(f"{IN_A_LIST}{line}" for line in lines[1:])]
         (validations if test.validates else fitted).extend(entry)
     return fitted, validations

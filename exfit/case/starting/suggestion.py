@@ -43,7 +43,7 @@ def record_section(
     """
     lines = ["record:", f"  file: {plain_text(file)}", f"  time: {clock_text(inspection)}"]
     lines += ["  channels:", *channel_lines(inspection, only, bases)]
-    return [*lines, *window_lines(window), *gap_lines(inspection)]
+    return [*lines, *window_lines(window), *gap_lines(inspection), *memory_lines(inspection)]
 
 
 def channel_lines(
@@ -72,6 +72,12 @@ def gap_lines(inspection: Inspection) -> list[str]:
     if not any(channel.missing for channel in signals if channel is not None):
         return []
     return ["  gaps: skip            # samples without a number are left out"]
+
+
+def memory_lines(inspection: Inspection) -> list[str]:
+    """Return the line of a record that needed more memory than usual."""
+    memory = inspection.memory
+    return [] if memory is None else [f"  memory: {number_text(memory)}"]
 
 
 def _voltage_lines(inspection: Inspection, base: Base | None) -> Iterator[str]:

@@ -13,30 +13,32 @@ BESIDE_CFG = (".dat", ".hdr")  # text files too may be called so
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 
-def open_table(path: Path, sheet: str | None = None) -> Table:
+def open_table(path: Path, sheet: str | None = None, memory: float | None = None) -> Table:
     """Return the table of a file of any kind that is known, by its suffix; ``sheet`` of a workbook.
 
-    Raises RecordError for a file that cannot be read, and for a sheet of a file without sheets.
+    ``memory`` (GB) is what reading may take; None: 1 GB, or four times the file's size up to 4 GB.
+    Raises RecordError for a file that cannot be read or needs more, and for a sheet of a file
+    without sheets.
     """
     suffix = path.suffix.lower()
     if suffix in WORKBOOKS:
         from exfit.records.formats.excel import read_excel
 
-        return read_excel(path, sheet)
+        return read_excel(path, sheet, memory)
     if sheet is not None:
         raise RecordError(f"{path}: a sheet, {sheet!r}, is given, but only workbooks have sheets")
     if suffix in COMTRADE or (suffix in BESIDE_CFG and siblings(path, ".cfg")):
         from exfit.records.formats.comtrade import read_comtrade
 
-        return read_comtrade(path)
+        return read_comtrade(path, memory)
     if suffix == ".mat":
         from exfit.records.formats.matlab import read_mat
 
-        return read_mat(path)
+        return read_mat(path, memory)
     if suffix == ".parquet":
         from exfit.records.formats.parquet import read_parquet
 
-        return read_parquet(path)
+        return read_parquet(path, memory)
     from exfit.records.formats.text import read_text_table
 
-    return read_text_table(path)
+    return read_text_table(path, memory)

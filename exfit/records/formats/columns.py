@@ -22,6 +22,7 @@ from exfit.records.formats.table import (
 
 T = TypeVar("T")
 
+PANIC = "PanicException"  # of packages in Rust
 SECOND = np.timedelta64(1, "s")
 
 
@@ -31,7 +32,8 @@ class Columns:
 
     ``fetch`` returns float64, or datetime64[ns] for timestamps and timedelta64[ns] for times of
     day, nan or NaT where a sample is missing; it raises RecordError for a column of anything else.
-    ``where`` names the place of a sample, counted from 0. ``time_columns`` are those of the time
+    ``where`` names the place of a sample, counted from 0; ``refuse_larger`` raises TooLargeError
+    where columns, by name, need too much memory. ``time_columns`` are those of the time
     where the kind of file defines them, ``stamps`` those that hold timestamps.
     """
 
@@ -41,6 +43,7 @@ class Columns:
     units: Mapping[str, str]
     fetch: Callable[[int], NDArray[Any]]
     where: Callable[[int], str]
+    refuse_larger: Callable[[Sequence[str]], None]
     time_columns: tuple[str, ...] = ()
     stamps: tuple[str, ...] = ()
 
@@ -55,6 +58,8 @@ class Columns:
         Raises RecordError for a column that is missing or there twice, that holds no numbers or
         lacks one, and for columns that are not equally long.
         """
+        names = [*names]
+        self.refuse_larger(names)
         columns = {name: self._numbers(name, name in gappy) for name in names}
         refuse_uneven(self.path, columns)
         return columns
@@ -65,6 +70,7 @@ class Columns:
         ``columns`` are one, or a date and a time of day; ``unit`` is that of numbers: s, ms, us or
         min. Raises RecordError where it contradicts the file, and where a sample is missing.
         """
+        self.refuse_larger(columns)
         whole = {name: self._whole(name) for name in columns}
         refuse_uneven(self.path, whole)
         first = columns[0]
@@ -114,6 +120,10 @@ def sound(path: Path, kind: str, read: Callable[[], T]) -> T:
     """Return what a package reads of a file; raises RecordError where it is not of that kind."""
     try:
         return read()
-    except Exception as error:  # damaged files make a package fail in many ways
+    except RecordError:
+        raise
+    except BaseException as error:  # damaged files make a package fail in many ways
+        if not (isinstance(error, Exception) or type(error).__name__ == PANIC):
+            raise
         what = str(error).partition("\n")[0] or type(error).__name__
         raise RecordError(f"{path}: not {kind}, or damaged: {what}") from None

@@ -4,6 +4,7 @@ Without a row of names the columns are called 1, 2, 3 ... What could be read in 
 """
 
 import csv
+import io
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,10 +15,15 @@ from typing import NamedTuple
 
 from exfit.errors import RecordError
 from exfit.records.formats.cells import CELL_SHOWN, INFINITE, NUMBER, is_missing
+from exfit.records.formats.decoding import Text
 from exfit.records.formats.heads import is_units, names_of, units_of
+from exfit.records.formats.memory import MemoryLimit
 from exfit.records.formats.timestamps import is_timestamp
 
 HEAD_LINES = 300  # within which the first row of numbers must be
+HEAD_BYTES = 1 << 22  # of very long lines the head has no more, but
+FEWEST_HEAD_LINES = 8  # so many
+CELL_BYTES = 600  # that a cell of the head takes while the dialect is found
 SEPARATORS: Mapping[str | None, str] = {
     ";": "semicolons", "\t": "tabs", ",": "commas", None: "spaces"
 }  # fmt: skip
@@ -117,6 +123,17 @@ def split_rows(
 def is_comment(text: str, separator: str | None) -> bool:
     """Return whether a row, or its first cell, begins with the mark of a comment."""
     return text.lstrip().startswith(tuple(mark for mark in COMMENT_MARKS if mark != separator))
+
+
+def head_of(text: Text, limit: MemoryLimit) -> list[str]:
+    """Return the first lines of a text; raises TooLargeError where they have too many cells."""
+    end = text.start_of(HEAD_LINES + 1)
+    if end > HEAD_BYTES:
+        end = max(text.data.rfind(b"\n", 0, HEAD_BYTES) + 1, text.start_of(FEWEST_HEAD_LINES + 1))
+    marks = [*(mark.encode() for mark in SEPARATORS if mark), b" "]
+    cells = max(text.data.count(mark, 0, end) for mark in marks) + 1
+    limit.check(len(text.data) + end + CELL_BYTES * cells, f"{cells} cells in its first lines")
+    return io.TextIOWrapper(io.BytesIO(text.data[:end]), text.encoding, newline="\n").readlines()
 
 
 def find_dialect(path: Path, head: Sequence[str]) -> Dialect:

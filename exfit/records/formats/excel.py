@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
+from exfit.records.formats import compound, xls
+from exfit.records.formats.archive import packed, unpacked
 from exfit.records.formats.cells import quoted
 from exfit.records.formats.columns import Columns, missing_package, sound
 from exfit.records.formats.heads import is_units, names_of, units_of
+from exfit.records.formats.memory import MemoryLimit, memory_limit
+from exfit.records.formats.sheet_size import CELL_BYTES, check_sheets
 from exfit.records.formats.table import Table, column_error, read_bytes
 
 if TYPE_CHECKING:
@@ -26,6 +31,7 @@ Row = Sequence[Any]
 FEWEST_CELLS = 2  # of a row that holds a sample: the time and one signal
 STAMP_KINDS = ("timestamp", "time of day")  # kinds of cells
 WORKBOOK = "an Excel workbook"
+BINARY = "xl/workbook.bin"
 
 
 @dataclass(frozen=True)
@@ -40,8 +46,8 @@ class _Sheet:
     samples: tuple[int, ...]
 
 
-def read_excel(path: Path, sheet: str | None = None) -> Table:
-    """Return the table on a sheet of an Excel workbook (.xlsx, .xlsm, .xlsb, .xls) or an .ods.
+def read_excel(path: Path, sheet: str | None = None, memory: float | None = None) -> Table:
+    """Return the table on a sheet of an Excel workbook (.xlsx, .xlsm, .xls) or an .ods.
 
     Above the samples is a row of names, between them perhaps a row of units; what is
     higher, as titles do, is left out, and so are blank rows and columns. Timestamps
@@ -50,13 +56,15 @@ def read_excel(path: Path, sheet: str | None = None) -> Table:
     Args:
         path: the workbook.
         sheet: the sheet's name; None: the only one with a table.
+        memory: what reading may take, GB.
 
     Raises:
-        RecordError: a file that is damaged, no table in it, several of them and no sheet named,
-            or the package python-calamine missing.
+        RecordError: a file that is damaged or needs more memory, no table in it, several of them
+            and no sheet named, or the package python-calamine missing.
     """
+    limit = memory_limit(path, memory)
     data = read_bytes(path)
-    tables = _tables(path, _workbook(path, data), sheet)
+    tables = _tables(path, _workbook(path, data, limit), sheet)
     if len(tables) > 1:
         names = ", ".join(repr(table.name) for table in tables)
         raise RecordError(f"{path}: name one of the sheets with a table: {names}")
@@ -65,24 +73,40 @@ def read_excel(path: Path, sheet: str | None = None) -> Table:
         raise RecordError(
             f"{path}: no table{where}: a row of names above rows of numbers, {FEWEST_CELLS} or more"
         )
-    return _columns(path, hashlib.sha256(data).hexdigest(), tables[0], sheet is not None)
+    return _columns(path, hashlib.sha256(data).hexdigest(), tables[0], sheet is not None, limit)
 
 
 def sheets_of(path: Path) -> dict[str, list[Row]]:
     """Return the cells of all sheets by name, those of a table of words among them.
 
-    Raises RecordError for a file that is damaged.
+    Raises RecordError for a file that is damaged or needs more memory than the usual limit.
     """
-    book = _workbook(path, read_bytes(path))
+    book = _workbook(path, read_bytes(path), memory_limit(path, None))
     return {name: sound(path, WORKBOOK, partial(_rows, book, name)) for name in book.sheet_names}
 
 
-def _workbook(path: Path, data: bytes) -> "CalamineWorkbook":
+def _workbook(path: Path, data: bytes, limit: MemoryLimit) -> "CalamineWorkbook":
     try:
         from python_calamine import CalamineWorkbook
     except ImportError:
         raise missing_package(path, "python-calamine", "excel") from None
-    return sound(path, WORKBOOK, lambda: CalamineWorkbook.from_filelike(io.BytesIO(data)))
+
+    def opened() -> "CalamineWorkbook":
+        return CalamineWorkbook.from_filelike(_checked(path, data, limit))
+
+    return sound(path, WORKBOOK, opened)
+
+
+def _checked(path: Path, data: bytes, limit: MemoryLimit) -> io.BytesIO:
+    """Return a workbook whose sheets need no more memory than they may take, unpacked."""
+    if data.startswith(compound.MARK):
+        xls.check(data, limit)
+        return io.BytesIO(data)
+    entries = unpacked(data, limit)
+    if BINARY in entries:
+        raise RecordError(f"{path}: a binary workbook (.xlsb); save it as .xlsx")
+    check_sheets(entries, limit)
+    return packed(entries)
 
 
 def _tables(path: Path, book: "CalamineWorkbook", sheet: str | None) -> list[_Sheet]:
@@ -103,7 +127,7 @@ def _rows(book: "CalamineWorkbook", name: str) -> list[Row]:
 
 def _table(name: str, rows: Sequence[Row]) -> _Sheet | None:
     """Return the first table on a sheet: a row of names right above the first sample."""
-    filled = [at for at, row in enumerate(rows) if any(cell != "" for cell in row)]
+    filled = [at for at, row in enumerate(rows) if row.count("") < len(row)]
     for place, at in enumerate(filled):
         if not _is_sample(rows[at]):
             continue
@@ -145,15 +169,19 @@ def _sheet(
     return _Sheet(name, rows, tuple(places), names, units_of(names, own_units), samples)
 
 
-def _columns(path: Path, sha256: str, sheet: _Sheet, name_sheet: bool) -> Columns:
+def _columns(
+    path: Path, sha256: str, sheet: _Sheet, name_sheet: bool, limit: MemoryLimit
+) -> Columns:
     place = f"{path}: sheet {sheet.name!r}, row" if name_sheet else f"{path}: row"
+
+    samples = [sheet.rows[row] for row in sheet.samples]
+    held = CELL_BYTES * sum(map(len, sheet.rows))
 
     def where(row: int) -> str:
         return f"{place} {sheet.samples[row] + 1}"
 
     def fetch(at: int) -> NDArray[Any]:
-        cells = [sheet.rows[row][sheet.places[at]] for row in sheet.samples]
-        return _column(cells, sheet.names[at], where)
+        return _column([*map(itemgetter(sheet.places[at]), samples)], sheet.names[at], where)
 
     return Columns(
         path=path,
@@ -162,6 +190,7 @@ def _columns(path: Path, sha256: str, sheet: _Sheet, name_sheet: bool) -> Column
         units=sheet.units,
         fetch=fetch,
         where=where,
+        refuse_larger=lambda columns: limit.check_columns([len(samples)] * len(columns), held),
         stamps=tuple(
             name
             for name, at in zip(sheet.names, sheet.places, strict=True)
@@ -172,8 +201,8 @@ def _columns(path: Path, sha256: str, sheet: _Sheet, name_sheet: bool) -> Column
 
 def _column(cells: Sequence[Any], name: str, where: Callable[[int], str]) -> NDArray[Any]:
     """Return cells of one kind as an array: numbers, timestamps or times of day."""
-    if all(type(cell) is float for cell in cells):  # as nearly always: five times as fast
-        return np.array(cells)
+    if {*map(type, cells)} == {float}:  # as nearly always: five times as fast
+        return np.array(cells, np.float64)
     kinds = [_kind(cell) for cell in cells]
     kind = next((kind for kind in kinds if kind not in ("", "text")), "number")
     for row, cell in enumerate(cells):

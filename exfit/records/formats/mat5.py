@@ -1,12 +1,16 @@
 """The layout of MATLAB files of version 5 to 7.2, which SciPy trusts: damaged, it ends Python.
 
-Checked here is that the elements nest as they should (MathWorks, "MAT-File Format", chapter 1).
+Checked here is that the elements nest as they should (MathWorks, "MAT-File Format", chapter 1), and
+that they do not need too much memory.
 """
 
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from itertools import islice
 from math import prod
+
+from exfit.records.formats.memory import MemoryLimit
 
 HEAD = 128  # bytes before the first element; the last two give the order of bytes
 ORDERS = {b"IM": "<", b"MI": ">"}
@@ -20,6 +24,10 @@ NESTED = (CELL, STRUCT, OBJECT, FUNCTION)
 NUMBERS = range(6, 16)  # classes from double to uint64
 COMPLEX = 0x0800
 DEEPEST = 50
+ARRAYS = "its arrays"
+WHILE_UNPACKED = 2  # times the bytes of an element, which zlib joins of pieces
+# bytes while an array is read: of itself, of a cell or field, of a character, a complex number
+ARRAY_BYTES, REFERENCE, CHARACTER_BYTES, COMPLEX_BYTES = 300, 16, 20, 56
 
 Element = tuple[int, memoryview]
 
@@ -30,18 +38,35 @@ class Damage(Exception):
 
 def is_mat5(data: bytes) -> bool:
     """Return whether a file is of version 5 to 7.2."""
-    return data[HEAD - 2 : HEAD] in ORDERS and not data.startswith(b"\0")
+    return data[HEAD - 2 : HEAD] in ORDERS and b"\0" not in data[:4]
 
 
-def check(data: bytes) -> None:
-    """Raise Damage or zlib.error where the elements of a file do not nest."""
+def check(data: bytes, limit: MemoryLimit) -> None:
+    """Raise Damage or zlib.error where the elements of a file do not nest.
+
+    Raises TooLargeError where its arrays need more memory than they may take.
+    """
     order = ORDERS[data[HEAD - 2 : HEAD]]
+    needed = len(data)
     for kind, content in _elements(memoryview(data)[HEAD:], order, padded=False):
         if kind == COMPRESSED:
-            for inner, unpacked in _elements(memoryview(zlib.decompress(content)), order):
-                _check_matrix(inner, unpacked, order)
+            unpacked = _unpacked(content, needed, limit)
+            arrays = _elements(memoryview(unpacked), order)
+            needed += sum(_memory_of(inner, array, order) for inner, array in arrays)
         else:
-            _check_matrix(kind, content, order)
+            needed += _memory_of(kind, content, order)
+        limit.check(needed, ARRAYS)
+
+
+def _unpacked(content: memoryview, needed: int, limit: MemoryLimit) -> bytes:
+    """Return a compressed element; raises TooLargeError where it needs too much memory."""
+    unpacking = zlib.decompressobj()
+    unpacked = unpacking.decompress(content, max(int(limit.most - needed) // WHILE_UNPACKED, 1))
+    if unpacking.unconsumed_tail:
+        limit.check(needed + WHILE_UNPACKED * len(unpacked), ARRAYS)
+    if not unpacking.eof:
+        raise Damage("a compressed element is cut off")
+    return unpacked
 
 
 def _elements(data: memoryview, order: str, padded: bool = True) -> Iterator[Element]:
@@ -63,40 +88,48 @@ def _elements(data: memoryview, order: str, padded: bool = True) -> Iterator[Ele
         at = end
 
 
-def _check_matrix(kind: int, data: memoryview, order: str, depth: int = 0) -> None:
-    """Raise Damage where an element is no array, or its parts are not those of its class."""
+def _memory_of(kind: int, data: memoryview, order: str, depth: int = 0) -> int:
+    """Return how many bytes an array takes when SciPy reads it.
+
+    Raises Damage where an element is no array, or its parts are not those of its class.
+    """
     if kind != MATRIX or depth > DEEPEST:
         raise Damage(f"an element of type {kind} in the place of an array")
     if not data:  # an empty array
-        return
+        return ARRAY_BYTES
     parts = _elements(data, order)
     word = struct.unpack(order + "II", _part(parts, FLAGS, 8))[0]
-    if word & 0xFF == OPAQUE:  # SciPy does not look further into it
-        return
+    if word & 0xFF == OPAQUE:  # names, then an array
+        arrays = (part for part in parts if part[0] == MATRIX)
+        return ARRAY_BYTES + sum(_memory_of(*array, order, depth + 1) for array in arrays)
     sizes = _part(parts, COUNTS)
     shape = struct.unpack(f"{order}{len(sizes) // 4}i", sizes)
     if len(shape) < 2 or min(shape) < 0:
         raise Damage(f"an array of the size {shape}")
     _part(parts, NAMES)
-    _check_content(word, prod(shape), parts, order, depth)
+    return ARRAY_BYTES + _memory_of_content(word, prod(shape), parts, order, depth)
 
 
-def _check_content(word: int, count: int, parts: Iterator[Element], order: str, depth: int) -> None:
-    """Raise Damage where what follows the name of an array is not as its class requires."""
+def _memory_of_content(
+    word: int, count: int, parts: Iterator[Element], order: str, depth: int
+) -> int:
+    """Return how many bytes the content of an array takes, what follows its name."""
     kind = word & 0xFF
+    fields = 1
     if kind in (STRUCT, OBJECT):
         if kind == OBJECT:
             _part(parts, NAMES)
-        count *= _count_fields(parts, order)
+        fields = _count_fields(parts, order)
     if kind in NESTED:
-        _check_nested(kind, count, parts, order, depth)
-        return
+        return REFERENCE * count * max(fields, 1) + _memory_of_nested(
+            kind, count * fields, parts, order, depth
+        )
     if kind == SPARSE:
         _part(parts, COUNTS)
         _part(parts, COUNTS)
     elif kind not in NUMBERS and kind != CHARACTERS:
         raise Damage(f"an array of class {kind}")
-    _check_numbers(kind, count, bool(word & COMPLEX), [*parts])
+    return _memory_of_numbers(kind, count, bool(word & COMPLEX), parts)
 
 
 def _count_fields(parts: Iterator[Element], order: str) -> int:
@@ -108,23 +141,33 @@ def _count_fields(parts: Iterator[Element], order: str) -> int:
     return len(names) // width
 
 
-def _check_nested(kind: int, count: int, parts: Iterator[Element], order: str, depth: int) -> None:
-    """Raise Damage where the elements of cells or structs are no arrays, or not so many."""
-    arrays = [*parts]
-    for inner, content in arrays:
-        _check_matrix(inner, content, order, depth + 1)
-    if len(arrays) != count and kind != FUNCTION:
-        raise Damage(f"{len(arrays)} arrays in an array of {count}")
-
-
-def _check_numbers(kind: int, count: int, is_complex: bool, parts: Sequence[Element]) -> None:
-    """Raise Damage where the parts of an array, real and imaginary, have not its size."""
-    if len(parts) != (2 if is_complex else 1):
-        raise Damage(f"{len(parts)} parts of numbers in an array")
+def _memory_of_nested(
+    kind: int, count: int, parts: Iterator[Element], order: str, depth: int
+) -> int:
+    """Return the bytes of cells or structs; raises Damage where they are not so many arrays."""
+    needed = arrays = 0
     for inner, content in parts:
+        needed += _memory_of(inner, content, order, depth + 1)
+        arrays += 1
+    if arrays != count and kind != FUNCTION:
+        raise Damage(f"{arrays} arrays in an array of {count}")
+    return needed
+
+
+def _memory_of_numbers(kind: int, count: int, is_complex: bool, parts: Iterator[Element]) -> int:
+    """Return the bytes of numbers or text; raises Damage where its parts have not their size."""
+    expected = 2 if is_complex else 1
+    contents = [*islice(parts, expected + 1)]
+    if len(contents) != expected:
+        raise Damage(f"{len(contents)} parts of numbers in an array")
+    for inner, content in contents:
         width = WIDTHS.get(inner, 0)
         if width == 0 or (kind in NUMBERS and len(content) != count * width):
             raise Damage(f"{len(content)} bytes of type {inner} in an array of {count}")
+    if kind == CHARACTERS:
+        return CHARACTER_BYTES * count
+    stored = sum(len(content) for _, content in contents)
+    return COMPLEX_BYTES * count if is_complex and kind != SPARSE else 2 * stored
 
 
 def _part(parts: Iterator[Element], kinds: tuple[int, ...], size: int | None = None) -> memoryview:

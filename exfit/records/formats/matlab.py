@@ -1,6 +1,7 @@
 """MATLAB files, versions 4 to 7.2, by SciPy."""
 
 import hashlib
+import io
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.formats import mat5
+from exfit.records.formats import mat4, mat5
 from exfit.records.formats.columns import Columns, sound
 from exfit.records.formats.heads import units_of
+from exfit.records.formats.memory import MemoryLimit, memory_limit
 from exfit.records.formats.table import Array, Table, column_error, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -23,7 +25,7 @@ DEEPEST = 8  # structs in structs
 NamedVector = tuple[str, NDArray[Any]]
 
 
-def read_mat(path: Path) -> Table:
+def read_mat(path: Path, memory: float | None = None) -> Table:
     """Return the table of a .mat file: its vectors, and the columns of its matrices.
 
     Columns are called as in MATLAB: ``Ut`` for a vector, ``data(:,2)`` for a column of a matrix,
@@ -32,17 +34,23 @@ def read_mat(path: Path) -> Table:
     ``s.signals(1).values``. Scalars are left out. Vectors may differ in length, as long as those
     requested together do not; complex numbers and text are refused when they are requested.
 
-    Raises RecordError for a file that is damaged, of version 7.3 (HDF5), or without any vector.
+    ``memory`` (GB) is what reading may take. Raises RecordError for a file that is damaged or needs
+    more, is of version 7.3 (HDF5), or without any vector.
     """
+    limit = memory_limit(path, memory)
     data = read_bytes(path)
     if data.startswith(HDF5) or data[HDF5_OFFSET:].startswith(HDF5):
         raise RecordError(
             f"{path}: version 7.3 (HDF5) is not read; in MATLAB: save('{path.name}', '-v7')"
         )
     vectors = [
-        vector for name, value in _loaded(path, data).items() for vector in _vectors(name, value)
+        vector
+        for name, value in _loaded(path, data, limit).items()
+        for vector in _vectors(name, value)
     ]
     names = tuple(name for name, _ in vectors)
+    lengths = {name: len(values) for name, values in vectors}
+    held = len(data) + sum(values.nbytes for _, values in vectors)
     if not any(_is_real(values) for _, values in vectors):
         raise RecordError(f"{path}: no vector of numbers in it; objects such as timeseries are not")
     return Columns(
@@ -52,18 +60,26 @@ def read_mat(path: Path) -> Table:
         units=units_of(names),
         fetch=lambda at: _numbers(path, *vectors[at]),
         where=lambda row: f"{path}: sample {row + 1}",
+        refuse_larger=lambda columns: limit.check_columns(
+            [lengths.get(name, 0) for name in columns], held
+        ),
     )
 
 
-def _loaded(path: Path, data: bytes) -> dict[str, Any]:
+def _loaded(path: Path, data: bytes, limit: MemoryLimit) -> dict[str, Any]:
     """Return the variables of the file, in its order."""
     from scipy.io import loadmat
 
     if mat5.is_mat5(data):
-        sound(path, MATLAB, lambda: mat5.check(data))
+        sound(path, MATLAB, lambda: mat5.check(data, limit))
+    elif mat4.is_mat4(data):
+        sound(path, MATLAB, lambda: mat4.check(data, limit))
+    else:
+        raise RecordError(f"{path}: not {MATLAB}, or damaged: no head of version 4 to 7.2")
+    stream: Any = io.BytesIO(data)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of objects that SciPy cannot read
-        variables = sound(path, MATLAB, lambda: loadmat(str(path), appendmat=False))
+        variables = sound(path, MATLAB, lambda: loadmat(stream))
     return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from exfit.errors import RecordError
 from exfit.records.formats.columns import Columns, missing_package, sound
 from exfit.records.formats.heads import stated
-from exfit.records.formats.table import Table, column_error, readable
+from exfit.records.formats.memory import memory_limit, readable
+from exfit.records.formats.table import Table, column_error
 from exfit.records.units import unit_in
 from exfit.util.root import on_disk
 
@@ -20,20 +21,22 @@ if TYPE_CHECKING:
     from pyarrow.parquet import ParquetFile
 
 PARQUET = "a Parquet file"
+ARROW_BYTES = 24  # of a sample, while a column becomes an array
 UNIT_KEYS = (b"unit", b"units")  # of a column's metadata
 
 
-def read_parquet(path: Path) -> Table:
+def read_parquet(path: Path, memory: float | None = None) -> Table:
     """Return the table of a Parquet file: its columns of numbers, timestamps and times of day.
 
     Nulls are missing samples; the unit is that of the column's metadata (unit or units), else of
-    its name. Raises RecordError for a file that is damaged or empty, or the package pyarrow
-    missing.
+    its name. ``memory`` (GB) is what reading may take. Raises RecordError for a file that is
+    damaged or empty or needs more, or the package pyarrow missing.
     """
     try:
         from pyarrow.parquet import ParquetFile
     except ImportError:
         raise missing_package(path, "pyarrow", "parquet") from None
+    limit = memory_limit(path, memory)
     sha256 = _hash(path)
 
     def opened() -> "ParquetFile":
@@ -50,6 +53,9 @@ def read_parquet(path: Path) -> Table:
         units=_units(schema),
         fetch=lambda at: _fetch(path, opened, schema.field(at)),
         where=lambda row: f"{path}: row {row + 1}",
+        refuse_larger=lambda columns: limit.check_columns(
+            [rows] * len(columns), ARROW_BYTES * rows
+        ),
         stamps=tuple(field.name for field in schema if _is_stamp(field.type)),
     )
 
@@ -61,7 +67,9 @@ def _hash(path: Path) -> str:
 
 def _outline(opened: "Callable[[], ParquetFile]") -> "tuple[pa.Schema, int]":
     with opened() as file:
-        return file.schema_arrow, file.metadata.num_rows
+        groups = (file.metadata.row_group(at) for at in range(file.num_row_groups))
+        rows = sum(group.num_rows for group in groups)
+        return file.schema_arrow, max(file.metadata.num_rows, rows)
 
 
 def _units(schema: "pa.Schema") -> dict[str, str]:

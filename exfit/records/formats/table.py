@@ -1,7 +1,6 @@
 """A recorder's file as a table: named columns of numbers, whatever kind of file it is."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -9,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.util.root import on_disk
+from exfit.records.formats.memory import TooLargeError, readable
+from exfit.util.files import read_regular
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,8 @@ def increases(table: Table, columns: Sequence[str]) -> bool:
     """Return whether columns can be the time, numbers or timestamps that increase throughout."""
     try:
         instants = table.instants(columns)
+    except TooLargeError:
+        raise
     except RecordError:
         return False
     return bool(np.all(np.diff(instants) > 0.0))
@@ -103,18 +105,7 @@ def column_error(place: Path | str, name: str, what: str) -> RecordError:
 def read_bytes(path: Path) -> bytes:
     """Return the bytes of a file; raises RecordError where it cannot be read."""
     with readable(path):
-        return on_disk(path).read_bytes()
-
-
-@contextmanager
-def readable(path: Path) -> Iterator[None]:
-    """Raise RecordError for what keeps a file from being read."""
-    try:
-        yield
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a name with a null character
-        raise RecordError(f"{path}: cannot be read: {error}") from None
+        return read_regular(path)
 
 
 def _near(name: str, names: Sequence[str]) -> str:

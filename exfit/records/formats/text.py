@@ -17,13 +17,14 @@ from exfit.records.clock import find_clock, in_seconds
 from exfit.records.formats.cells import is_missing, is_number, quoted, why_not
 from exfit.records.formats.decoding import Text, decoded
 from exfit.records.formats.dialect import (
-    HEAD_LINES,
     Dialect,
     find_dialect,
     has_comma,
+    head_of,
     is_comment,
     split_rows,
 )
+from exfit.records.formats.memory import MemoryLimit, memory_limit
 from exfit.records.formats.table import NONE, Array, column_error, increases, position, read_bytes
 from exfit.records.formats.timestamps import (
     WIDEST,
@@ -34,6 +35,7 @@ from exfit.records.formats.timestamps import (
 )
 
 SCANNED_BYTES = 1 << 22  # looked at together
+STAMP_BYTES = 120  # of a row, while timestamps become numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,7 @@ class TextTable:
     sha256: str
     text: Text
     dialect: Dialect
+    limit: MemoryLimit
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -67,6 +70,8 @@ class TextTable:
 
         Raises RecordError for a column that is not there, and a cell that is no number.
         """
+        names = [*names]
+        self.limit.check_columns([self._count] * len(names), len(self.text.data))
         places = {name: position(self.path, self.names, name) for name in names}
         if not self._even:
             self._find_fault(places, gappy)
@@ -109,6 +114,11 @@ class TextTable:
     def _start(self) -> int:
         """The byte at which the rows begin."""
         return self.text.start_of(self.dialect.first_line)
+
+    @cached_property
+    def _count(self) -> int:
+        """How many rows there are at most."""
+        return self.text.data.count(b"\n", self._start) + 1
 
     @cached_property
     def _even(self) -> bool:
@@ -226,6 +236,8 @@ class TextTable:
 
     def _stamps(self, columns: Sequence[str], places: Sequence[int]) -> Array:
         """Return timestamps of one column, or of two, in s since the first."""
+        needed = len(self.text.data) + STAMP_BYTES * self._count * len(places)
+        self.limit.check(needed, f"{self._count} timestamps")
         if not self._even:
             for line, row in self.rows():
                 self._check_width(line, row)
@@ -246,18 +258,19 @@ class TextTable:
             raise column_error(self.place(error.row), columns[error.column], str(error)) from None
 
 
-def read_text_table(path: Path) -> TextTable:
+def read_text_table(path: Path, memory: float | None = None) -> TextTable:
     """Return the table of a delimited text file, whose dialect is found in its first lines.
 
-    Raises RecordError for a file that cannot be read, is no text, has no rows of numbers, or could
-    be read in two ways.
+    ``memory`` (GB) is what reading may take. Raises RecordError for a file that cannot be read or
+    needs more, is no text, has no rows of numbers, or could be read in two ways.
     """
+    limit = memory_limit(path, memory)
     data = read_bytes(path)
     text = decoded(path, data)
     if not text.data or text.data.isspace():
         raise RecordError(f"{path}: the file is empty")
-    dialect = find_dialect(path, [*islice(text.lines(), HEAD_LINES)])
-    table = TextTable(path, hashlib.sha256(data).hexdigest(), text, dialect)
+    dialect = find_dialect(path, head_of(text, limit))
+    table = TextTable(path, hashlib.sha256(data).hexdigest(), text, dialect, limit)
     if next(table.rows(), None) is None:
         raise RecordError(f"{path}: no samples below the column names")
     if dialect.comma is None and b"," in text.data:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TIME = "time"
 
 
-def read_comtrade(path: Path) -> Table:
+def read_comtrade(path: Path, memory: float | None = None) -> Table:
     """Return the table of a COMTRADE record: the time, the analog and the status channels.
 
     The columns are called by the channels' identifiers, after ``time`` in s, 0 at the first
@@ -30,17 +30,20 @@ def read_comtrade(path: Path) -> Table:
 
     Args:
         path: the .cfg or the .dat file, the other one beside it; or a .cff file.
+        memory: what reading may take, GB.
 
     Raises:
-        RecordError: a file that is missing, damaged or truncated, or the package comtrade missing.
+        RecordError: a file that is missing, damaged or truncated or needs more memory, or the
+            package comtrade missing.
     """
-    parts = files_of(path)
+    parts = files_of(path, memory)
     config = config_of(parts)
     return _table(parts, config, samples_of(parts, config))
 
 
 def _table(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples) -> Columns:
     time = time_of(parts, config, samples)
+    held = len(parts.data) + samples.analog.nbytes
     analog, status = config.analog_channels, config.status_channels
 
     def fetch(at: int) -> Array:
@@ -61,5 +64,6 @@ def _table(parts: ComtradeFiles, config: "Cfg", samples: ComtradeSamples) -> Col
         units=stated(units) | {TIME: "s"},
         fetch=fetch,
         where=parts.sample,
+        refuse_larger=lambda columns: parts.limit.check_columns([len(time)] * len(columns), held),
         time_columns=(TIME,),
     )

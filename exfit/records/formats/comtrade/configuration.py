@@ -19,6 +19,7 @@ ANALOG_CELLS = (10, 13)  # 1991, and since
 STATUS_CELLS = (3, 5)
 SLOWEST_RATE = 1e-6  # Hz: less is no sampling rate
 TEXT_SHOWN = 60
+CHANNEL_BYTES = 4000  # of a channel's description, while it is read
 
 _COUNTS = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*[Aa]\s*,\s*(\d{1,6})\s*[Dd]\s*")
 _NO_FRACTION = re.compile(r"(\d:\d\d:\d\d)(?=[ \t]*$)", re.MULTILINE)
@@ -53,6 +54,8 @@ def _check_lines(parts: ComtradeFiles) -> None:
     _check_station(parts, lines[0])
     analog, status = _channel_counts(parts, lines)
     total = analog + status
+    held = len(parts.data) + len(parts.text)
+    parts.limit.check(held + CHANNEL_BYTES * total, f"{total} channels")
     if len(lines) < total + 2:
         raise RecordError(
             f"{parts.line(len(lines) - 1)}: the file ends here: {total} channels, but "

@@ -74,6 +74,8 @@ def _binary(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
 def _ascii(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     """Return the samples of data in text, blank cells as nan."""
     width = 2 + config.analog_count + config.status_count
+    lines = parts.data.count(b"\n") + 1
+    parts.limit.check_columns([lines] * width, len(parts.data))
     data = parts.data.replace(b"\x1a", b"")
     try:
         cells = _loaded(data, width)

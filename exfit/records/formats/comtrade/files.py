@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from exfit.errors import RecordError
+from exfit.records.formats.memory import MemoryLimit, memory_limit
 from exfit.records.formats.table import read_bytes
 from exfit.util.files import siblings
 
@@ -26,6 +27,7 @@ class ComtradeFiles:
     dat: Path
     data: bytes
     sha256: str
+    limit: MemoryLimit
 
     def line(self, at: int) -> str:
         """Return the place of a line of the configuration, counted from 0."""
@@ -36,27 +38,28 @@ class ComtradeFiles:
         return f"{self.dat}: sample {row + 1}"
 
 
-def files_of(path: Path) -> ComtradeFiles:
+def files_of(path: Path, memory: float | None = None) -> ComtradeFiles:
     """Return the parts of a record, by its .cfg, its .dat or its .cff file.
 
-    Raises RecordError for a file of another kind, and where one is missing or cut off.
+    ``memory`` (GB) is what reading may take. Raises RecordError for a file of another kind, and
+    where one is missing, cut off or too large.
     """
     kind = path.suffix.lower()
     if kind not in (".cfg", ".dat", ".cff"):
         raise RecordError(f"{path}: a COMTRADE record is a .cfg with its .dat, or a .cff")
-    return _one_file(path) if kind == ".cff" else _two_files(path)
+    return _one_file(path, memory) if kind == ".cff" else _two_files(path, memory)
 
 
-def _two_files(path: Path) -> ComtradeFiles:
-    given = read_bytes(path)
+def _two_files(path: Path, memory: float | None) -> ComtradeFiles:
+    memory_limit(path, memory)  # the file itself may be missing, or none
     if path.suffix.lower() == ".cfg":
-        cfg, dat, text = path, _beside(path, ".dat"), given
-        data = read_bytes(dat)
+        cfg, dat = path, _beside(path, ".dat")
     else:
-        cfg, dat, data = _beside(path, ".cfg"), path, given
-        text = read_bytes(cfg)
+        cfg, dat = _beside(path, ".cfg"), path
+    limit = memory_limit(cfg, memory, dat)
+    text, data = read_bytes(cfg), read_bytes(dat)
     sha256 = hashlib.sha256(text + data).hexdigest()
-    return ComtradeFiles(path, cfg, _decoded(cfg, text), 1, dat, data, sha256)
+    return ComtradeFiles(path, cfg, _decoded(cfg, text), 1, dat, data, sha256, limit)
 
 
 def _beside(path: Path, suffix: str) -> Path:
@@ -70,8 +73,9 @@ def _beside(path: Path, suffix: str) -> Path:
     return files[0]
 
 
-def _one_file(path: Path) -> ComtradeFiles:
+def _one_file(path: Path, memory: float | None) -> ComtradeFiles:
     """Return the parts of a .cff file (IEEE Std C37.111-2013, clause 9)."""
+    limit = memory_limit(path, memory)
     whole = read_bytes(path)
     sections = {}
     for section in _SECTION.finditer(whole):
@@ -91,7 +95,7 @@ def _one_file(path: Path) -> ComtradeFiles:
     text = _decoded(path, whole[cfg.end() : min(ends)])
     first_line = whole.count(b"\n", 0, cfg.end()) + 1
     return ComtradeFiles(
-        path, path, text, first_line, path, data, hashlib.sha256(whole).hexdigest()
+        path, path, text, first_line, path, data, hashlib.sha256(whole).hexdigest(), limit
     )
 
 
