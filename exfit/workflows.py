@@ -236,17 +236,10 @@ def read_record(
     """
     from exfit.case.record_section import record_section
 
-    section = {
-        "file": Path(path),
-        "time": time,
-        "channels": channels,
-        "window": window,
-        "gaps": "skip" if missing else "refuse",
-        "sheet": sheet,
-        "resample": resample,
-        "memory": memory,
-    }
-    given = {key: value for key, value in section.items() if value is not None}
+    file = {"file": Path(path), "sheet": sheet, "memory": memory, "resample": resample}
+    gaps = "skip" if missing else "refuse"
+    samples = {"time": time, "channels": channels, "window": window, "gaps": gaps}
+    given = {key: value for key, value in (file | samples).items() if value is not None}
     return read_section(record_section(given), Path(), per_unit=True)
 
 
