@@ -1,6 +1,7 @@
 """The command batch."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,8 @@ from exfit.errors import ExfitError
 from exfit.util.strategies import EXPLAINED, SEARCHES, SEARCHES_EXPLAINED, STRATEGIES
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from exfit.fleet.batch import CaseMaking
     from exfit.fleet.folder import Fleet
     from exfit.fleet.observer import BatchObserver
@@ -127,24 +130,25 @@ def batch(
     from exfit.output.fleet_folder import write_tables
 
     tables, others = _tables_among(cases)
-    fleet = fit_all(
-        others,
-        output,
-        workers=workers,
-        scheduler=scheduler,
-        part=part,
-        retry_failed=retry is not None,
-        trust=trust,
-        time_limit=time_limit,
-        strategy=strategy,
-        search=search,
-        observer=None if quiet or as_json else _observer(),
-        further=_reports() if reports else (),
-        write_tables=write_tables,
-        made=_cases_of(tables, output),
-    )
-    if reports:
-        _write_missing_reports(fleet)
+    with _observer(shown=not (quiet or as_json)) as observer:
+        fleet = fit_all(
+            others,
+            output,
+            workers=workers,
+            scheduler=scheduler,
+            part=part,
+            retry_failed=retry is not None,
+            trust=trust,
+            time_limit=time_limit,
+            strategy=strategy,
+            search=search,
+            observer=observer,
+            further=_reports() if reports else (),
+            write_tables=write_tables,
+            made=_cases_of(tables, output),
+        )
+    if reports and _write_missing_reports(fleet):
+        write_tables(fleet)
     if as_json:
         print_json(fleet.to_dict())
     elif not quiet:
@@ -179,10 +183,13 @@ def _cases_of(tables: "Sequence[Path]", folder: Path) -> "dict[Path, CaseMaking]
     return made
 
 
-def _observer() -> "BatchObserver":
+def _observer(shown: bool) -> "AbstractContextManager[BatchObserver | None]":
+    """Return what shows a batch while it runs, None where nothing is to be shown."""
+    if not shown:
+        return nullcontext()
     from exfit.output import terminal
 
-    return terminal.BatchProgress(terminal.console())
+    return terminal.BatchProgress(terminal.console()).running()
 
 
 def _reports() -> "Sequence[FurtherFiles]":
@@ -191,9 +198,9 @@ def _reports() -> "Sequence[FurtherFiles]":
     return (report_file,)
 
 
-def _write_missing_reports(fleet: "Fleet") -> None:
-    """Write the reports of fits that an earlier run has made without."""
-    from exfit.output.fleet_folder import REPORT
+def _write_missing_reports(fleet: "Fleet") -> bool:
+    """Write the reports of fits that an earlier run has made without; return whether any was."""
+    from exfit.output.fleet_page import REPORT
 
     folders = [fleet.folder_of(case) for case in fleet.of_run]
     missing = [folder for folder in folders if folder and not (folder / REPORT).is_file()]
@@ -201,6 +208,7 @@ def _write_missing_reports(fleet: "Fleet") -> None:
         from exfit.output.report import write_report
 
         write_report(folder)
+    return bool(missing)
 
 
 def _show(fleet: "Fleet") -> None:

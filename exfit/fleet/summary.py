@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.results.facts import UNIT, Facts, stated
+from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.typed import IN_FILE
 
 if TYPE_CHECKING:
@@ -111,6 +112,17 @@ class CaseSummary:
     def named(self, name: str, case: str) -> "CaseSummary":
         """Return the summary for another case of equal content."""
         return replace(self, name=name, case=case)
+
+    @property
+    def outcome(self) -> str:
+        """What the case came to in a few words: its verdict, or why there is none."""
+        from exfit.results.side_by_side import NOT_ACCEPTED
+
+        if self.status != "done":
+            return self.status
+        if self.verdict in (GOOD, MATCHES) and not self.holds:
+            return NOT_ACCEPTED
+        return self.verdict or "no verdict"
 
     @property
     def fitted(self) -> dict[str, SummaryParameter]:

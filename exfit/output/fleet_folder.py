@@ -1,38 +1,27 @@
-"""What a batch writes for people: the table of its cases, and the reports of its fits."""
+"""What a batch writes for people: the tables and the page of its cases, the reports of its fits."""
 
-import csv
-import io
 from collections.abc import Iterator
 from pathlib import Path
 
 from exfit.fleet.folder import Fleet
-from exfit.fleet.summary import CaseSummary
+from exfit.fleet.sisters import sisters
+from exfit.output.fleet_page import REPORT, fleet_page
+from exfit.output.fleet_table import fleet_table, parameter_table
 from exfit.results.model import FitResult
-from exfit.util.files import write
+from exfit.util.files import write_together
 
-TABLE, REPORT = "fleet.csv", "report.html"
+TABLE, PARAMETERS, PAGE = "fleet.csv", "parameters.csv", "fleet.html"
 
 
 def write_tables(fleet: Fleet) -> None:
-    """Write the table of a fleet into its folder; raises ExfitError where it cannot be written."""
-    out = io.StringIO()
-    rows = [_cells(case) for case in fleet.cases]
-    writer = csv.DictWriter(out, [*dict.fromkeys(key for row in rows for key in row)], restval="")
-    writer.writeheader()
-    writer.writerows(rows)
-    write(fleet.folder / TABLE, out.getvalue())
-
-
-def _cells(case: CaseSummary) -> dict[str, str]:
-    return {
-        "case": case.name,
-        "unit": case.unit,
-        "model": case.model,
-        "status": case.status,
-        "verdict": case.verdict,
-        "reason": case.reason,
-        **{f"rmse {signal}": f"{rmse:.9g}" for signal, rmse in case.rmse.items()},
+    """Write the tables and the page of a fleet; raises ExfitError where they cannot be written."""
+    groups = sisters(fleet.cases)
+    contents = {
+        PARAMETERS: parameter_table(fleet.cases, groups),
+        PAGE: fleet_page(fleet, groups),
+        TABLE: fleet_table(fleet.cases),
     }
+    write_together(fleet.folder, contents)
 
 
 def report_file(result: FitResult, folder: Path) -> Iterator[tuple[str, str]]:

@@ -20,14 +20,14 @@ def cases(empty_folder, monkeypatch):
 
 
 def rows():
-    with Path("fleet/fleet.csv").open(encoding="utf-8", newline="") as table:
+    with Path("fleet/fleet.csv").open(encoding="utf-8-sig", newline="") as table:
         return [*csv.DictReader(table)]
 
 
 def test_all_cases_are_fitted_and_the_table_is_written(run):
     done = run("batch", "cases")
     assert (done.code, done.err) == (0, "")
-    assert [row["case"] for row in rows()] == ["a", "b"]
+    assert [row["name"] for row in rows()] == ["a", "b"]
     assert {row["verdict"] for row in rows()} == {"good"}
     assert len([*Path("fleet").glob("*/result.json")]) == 2
 

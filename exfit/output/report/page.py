@@ -72,7 +72,7 @@ def page_html(page: Page, interactive: bool = True) -> str:
     scripts = [*library(), script.read_text(encoding="utf-8")] if interactive else []
     overlays = _overlays(content for _, content in page.sections) if interactive else []
     text: str = (
-        _environment()
+        environment()
         .get_template("report.html.jinja")
         .render(
             title=page.title,
@@ -131,22 +131,23 @@ def _overlays(contents: Iterable[Any]) -> list[OverlayChart]:
 
 
 @cache
-def _environment() -> "Environment":
+def environment() -> "Environment":
+    """Return what renders the templates of pages: every text is escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    environment = Environment(
+    shared = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": _number, "rounded": rounded, "feature_cells": feature_cells}
-    environment.filters |= {"drawing": drawing, "command": shlex.join}
-    environment.tests |= {"finite": _is_finite}
-    environment.globals |= {"version": __version__, "features": LABELS, "long": LONG}
-    environment.globals |= {"most_printed": MOST_PRINTED}
-    return environment
+    shared.filters |= {"number": _number, "rounded": rounded, "feature_cells": feature_cells}
+    shared.filters |= {"drawing": drawing, "command": shlex.join}
+    shared.tests |= {"finite": _is_finite}
+    shared.globals |= {"version": __version__, "features": LABELS, "long": LONG}
+    shared.globals |= {"most_printed": MOST_PRINTED}
+    return shared
 
 
 def _is_finite(value: float | None) -> bool:
