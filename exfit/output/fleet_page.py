@@ -1,11 +1,11 @@
 """The page of a batch: one HTML file with all cases, their overlays, and sister units."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from exfit.fleet.folder import Fleet
 from exfit.fleet.sisters import OUTLIER, SisterGroup, SisterParameter, SisterValue
@@ -41,7 +41,6 @@ class CaseView:
     """A row of the page. ``order`` is the rank of its outcome, the best first."""
 
     case: CaseSummary
-    outcome: str
     style: str
     order: int
     link: str
@@ -69,55 +68,76 @@ class SisterView:
 
 def fleet_page(fleet: Fleet, groups: Sequence[SisterGroup]) -> str:
     """Return the page of a batch, with its sister units, as HTML."""
-    outliers = {
+    remarks = {
         (value.case, parameter.name): value.remark
-        for group in groups
-        for parameter in group.parameters
+        for parameter in _parameters(groups)
         for value in parameter.remarkable
     }
-    rows = [_case_view(fleet, case, outliers) for case in fleet.cases]
-    counts = Counter((row.order, row.outcome, row.style) for row in rows)
-    styles = ("report.css", "fleet.css")
     template = environment().get_template("fleet.html.jinja")
     text: str = template.render(
         title=fleet.folder.resolve().name,
-        rows=rows,
-        outcomes=[(outcome, style, count) for (_, outcome, style), count in sorted(counts.items())],
-        models=sorted({case.model for case in fleet.cases if case.model}),
-        unresolved=sum(bool(case.unresolved) for case in fleet.cases),
-        not_accepted=sum(case.validation.outcome == NOT_ACCEPTED for case in fleet.cases),
-        seconds=sum(case.seconds for case in fleet.cases),
+        rows=[_case_view(fleet, case, remarks) for case in fleet.cases],
         groups=[_sister_view(group) for group in groups],
-        compared=sum(_is_judged(p) for group in groups for p in group.parameters),
+        **_summary(fleet.cases),
+        sisters_apart=len(remarks),
+        compared=sum(parameter.centre is not None for parameter in _parameters(groups)),
         level=LEVEL,
         fewest=FEWEST,
         width=WIDTH,
         height=HEIGHT,
-        statuses=sorted(fleet.counts.items()),
-        sisters_apart=sum(len(p.remarkable) for group in groups for p in group.parameters),
-        css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in styles),
-        script=(TEMPLATES / "fleet.js").read_text(encoding="utf-8"),
+        css="".join(_template(name) for name in ("report.css", "fleet.css")),
+        script=_template("fleet.js"),
         value_words=_value_words,
         interval_words=_interval,
     )
     return text
 
 
+def _template(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+def _parameters(groups: Sequence[SisterGroup]) -> Iterator[SisterParameter]:
+    for group in groups:
+        yield from group.parameters
+
+
+def _summary(cases: Sequence[CaseSummary]) -> dict[str, Any]:
+    """Return the counts of a page, and what its filters offer."""
+    outcomes = Counter(case.outcome for case in cases)
+    return {
+        "outcomes": [(word, _style(word), outcomes[word]) for word in sorted(outcomes, key=_rank)],
+        "statuses": sorted(Counter(case.status for case in cases).items()),
+        "models": sorted({case.model for case in cases} - {""}),
+        "unresolved": sum(bool(case.unresolved) for case in cases),
+        "not_accepted": sum(case.validation.outcome == NOT_ACCEPTED for case in cases),
+        "seconds": sum(case.seconds for case in cases),
+    }
+
+
+def _style(outcome: str) -> str:
+    """Return the class of an outcome in the style sheet."""
+    return STYLES.get(outcome, "bad")
+
+
+def _rank(outcome: str) -> tuple[int, str]:
+    """Return the place of an outcome, the best first."""
+    words = (*VERDICTS, *STATUSES)
+    return (words.index(outcome) if outcome in words else len(words)), outcome
+
+
 def _case_view(
     fleet: Fleet, case: CaseSummary, outliers: Mapping[tuple[str, str], str]
 ) -> CaseView:
-    outcome = case.outcome
-    words = (*VERDICTS, *STATUSES)
     worst = max((rmse for rmse in case.rmse.values() if isfinite(rmse)), default=None)
     return CaseView(
         case,
-        outcome,
-        STYLES.get(outcome, "bad"),
-        words.index(outcome) if outcome in words else len(words),
+        _style(case.outcome),
+        _rank(case.outcome)[0],
         _link(fleet.folder, case),
         case.rmse.get("vt", worst),
         tuple(
-            _parameter_view(case, name, value, outliers.get((case.name, name), ""))
+            _parameter_view(case, name, value, remarks.get((case.name, name), ""))
             for name, value in case.fitted.items()
         ),
         tuple(picture(curve, _label(case, curve)) for curve in case.curves[:MOST_PICTURES]),
@@ -177,10 +197,6 @@ def _sister_view(group: SisterGroup) -> SisterView:
     remarkable = {value.case for p in group.parameters for value in p.remarkable}
     kept = tuple(row for row in rows if row.name in remarkable)
     return SisterView(group, kept, len(rows) - len(kept))
-
-
-def _is_judged(parameter: SisterParameter) -> bool:
-    return parameter.centre is not None
 
 
 def _value_words(value: SisterValue) -> str:

@@ -6,7 +6,7 @@ The texts come from the files of others: a spreadsheet must not take one for a f
 import csv
 import io
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from exfit.fleet.sisters import SisterGroup, SisterParameter, SisterValue
 from exfit.fleet.summary import CaseSummary, SummaryParameter
@@ -48,29 +48,33 @@ def fleet_table(cases: Sequence[CaseSummary]) -> str:
     Behind the columns that every table has stands the rmse of each signal, and the value and the
     ends of the interval of each parameter that any case fitted. What a case does not have is blank.
     """
-    ordered = sorted(cases, key=lambda case: (case.name.casefold(), case.name))
+    ordered = _by_name(cases)
     signals = [name for name in SIGNALS if any(name in case.rmse for case in ordered)]
     parameters = sorted({name for case in ordered for name in case.fitted})
-    header = [
-        *CASE_COLUMNS,
-        *(f"rmse {signal}" for signal in signals),
-        *(text_cell(name) + end for name in parameters for end in ("", " low", " high")),
-    ]
-    rows = (
-        [
-            *(cell(case) for cell in CASE_COLUMNS.values()),
-            *(_number(case.rmse.get(signal)) for signal in signals),
-            *(cell for name in parameters for cell in _interval(case.fitted.get(name))),
-        ]
-        for case in ordered
-    )
-    return _csv(header, rows)
+    header = [*CASE_COLUMNS, *(f"rmse {signal}" for signal in signals)]
+    header += [text_cell(name) + end for name in parameters for end in ("", " low", " high")]
+    return _csv(header, (_case_cells(case, signals, parameters) for case in ordered))
+
+
+def _by_name(cases: Sequence[CaseSummary]) -> list[CaseSummary]:
+    return sorted(cases, key=lambda case: (case.name.casefold(), case.name))
+
+
+def _case_cells(
+    case: CaseSummary, signals: Sequence[str], parameters: Sequence[str]
+) -> Iterator[str]:
+    for text in CASE_COLUMNS.values():
+        yield text(case)
+    for signal in signals:
+        yield _number(case.rmse.get(signal))
+    for name in parameters:
+        yield from _interval(case.fitted.get(name))
 
 
 def parameter_table(cases: Sequence[CaseSummary], groups: Iterable[SisterGroup]) -> str:
     """Return the fitted parameters of all cases as CSV, a line for each beside its sisters'."""
     compared = {
-        (value.case, parameter.name): (group, parameter, value)
+        (value.case, parameter.name): (parameter, value)
         for group in groups
         for parameter in group.parameters
         for value in parameter.values
@@ -83,7 +87,7 @@ def parameter_table(cases: Sequence[CaseSummary], groups: Iterable[SisterGroup])
             text_cell(value.unit),
             *_beside_sisters(compared.get((case.name, name))),
         ]
-        for case in sorted(cases, key=lambda case: (case.name.casefold(), case.name))
+        for case in _by_name(cases)
         for name, value in case.fitted.items()
     )
     return _csv(PARAMETER_COLUMNS, rows)
@@ -95,10 +99,10 @@ def text_cell(text: str) -> str:
     return f"'{line}" if STARTS_FORMULA.match(line) else line
 
 
-def _beside_sisters(place: tuple[SisterGroup, SisterParameter, SisterValue] | None) -> list[str]:
+def _beside_sisters(place: tuple[SisterParameter, SisterValue] | None) -> list[str]:
     if place is None:
         return [""] * len(PARAMETER_COLUMNS[11:])
-    _, parameter, value = place
+    parameter, value = place
     numbers = (parameter.centre, parameter.spread, value.deviation, value.probability)
     return [str(len(parameter.values)), *map(_number, numbers), text_cell(value.remark)]
 
@@ -113,7 +117,7 @@ def _number(value: float | None) -> str:
     return "" if value is None or value != value else f"{value:.{DIGITS}g}"
 
 
-def _csv(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def _csv(header: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)
