@@ -126,9 +126,7 @@ def _rank(outcome: str) -> tuple[int, str]:
     return (words.index(outcome) if outcome in words else len(words)), outcome
 
 
-def _case_view(
-    fleet: Fleet, case: CaseSummary, outliers: Mapping[tuple[str, str], str]
-) -> CaseView:
+def _case_view(fleet: Fleet, case: CaseSummary, remarks: Mapping[tuple[str, str], str]) -> CaseView:
     worst = max((rmse for rmse in case.rmse.values() if isfinite(rmse)), default=None)
     return CaseView(
         case,
