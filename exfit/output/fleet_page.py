@@ -11,7 +11,7 @@ from exfit.fleet.folder import Fleet
 from exfit.fleet.sisters import OUTLIER, SisterGroup, SisterParameter, SisterValue
 from exfit.fleet.summary import CaseSummary, SummaryCurve, SummaryParameter
 from exfit.inference.outliers import FEWEST, LEVEL
-from exfit.output.fleet_pictures import HEIGHT, WIDTH, Picture, picture
+from exfit.output.fleet_pictures import HEIGHT, WIDTH, Thumbnail, picture
 from exfit.output.report.page import TEMPLATES, environment
 from exfit.results.side_by_side import NOT_ACCEPTED
 from exfit.results.verdict import GOOD, MATCHES, VerdictWords
@@ -46,7 +46,7 @@ class CaseView:
     link: str
     rmse: float | None
     parameters: tuple[ParameterView, ...]
-    pictures: tuple[Picture, ...]
+    pictures: tuple[Thumbnail, ...]
 
 
 @dataclass(frozen=True)

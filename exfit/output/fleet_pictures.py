@@ -19,7 +19,7 @@ BINS = 20  # of a line, each with its least and greatest value
 
 
 @dataclass(frozen=True)
-class Picture:
+class Thumbnail:
     """An overlay: the d of the paths of measured and simulated samples, and what it is of."""
 
     label: str
@@ -27,7 +27,7 @@ class Picture:
     simulated: str
 
 
-def picture(curve: SummaryCurve, label: str) -> Picture:
+def picture(curve: SummaryCurve, label: str) -> Thumbnail:
     """Return a signal beside its simulation as paths of whole numbers, two to a pixel."""
     lines = (curve.measured, curve.simulated)
     rows = kept_rows(lines, BINS)
@@ -43,7 +43,7 @@ def picture(curve: SummaryCurve, label: str) -> Picture:
         )
         for line in samples
     ]
-    return Picture(label, *paths)
+    return Thumbnail(label, *paths)
 
 
 def _path(x: Array, y: Array) -> str:
