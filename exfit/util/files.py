@@ -99,8 +99,11 @@ def prepare(folder: Path) -> None:
         remove_abandoned(folder)
         beside = _temporary(folder)
         with deferred_interrupts():
-            _write_new(beside, b"")
-            beside.unlink()
+            try:
+                _write_new(beside, b"")
+            finally:
+                with suppress(OSError):
+                    beside.unlink()
     except OSError as fault:
         raise ExfitError(_message(folder, fault)) from fault
 

@@ -25,6 +25,8 @@ WRITERS = {
     "report": ("report", "fit", "-o", "report.html"),
     "new": ("new", "--model", "AC1A", "--record", "record.csv", "--step", "0.05", "--force",
             "-o", "new.yaml"),
+    "batch": ("batch", "case.yaml", "--workers", "1", "-o", "fleet"),
+    "import all": ("import", "unit.dyr", "--all", "--force", "-o", "units"),
     "import": ("import", "unit.dyr", "--force", "-o", "imported.yaml"),
     "export": ("export", "fit", "--force", "-o", "exported.dyr"),
 }  # fmt: skip
