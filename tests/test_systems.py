@@ -87,13 +87,19 @@ def without_encoding(tree):
             continue
         owner, _, name = ast.unparse(node.func).rpartition(".")
         named = any(word.arg == "encoding" for word in node.keywords)
-        modes = [str(part.value) for part in node.args if isinstance(part, ast.Constant)]
-        if (
-            (name == "write_text" and owner)
-            or (name == "read_text" and owner and not named)
-            or (name == "open" and owner != "os" and not named and not any("b" in m for m in modes))
-        ):
+        if name in ("read_text", "write_text") and owner:
+            faulty = name == "write_text" or not named
+        else:
+            faulty = name == "open" and owner != "os" and not named and _opens_text(node, owner)
+        if faulty:
             yield node
+
+
+def _opens_text(call, owner):
+    """Return whether a call opens a file as text: an archive is given a name, a path a mode."""
+    modes = call.args[0 if owner else 1 :]
+    constants = [str(mode.value) for mode in modes if isinstance(mode, ast.Constant)]
+    return not modes or any("b" not in mode for mode in constants)
 
 
 def listed(faults):
@@ -141,7 +147,17 @@ def test_the_test_finds_what_it_looks_for_but_not_behind_a_question(code):
     assert unguarded(ast.parse(f"if os.name == 'posix':\n    {body}")) == []
 
 
-@pytest.mark.parametrize("code", ["open(path)", "path.open()", "p.read_text()", "p.write_text(t)"])
+@pytest.mark.parametrize(
+    "code",
+    [
+        "open(path)",
+        "open(path, 'w')",
+        "path.open()",
+        "path.open('r')",
+        "p.read_text()",
+        "p.write_text(t)",
+    ],
+)
 def test_the_test_finds_what_names_no_encoding(code):
     assert len([*without_encoding(ast.parse(code))]) == 1
 
