@@ -9,7 +9,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 from exfit.errors import ExfitError
-from exfit.fleet.dispatch import cluster_workers
 from exfit.fleet.folder import (
     CaseOutcome,
     Fleet,
@@ -116,6 +115,8 @@ def batch(
     count = min(workers or processors(), max(1, len(files)))
     run = BatchRun(files, place, settings, observer or Unobserved(), made)
     if scheduler is not None:
+        from exfit.fleet.dispatch import cluster_workers
+
         compute, count = cluster_workers(scheduler, time_limit), 0
     try:
         interrupted = run.fit_all(compute or local_workers(count, time_limit), count)

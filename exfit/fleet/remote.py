@@ -11,7 +11,7 @@ import shutil
 import sys
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
@@ -88,15 +88,23 @@ class Seat:
             raise NoProcess(seat.gone())
         return seat
 
-    def reply(self, case: PlannedCase, group: str, limit: float) -> Reply:
-        """Return what becomes of a case; the process has ended where it takes longer or crashes."""
+    def reply(
+        self, case: PlannedCase, group: str, limit: float, is_wanted: Callable[[], bool]
+    ) -> Reply:
+        """Return what becomes of a case; the process has ended where it takes longer or crashes.
+
+        It is ended, too, once the case is not wanted any more.
+        """
         self.process.give(case, group)
         until = time.monotonic() + limit
         while time.monotonic() < until:
             try:
                 content = self.said.get(timeout=min(LISTENING, limit)).content
             except Empty:
-                continue
+                if is_wanted():
+                    continue
+                self.process.dismiss()
+                return Reply(death=self.gone())
             if content is None:
                 return Reply(death=self.gone())
             if content != BEGUN:
@@ -126,14 +134,14 @@ class Seats:
     stopped: bool = False
     leaving: Timer | None = None
 
-    def reply(self, remote: RemoteCase) -> Reply:
+    def reply(self, remote: RemoteCase, is_wanted: Callable[[], bool]) -> Reply:
         """Return what becomes of a case; raises NoProcess where none can be started for it."""
         case = remote.case
         if not isinstance(case.task, BundledTask):
             raise TypeError("a case without its files")
         task = replace(case.task, temporary=self.folder)
         with self._seat() as seat:
-            return seat.reply(case._replace(task=task), task.group, remote.limit)
+            return seat.reply(case._replace(task=task), task.group, remote.limit, is_wanted)
 
     @contextmanager
     def _seat(self) -> Iterator[Seat]:
@@ -186,7 +194,14 @@ def run_packed(payload: bytes) -> Reply:
     from distributed import get_worker
 
     remote: RemoteCase = pickle.loads(payload)
-    return _seats(get_worker(), remote.batch).reply(remote)
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_wanted() -> bool:  # not after a sudden end of the client, who could not say so
+        state = worker.state.tasks.get(key)
+        return state is not None and state.state != "cancelled"
+
+    return _seats(worker, remote.batch).reply(remote, is_wanted)
 
 
 def stop_batch(batch: str, dask_worker: "Worker | None" = None) -> None:

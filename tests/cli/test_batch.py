@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -108,7 +109,10 @@ def test_a_cluster_that_cannot_be_reached_is_a_line_and_the_table_is_there(run, 
     monkeypatch.setattr("exfit.fleet.cluster.CONNECTED_WITHIN", 0.2)
     done = run("batch", "cases", "--scheduler", "127.0.0.1:1", "-q")
     assert done.code == 1
-    assert done.err == "Error: 127.0.0.1:1: no connection: Connection refused\n"
+    # a busy machine may not even come to the refusal in so short a time
+    assert re.fullmatch(
+        r"Error: 127\.0\.0\.1:1: no connection: (Connection refused|Timed out .*)\n", done.err
+    )
     assert {row["status"] for row in rows()} == {"not run"}
     done = run("batch", "cases", "--scheduler", "127.0.0.1:1", "--workers", "2")
     assert done.code == 2

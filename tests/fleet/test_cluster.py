@@ -1,6 +1,7 @@
 """Batches on a Dask cluster: the same files as here, whatever happens to its processes."""
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -134,6 +135,7 @@ def test_an_interruption_ends_all_workers_and_a_lost_scheduler_the_batch(user):
         command = ["batch", str(folder), "--trust", "-q", "--scheduler", there.address]
         for output, stop, code in (
             ("interrupted", lambda batch: batch.send_signal(signal.SIGINT), 3),
+            ("killed", lambda batch: batch.kill(), -signal.SIGKILL),
             ("lost", lambda _: kill_group(there.scheduler), 1),
         ):
             batch = subprocess.Popen(
@@ -150,9 +152,11 @@ def test_an_interruption_ends_all_workers_and_a_lost_scheduler_the_batch(user):
             assert said.startswith(lost) if code == 1 else said == ""
             assert len(said.splitlines()) == (code == 1)
             assert {case.status for case in exfit.read_fleet(output).cases} == {"done", "not run"}
-            assert Path(output, "fleet.csv").is_file()
+            assert Path(output, "fleet.csv").is_file() == (code > 0)
             if code == 3:
-                waited(lambda: none_runs(beside), "the end of all fits", within=10.0)  # noqa: B023
+                waited(lambda: none_runs(beside), "the end of all fits")  # noqa: B023
+            if code < 0:  # those without a case stay for a while
+                waited(lambda: len(processes_of(there)) == 1, "the end of the fit that hangs")
 
 
 def free_port():
@@ -169,7 +173,8 @@ def refusal(address):
 def test_an_address_without_a_scheduler_is_refused_in_a_line(monkeypatch, capfd):
     monkeypatch.setattr(cluster, "CONNECTED_WITHIN", 0.3)
     free = f"127.0.0.1:{free_port()}"
-    assert refusal(free) == f"{free}: no connection: Connection refused"
+    # a busy machine may not even come to the refusal in so short a time
+    assert re.fullmatch(f"{free}: no connection: (Connection refused|Timed out .*)", refusal(free))
     assert refusal("here") == "here: no connection: missing port number in address 'here'"
     assert "unknown address scheme 'fax'" in refusal("fax://here:1")
     assert refusal(f"tls://{free}").endswith(
