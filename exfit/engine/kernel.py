@@ -5,7 +5,6 @@ import hashlib
 import os
 import threading
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,13 +16,13 @@ from numpy.typing import NDArray
 from exfit.engine.calls import ALONG, AT_REST, address, function
 from exfit.engine.sampling import Courses, Sampler, Sizes
 from exfit.engine.system import System, differentiate, trace
-from exfit.util.cache import cache_folder
-from exfit.util.files import write_whole
+from exfit.util.cache import keep_private, private_cache, read_private
 
 Array = NDArray[np.float64]
 
 SIDE_BY_SIDE = 16  # parameter sets: two vectors of 512 bits hide each other's waiting
 DIRECTIONS = 8  # of differentiation in one run
+FORM = "2"  # of a file of code: in its key, as one of another form is none
 DIGEST = hashlib.sha256().digest_size
 
 _lock = threading.Lock()
@@ -101,20 +100,27 @@ def _build(ir: str, machine: Any) -> bytes:
     return code
 
 
+def _digest(path: Path, code: bytes) -> bytes:
+    """Return the digest of code that is kept at a path: under another name it is none of that."""
+    return hashlib.sha256(f"{path.name}\n".encode() + code).digest()
+
+
 def _cached(path: Path) -> bytes | None:
-    """Return the code kept at path; None where there is none, or it is damaged."""
-    try:
-        content = path.read_bytes()
-    except OSError:
+    """Return the code kept at path; None where there is none, or it is damaged or of others.
+
+    The digest shows damage, and a file under a name that is not its own. It protects from nobody
+    who can write there: that is for the owner and the mode of the file.
+    """
+    content = read_private(path)
+    if content is None:
         return None
     digest, code = content[:DIGEST], content[DIGEST:]
-    return code if hashlib.sha256(code).digest() == digest else None
+    return code if _digest(path, code) == digest else None
 
 
 def _keep(path: Path, code: bytes) -> None:
     """Keep code on disk; a folder that cannot be written keeps nothing."""
-    with suppress(OSError):
-        write_whole(path, hashlib.sha256(code).digest() + code)
+    keep_private(path, _digest(path, code) + code)
 
 
 @cache
@@ -133,13 +139,15 @@ def _code(traced: str, write_ir: Callable[[], str], machine: Any, name: str) -> 
 
     Which IR a trace leads to is kept as well: to write it takes longer than to load the code.
     """
-    folder = cache_folder()
+    folder = private_cache()
+    if folder is None:
+        return _build(write_ir(), machine)
     place = folder / "traces" / _key(name, _sources(), traced)
     key = _cached(place)
     code = None if key is None else _cached(folder / f"{key.decode()}.code")
     if code is None:
         ir = write_ir()
-        path = folder / f"{_key(name, ir)}.code"
+        path = folder / f"{_key(FORM, name, ir)}.code"
         code = _cached(path)
         if code is None:
             code = _build(ir, machine)

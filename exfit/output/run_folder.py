@@ -3,7 +3,6 @@
 import hashlib
 import os
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,9 +32,9 @@ from exfit.results.tables import (
     table,
     whole_table,
 )
-from exfit.util.cache import cache_folder
+from exfit.util.cache import keep_private, private_cache, read_private
 from exfit.util.file_names import files_named_after
-from exfit.util.files import write, write_together
+from exfit.util.files import write_together
 from exfit.util.interrupts import deferred_interrupts
 from exfit.util.json_files import read_json
 from exfit.util.strategies import PHASES
@@ -146,8 +145,7 @@ def write_fit(result: FitResult, folder: Path) -> FigureFiles:
     with deferred_interrupts():
         numbers = dict(files_of_fit(result))
         write_together(folder, numbers, {*FILES_OF_FIT, *_of_records(folder / WHOLE_FIT)})
-        with suppress(ExfitError):  # a cache that cannot be written keeps nothing
-            write(_last_parameters(result.case), numbers[PARAMETERS])
+        _remember(result.case, numbers[PARAMETERS])
     return FigureFiles.beside(folder / WHOLE_FIT, partial(run_figures.of_fit, result))
 
 
@@ -167,8 +165,7 @@ def write_series(series: "FitSeries", folder: Path) -> FigureFiles:
         )
         for fits in series.by_case.values():
             lowest = min((run.result for run in fits), key=lambda result: result.cost)
-            with suppress(ExfitError):
-                write(_last_parameters(lowest.case), parameter_file(lowest))
+            _remember(lowest.case, parameter_file(lowest))
     return FigureFiles.beside(folder / SERIES, partial(run_figures.of_series, series))
 
 
@@ -317,13 +314,21 @@ def record_table(agreement: "Agreement") -> str | None:
 def last_fit(case: Path) -> Path | None:
     """Return the parameters of the last fit of a case; None where there was no fit."""
     parameters = _last_parameters(case)
-    return parameters if parameters.is_file() else None
+    return None if parameters is None or read_private(parameters) is None else parameters
 
 
-def _last_parameters(case: Path) -> Path:
-    """Return where the parameters of a case's last fit are kept.
+def _remember(case: Path, parameters: str) -> None:
+    """Keep the parameters of a case's last fit; a cache that cannot be written keeps nothing."""
+    place = _last_parameters(case)
+    if place is not None:
+        keep_private(place, parameters.encode())
+
+
+def _last_parameters(case: Path) -> Path | None:
+    """Return where the parameters of a case's last fit are kept; None where no place is.
 
     A copy beside the compiled code: a folder of results may be written over by another case.
     """
+    folder = private_cache()
     name = hashlib.sha256(str(case.resolve()).encode()).hexdigest()[:32]
-    return cache_folder() / "last-fit" / f"{name}.yaml"
+    return None if folder is None else folder / "last-fit" / f"{name}.yaml"

@@ -1,6 +1,8 @@
 """Machine code: what it computes equals the float run of the same equations; the cache is safe."""
 
+import os
 import re
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -579,6 +581,73 @@ def test_a_damaged_cache_is_rebuilt_in_silence(cache, builds, damage, capfd):
     assert path.read_bytes() == sound
     assert codes(cache) == [path]
     assert capfd.readouterr() == ("", "")
+
+
+def test_code_under_the_name_of_other_code_is_not_run(cache, builds):
+    """A digest of the code alone would let it run: it was a crash of the process."""
+    nine()
+    apply(lambda x: x * x + 1.0, np.array([3.0]), lanes=1)
+    for files in (codes(cache), [*(cache / "traces").iterdir()]):
+        first, second = files
+        sound = first.read_bytes()
+        first.write_bytes(second.read_bytes())
+        second.write_bytes(sound)
+        assert nine() == 9.0
+        assert apply(lambda x: x * x + 1.0, np.array([3.0]), lanes=1)[0] == 10.0
+    assert len(builds) == 4
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of POSIX")
+@pytest.mark.parametrize("mask", [0o000, 0o002, 0o022])
+def test_what_is_kept_is_for_the_user_alone_whatever_the_mask(cache, builds, mask):
+    former = os.umask(mask)
+    try:
+        nine()
+    finally:
+        os.umask(former)
+    assert {path.stat().st_mode & 0o777 for path in (cache, cache / "traces")} == {0o700}
+    kept = [*codes(cache), *(cache / "traces").iterdir()]
+    assert {path.stat().st_mode & 0o777 for path in kept} == {0o600}
+    nine()
+    assert len(builds) == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of POSIX")
+@pytest.mark.parametrize("mode", [0o770, 0o702, 0o777])
+def test_a_folder_that_others_can_write_to_is_not_used_and_that_is_reported_once(
+    cache, builds, caplog, mode
+):
+    cache.mkdir()
+    cache.chmod(mode)
+    assert (nine(), nine()) == (9.0, 9.0)
+    assert len(builds) == 2
+    assert [*cache.iterdir()] == []
+    (message,) = caplog.messages
+    assert message == (
+        f"Warning: {cache}: not used for compiled code: others can write to it (mode {mode:o}): "
+        "chmod go-w"
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of POSIX")
+def test_a_folder_of_another_user_is_not_used(cache, builds, caplog, monkeypatch):
+    cache.mkdir()
+    monkeypatch.setattr("os.geteuid", lambda: os.getuid() + 1)
+    assert (nine(), nine()) == (9.0, 9.0)
+    assert len(builds) == 2
+    assert [*cache.iterdir()] == []
+    (message,) = caplog.messages
+    assert message.endswith(f"it belongs to another user (number {os.getuid()})")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes of POSIX")
+def test_a_file_that_others_could_write_is_not_run(cache, builds):
+    nine()
+    (path,) = codes(cache)
+    path.chmod(0o666)
+    assert nine() == 9.0
+    assert len(builds) == 2
+    assert path.stat().st_mode & 0o777 == 0o600
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch, builds):
