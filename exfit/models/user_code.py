@@ -1,6 +1,7 @@
 """The one place where a file of Python that a case names is run: with the rights of its user."""
 
 import hashlib
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,8 +16,11 @@ HASH_DIGITS = 12  # digits of a hash that distinguish files
 def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
     """Run a file of Python and return the names that it defines.
 
+    A file whose hash ``sha256`` is given is run once in a process: its models are then the same
+    ones, which share their machine code. Without a hash it is run each time.
+
     Raises ModelError where the file cannot be read or fails, and, before anything of it is run,
-    where its hash is not ``sha256``; empty: any hash will do.
+    where its hash is another one.
     """
     try:
         code = read_limited(path, LARGEST_FILE)
@@ -28,6 +32,15 @@ def run_user_code(path: Path, sha256: str = "") -> dict[str, Any]:
             f"{path}: not run: the file has changed since the fit: its SHA-256 begins with "
             f"{own[:HASH_DIGITS]}, that of the fitted model was {sha256[:HASH_DIGITS]}; fit again"
         )
+    return _run_once(path, code) if sha256 else _run(path, code)
+
+
+@cache
+def _run_once(path: Path, code: bytes) -> dict[str, Any]:
+    return _run(path, code)
+
+
+def _run(path: Path, code: bytes) -> dict[str, Any]:
     module = ModuleType(f"exfit_user_{path.stem}")
     try:
         # compiled here, not imported: a module cache beside it would outlive a quick edit

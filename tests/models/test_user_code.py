@@ -53,6 +53,20 @@ def test_a_file_with_another_hash_is_not_run(tmp_path):
     assert (tmp_path / "run").exists()
 
 
+def test_a_file_that_is_known_by_its_hash_is_run_once(tmp_path):
+    """So that the models of many cases are one, compiled once; an edit is another file."""
+    path = tmp_path / "trap.py"
+    for text in ("", "# edited\n"):
+        path.write_text(trap(tmp_path) + text)
+        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        names = run_user_code(path, sha256)
+        (tmp_path / "run").unlink()
+        assert run_user_code(path, sha256) is names
+        assert not (tmp_path / "run").exists()
+        run_user_code(path)
+        (tmp_path / "run").unlink()
+
+
 @pytest.mark.parametrize(
     "command",
     [
