@@ -90,6 +90,8 @@ def from_record_to_export() -> None:
     exfit("export", "fit", "--bus", "101", "--id", "1", "-o", "unit.dyr")
     exfit("import", "unit.dyr", "-o", "again.yaml")
     exfit("simulate", "again.yaml", "--no-plots")
+    exfit("batch", "unit.yaml", "--workers", "1", "--search", "local", "-o", "fleet")
+    expect(Path("fleet", "fleet.html").is_file(), "fleet/fleet.html is missing")
 
 
 def extras() -> None:
@@ -100,6 +102,9 @@ def extras() -> None:
         if find_spec(package) is None:
             ran = exfit("inspect", file, code=1)
             expect(f"exfit[{extra}]" in ran.stderr, f"{file}: {ran.stderr}")
+    if find_spec("distributed") is None:
+        ran = exfit("batch", "unit.yaml", "--scheduler", "tcp://127.0.0.1:1", code=1)
+        expect("exfit[cluster]" in ran.stderr, ran.stderr)
     if find_spec("weasyprint") is None:
         ran = exfit("report", "fit", "--pdf", code=1)
         expect("exfit[pdf]" in ran.stderr, ran.stderr)
