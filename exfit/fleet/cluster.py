@@ -127,16 +127,22 @@ def threads_of(client: "Client") -> dict[str, int]:
 
     Raises ClusterError where the scheduler is lost.
     """
-    reason = f"{client.scheduler.address}: connection to the scheduler lost"
     if client.status != "running":
-        raise ClusterError(reason)
+        raise lost(client)
     try:
         threads: dict[str, int] = client.sync(
             client.scheduler.ncores, callback_timeout=ANSWERED_WITHIN
         )
     except (OSError, TimeoutError) as fault:
-        raise ClusterError(f"{reason}: {_reason(fault)}") from None
+        raise lost(client, fault) from None
     return threads
+
+
+def lost(client: "Client", fault: BaseException | None = None) -> ClusterError:
+    """Return the error of a scheduler that does not answer any more."""
+    reason = "" if fault is None else f": {_reason(fault)}"
+    text = f"connection to the scheduler lost{reason}"
+    return ClusterError(f"{client.scheduler.address}: {text}")
 
 
 def asked(client: "Client", worker: str) -> "Future[Mapping[str, Any]]":

@@ -23,6 +23,7 @@ from exfit.fleet.cluster import (
     answered,
     asked,
     connected,
+    lost,
     stop,
     threads_of,
 )
@@ -241,9 +242,13 @@ class Dispatch:
             self.end(case, CaseOutcome(failure=Failure("failed", str(fault))))
             return
         payload = pickle.dumps(RemoteCase(bundled, self.batch, self.time_limit))
-        future = self.client.submit(
-            _in_worker(), payload, key=f"exfit-{uuid4().hex}", workers=[worker], pure=False
-        )
+        key = f"exfit-{uuid4().hex}"
+        try:
+            future = self.client.submit(
+                _in_worker(), payload, key=key, workers=[worker], pure=False
+            )
+        except Exception as fault:  # of many kinds, by where it has noticed
+            raise lost(self.client, fault) from None
         self.sent[future.key] = Sent(case, worker, len(payload), future)
         future.add_done_callback(lambda done: self.arrived.put(done.key))
 
@@ -270,8 +275,10 @@ class Dispatch:
     def _finish(self, case: PlannedCase, reply: Reply) -> None:
         """Take the outcome of a case; one whose process died is tried again, elsewhere perhaps."""
         if not reply.death:
-            self._send()  # before the outcome is written
-            self.end(case, unpacked(reply.packed))
+            try:
+                self._send()  # before the outcome is written
+            finally:
+                self.end(case, unpacked(reply.packed))
             return
         self.deaths[_key(case)] += 1
         if self.deaths[_key(case)] < MOST_DEATHS:

@@ -318,6 +318,23 @@ def test_a_lost_scheduler_ends_the_batch(tmp_path):
         run.until_done(lambda _: None)
 
 
+def test_what_has_arrived_is_kept_where_the_scheduler_is_lost(tmp_path):
+    client = WordyClient(a=1)
+    run = Run(client, planned([f"m{number}" for number in range(9)], tmp_path))
+
+    def reply(client):
+        client.finish(client.under_way[0])
+
+        def refuse(*_, **__):
+            raise RuntimeError("closed")
+
+        client.submit = refuse
+
+    with pytest.raises(ClusterError, match="tcp://words:1: connection to the scheduler lost: clo"):
+        run.until_done(reply)
+    assert [*run.ended] == ["m0"]
+
+
 def test_without_workers_the_message_names_the_command_that_starts_one(tmp_path, monkeypatch):
     monkeypatch.setattr(dispatch, "FIRST_WORKER", 0.0)
     with pytest.raises(ClusterError, match="dask worker tcp://words:1 --nthreads 1"):
