@@ -10,6 +10,7 @@ import numpy as np
 from exfit.errors import RecordError
 from exfit.records.formats.table import Array, column_error
 from exfit.records.units import SECONDS, alike, bare, usual
+from exfit.util.sorting import median
 
 TIMESTAMP_NAMES = frozenset(  # date and time of day in one column
     ("timestamp", "zeitstempel", "zeitpunkt", "datetime", "date_time", "date_&_time",
@@ -20,6 +21,9 @@ TIME_NAME = re.compile(
     r"t|time|tout|zeit|uhrzeit|tiempo|hora|temps|tempo|tijd|tid|utc|x_value|time_of_day"
     r"|(?:rel|abs|elapsed)[a-z]*_?(?:time|zeit)"
 )
+LARGEST = 1e100  # of a number in a record: its squares and cubes are numbers still
+SMALLEST = 1e-100  # pu: a signal that stays below it all along, but is not 0
+SHORTEST_STEP = 1e-12  # s, between most samples: no recorder is as fast
 WORD_SEPARATOR = re.compile(r"[\s\-/.]+")
 
 
@@ -82,10 +86,30 @@ def in_seconds(
 
 
 def check_finite(time: Array, label: str, place: Callable[[int], str]) -> None:
-    """Raise a RecordError where time is not finite; ``place`` names a sample, counted from 0."""
-    lost = np.flatnonzero(~np.isfinite(time))
+    """Raise a RecordError where time is no number to compute with; ``place`` names a sample."""
+    lost = np.flatnonzero(~(np.abs(time) <= LARGEST))
     if lost.size:
-        raise RecordError(f"{place(int(lost[0]))}: {label}: {time[lost[0]]} is not a finite number")
+        number = time[lost[0]]
+        raise RecordError(f"{place(int(lost[0]))}: {label}: {number} {why_unusable(number)}")
+
+
+def why_unusable(number: float) -> str:
+    """Return why a number of a record is none to compute with."""
+    return f"exceeds {LARGEST:g}" if np.isfinite(number) else "is not a finite number"
+
+
+def check_steps(time: Array, label: str, place: Callable[[int], str]) -> None:
+    """Raise a RecordError where most samples (M,) follow each other closer than a recorder's."""
+    steps = np.diff(time)
+    if steps.min(initial=np.inf) >= SHORTEST_STEP:
+        return
+    forward = steps[steps > 0.0]
+    if forward.size and (step := float(median(forward))) < SHORTEST_STEP:
+        at = int(np.argmax((steps > 0.0) & (steps <= step))) + 1
+        raise RecordError(
+            f"{place(at)}: {label}: {step:g} s after the sample before, as most are: closer than "
+            f"{SHORTEST_STEP:g} s"
+        )
 
 
 def check_increasing(

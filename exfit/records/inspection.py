@@ -21,11 +21,11 @@ from exfit.records.channel_inspection import (
     inspect_channel,
 )
 from exfit.records.channel_recognition import guess_signals, three_phases
-from exfit.records.clock import Clock, check_finite
+from exfit.records.clock import LARGEST, Clock, check_finite, check_steps, why_unusable
 from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
 from exfit.records.formats.memory import TooLargeError
-from exfit.records.formats.table import Table, listed, refuse_uneven
+from exfit.records.formats.table import Table, column_error, listed, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
 from exfit.records.steps import (
@@ -180,6 +180,7 @@ def _stamps(table: Table, clock: Clock) -> Array:
             f"{table.path}: {len(stamps)} samples; at least {FEWEST_SAMPLES} are needed"
         )
     check_finite(stamps, clock.label, table.place)
+    check_steps(stamps, clock.label, table.place)
     return stamps
 
 
@@ -212,6 +213,11 @@ def _numbers(table: Table, names: Sequence[str], clock: Clock, stamps: Array) ->
     """Return columns of numbers; raises RecordError where they are none or unevenly long."""
     columns = table.numbers(names, frozenset(names))
     refuse_uneven(table.path, {clock.columns[0]: stamps, **columns})
+    for name, column in columns.items():
+        huge = np.isfinite(column) & (np.abs(column) > LARGEST)
+        if huge.any():
+            row = int(huge.argmax())
+            raise column_error(table.place(row), name, f"{column[row]} {why_unusable(column[row])}")
     return columns
 
 

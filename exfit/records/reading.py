@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from exfit.dsp.resampling import resampled
 from exfit.dsp.three_phase import Connection, vt_of_rms, vt_of_waveforms
 from exfit.errors import RecordError
-from exfit.records.clock import Clock, check_finite, check_increasing
+from exfit.records.clock import (
+    LARGEST,
+    SMALLEST,
+    Clock,
+    check_finite,
+    check_increasing,
+    check_steps,
+    why_unusable,
+)
 from exfit.records.formats import open_table
 from exfit.records.formats.table import NONE, Table, column_error, read_bytes, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
@@ -109,11 +117,12 @@ def read_record(
     time = table.instants(clock.columns, clock.unit)
     check_finite(time, clock.label, table.place)
     check_increasing(time, clock.label, table.place)
+    check_steps(time, clock.label, table.place)
     columns = _columns(table, clock, channels, missing)
     refuse_uneven(path, {clock.columns[0]: time} | columns)
     rows = _rows_in_window(path, time, window)
     voltages = {
-        name: _of_phases(path, time, columns, channel, rows)
+        name: _of_phases(table, time, columns, channel, rows)
         for name, channel in channels.items()
         if isinstance(channel, ThreePhases)
     }
@@ -158,13 +167,18 @@ def _columns(
 
 
 def _of_phases(
-    path: Path, time: Array, columns: Mapping[str, Array], channel: ThreePhases, rows: Rows
+    table: Table, time: Array, columns: Mapping[str, Array], channel: ThreePhases, rows: Rows
 ) -> _PhaseVoltage:
     """Return the voltage of three phases at the given rows.
 
     Raises RecordError where the columns are not the three phases of one voltage.
     """
     phases = np.stack([columns[name][rows] for name in channel.columns], axis=1)
+    huge = np.argwhere(np.isfinite(phases) & (np.abs(phases) > LARGEST))
+    if huge.size:
+        row, at = huge[0]
+        what = f"{phases[row, at]} {why_unusable(phases[row, at])}"
+        raise column_error(table.place(int(rows[row])), channel.columns[at], what)
     samples, rating = np.full(len(time), np.nan), (channel.base, channel.connection)
     try:
         if channel.kind == "rms":
@@ -173,7 +187,7 @@ def _of_phases(
         phasor = vt_of_waveforms(time[rows], phases, *rating, channel.cycles)
     except ValueError as fault:
         names = ", ".join(map(repr, channel.columns))
-        raise RecordError(f"{path}: columns {names}: {fault}") from None
+        raise RecordError(f"{table.path}: columns {names}: {fault}") from None
     samples[rows[phasor.rows]] = phasor.voltage
     return _PhaseVoltage(samples, phasor.window)
 
@@ -234,10 +248,14 @@ def _signal(table: Table, channel: ChannelLike, column: Array, rows: Rows, missi
     gaps = np.isnan(column[rows]) & missing
     if gaps.all():
         raise RecordError(f"{table.path}: column {channel.column!r}: every sample is missing")
-    lost = np.flatnonzero(~np.isfinite(signal) & ~gaps)
+    lost = np.flatnonzero(~(np.abs(signal) <= LARGEST) & ~gaps)
     if lost.size:
         row = int(rows[lost[0]])
         scaled = "" if not np.isfinite(column[row]) else f" * {channel.scale:g}"
-        what = f"{column[row]}{scaled} is not a finite number"
+        what = f"{column[row]}{scaled} {why_unusable(signal[lost[0]])}"
         raise column_error(table.place(row), channel.column, what)
+    peak = float(np.nanmax(np.abs(signal)))
+    if 0.0 < peak < SMALLEST:
+        what = f"at most {peak:g} pu all along, below {SMALLEST:g}"
+        raise column_error(table.path, channel.column, what)
     return np.asarray(signal, np.float64)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from exfit.errors import RecordError
-from exfit.records.clock import check_increasing
+from exfit.records.clock import LARGEST, check_increasing, check_steps, why_unusable
 
 Array = NDArray[np.float64]
 
@@ -72,6 +72,7 @@ class Record:
         for name, values in {"time": instants, **samples}.items():
             _check_samples(source, name, values, len(instants), missing and name in samples)
         check_increasing(instants, "time", lambda row: f"{source}: sample {row}")
+        check_steps(instants, "time", lambda row: f"{source}: sample {row}")
         return cls(instants, MappingProxyType(samples), source, _content_hash(instants, samples))
 
 
@@ -99,10 +100,11 @@ def _check_samples(source: Path, name: str, values: Array, count: int, missing: 
     gaps = np.isnan(values) & missing
     if gaps.all():
         raise RecordError(f"{source}: {name}: every sample is missing")
-    lost = np.flatnonzero(~np.isfinite(values) & ~gaps)
+    lost = np.flatnonzero(~(np.abs(values) <= LARGEST) & ~gaps)
     if lost.size:
         row = lost[0]
-        raise RecordError(f"{source}: sample {row}: {name}: {values[row]} is not a finite number")
+        what = f"{values[row]} {why_unusable(values[row])}"
+        raise RecordError(f"{source}: sample {row}: {name}: {what}")
 
 
 def _content_hash(time: Array, signals: Mapping[str, Array]) -> str:
