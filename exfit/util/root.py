@@ -8,7 +8,7 @@ import os
 import re
 from pathlib import Path
 
-ROOT = "EXFIT_ROOT"  # the variable of the environment that names the folder; its real path
+ROOT = "EXFIT_LAID_OUT"  # the variable of the environment that names the folder; its real path
 
 
 def on_disk(path: Path) -> Path:
