@@ -61,7 +61,7 @@ CELLS: tuple[Any, ...] = (
     "text", "", "1,5", "9" * 400, "12:34:56.789", "2020-02-30", "#DIV/0!", "1e400",
 )  # fmt: skip
 NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
-DEEP = 200  # levels of nesting
+DEEP = 60  # levels of nesting, perhaps several times
 MANY = 20_000  # keys or entries
 LONGEST = 1 << 20  # bytes of a mutant: more would test patience
 
