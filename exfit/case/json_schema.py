@@ -1,5 +1,7 @@
 """The JSON Schema of the case file, for editors and for messages about unknown keys."""
 
+from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from exfit.case.schema import CaseDocument
@@ -7,7 +9,8 @@ from exfit.case.schema import CaseDocument
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def json_schema() -> dict[str, Any]:
+@cache
+def json_schema() -> Mapping[str, Any]:
     """Return the JSON Schema of the case file."""
     from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 

@@ -257,6 +257,11 @@ def _nested(rng: random.Random, value: Any) -> Any:
     return value
 
 
+def _many(rng: random.Random) -> int:
+    """Return how many keys are added: seldom so many that reading them takes a second."""
+    return MANY if rng.random() < 0.03 else rng.choice((1, 30, 300))
+
+
 def _other_value(rng: random.Random, value: Any, other: Any) -> Any:
     """Return what stands in place of a value: of another type or size, or from another tree."""
     match rng.randrange(8):
@@ -273,7 +278,7 @@ def _other_value(rng: random.Random, value: Any, other: Any) -> Any:
             times = rng.choice((2, 2, 50))
             return (value * times)[:MANY]
         case 5 if isinstance(value, dict):
-            return value | {f"key {k}": k for k in range(rng.choice((1, 30, MANY)))}
+            return value | {f"key {k}": k for k in range(_many(rng))}
         case 6 if isinstance(value, str):
             return rng.choice((value.upper(), value[:-1], value * 2, value + rng.choice(PAYLOADS)))
     if isinstance(value, int | float) and not isinstance(value, bool):
@@ -332,7 +337,10 @@ def mutated_tree(
     return tree
 
 
-class _WithoutAliases(yaml.SafeDumper):
+Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
+
+class _WithoutAliases(Dumper):
     """Writes every value where it stands."""
 
     def ignore_aliases(self, _: Any) -> bool:
