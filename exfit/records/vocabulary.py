@@ -55,6 +55,8 @@ CAPITAL = re.compile(r"(?<=[a-zäöü])(?=[A-ZÄÖÜ])")  # where a word of a na
 
 def folded(text: str) -> str:
     """Return a text in small letters without accents."""
+    if text.isascii():
+        return text.lower()
     decomposed = unicodedata.normalize("NFKD", text.casefold())
     return "".join(letter for letter in decomposed if not unicodedata.combining(letter))
 
