@@ -1,18 +1,12 @@
-"""The report in a real browser: it opens from disk, can be zoomed, read without scripts, printed.
-
-Without Chromium (or, for the checker of HTML, Java and the path EXFIT_VNU of its jar) these tests
-are skipped; with EXFIT_BROWSER=required they fail then.
-"""
+"""The report in a browser: it opens from disk, can be zoomed, read without scripts, printed."""
 
 import json
-import os
 import re
-import shutil
-import subprocess
 from io import BytesIO
 
 import numpy as np
 import pytest
+from browsers import WIDTHS, barriers, chromium, html_errors, listened_to
 from matplotlib.image import imread
 from payloads import HOSTILE, with_texts
 from records import config, recording, several
@@ -24,50 +18,22 @@ from exfit.output.report import write_report
 
 pytestmark = pytest.mark.long  # a browser is started for each page
 
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 CASES = (
     "ac1a_typical",
     "ac8b_unit1",
     "ac8b_on_line",
     "several",
 )
-WIDTHS = (390, 1280)  # of a telephone and of a desk, px
 READABLE = 10.0  # px: the least size of a text
 BLANK = 0.02  # spread of the pixels, of white: a page of text and lines has ten times that
 WHEEL = -400.0  # towards the reader
 
 
-def missing(what):
-    """Skip a test, or fail it where the browser is required."""
-    if os.environ.get("EXFIT_BROWSER") == "required":
-        pytest.fail(f"{what} is missing, and EXFIT_BROWSER says it is required")
-    pytest.skip(f"{what} is missing")
-
-
 @pytest.fixture(scope="module")
 def browser():
     """Start the browser once."""
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        missing("the package playwright")
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        missing("Chromium")
-    with sync_playwright() as driver:
-        started = driver.chromium.launch(executable_path=path, args=list(FLAGS))
+    with chromium() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
@@ -112,14 +78,7 @@ def opened(browser, report):
                 viewport={"width": width, "height": 900}, java_script_enabled=scripts
             )
         )
-        found = rooms[-1].new_page()
-        found.faults, found.asked = [], []
-        found.on("pageerror", lambda fault: found.faults.append(str(fault)))
-        found.on(
-            "console",
-            lambda said: found.faults.append(said.text) if said.type in ("error", "warning") else 0,
-        )
-        found.on("request", lambda asked: found.asked.append(asked.url))
+        found = listened_to(rooms[-1])
         address = report(name).as_uri()
         found.goto(address)
         if scripts:
@@ -298,21 +257,9 @@ def test_no_text_of_a_result_acts_in_a_browser(browser, report, tmp_path):
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_axe_finds_no_barrier(opened, name, width):
-    try:
-        from axe_playwright_python.sync_playwright import Axe
-    except ImportError:
-        missing("the package axe-playwright-python")
-    found = Axe().run(opened(name, width))
-    assert found.violations_count == 0, found.generate_report()
+    assert barriers(opened(name, width)) == ""
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_checker_of_html_finds_no_error(report, name):
-    java, jar = shutil.which("java"), os.environ.get("EXFIT_VNU")
-    if java is None or not jar:
-        missing("Java, or the path EXFIT_VNU of vnu.jar")
-    done = subprocess.run(
-        [java, "-jar", jar, "--format", "json", str(report(name))], capture_output=True, text=True
-    )
-    said = json.loads(done.stderr)["messages"]
-    assert [one["message"] for one in said if one["type"] == "error"] == []
+    assert html_errors(report(name)) == []
