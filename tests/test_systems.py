@@ -169,7 +169,7 @@ def test_no_file_is_read_in_the_encoding_of_the_system(tmp_path):
     environment = {**os.environ, "PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"}
     case = ROOT / "configs" / "first_order.yaml"
     for arguments in (
-        ("fit", str(case), "--search", "local", "-o", "out"),
+        ("fit", str(case), "--search", "local", "--no-plots", "-o", "out"),
         ("report", "out"),
         ("models", "AC1A"),
     ):
