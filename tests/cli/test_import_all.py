@@ -191,3 +191,12 @@ def test_two_hundred_units_take_no_longer_than_a_few_reads(run):
     assert run("import", "--all", "many.dyr", "-o", "many").code == 0
     assert time.process_time() - began < 60 * single
     assert len([*Path("many").glob("*.yaml")]) == 200
+
+
+def test_a_base_of_a_channel_in_per_unit_makes_a_case_that_can_be_loaded(run):
+    record("1_1.csv")
+    ran = run("import", "--all", "units.dyr", "-o", "cases", "--records", "records",
+              "--step", "0.05", "--base", "efd=1.25")  # fmt: skip
+    assert ran.code == 0, ran.err
+    channels = load_case(Path("cases", CASES[0])).recordings[0].record.channels
+    assert (channels["efd"].unit, channels["efd"].base) == ("pu", 1.25)

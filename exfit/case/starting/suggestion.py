@@ -285,7 +285,7 @@ def _scaling(
     percent = channel.unit == "%"
     if base is not None and (channel.seems_per_unit or percent):
         value = yaml_number(base.in_unit(channel.unit or "pu", channel.name))
-        return {"unit": '"%"', "base": value} if percent else {"base": value}
+        return {"unit": '"%"' if percent else "pu", "base": value}
     if scale is not None:
         return {"scale": _range(scale.start, scale.low, scale.high)}
     if channel.system_base:
