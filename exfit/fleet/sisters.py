@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exfit.fleet.summary import CaseSummary, SummaryParameter
+from exfit.fleet.summary import CaseSummary
 from exfit.inference.outliers import FEWEST, Estimates, deviations
 from exfit.results.facts import MAKER, MODEL, PLANT, RATED, TYPE, UNIT, stated
 
@@ -21,6 +21,7 @@ ERRORS_IN_HALF = NormalDist().inv_cdf(0.975)  # standard errors in half of a 95 
 ALIKE = (MAKER, MODEL, TYPE, RATED)  # facts that sisters share where they are stated
 OUTLIER = "outlier"
 UNDETERMINED = "not determined"
+WITHOUT_INTERVAL = "no interval"  # that was looked for, as without a global search
 
 
 class SisterValue(NamedTuple):
@@ -28,7 +29,7 @@ class SisterValue(NamedTuple):
 
     ``deviation`` from the others is in standard deviations of such a difference, ``probability``
     that of chance alone to let any of them deviate as much; None where that is not known.
-    ``remark`` is "outlier", what it lies beyond, "not determined" or "".
+    ``remark`` is "outlier", what it lies beyond, "not determined", "no interval" or "".
     """
 
     case: str
@@ -38,6 +39,11 @@ class SisterValue(NamedTuple):
     remark: str = ""
     deviation: float | None = None
     probability: float | None = None
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it is an outlier, or lies beyond the interval of another."""
+        return self.remark not in ("", UNDETERMINED, WITHOUT_INTERVAL)
 
     @property
     def is_outlier(self) -> bool:
@@ -62,7 +68,7 @@ class SisterParameter:
     @property
     def remarkable(self) -> tuple[SisterValue, ...]:
         """Those that stand out."""
-        return tuple(v for v in self.values if v.remark not in ("", UNDETERMINED))
+        return tuple(value for value in self.values if value.stands_out)
 
 
 @dataclass(frozen=True)
@@ -148,7 +154,7 @@ def _unit(case: CaseSummary) -> tuple[str, ...]:
 
 def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
     """Return a parameter of all sisters that were fitted with it."""
-    values = [_value(case.name, case.fitted[name]) for case in cases]
+    values = [_value(case, name) for case in cases]
     unit = next(iter(cases)).fitted[name].unit
     closed = [v for v in values if v.low is not None and v.high is not None]
     if len(closed) < FEWEST:
@@ -168,10 +174,12 @@ def _parameter(name: str, cases: Sequence[CaseSummary]) -> SisterParameter:
     return SisterParameter(name, unit, every, judged.centre, judged.spread)
 
 
-def _value(case: str, parameter: SummaryParameter) -> SisterValue:
+def _value(case: CaseSummary, name: str) -> SisterValue:
+    parameter = case.fitted[name]
     closed = parameter.low is not None and parameter.high is not None
-    remark = "" if closed and isfinite(parameter.value) else UNDETERMINED
-    return SisterValue(case, parameter.value, parameter.low, parameter.high, remark)
+    missing = UNDETERMINED if name in case.unresolved else WITHOUT_INTERVAL
+    remark = "" if closed and isfinite(parameter.value) else missing
+    return SisterValue(case.name, parameter.value, parameter.low, parameter.high, remark)
 
 
 def _estimates(values: Sequence[SisterValue]) -> Estimates:

@@ -216,10 +216,17 @@ def _validation(validations: "Sequence[Comparison]") -> SummaryValidation:
 
 
 def _unresolved(result: "FitResult") -> tuple[str, ...]:
+    """Return what the records do not determine, as the verdict counts it.
+
+    A parameter whose interval was not looked for, as without a global search, is none of these.
+    """
+    from exfit.analysis.intervals.determination import NEEDS_PROFILE, UNFINISHED
+
     return tuple(
         name
         for name, parameter in result.parameters.items()
-        if not parameter.of_record and not parameter.determined
+        if not (parameter.of_record or parameter.determined)
+        and parameter.why not in (NEEDS_PROFILE, UNFINISHED)
     )
 
 

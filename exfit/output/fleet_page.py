@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from exfit.fleet.folder import Fleet
-from exfit.fleet.sisters import OUTLIER, SisterGroup, SisterParameter, SisterValue
+from exfit.fleet.sisters import OUTLIER, WITHOUT_INTERVAL, SisterGroup, SisterParameter, SisterValue
 from exfit.fleet.summary import CaseSummary, SummaryCurve, SummaryParameter
 from exfit.inference.outliers import FEWEST, LEVEL
 from exfit.output.fleet_pictures import HEIGHT, WIDTH, Thumbnail, picture
@@ -163,6 +163,8 @@ def _parameter_view(
     marks = [OUTLIER if remark == OUTLIER else "differs"] if remark else []
     if name in case.unresolved:
         marks.append("unresolved")
+    elif value.low is None and value.high is None:
+        marks.append(WITHOUT_INTERVAL)
     error = _error(value.low, value.high)
     unit = "" if value.unit in ("", "pu", "-") else f" {value.unit}"
     return ParameterView(

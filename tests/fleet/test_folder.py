@@ -1,12 +1,14 @@
 """The folder of a batch: what is written is read back, and what is missing is made again."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from cases import FIRST_ORDER, TIME, TRUTH
 
 import exfit
+from exfit.analysis.intervals.determination import NEEDS_PROFILE
 from exfit.errors import ExfitError
 from exfit.fleet.folder import (
     CaseOutcome,
@@ -168,3 +170,13 @@ def test_a_summary_as_a_file_is_what_it_was(folder):
     row = read_fleet(folder).cases[0]
     written = {**plain(row, whole=True), "name": content["name"], "case": content["case"]}
     assert {"version": 1, **written} == content
+
+
+def test_an_interval_that_was_not_looked_for_is_not_an_unresolved_parameter(result):
+    """As the verdict counts: of a local search intervals are missing, which a profile gives."""
+    named = {"k": NEEDS_PROFILE, "a": "has no interval: the records do not determine it"}
+    parameters = {
+        name: replace(result.parameters[name], interval=None, why=why)
+        for name, why in named.items()
+    }
+    assert summary_of(replace(result, parameters=parameters), "", 0.0).unresolved == ("a",)

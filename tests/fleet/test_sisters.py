@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fleets import parameter, row
 
-from exfit.fleet.sisters import OUTLIER, UNDETERMINED, sisters
+from exfit.fleet.sisters import OUTLIER, UNDETERMINED, WITHOUT_INTERVAL, sisters
 
 MAKE = {"Excitation maker": "Maker AG", "Rated": "120 MVA"}
 
@@ -71,8 +71,14 @@ def test_of_three_sisters_none_is_an_outlier_but_intervals_that_do_not_meet_are_
 
 def test_what_is_not_determined_is_shown_and_not_compared():
     vague = {"KA": parameter(9000.0)}
-    (group,) = sisters([*(unit(k) for k in range(4)), unit(4, parameters=vague)])
-    assert remarks(group) == {**{f"unit{k}": "" for k in range(4)}, "unit4": UNDETERMINED}
+    cases = [unit(4, parameters=vague, unresolved=("KA",)), unit(5, parameters=vague)]
+    (group,) = sisters([*(unit(k) for k in range(4)), *cases])
+    assert remarks(group) == {
+        **{f"unit{k}": "" for k in range(4)},
+        "unit4": UNDETERMINED,
+        "unit5": WITHOUT_INTERVAL,
+    }
+    assert group.parameters[0].remarkable == ()
     half_open = {"KA": parameter(9000.0, 1.0)._replace(high=None)}
     (group,) = sisters([unit(1), unit(2, parameters=half_open)])
     assert remarks(group)["unit2"] == "beyond the interval of unit1"
