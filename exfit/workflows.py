@@ -290,12 +290,14 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         comparison = compare_with_record(setup, "record", values) if setup.channels else None
         notes = [] if comparison is None else rest_notes(setup, comparison)
         at = setup.experiment.parameters(setup.with_start_values(values))
-        simulated = simulation_notes(case, at, response, setup.experiment.simulator.inputs)
+        simulator = setup.experiment.with_inputs(setup.with_start_values(values))
+        simulated = simulation_notes(case, simulator, at, response)
         return SimulationResult(response, comparison, (*simulated, *notes))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
-    response = with_enough_substeps(simulator, at, case.path).response(at)
-    notes = simulation_notes(case, values, response, simulator.inputs)
+    simulator = with_enough_substeps(simulator, at, case.path)
+    response = simulator.response(at)
+    notes = simulation_notes(case, simulator, at, response)
     return SimulationResult(response, None, tuple(notes))
 
 

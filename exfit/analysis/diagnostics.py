@@ -7,6 +7,12 @@ from numpy.typing import NDArray
 
 from exfit import estimate
 from exfit.analysis.causes.rest import INVISIBLE, other_levels, unsteady_signals
+from exfit.analysis.causes.run_quality import (
+    LARGEST_STEP_ERROR,
+    step_error_notes,
+    unstable_rest_notes,
+    voltage_notes,
+)
 from exfit.analysis.typical_values import typical_values_used
 from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
@@ -22,7 +28,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.plants import BREAKER, NETWORK, REFERENCES, SPEED
 from exfit.results.comparisons import Comparison
 from exfit.simulation.inputs import Inputs
-from exfit.simulation.simulator import Response
+from exfit.simulation.simulator import Response, Simulator
 
 Array = NDArray[np.float64]
 
@@ -41,10 +47,13 @@ def notes(
     yield from unphysical_notes(case, values)
     for experiment, comparison in zip(residuals.experiments, compared, strict=True):
         simulator, at = experiment.with_inputs(values), experiment.parameters(values)
+        yield from unstable_rest_notes(simulator, at)
+        vt = comparison.overlays.get("vt")
+        yield from voltage_notes(case, comparison.time, None if vt is None else vt.simulated)
         for signal, change in simulator.step_errors(at, experiment.signals).items():
             error = comparison.overlays[signal].error
             rmse = float(np.sqrt(np.nanmean(error**2)))
-            if change > max(COARSE * rmse, INVISIBLE):
+            if change > min(max(COARSE * rmse, INVISIBLE), LARGEST_STEP_ERROR):
                 yield (
                     f"halving the step of {case.simulation.step:g} s moves {signal} by "
                     f"{change:.1e} pu, its error is {rmse:.1e} pu: reduce simulation.step"
@@ -178,15 +187,18 @@ def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str
 
 
 def simulation_notes(
-    case: Case, values: Mapping[str, float], response: Response, inputs: Inputs
+    case: Case, simulator: Simulator, values: Mapping[str, float], response: Response
 ) -> Iterator[str]:
-    """Yield which values are typical or not physical, and whether the machine falls out of step.
+    """Yield what a reader of a simulated response must know: its values, and whether it holds.
 
     ``values`` are those of the case, and of what the test has of its own.
     """
     yield from typical_notes(case, values)
     yield from unphysical_notes(case, values)
-    yield from speed_notes(inputs, values)
+    yield from speed_notes(simulator.inputs, values)
+    yield from unstable_rest_notes(simulator, values)
+    yield from step_error_notes(case, simulator, values, response.signals)
+    yield from voltage_notes(case, response.time, response.signals.get("vt"))
     delta = response.signals.get("delta")
     if delta is not None and np.max(np.abs(delta)) > np.pi:
         at = float(response.time[np.argmax(np.abs(delta) > np.pi)])

@@ -1,15 +1,17 @@
 """Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.causes.before_fit import case_warnings, record_warnings
+from exfit.analysis.causes.run_quality import unstable_rest_notes
 from exfit.analysis.diagnostics import search_range_notes, typical_notes
 from exfit.case.case import Case
 from exfit.fitting.build import build_experiments, planned
+from exfit.fitting.experiment import Experiment
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.models.blocks import SHORTEST
@@ -89,9 +91,19 @@ def check(case: Case) -> Check:
         step=first.step,
         step_error=error,
         drift=drift,
-        notes=(*typical_notes(case, case.values()), *search_range_notes(case)),
+        notes=(
+            *typical_notes(case, case.values()),
+            *search_range_notes(case),
+            *dict.fromkeys(_rest_notes(experiments, values)),
+        ),
         warnings=(*case_warnings(case), *record_warnings(case, setups, case.values())),
     )
+
+
+def _rest_notes(experiments: Sequence[Experiment], values: Values) -> Iterator[str]:
+    for experiment in experiments:
+        simulator = experiment.with_inputs(values)
+        yield from unstable_rest_notes(simulator, experiment.parameters(values))
 
 
 def flat_drift(simulator: Simulator, values: Values, signals: Sequence[str] = ("vt",)) -> float:

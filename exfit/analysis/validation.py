@@ -7,6 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from exfit.analysis.causes.rest import unsteady_signals
+from exfit.analysis.causes.run_quality import (
+    step_error_notes,
+    unstable_rest_notes,
+    voltage_notes,
+)
 from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.case.schema import Recording
@@ -50,7 +55,28 @@ def validate(
         raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
     unseen = [build_experiment(case, recording, values) for recording in case.validations]
     validated = (aligned(case, setup, values) for setup in unseen)
-    return [*fitted, *(validation_of(case, fitted, *pair) for pair in validated)]
+    return [*fitted, *(_validated(case, fitted, *pair) for pair in validated)]
+
+
+def _validated(
+    case: Case, fitted: Sequence[Comparison], setup: ExperimentSetup, values: Values
+) -> Comparison:
+    comparison = validation_of(case, fitted, setup, values)
+    return replace(
+        comparison, notes=(*comparison.notes, *_run_notes(case, setup, comparison, values))
+    )
+
+
+def _run_notes(
+    case: Case, setup: ExperimentSetup, comparison: Comparison, values: Values
+) -> Iterator[str]:
+    """Yield what speaks against the simulated response of a record."""
+    simulator = setup.experiment.with_inputs(values)
+    at = setup.experiment.parameters(values)
+    simulated = {signal: overlay.simulated for signal, overlay in comparison.overlays.items()}
+    yield from unstable_rest_notes(simulator, at)
+    yield from step_error_notes(case, simulator, at, simulated)
+    yield from voltage_notes(case, comparison.time, simulated.get("vt"))
 
 
 def validation_by_hand(
@@ -78,7 +104,10 @@ def validation_by_hand(
     return replace(
         comparison,
         steps=tuple(_steps(setup, own_values, given)),
-        notes=tuple(_notes(test, comparison, fitted, own_values)),
+        notes=(
+            *_notes(test, comparison, fitted, own_values),
+            *_run_notes(case, setup, comparison, own_values),
+        ),
     )
 
 

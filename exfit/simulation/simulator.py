@@ -27,6 +27,7 @@ from exfit.util.sorting import distinct
 from exfit.util.threads import in_threads
 
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
@@ -149,6 +150,15 @@ class Simulator:
         if parts == NO_SUBSTEPS:
             raise why_unreachable(self.system, self.step, values, p[0])
         return parts
+
+    def rates_at_rest(self, values: Values) -> ComplexArray:
+        """Return the eigenvalues (1/s) of the system at rest, zero for a state that stays put.
+
+        Raises SimulationError where the start is no rest.
+        """
+        self.substeps(values)
+        jacobian = linear_kernel(self.system).at_rest(self._vectors([values])).jacobian[0]
+        return np.asarray(np.linalg.eigvals(jacobian), dtype=np.complex128)
 
     def _substeps_of_many(self, p: Array) -> Counts:
         """Return the sub-steps of parameter sets p (K, np), NO_SUBSTEPS where there are none."""
