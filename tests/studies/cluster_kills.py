@@ -65,7 +65,7 @@ def main():
                 observer=events,
             )  # fmt: skip
         seconds = time.monotonic() - began
-        exfit.batch(place / "cases", place / "here", workers=2, search=search)
+        local = exfit.batch(place / "cases", place / "here", workers=2, search=search)
         there, here = without_times(place / "there"), without_times(place / "here")
     ends = Counter(event[1] for event in events.events if event[0] not in ("begun", "started"))
     kinds = Counter(event[0] for event in events.events if event[0] not in ("begun", "started"))
@@ -74,7 +74,8 @@ def main():
     print(f"  {', '.join(f'{number} {kind}' for kind, number in kinds.items())}")
     print(f"  {len(results)} results; counted twice: {sum(times - 1 for times in ends.values())}")
     differ = [name for name in there.keys() | here.keys() if there.get(name) != here.get(name)]
-    print(f"  {len(here)} files of a local batch; {len(differ)} differ: {sorted(differ)[:5]}")
+    print(f"  {len(here)} files of a local batch: {local.counts}")
+    print(f"  {len(differ)} files differ: {sorted(differ)[:5]}")
 
 
 if __name__ == "__main__":
