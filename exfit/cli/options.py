@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from exfit.output.figure_files import FigureFiles
 
 NOT_CONVERGED = 3
+LONGEST_LINE = 1000  # characters of a message: a longer one quotes what is no name of a file
 NAMED_AFTER_RECORDS = ("fit", "validate")  # commands that name files so
 
 case_argument = click.argument("case", type=GivenFile(Kind.CASE))
@@ -125,8 +126,12 @@ class Refusal(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print the message, all faults of a case under each other."""
-        lines = self.message.splitlines()
+        lines = [_shortened(line) for line in self.message.splitlines()]
         echo("Error: " + "\n       ".join(lines), err=True, file=file)
+
+
+def _shortened(line: str) -> str:
+    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
 
 
 class Interruption(click.ClickException):

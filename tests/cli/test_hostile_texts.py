@@ -123,6 +123,13 @@ def test_a_name_that_is_not_text_is_refused(run, empty_folder, command):
     assert "not UTF-8 text" in ran.err
 
 
+def test_a_message_quotes_no_name_of_any_length(run, empty_folder):
+    (empty_folder / "tests.csv").write_text(f"file,at\n{'x' * 50_000}.csv,1\n")
+    ran = run("new", "--model", "AC1A", "--tests", "tests.csv")
+    assert ran.code == 1
+    assert 500 < len(ran.err) < 1100
+
+
 def test_tables_of_a_run_have_a_cell_for_each_column(run, hostile):
     assert run("fit", CASE, "-o", RUN, "--no-plots").code == 0
     files = [*(hostile / RUN).glob("*.csv")]
