@@ -21,7 +21,8 @@ SEED = 1601
 FIRST_BUS = 101
 SPREAD = 1.5  # of the planner's value to the true one: a factor
 NOISE = 1e-4  # pu, of vt and efd
-STEP, INTERVAL, LENGTH, AT = 0.05, 0.01, 12.0, 2.0  # pu, s
+STEP, INTERVAL, LENGTH = 0.05, 0.01, 12.0  # pu, s
+AT = 2.0035  # s: between two samples, since efd may jump there
 OWN = [each for each in definitions() if definition_of(each.record.name) == each]
 OTHERS = (
     "{bus} 'IEEEG1', 1 0 0 0.050   0.10 /   governor, as of 1999\n",
@@ -106,6 +107,7 @@ def write_record(folder, bus, unit, random):
     case = case_text(read_unit(text, "true.dyr"), "true.dyr")
     case = case.replace("{at: 1.0, step: 0.05}", f"{{at: {AT}, step: {STEP}}}")
     case = case.replace("duration: 10.0", f"duration: {LENGTH}")
+    case += "simulation: {output_step: 0.0005}\n"
     response = simulate(parse_case(case, Path("true.yaml"))).response
     time = np.arange(0.0, LENGTH, INTERVAL)
     columns = [time]
