@@ -127,7 +127,7 @@ def _repeats(samples: Array, starts: Places, lengths: Places) -> float:
 def mains_frequency(time: Array, samples: Array) -> float | None:
     """Return the frequency (Hz) of a channel that is a waveform of the mains, else None."""
     t, y = time[:WAVE_SAMPLES], samples[:WAVE_SAMPLES]
-    if len(y) < OUTLIER_WINDOW or t[-1] - t[0] <= 0.0:
+    if len(y) < OUTLIER_WINDOW or t[-1] - t[0] <= 0.0 or np.isinf(y).any():
         return None
     mean, deviation = float(np.mean(y)), float(np.std(y))
     if deviation == 0.0 or abs(mean) > LARGEST_MEAN * deviation:
