@@ -9,7 +9,6 @@ Parts of a batch, and batches one after the other, need no coordination but this
 """
 
 import hashlib
-import json
 import os
 import re
 from collections import Counter
@@ -23,8 +22,9 @@ from exfit.errors import ExfitError
 from exfit.fleet.names import distinct_names
 from exfit.fleet.summary import CaseFacts, CaseStatus, CaseSummary, FailureKind, summary_of
 from exfit.util.files import prepare, write, write_quickly, write_together
+from exfit.util.json_files import read_json
 from exfit.util.text import to_json
-from exfit.util.typed import FormError, Reader, plain
+from exfit.util.typed import Reader, plain
 
 INDEX, CASES = "index", "cases"
 RESULT, SUMMARY, FAILED = "result.json", "summary.json", "failed.json"
@@ -269,10 +269,10 @@ def _summary_text(summary: CaseSummary) -> str:
 def _read(file: Path, kind: type[Content], version: int | None = None) -> Content | None:
     """Return the content of a file, None where there is none of this form and version."""
     try:
-        data = json.loads(file.read_bytes())
+        data = read_json(file)
         if version is not None and data.get("version") != version:
             return None
         content: Content = Reader().read(kind, data)
-    except (FormError, OSError, ValueError, AttributeError, RecursionError):
+    except (ExfitError, RecursionError):
         return None
     return content

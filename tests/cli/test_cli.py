@@ -1062,7 +1062,7 @@ def test_the_program_starts_as_a_command_and_as_a_pipe(tmp_path):
             id="scaled away",
         ),
         pytest.param(
-            ("record.channels.vt", {"column": "v", "scale": 1e200}), "too large", id="overflow"
+            ("record.channels.vt", {"column": "v", "scale": 1e200}), "exceeds", id="overflow"
         ),
     ],
 )
