@@ -45,8 +45,8 @@ REFERENCE = "vref"
 class Inspection:
     """What a file holds; ``unreadable`` says by column why it has no numbers.
 
-    ``opening`` is that of the breaker in a load rejection, ``memory`` what the user allowed for
-    reading, GB.
+    ``opening`` is that of the breaker in a load rejection; ``sheet`` and ``memory`` (GB) are what
+    the user gave for reading, None where nothing.
 
     ``time`` (M,) in s and ``samples``, each (M,), are those whose time increases.
     """
@@ -63,6 +63,7 @@ class Inspection:
     time: Array
     samples: Mapping[str, Array]
     opening: BreakerOpening | None = None
+    sheet: str | None = None
     memory: float | None = None
 
     def channel_of(self, signal: str) -> InspectedChannel | None:

@@ -8,6 +8,7 @@ import pytest
 import yaml
 from dynamics import SOUND, THREE, replaced
 from places import ROOT
+from records import workbook_of
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError
@@ -105,6 +106,16 @@ def test_a_case_with_records_is_the_one_that_new_makes(run):
     run("new", "--dyr", "units.dyr", "--bus", "1", "--id", "1", "--step", "0.05", "--record",
         "records/1_1.csv", "-o", "cases/new.yaml")  # fmt: skip
     assert Path("cases", CASES[0]).read_text() == Path("cases", "new.yaml").read_text()
+
+
+@pytest.mark.parametrize("in_table", [True, False])
+def test_the_sheet_of_a_workbook_is_in_the_case(run, in_table):
+    workbook_of(SAMPLES / "ac1a_up.csv", Path("records", "1_1.xlsx"), ("a", "b"))
+    Path("records", "table.csv").write_text("bus,id,file,step,sheet\n1,1,1_1.xlsx,0.05,b\n")
+    options = ("records/table.csv",) if in_table else ("records", "--step", "0.05", "--sheet", "b")
+    ran = run("import", "--all", "units.dyr", "-o", "cases", "--records", *options)
+    assert ran.code == 0, ran.err
+    assert load_case(Path("cases", CASES[0])).recordings[0].record.sheet == "b"
 
 
 def test_a_size_that_no_record_has_a_test_for_is_refused(run):

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from places import CONFIGS, SAMPLES
 from programme_files import BUS, programme_file
-from records import write
+from records import workbook_of, write
 
 from exfit.case.load import load_case
 from exfit.models import MODELS
@@ -113,6 +113,15 @@ def test_a_base_far_from_the_voltage_at_rest_is_warned_of(record, new):
     ran, _ = new("--record", record, "--base", "vt=18kV")
     assert "Ugen (kV) rests at 0.875 times its base: is 18 the rated voltage" in ran.err
     assert new("--record", record, "--base", "vt=15kV")[0].err == ""
+
+
+def test_how_the_record_is_read_is_in_the_case_too(empty_folder, new):
+    file = workbook_of(SAMPLES / "ac1a_up.csv", empty_folder / "two.xlsx", ("1", "2"), "lap", 1e3)
+    new("--record", file, "--step", "0.05", "--sheet", "2", "--time", "lap", "--time-unit", "ms",
+        "--memory", "0.5")  # fmt: skip
+    given = load_case(empty_folder / "case.yaml").recordings[0].record
+    assert (given.sheet, given.time.column, given.time.unit) == ("2", "lap", "ms")
+    assert given.memory == 0.5
 
 
 def test_what_is_open_is_named_once_with_its_line(record, new, run):

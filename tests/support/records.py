@@ -101,3 +101,19 @@ def synthetic(folder, test, time, seed=0, noise=NOISE, signals=("vt",)):
     }
     write(folder / "record.csv", t=time, **shown)
     return shown
+
+
+def workbook_of(text_file, path, sheets, time="t", factor=1.0):
+    """Write the columns of a text file on each of some sheets, the time renamed and scaled."""
+    from openpyxl import Workbook
+
+    names, *rows = text_file.read_text().splitlines()
+    book = Workbook(write_only=True)
+    for title in sheets:
+        sheet = book.create_sheet(title)
+        sheet.append([time, *names.split(",")[1:]])
+        for row in rows:
+            first, *others = map(float, row.split(","))
+            sheet.append([first * factor, *others])
+    book.save(path)
+    return path

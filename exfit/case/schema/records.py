@@ -129,7 +129,9 @@ class RecordFile(Section):
     """A measured record: a file as a recorder writes it."""
 
     file: Text = Field(description="Path, relative to the case file.")
-    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    sheet: Text | None = Field(
+        default=None, description="Sheet of a workbook; default: the only one with a table."
+    )
     time: Time = Field(
         description="Column with the time, in s or in the unit that the file gives; or two "
         "columns, [date, time of day]; or {column, unit}. Timestamps count from the first sample."

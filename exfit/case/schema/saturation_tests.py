@@ -75,7 +75,9 @@ class SaturationTest(Section):
         description="File of the points, in any format of a record, in the order in which they "
         "were taken.",
     )
-    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    sheet: Text | None = Field(
+        default=None, description="Sheet of a workbook; default: the only one with a table."
+    )
     points: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MOST_POINTS)] | None = Field(
         default=None,
         description="In place of a file: [vt, ifd] or [vt, ifd, efd] of each point, in the order "

@@ -72,7 +72,9 @@ class SteadyTest(Section):
     file: Text | None = Field(
         default=None, description="File of the points, in any format of a record."
     )
-    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    sheet: Text | None = Field(
+        default=None, description="Sheet of a workbook; default: the only one with a table."
+    )
     points: (
         Annotated[tuple[tuple[Number, ...], ...], Field(min_length=1, max_length=MOST_POINTS)]
         | None

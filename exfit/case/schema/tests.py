@@ -65,7 +65,9 @@ class ReferenceFile(Section):
     """
 
     file: Text = Field(description="Path, relative to the case file.")
-    sheet: Text | None = Field(default=None, description="Sheet of a workbook; default: its first.")
+    sheet: Text | None = Field(
+        default=None, description="Sheet of a workbook; default: the only one with a table."
+    )
     memory: Positive | None = Field(
         default=None,
         description="Memory that reading the file may take, GB, given like record.memory.",

@@ -23,4 +23,5 @@ class RecordSettings:
     def inspect(self, file: Path) -> Inspection:
         """Return what a recorder's file holds; raises RecordError where it is none."""
         table = open_table(file, self.sheet, self.memory)
-        return replace(inspect(table, self.clock or None, self.unit), memory=self.memory)
+        inspection = inspect(table, self.clock or None, self.unit)
+        return replace(inspection, sheet=self.sheet, memory=self.memory)

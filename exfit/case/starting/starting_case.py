@@ -12,9 +12,9 @@ from exfit.case.starting.suggestion import (
     channel_lines,
     clock_text,
     gap_lines,
-    memory_lines,
     number_text,
     plain_text,
+    reading_lines,
     record_section,
     relative,
     steps_section,
@@ -158,7 +158,7 @@ def _several(
         lines += [
             *window_lines(test.window),
             *gap_lines(test.inspection),
-            *memory_lines(test.inspection),
+            *reading_lines(test.inspection),
         ]
         entry = [f"  - {lines[0]}", *(f"{IN_A_LIST}{line}" for line in lines[1:])]
         (validations if test.validates else fitted).extend(entry)

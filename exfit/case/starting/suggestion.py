@@ -43,7 +43,7 @@ def record_section(
     """
     lines = ["record:", f"  file: {plain_text(file)}", f"  time: {clock_text(inspection)}"]
     lines += ["  channels:", *channel_lines(inspection, only, bases)]
-    return [*lines, *window_lines(window), *gap_lines(inspection), *memory_lines(inspection)]
+    return [*lines, *window_lines(window), *gap_lines(inspection), *reading_lines(inspection)]
 
 
 def channel_lines(
@@ -74,10 +74,13 @@ def gap_lines(inspection: Inspection) -> list[str]:
     return ["  gaps: skip            # samples without a number are left out"]
 
 
-def memory_lines(inspection: Inspection) -> list[str]:
-    """Return the line of a record that needed more memory than usual."""
-    memory = inspection.memory
-    return [] if memory is None else [f"  memory: {number_text(memory)}"]
+def reading_lines(inspection: Inspection) -> list[str]:
+    """Return the lines that the file of a record needs to be read again: its sheet, its memory."""
+    sheet, memory = inspection.sheet, inspection.memory
+    return [
+        *([] if sheet is None else [f"  sheet: {plain_text(sheet)}"]),
+        *([] if memory is None else [f"  memory: {number_text(memory)}"]),
+    ]
 
 
 def _voltage_lines(inspection: Inspection, base: Base | None) -> Iterator[str]:
