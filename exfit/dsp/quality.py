@@ -20,6 +20,7 @@ FEW_SPIKES, SPIKE_SHARE = 3, 0.005  # samples, or of all: more are the signal's 
 LONGEST_SPIKE = 2  # samples
 LEVEL_SAMPLES = 3  # on each side of a spike, whose median is the level: it stays
 NEARLY, MOST_NEARLY = 2.0 / 3.0, 0.5  # of the limit; of the spikes: so many come near it at most
+MOST_MULTIPLES = 1e12  # of a step between numbers: doubles show no grid that is finer
 OFF_GRID = 0.05  # of a step: numbers farther off its grid are not rounded to it
 STUCK_RUN, FEWEST_STUCK = 3.0, 20  # times the longest run by chance, and samples
 WAVE_POWER = 0.9  # of the power of a waveform, near its mains frequency
@@ -88,6 +89,8 @@ def quantum(samples: Array) -> float | None:
         return None
     steps = np.diff(values)
     step = float(np.min(steps))
+    if float(np.max(steps)) > MOST_MULTIPLES * step:  # no double tells them from whole numbers
+        return None
     multiples = steps / step
     if np.max(np.abs(multiples - np.round(multiples))) > OFF_GRID:
         return None
@@ -108,6 +111,8 @@ def stuck(samples: Array) -> tuple[tuple[int, int], ...]:
     if np.max(lengths) <= FEWEST_STUCK:
         return ()
     repeats = _repeats(samples, starts, lengths)
+    if repeats >= 1.0:  # two levels, as of a switch: each stays by its nature
+        return ()
     chances = len(samples) * (1.0 - repeats)
     longest_by_chance = log(max(chances, 1.0)) / -log(repeats) if repeats > 0.0 else 1.0
     long = np.flatnonzero(lengths > max(STUCK_RUN * longest_by_chance, FEWEST_STUCK))

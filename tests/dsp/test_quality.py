@@ -29,6 +29,16 @@ def test_rounding_alone_is_no_stuck_recorder(coarse):
         assert last >= 1199
 
 
+def test_a_switch_is_no_stuck_recorder():
+    """Its levels have no noise that could repeat a number by chance."""
+    assert stuck(np.repeat([0.0, 1.0], [200, 300])) == ()
+
+
+def test_numbers_of_all_sizes_have_no_grid():
+    with np.errstate(all="raise"):
+        assert quantum(np.array([0.0, 1e-300, 1.0, 1e100])) is None
+
+
 def test_white_noise_has_no_spikes_and_each_spike_is_found_at_its_place():
     rng = np.random.default_rng(7)
     time = 0.01 * np.arange(20_000)
