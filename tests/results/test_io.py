@@ -195,7 +195,7 @@ def test_a_file_in_another_encoding_is_refused(saved, encoding):
     path, content = saved
     text = json.dumps({**content, "case": "é"}, ensure_ascii=False)
     path.write_bytes(text.encode(encoding, "replace"))
-    with pytest.raises(ExfitError, match=r"not UTF-8 text: line 1: byte 0x"):
+    with pytest.raises(ExfitError, match=r":1: not UTF-8 text: byte 0x"):
         load_result(path)
 
 

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 ALLOWED = 3 << 30  # bytes of addresses; libraries reserve far more of them than they use
-CHILD = """
-import json, resource, sys
+CHILD = r"""
+import json, re, resource, sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -26,13 +26,19 @@ for name in sys.argv[1:]:
         message = ""
     except RecordError as fault:
         message = str(fault)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    try:  # that of getrusage begins with the peak of the process that started this one
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        status = "VmHWM: 0 kB"
+    peak = 1024 * int(re.search(r"VmHWM:\s*(\d+)", status)[1])
     print(json.dumps([name, message, peak]), flush=True)
 """
 
 
 def inspected_in_a_process(paths):
     """Return message ("" where all is well) and peak so far (bytes) of each file, by its name.
+
+    The peak is 0 where the system does not say it; the limit holds all the same.
 
     A file that ends the process, or that takes all it may, is missing with all that follow it.
     """
@@ -43,7 +49,6 @@ def inspected_in_a_process(paths):
         timeout=300,
     )
     lines = [json.loads(line) for line in child.stdout.splitlines()]
-    kilobyte = 1 if sys.platform == "darwin" else 1024
     return {
-        Path(line[0]).name: (line[1], line[2] * kilobyte) for line in lines if len(line) == 3
+        Path(line[0]).name: (line[1], line[2]) for line in lines if len(line) == 3
     }, child.stderr
