@@ -32,6 +32,7 @@ __all__ = [
     "high_pass",
     "inf",
     "integrator",
+    "is_curved",
     "lag",
     "larger",
     "lead_lag",
@@ -49,11 +50,13 @@ __all__ = [
     "rectifier_supply",
     "regulator_output",
     "second_order",
+    "second_order_lead",
     "sin",
     "smaller",
     "source_voltage",
     "sqrt",
     "washout",
+    "washout_or_lag",
     "where",
     "zero",
 ]
@@ -98,6 +101,19 @@ def high_pass(u: Signal, x: Signal, T: Signal) -> tuple[Signal, Signal]:
     return where(T < SHORTEST, u, u - x), (u - x) * rate(T)
 
 
+def washout_or_lag(
+    u: Signal, x: Signal, K: Signal, TN: Signal, TD: Signal
+) -> tuple[Signal, Signal]:
+    """sK TN / (1 + sTD), or K / (1 + sTD) where TN = 0; the state is K u through the lag TD."""
+    slope = (K * u - x) * rate(TD)
+    return where(TN < SHORTEST, x, TN * slope), slope
+
+
+def is_curved(A1: Signal, A2: Signal) -> Signal:
+    """Return whether neither pole of 1 / (1 + s A1 + s^2 A2) is faster than ``SHORTEST``."""
+    return SHORTEST * larger(A1, SHORTEST) < A2
+
+
 def second_order(
     u: Signal, x: Signal, v: Signal, A1: Signal, A2: Signal
 ) -> tuple[Signal, Signal, Signal]:
@@ -105,10 +121,21 @@ def second_order(
 
     Where A2 is so small that one of its poles is faster than ``SHORTEST``, it is the lag A1.
     """
-    curved = SHORTEST * larger(A1, SHORTEST) < A2
+    curved = is_curved(A1, A2)
     bend = (u - x - A1 * v) / where(curved, A2, 1.0)
     y = where(curved | (A1 >= SHORTEST), x, u)
     return y, where(curved, v, (u - x) * rate(A1)), where(curved, bend, 0.0)
+
+
+def second_order_lead(
+    u: Signal, x: Signal, v: Signal, B1: Signal, B2: Signal, A1: Signal, A2: Signal
+) -> tuple[Signal, Signal, Signal]:
+    """(1 + s B1 + s^2 B2) / (1 + s A1 + s^2 A2), with the states of ``second_order``.
+
+    Where A2 = 0 leaves the lag A1, B2 is left out; where A1 = A2 = 0 the whole block is.
+    """
+    y, slope, bend = second_order(u, x, v, A1, A2)
+    return y + B1 * slope + B2 * bend, slope, bend
 
 
 def integrator(u: Signal, x: Signal, T: Signal = 1.0) -> tuple[Signal, Signal]:

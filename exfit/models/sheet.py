@@ -118,8 +118,10 @@ class DynamicsRecord:
 
     ``icons`` are the integers before them, each a symbol and the only value that the model stands
     for, unless its sheet has the symbol; ``absent`` are symbols that the model does not have, with
-    the only value that it stands for; ``ignored`` are symbols that act only where a limiter does,
-    which none is here: any value will do; ``doubt`` says what is not settled about the order.
+    the only value that it stands for; ``held`` are those of the model that the record does not
+    have, with the value that makes the model that of the record; ``ignored`` are symbols that act
+    only where a limiter does, which none is here: any value will do; ``doubt`` says what is not
+    settled about the order.
     """
 
     name: str
@@ -128,6 +130,7 @@ class DynamicsRecord:
     absent: tuple[tuple[str, float], ...]
     ignored: tuple[str, ...]
     doubt: str
+    held: tuple[tuple[str, float], ...] = ()
 
 
 def record(
@@ -138,6 +141,7 @@ def record(
     absent: Mapping[str, float] | None = None,
     ignored: str = "",
     doubt: str = "",
+    held: Mapping[str, float] | None = None,
 ) -> DynamicsRecord:
     """Return a PSS/E record from its symbols in one text, ``"TR KA TA"``."""
     return DynamicsRecord(
@@ -147,6 +151,7 @@ def record(
         tuple((absent or {}).items()),
         tuple(ignored.split()),
         doubt,
+        tuple((held or {}).items()),
     )
 
 

@@ -326,6 +326,7 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         for name, value in (*icons, *record.absent):
             assert f"{record.name}: {name}: {value + 1:g} is not modelled; {value:g} is" in told
         assert record.doubt in told
+        listed = (*definition.names, *dict(record.held))
         for row in definition.model.sheet:
-            assert row.symbol in definition.names or f"{row.symbol}: not in the record" in told
-        assert read.values == typical(definition.model.sheet)
+            assert (row.symbol in listed) != (f"{row.symbol}: not in the record" in told)
+        assert read.values == {**own, **dict(record.held)}

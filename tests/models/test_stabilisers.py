@@ -19,7 +19,20 @@ SIGNALS = ("speed", "p", "vt")
 SIDES = ("vsi1", "vsi2")
 
 # washouts that T = 0 leaves out: there the limit is the long time constant
-LEFT_OUT = {"PSS2B": ("TW2", "TW4")}
+LEFT_OUT = {"PSS2B": ("TW2", "TW4"), "PSS3B": ("TW3",)}
+# what is zero beside a time constant that shrinks: the rest of its filter, which would resonate,
+# a numerator that the lag bypasses, or makes steep enough for a limit; in PSS4B the branch that
+# cancels most of the other
+BESIDE = {
+    "PSS1A": {"A1": ("A2",)},
+    "IEEEST": {"A1": ("A2",), "A3": ("A4", "A6")},
+    "PSS3B": {"A3": ("A1", "A2", "A4"), "A7": ("A5", "A6", "A8")},
+    "PSS4B": {
+        f"T{band}{k}": (f"K{band}{2 if k <= 6 else 1}",) for band in "LIH" for k in range(1, 13)
+    },
+}
+# numerators of a washout, where 0 stands for 1 instead of s times it
+WITHOUT_WASHOUT = {"IEEEST": "T5", "ST2CUT": "T3"}
 
 
 @pytest.fixture(params=list(STABILISERS))
@@ -35,6 +48,12 @@ def lively(model):
     """Return typical data with no block bypassed."""
     values = typical(model.sheet)
     return values | {row.symbol: values[row.symbol] or 0.04 for row in model.sheet}
+
+
+def limits_of(values):
+    """Return the floor and the ceiling of the output."""
+    high = next(values[name] for name in ("VSTMAX", "LSMAX", "HLIM") if name in values)
+    return values.get("VSTMIN", values.get("LSMIN", -high)), high
 
 
 def resting(model, p, u):
@@ -108,7 +127,66 @@ def pss2b(s, p):
     return [ramp * speed * shaped, (ramp * p["KS3"] - 1.0) * power * shaped]
 
 
-FUNCTIONS = {"STAB1": stab1, "PSS1A": pss1a, "PSS2B": pss2b}
+def ieeest(s, p):
+    numerator = 1.0 + p["A5"] * s + p["A6"] * s * s
+    first, second = 1.0 + p["A1"] * s + p["A2"] * s * s, 1.0 + p["A3"] * s + p["A4"] * s * s
+    shaped = lead(s, p["T1"], p["T2"]) * lead(s, p["T3"], p["T4"])
+    washout = (p["T5"] * s if p["T5"] > 0.0 else 1.0) / (1.0 + p["T6"] * s)
+    return [numerator / first / second * shaped * p["KS"] * washout]
+
+
+def st2cut(s, p):
+    washout = (p["T3"] * s if p["T3"] > 0.0 else 1.0) / (1.0 + p["T4"] * s)
+    shaped = washout * lead(s, p["T5"], p["T6"]) * lead(s, p["T7"], p["T8"])
+    shaped *= lead(s, p["T9"], p["T10"])
+    return [p[f"K{k}"] / (1.0 + p[f"T{k}"] * s) * shaped for k in (1, 2)]
+
+
+def stab2a(s, p):
+    washout = (p["K2"] * p["T2"] * s / (1.0 + p["T2"] * s)) ** 3
+    branches = p["K3"] / (1.0 + p["T3"] * s) + p["K4"]
+    return [-washout * branches * (p["K5"] / (1.0 + p["T5"] * s)) ** 2]
+
+
+def pss3b(s, p):
+    shaped = washed(s, p["TW3"])
+    for B1, B2, A1, A2 in (("A1", "A2", "A3", "A4"), ("A5", "A6", "A7", "A8")):
+        above, below = 1.0 + p[B1] * s + p[B2] * s * s, 1.0 + p[A1] * s + p[A2] * s * s
+        shaped *= above / below
+    sides = (("KS1", "T1", "TW1"), ("KS2", "T2", "TW2"))
+    return [p[K] / (1.0 + p[T] * s) * washed(s, p[TW]) * shaped for K, T, TW in sides]
+
+
+def pss4b(s, p):
+    def notch(BW, W):
+        return (s * s + W * W) / (s * s + BW * s + W * W) if W > 0.0 else 1.0
+
+    def band(letter):
+        def branch(gain, coefficient, first):
+            T = [p[f"T{letter}{k}"] for k in range(first, first + 6)]
+            begin = (p[coefficient] + T[0] * s) / (1.0 + T[1] * s)
+            return p[gain] * begin * lead(s, T[2], T[3]) * lead(s, T[4], T[5])
+
+        upper = branch(f"K{letter}1", f"K{letter}11", 1)
+        return p[f"K{letter}"] * (upper - branch(f"K{letter}2", f"K{letter}17", 7))
+
+    low = (1.0 + p["DLI"] * s + p["CLI"] * s * s) / (1.0 + p["BLI"] * s + p["ALI"] * s * s)
+    low *= notch(p["BWLI1"], p["WLI1"]) * notch(p["BWLI2"], p["WLI2"])
+    high = -1.0 / (1.0 + p["TH"] * s) * s * s / (1.0 + p["BH"] * s + p["AH"] * s * s)
+    high *= notch(p["BWH1"], p["WH1"]) * notch(p["BWH2"], p["WH2"]) / (p["M"] * s)
+    return [low * (band("L") + band("I")), high * band("H")]
+
+
+FUNCTIONS = {
+    "STAB1": stab1,
+    "STAB2A": stab2a,
+    "PSS1A": pss1a,
+    "PSS2B": pss2b,
+    "PSS3B": pss3b,
+    "PSS4B": pss4b,
+    "IEEEST": ieeest,
+    "ST2CUT": st2cut,
+}
 
 
 def assert_is_its_function(model, values):
@@ -140,6 +218,23 @@ def test_the_ramp_tracking_filter_has_as_many_lags_as_M(lags):
     assert_is_its_function(STABILISERS["PSS2B"], lively(STABILISERS["PSS2B"]) | {"M": lags})
 
 
+@pytest.mark.parametrize("name", WITHOUT_WASHOUT)
+def test_a_washout_without_its_numerator_is_a_lag(name):
+    assert_is_its_function(
+        STABILISERS[name], lively(STABILISERS[name]) | {WITHOUT_WASHOUT[name]: 0.0}
+    )
+
+
+@pytest.mark.parametrize(
+    "without",
+    ["A3 A4", "A4", "A1 A2 A6", "A2 A6", "A2 A4", "A2 A3 A4 A6", "A1 A2 A3 A4 A5 A6", "A2", ""],
+)
+def test_a_numerator_acts_on_the_filters_that_remain(without):
+    """Each of these is proper: nothing of the numerator is left out."""
+    model = STABILISERS["IEEEST"]
+    assert_is_its_function(model, lively(model) | dict.fromkeys(without.split(), 0.0))
+
+
 @pytest.mark.parametrize("filtered", [{"A2": 0.0}, {"A1": 0.0, "A2": 0.0}])
 def test_the_filter_of_PSS1A_shrinks_with_its_coefficients(filtered):
     model = STABILISERS["PSS1A"]
@@ -158,12 +253,12 @@ def test_a_filter_with_a_pole_too_fast_to_see_is_a_lag():
 
 def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(stabiliser):
     for row in stabiliser.sheet:
-        if row.unit != "s" or row.low > 0.0 or row.symbol in LEFT_OUT.get(stabiliser.name, ()):
+        apart = (*LEFT_OUT.get(stabiliser.name, ()), WITHOUT_WASHOUT.get(stabiliser.name))
+        if row.unit != "s" or row.low > 0.0 or row.symbol in apart:
             continue
         rows = {one.symbol: one for one in stabiliser.sheet}
         values = lively(stabiliser) | dict.fromkeys(leads_of(row.symbol, rows), 0.0)
-        if row.symbol == "A1":
-            values["A2"] = 0.0
+        values |= dict.fromkeys(BESIDE.get(stabiliser.name, {}).get(row.symbol, ()), 0.0)
         none, small, twice = (
             frequency_response(stabiliser, values | {row.symbol: T})
             for T in (0.0, SHORTEST, 2.0 * SHORTEST)
@@ -197,8 +292,7 @@ def test_rest_is_rest_with_an_output_of_zero(stabiliser):
 
 def test_the_output_stays_within_its_limits_and_reaches_both(stabiliser):
     values = typical(stabiliser.sheet)
-    high = values.get("VSTMAX", values.get("HLIM"))
-    low = values.get("VSTMIN", -high)
+    low, high = limits_of(values)
     rng = np.random.default_rng(8)
     outputs = [
         motion_of(
@@ -282,7 +376,7 @@ def test_compiled_code_gives_what_the_plain_equations_give(stabiliser):
     size = np.abs(expected).max()
     assert np.abs(got[:, :, 0] - expected).max() < 1e-11 * size
     vs = got[:, 0, 0]
-    assert vs.max() == values.get("VSTMAX", values.get("HLIM"))
+    assert vs.max() == limits_of(values)[1]
 
 
 # --- sheets and records ---------------------------------------------------------------------------
@@ -311,7 +405,8 @@ def test_a_record_lists_every_parameter_once(stabiliser):
     for record in stabiliser.records:
         symbols = [row.symbol for row in stabiliser.sheet]
         integers = [name for name, _ in record.icons if name in symbols]
-        assert sorted([*record.cons, *integers]) == sorted([*symbols, *dict(record.absent)])
+        listed = [*record.cons, *integers, *dict(record.held)]
+        assert sorted(listed) == sorted([*symbols, *dict(record.absent)])
 
 
 def test_the_inputs_are_signals_of_a_plant(stabiliser):

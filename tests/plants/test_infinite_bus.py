@@ -343,6 +343,18 @@ def test_exact_derivatives_on_load_equal_central_differences(machine):
 # --- stabilisers ----------------------------------------------------------------------------------
 
 
+GAINS = {
+    "IEEEST": ("KS",),
+    "PSS1A": ("KS",),
+    "PSS2B": ("KS1",),
+    "PSS3B": ("KS1", "KS2"),
+    "PSS4B": ("KL", "KI", "KH"),
+    "ST2CUT": ("K1", "K2"),
+    "STAB1": ("K_T",),
+    "STAB2A": ("K5",),
+}
+
+
 @pytest.fixture(params=list(STABILISERS))
 def stabiliser(request):
     return STABILISERS[request.param]
@@ -382,12 +394,15 @@ def damping_of_the_swing(made, values):
     return (-swings.real / np.abs(swings)).min()
 
 
-def test_a_stabiliser_damps_the_swing():
-    """A fast exciter at high gain with and without PSS2B and PSS1A as they are tuned for speed."""
-    for name, gain in (("PSS2B", "KS1"), ("PSS1A", "KS")):
-        made, values = stabilised(STABILISERS[name])
-        without = damping_of_the_swing(made, values | {STABILISER + gain: 0.0})
-        assert damping_of_the_swing(made, values) > without + 0.02, name
+def test_a_stabiliser_damps_the_swing(stabiliser):
+    """A fast exciter at high gain with and without each, at half of its gain: its sign is right."""
+    made, values = stabilised(stabiliser)
+
+    def damping(share):
+        gains = [STABILISER + name for name in GAINS[stabiliser.name]]
+        return damping_of_the_swing(made, values | {name: share * values[name] for name in gains})
+
+    assert damping(0.5) > damping(0.0) + 0.02
 
 
 def test_a_step_of_vs_is_one_of_the_reference(machine):
@@ -416,8 +431,12 @@ def test_a_stabiliser_hears_the_inputs_it_is_given():
 def test_exact_derivatives_reach_through_a_stabiliser(stabiliser):
     """With gains so low that the unit is stable: a growing swing would end at limits."""
     made, values = stabilised(stabiliser)
-    gains = {STABILISER + name for name in ("KS", "KS1", "K_T")} & values.keys()
+    gains = [STABILISER + name for name in GAINS[stabiliser.name]]
     values |= {name: 0.2 * values[name] for name in gains}
+    if stabiliser.name == "PSS3B":
+        values[STABILISER + "A5"] = 0.0015  # 0.001 is the step: half of its neighbours take two
+    # the bands of PSS4B are small differences of large branches
+    part = 3e-5 if stabiliser.name == "PSS4B" else 1e-4
     assert damping_of_the_swing(made, values) > 0.0
     inputs = Inputs(0.0, 2.0, (InputStep(0.2, 0.0005),))
     simulator = Simulator(made, inputs, np.linspace(0.0, 2.0, 41), 1e-3)
@@ -426,7 +445,7 @@ def test_exact_derivatives_reach_through_a_stabiliser(stabiliser):
     )
     _, slopes = simulator.tangents(values, ("vt",), each(free))
     for column, name in enumerate(free):
-        h = 1e-4 * values[name]
+        h = part * values[name]
         sets = [values | {name: values[name] + side * h} for side in (1, -1)]
         up, down = simulator.samples_of_many(sets, ("vt",))[0]
         difference = ((up - down) / (2.0 * h))[:, 0]

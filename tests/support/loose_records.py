@@ -29,8 +29,8 @@ def sound(definition, random):
     rows = {row.symbol: row for row in definition.model.sheet}
     held = {name: row for name, row in rows.items() if name in definition.names}
     whole = dict(definition.record.icons)
-    values = typical(definition.model.sheet)
-    values |= {name: within(row, random) for name, row in held.items()}
+    unseen = typical(definition.model.sheet) | dict(definition.record.held)
+    values = unseen | {name: within(row, random) for name, row in held.items()}
     values |= {name: float(round(values[name])) for name in held if name in whole}
     for _ in range(TRIES):
         wrong = [*contradictions(definition.model, values)]
@@ -39,7 +39,7 @@ def sound(definition, random):
         symbol, text = wrong[random.integers(len(wrong))]
         drawn = SWAPPED if symbol in SWAPPED else [symbol, *re.findall(r"\w+", text)]
         values |= {name: within(held[name], random) for name in drawn if name in held}
-    return typical(definition.model.sheet)
+    return unseen
 
 
 def styled(value, random):

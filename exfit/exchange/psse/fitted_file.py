@@ -236,12 +236,15 @@ def _edits(result: FitResult, part: UnitPart, prefix: str, file: str) -> Iterato
 def _refuse_lost(
     result: FitResult, part: UnitPart, prefix: str, values: Mapping[str, float]
 ) -> None:
-    """Raise ExfitError where the record has no field for a value that is not typical."""
-    held = {*part.definition.names}
-    for row in part.definition.model.sheet:
-        if row.symbol not in held and prefix + row.symbol in result.parameters:
-            name, value = part.definition.record.name, show(values[row.symbol])
-            raise ExfitError(f"{name} cannot hold {row.symbol} = {value}, which was fitted")
+    """Raise ExfitError where the record has no field for a value that is fitted or not its own."""
+    record = part.definition.record
+    fields, own = {*part.definition.names}, dict(record.held)
+    for symbol in (row.symbol for row in part.definition.model.sheet):
+        lost = f"{record.name} cannot hold {symbol} = {show(values[symbol])}"
+        if symbol not in fields and prefix + symbol in result.parameters:
+            raise ExfitError(f"{lost}, which was fitted")
+        if values[symbol] != own.get(symbol, values[symbol]):
+            raise ExfitError(f"{lost}: it stands for {show(own[symbol])}")
 
 
 def _without_saturation(part: UnitPart) -> bool:

@@ -101,15 +101,13 @@ def _plant(machine: UnitPart) -> Iterator[str]:
 def _values(part: UnitPart, indent: str) -> Iterator[str]:
     rows: Sheet = part.definition.model.sheet
     for row in rows:
-        remark = "" if row.symbol in part.definition.names else "; typical, not in the file"
+        remark = "; typical, not in the file" if row.symbol in part.definition.absent else ""
         yield parameter_line(row, yaml_number(part.values[row.symbol]), indent, remark)
 
 
 def _sources(part: UnitPart) -> Iterator[str]:
     """Yield which values are not of the file; it does not say where its own come from."""
-    names = part.definition.names
-    absent = [row.symbol for row in part.definition.model.sheet if row.symbol not in names]
-    yield from source_lines(dict.fromkeys(absent, TYPICAL), "  ")
+    yield from source_lines(dict.fromkeys(part.definition.absent, TYPICAL), "  ")
 
 
 def _origin(part: UnitPart) -> str:

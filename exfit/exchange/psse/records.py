@@ -28,6 +28,12 @@ class Definition:
         """The names of what follows the id: integers, then constants."""
         return (*(name for name, _ in self.record.icons), *self.record.cons)
 
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """The parameters of the model that the record neither lists nor holds at a value."""
+        given = (*self.names, *dict(self.record.held))
+        return tuple(row.symbol for row in self.model.sheet if row.symbol not in given)
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -103,14 +109,14 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     of_sheet = {row.symbol: given[row.symbol] for row in rows if row.symbol in given}
     if all(of_sheet.get(name) == 0.0 for name in UNSATURATED):
         of_sheet |= UNSATURATED  # the voltages say nothing
-    values = {**typical(rows), **of_sheet}
+    values = {**typical(rows), **dict(record.held), **of_sheet}
     wrong = [*unreadable, *outside(rows, of_sheet)]
     wrong = wrong or [*contradictions(definition.model, values)]
     doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
     lacking = [
         (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
         for row in definition.model.sheet
-        if row.symbol not in definition.names
+        if row.symbol in definition.absent
     ]
     symbols = [row.symbol for row in definition.model.sheet]
     return Reading(

@@ -20,8 +20,5 @@ def unit_data(unit: Unit, file: str) -> UnitData:
 
 
 def _part(part: UnitPart, file: str) -> PartData:
-    names, model = part.definition.names, part.definition.model
-    absent = [row.symbol for row in model.sheet if row.symbol not in names]
-    return PartData(
-        model, part.values, dict.fromkeys(absent, TYPICAL), f"those of {Path(file).name}"
-    )
+    absent = dict.fromkeys(part.definition.absent, TYPICAL)
+    return PartData(part.definition.model, part.values, absent, f"those of {Path(file).name}")

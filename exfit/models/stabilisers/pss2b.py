@@ -16,7 +16,7 @@ The first input is the speed, the second the electrical power (KS2 = T7 / 2H).
 TW2 = 0 and TW4 = 0 leave out their washouts; T6, T7, T2, T4 or T11 = 0 bypass
 their blocks. The ramp tracking filter has N = 1, and M is a whole number from 1
 to 5. With T10 = T11 = 0 and input limits out of reach this is PSS2A, whose
-record has no such rows.
+record has no such rows: it is read as PSS2B with these values.
 """
 
 from exfit.engine.trace import Signal
@@ -24,6 +24,8 @@ from exfit.models.blocks import clip, high_pass, lag, lead_lag, where
 from exfit.models.sheet import record, sheet
 
 INPUTS = ("speed", "p")
+ALIASES = ("PSS2A",)
+NO_LIMIT = 9999.0  # pu
 
 SHEET = sheet(
     ("TW1", 10.0, "s", (0.01, 1000.0), "first washout of the first input"),
@@ -58,6 +60,16 @@ RECORDS = (
         "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 T10 T11 "
         "VSI1MAX VSI1MIN VSI2MAX VSI2MIN VSTMAX VSTMIN",
         icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+    ),
+    record(
+        "PSS2A",
+        "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 VSTMAX VSTMIN",
+        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+        held={
+            **{"T10": 0.0, "T11": 0.0},
+            **{"VSI1MAX": NO_LIMIT, "VSI1MIN": -NO_LIMIT},
+            **{"VSI2MAX": NO_LIMIT, "VSI2MIN": -NO_LIMIT},
+        },
     ),
 )
 

@@ -1,0 +1,71 @@
+"""PSS3B: dual input stabiliser, power and speed (IEEE Std 421.5-2005, 8.3).
+
+vsi1 ─►[  KS1  ]─►[ sTW1  ]─►(+)─►[ sTW3  ]─►[1 + sA1 + s²A2]─► v
+       [1 + sT1]  [1 + sTW1]  ▲   [1 + sTW3] [1 + sA3 + s²A4]
+                              │
+vsi2 ─►[  KS2  ]─►[ sTW2  ]───┘
+       [1 + sT2]  [1 + sTW2]
+                         VSTMAX
+v ─►[1 + sA5 + s²A6]─►[clip]─► vs
+    [1 + sA7 + s²A8]   VSTMIN
+
+The first input is the electrical power (KS1 is negative), the second the speed.
+T1 or T2 = 0 bypasses its block, TW3 = 0 leaves out its washout. A4 = 0 leaves a
+lag, without A2, and A3 = A4 = 0 no filter; so do A7 and A8.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, high_pass, lag, second_order_lead
+from exfit.models.sheet import record, sheet
+
+INPUTS = ("p", "speed")
+
+SHEET = sheet(
+    ("KS1", -0.602, "pu", (-10000.0, 10000.0), "gain of the first input"),
+    ("T1", 0.012, "s", (0.0, 100.0), "transducer lag of the first input"),
+    ("TW1", 0.3, "s", (0.01, 1000.0), "washout of the first input"),
+    ("KS2", 30.12, "pu", (-10000.0, 10000.0), "gain of the second input"),
+    ("T2", 0.012, "s", (0.0, 100.0), "transducer lag of the second input"),
+    ("TW2", 0.3, "s", (0.01, 1000.0), "washout of the second input"),
+    ("TW3", 0.6, "s", (0.0, 1000.0), "washout of the sum"),
+    ("A1", 0.359, "s", (-100.0, 100.0), "first coefficient of the first numerator"),
+    ("A2", 0.586, "s2", (-100.0, 100.0), "second coefficient of the first numerator"),
+    ("A3", 0.429, "s", (0.0, 100.0), "first coefficient of the first filter"),
+    ("A4", 0.564, "s2", (0.0, 100.0), "second coefficient of the first filter"),
+    ("A5", 0.001, "s", (-100.0, 100.0), "first coefficient of the second numerator"),
+    ("A6", 0.0, "s2", (-100.0, 100.0), "second coefficient of the second numerator"),
+    ("A7", 0.031, "s", (0.0, 100.0), "first coefficient of the second filter"),
+    ("A8", 0.0, "s2", (0.0, 100.0), "second coefficient of the second filter"),
+    ("VSTMAX", 0.1, "pu", (-9999.0, 9999.0), "ceiling of the output"),
+    ("VSTMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
+)
+
+RECORDS = (
+    record(
+        "PSS3B",
+        "KS1 T1 TW1 KS2 T2 TW2 TW3 A1 A2 A3 A4 A5 A6 A7 A8 VSTMAX VSTMIN",
+        icons={"ICS1": 3, "REMBUS1": 0, "ICS2": 1, "REMBUS2": 0},
+        doubt="whether REMBUS1 and REMBUS2 are in the record of PSS3B is not confirmed",
+    ),
+)
+
+STATES = "V1 W1 V2 W2 W3 V3 DV3 V4 DV4"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return vs."""
+    v1, d.V1 = lag(u.vsi1, s.V1, p.KS1, p.T1)
+    w1, d.W1 = high_pass(v1, s.W1, p.TW1)
+    v2, d.V2 = lag(u.vsi2, s.V2, p.KS2, p.T2)
+    w2, d.W2 = high_pass(v2, s.W2, p.TW2)
+    w3, d.W3 = high_pass(w1 + w2, s.W3, p.TW3)
+    v3, d.V3, d.DV3 = second_order_lead(w3, s.V3, s.DV3, p.A1, p.A2, p.A3, p.A4)
+    v4, d.V4, d.DV4 = second_order_lead(v3, s.V4, s.DV4, p.A5, p.A6, p.A7, p.A8)
+    return clip(v4, p.VSTMIN, p.VSTMAX)
+
+
+def rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is then 0."""
+    x.V1 = x.W1 = p.KS1 * u.vsi1
+    x.V2 = x.W2 = p.KS2 * u.vsi2
+    x.W3 = x.V3 = x.DV3 = x.V4 = x.DV4 = 0.0

@@ -1,0 +1,200 @@
+"""PSS4B: multi-band stabiliser, speed and power (IEEE Std 421.5-2005, 8.4).
+
+                                                                   VSTMAX
+vsi1 ─►[1 + sDLI + s²CLI]─►[NLI1]─►[NLI2]─┬─►[ L ]─►(+)──────►(+)─►[clip]─► vs
+       [1 + sBLI + s²ALI]                 │          ▲         ▲   VSTMIN
+                                          └─►[ I ]───┘         │
+                                                               │
+vsi2 ─►[  -1   ]─►[       s²     ]─►[1 ]─►[NH1]─►[NH2]─►[ H ]──┘
+       [1 + sTH]  [1 + sBH + s²AH]  [sM]
+
+L, I and H are the bands of low, intermediate and high frequency, NLI1, NLI2,
+NH1 and NH2 notches. The low band, and the others with I and H in place of L:
+
+KL1 (KL11 + sTL1)/(1 + sTL2) (1 + sTL3)/(1 + sTL4) (1 + sTL5)/(1 + sTL6)
+  - KL2 (KL17 + sTL7)/(1 + sTL8) (1 + sTL9)/(1 + sTL10) (1 + sTL11)/(1 + sTL12),
+  times KL, limited between VLMIN and VLMAX;
+KI KI1 KI11 TI1 TI2 TI3 TI4 TI5 TI6, KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12, VIMIN
+  and VIMAX;
+KH KH1 KH11 TH1 TH2 TH3 TH4 TH5 TH6, KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12, VHMIN
+  and VHMAX.
+
+A notch is (s² + W²) / (s² + sBW + W²), with BWLI1 and WLI1, BWLI2 and WLI2,
+BWH1 and WH1, BWH2 and WH2; W = 0 leaves it out. A lag of 0 bypasses its block,
+ALI = 0 and AH = 0 leave a lag.
+
+The first input is the speed, the second the electrical power. The standard of
+2005 prints PE; IEC 61970-302 corrects that to -PE, the sign of the swing
+equation, which is taken here. M is 2 H; programs that read M = 0 as the 2 H of
+the machine need its value here. Typical data are the standard's.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    SHORTEST,
+    clip,
+    lag,
+    rate,
+    second_order,
+    second_order_lead,
+    where,
+)
+from exfit.models.sheet import record, sheet
+
+INPUTS = ("speed", "p")
+
+SHEET = sheet(
+    ("CLI", 0.0, "s2", (-1.0, 1.0), "second coefficient of the speed's numerator"),
+    ("DLI", -0.001759, "s", (-1.0, 1.0), "first coefficient of the speed's numerator"),
+    ("ALI", 0.00012739, "s2", (0.0, 1.0), "second coefficient of the speed's filter"),
+    ("BLI", 0.017823, "s", (0.0, 1.0), "first coefficient of the speed's filter"),
+    ("BWLI1", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the speed's first notch"),
+    ("WLI1", 0.0, "rad/s", (0.0, 10000.0), "frequency of the speed's first notch"),
+    ("BWLI2", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the speed's second notch"),
+    ("WLI2", 0.0, "rad/s", (0.0, 10000.0), "frequency of the speed's second notch"),
+    ("TH", 0.0125, "s", (0.0, 10.0), "transducer lag of the power"),
+    ("AH", 1.0, "s2", (0.0, 1000.0), "second coefficient of the power's filter"),
+    ("BH", 2.0, "s", (0.001, 1000.0), "first coefficient of the power's filter"),
+    ("M", 7.0, "s", (0.01, 100.0), "twice the inertia constant H"),
+    ("BWH1", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the power's first notch"),
+    ("WH1", 0.0, "rad/s", (0.0, 10000.0), "frequency of the power's first notch"),
+    ("BWH2", 0.0, "rad/s", (0.0, 10000.0), "bandwidth of the power's second notch"),
+    ("WH2", 0.0, "rad/s", (0.0, 10000.0), "frequency of the power's second notch"),
+    ("KL1", 66.0, "pu", (-10000.0, 10000.0), "gain of the low band's upper branch"),
+    ("KL11", 1.0, "pu", (-1000.0, 1000.0), "coefficient of the low band's upper branch"),
+    ("TL1", 1.73, "s", (0.0, 100.0), "first lead of the low band's upper branch"),
+    ("TL2", 2.075, "s", (0.0, 100.0), "first lag of the low band's upper branch"),
+    ("TL3", 0.0, "s", (0.0, 100.0), "second lead of the low band's upper branch"),
+    ("TL4", 0.0, "s", (0.0, 100.0), "second lag of the low band's upper branch"),
+    ("TL5", 0.0, "s", (0.0, 100.0), "third lead of the low band's upper branch"),
+    ("TL6", 0.0, "s", (0.0, 100.0), "third lag of the low band's upper branch"),
+    ("KL2", 66.0, "pu", (-10000.0, 10000.0), "gain of the low band's lower branch"),
+    ("KL17", 1.0, "pu", (-1000.0, 1000.0), "coefficient of the low band's lower branch"),
+    ("TL7", 2.075, "s", (0.0, 100.0), "first lead of the low band's lower branch"),
+    ("TL8", 2.491, "s", (0.0, 100.0), "first lag of the low band's lower branch"),
+    ("TL9", 0.0, "s", (0.0, 100.0), "second lead of the low band's lower branch"),
+    ("TL10", 0.0, "s", (0.0, 100.0), "second lag of the low band's lower branch"),
+    ("TL11", 0.0, "s", (0.0, 100.0), "third lead of the low band's lower branch"),
+    ("TL12", 0.0, "s", (0.0, 100.0), "third lag of the low band's lower branch"),
+    ("KL", 7.5, "pu", (-10000.0, 10000.0), "gain of the low band"),
+    ("VLMAX", 0.075, "pu", (-9999.0, 9999.0), "ceiling of the low band"),
+    ("VLMIN", -0.075, "pu", (-9999.0, 9999.0), "floor of the low band"),
+    ("KI1", 66.0, "pu", (-10000.0, 10000.0), "gain of the intermediate band's upper branch"),
+    ("KI11", 1.0, "pu", (-1000.0, 1000.0), "coefficient of the intermediate band's upper branch"),
+    ("TI1", 0.173, "s", (0.0, 100.0), "first lead of the intermediate band's upper branch"),
+    ("TI2", 0.2075, "s", (0.0, 100.0), "first lag of the intermediate band's upper branch"),
+    ("TI3", 0.0, "s", (0.0, 100.0), "second lead of the intermediate band's upper branch"),
+    ("TI4", 0.0, "s", (0.0, 100.0), "second lag of the intermediate band's upper branch"),
+    ("TI5", 0.0, "s", (0.0, 100.0), "third lead of the intermediate band's upper branch"),
+    ("TI6", 0.0, "s", (0.0, 100.0), "third lag of the intermediate band's upper branch"),
+    ("KI2", 66.0, "pu", (-10000.0, 10000.0), "gain of the intermediate band's lower branch"),
+    ("KI17", 1.0, "pu", (-1000.0, 1000.0), "coefficient of the intermediate band's lower branch"),
+    ("TI7", 0.2075, "s", (0.0, 100.0), "first lead of the intermediate band's lower branch"),
+    ("TI8", 0.2491, "s", (0.0, 100.0), "first lag of the intermediate band's lower branch"),
+    ("TI9", 0.0, "s", (0.0, 100.0), "second lead of the intermediate band's lower branch"),
+    ("TI10", 0.0, "s", (0.0, 100.0), "second lag of the intermediate band's lower branch"),
+    ("TI11", 0.0, "s", (0.0, 100.0), "third lead of the intermediate band's lower branch"),
+    ("TI12", 0.0, "s", (0.0, 100.0), "third lag of the intermediate band's lower branch"),
+    ("KI", 30.0, "pu", (-10000.0, 10000.0), "gain of the intermediate band"),
+    ("VIMAX", 0.6, "pu", (-9999.0, 9999.0), "ceiling of the intermediate band"),
+    ("VIMIN", -0.6, "pu", (-9999.0, 9999.0), "floor of the intermediate band"),
+    ("KH1", 66.0, "pu", (-10000.0, 10000.0), "gain of the high band's upper branch"),
+    ("KH11", 1.0, "pu", (-1000.0, 1000.0), "coefficient of the high band's upper branch"),
+    ("TH1", 0.01513, "s", (0.0, 100.0), "first lead of the high band's upper branch"),
+    ("TH2", 0.01816, "s", (0.0, 100.0), "first lag of the high band's upper branch"),
+    ("TH3", 0.0, "s", (0.0, 100.0), "second lead of the high band's upper branch"),
+    ("TH4", 0.0, "s", (0.0, 100.0), "second lag of the high band's upper branch"),
+    ("TH5", 0.0, "s", (0.0, 100.0), "third lead of the high band's upper branch"),
+    ("TH6", 0.0, "s", (0.0, 100.0), "third lag of the high band's upper branch"),
+    ("KH2", 66.0, "pu", (-10000.0, 10000.0), "gain of the high band's lower branch"),
+    ("KH17", 1.0, "pu", (-1000.0, 1000.0), "coefficient of the high band's lower branch"),
+    ("TH7", 0.01816, "s", (0.0, 100.0), "first lead of the high band's lower branch"),
+    ("TH8", 0.02179, "s", (0.0, 100.0), "first lag of the high band's lower branch"),
+    ("TH9", 0.0, "s", (0.0, 100.0), "second lead of the high band's lower branch"),
+    ("TH10", 0.0, "s", (0.0, 100.0), "second lag of the high band's lower branch"),
+    ("TH11", 0.0, "s", (0.0, 100.0), "third lead of the high band's lower branch"),
+    ("TH12", 0.0, "s", (0.0, 100.0), "third lag of the high band's lower branch"),
+    ("KH", 120.0, "pu", (-10000.0, 10000.0), "gain of the high band"),
+    ("VHMAX", 0.6, "pu", (-9999.0, 9999.0), "ceiling of the high band"),
+    ("VHMIN", -0.6, "pu", (-9999.0, 9999.0), "floor of the high band"),
+    ("VSTMAX", 0.15, "pu", (-9999.0, 9999.0), "ceiling of the output"),
+    ("VSTMIN", -0.15, "pu", (-9999.0, 9999.0), "floor of the output"),
+)
+
+RECORDS = (
+    record(
+        "PSS4B",
+        "CLI DLI ALI BLI BWLI1 WLI1 BWLI2 WLI2 TH AH BH M BWH1 WH1 BWH2 WH2 "
+        "KL1 KL11 TL1 TL2 TL3 TL4 TL5 TL6 KL2 KL17 TL7 TL8 TL9 TL10 TL11 TL12 KL VLMAX VLMIN "
+        "KI1 KI11 TI1 TI2 TI3 TI4 TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN "
+        "KH1 KH11 TH1 TH2 TH3 TH4 TH5 TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN "
+        "VSTMAX VSTMIN",
+        doubt="its order is from one public source; the sign of its power is not confirmed",
+    ),
+)
+
+STATES = (
+    "XLI YLI XLI1 YLI1 XLI2 YLI2 PH XH YH XH1 YH1 XH2 YH2 "
+    "L1 L2 L3 L4 L5 L6 I1 I2 I3 I4 I5 I6 H1 H2 H3 H4 H5 H6"
+)
+SLOWEST = 1e-6  # rad/s
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return vs."""
+    low, d.XLI, d.YLI = second_order_lead(u.vsi1, s.XLI, s.YLI, p.DLI, p.CLI, p.BLI, p.ALI)
+    low, d.XLI1, d.YLI1 = notch(low, s.XLI1, s.YLI1, p.BWLI1, p.WLI1)
+    low, d.XLI2, d.YLI2 = notch(low, s.XLI2, s.YLI2, p.BWLI2, p.WLI2)
+    power, d.PH = lag(u.vsi2, s.PH, -1.0, p.TH)
+    _, steep, d.YH = second_order(power, s.XH, s.YH, p.BH, p.AH)
+    d.XH = steep
+    high, d.XH1, d.YH1 = notch(steep / p.M, s.XH1, s.YH1, p.BWH1, p.WH1)
+    high, d.XH2, d.YH2 = notch(high, s.XH2, s.YH2, p.BWH2, p.WH2)
+    bands = band("L", low, s, p, d) + band("I", low, s, p, d) + band("H", high, s, p, d)
+    return clip(bands, p.VSTMIN, p.VSTMAX)
+
+
+def notch(u: Signal, x: Signal, v: Signal, BW: Signal, W: Signal) -> tuple[Signal, Signal, Signal]:
+    """(s^2 + W^2) / (s^2 + s BW + W^2), or 1 where W = 0; the states are ``second_order``'s."""
+    square = where(W < SLOWEST, 0.0, 1.0 / where(W < SLOWEST, 1.0, W * W))
+    return second_order_lead(u, x, v, 0.0, square, BW * square, square)
+
+
+def band(letter: str, u: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
+    """Return the output of a band, the difference of its branches; its names have its letter."""
+
+    def branch(first: int, gain: str, coefficient: str) -> Signal:
+        y = getattr(p, gain) * u
+        for k in range(first, first + 3):
+            x = getattr(s, f"{letter}{k}")
+            lead, slow = (getattr(p, f"T{letter}{n}") for n in (2 * k - 1, 2 * k))
+            constant = getattr(p, coefficient) if k == first else 1.0
+            y, slope = scaled_lead_lag(y, x, constant, lead, slow)
+            setattr(d, f"{letter}{k}", slope)
+        return y
+
+    upper = branch(1, f"K{letter}1", f"K{letter}11")
+    lower = branch(4, f"K{letter}2", f"K{letter}17")
+    ceiling, floor = getattr(p, f"V{letter}MAX"), getattr(p, f"V{letter}MIN")
+    return clip(getattr(p, f"K{letter}") * (upper - lower), floor, ceiling)
+
+
+def scaled_lead_lag(
+    u: Signal, x: Signal, K: Signal, TC: Signal, TB: Signal
+) -> tuple[Signal, Signal]:
+    """(K + sTC) / (1 + sTB), or K where TB = 0; the state is u seen through the lag TB."""
+    slope = (u - x) * rate(TB)
+    return where(TB < SHORTEST, K * u, K * x + TC * slope), slope
+
+
+def rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is 0 where the speed is 1."""
+    x.XLI = x.XLI1 = x.XLI2 = u.vsi1
+    x.PH = x.XH = -u.vsi2
+    x.YLI = x.YLI1 = x.YLI2 = x.YH = x.XH1 = x.YH1 = x.XH2 = x.YH2 = 0.0
+    for letter, low in (("L", u.vsi1), ("I", u.vsi1), ("H", 0.0)):
+        upper, lower = getattr(p, f"K{letter}1") * low, getattr(p, f"K{letter}2") * low
+        coefficients = getattr(p, f"K{letter}11"), getattr(p, f"K{letter}17")
+        for k, (gained, constant) in enumerate(zip((upper, lower), coefficients, strict=True)):
+            for n in range(3):
+                setattr(x, f"{letter}{3 * k + n + 1}", gained if n == 0 else constant * gained)
