@@ -61,8 +61,9 @@ def guess_signals(
 def three_phases(names: Sequence[str], units: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
     """Return the columns that are the three phases of a voltage: Ua Ub Uc, UL1 UL2 UL3, U12 ..."""
     groups: list[tuple[str, ...]] = []
+    by_lower_case = {name.lower(): name for name in names}
     for name in names:
-        for triple in _triples(name, names):
+        for triple in _triples(name, by_lower_case):
             quantities = {quantity_of(units.get(column)) for column in triple}
             voltage = quantities == {"voltage"} or (
                 quantities == {None} and OF_VOLTAGE.match(bare(name).lower())
@@ -81,9 +82,8 @@ def connection_of(columns: Sequence[str]) -> str:
     return "phase-to-ground"
 
 
-def _triples(name: str, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
+def _triples(name: str, by_lower_case: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
     """Yield the columns that differ from one in the mark of the phase alone."""
-    by_lower_case = {column.lower(): column for column in names}
     text = name.lower()
     for marks in TRIPLES:
         for at in (match.start() for match in re.finditer(re.escape(marks[0]), text)):

@@ -96,6 +96,21 @@ class Inspection:
             *base_findings(self.channels),
         )
 
+    @property
+    def foremost(self) -> tuple[InspectedChannel, ...]:
+        """The channels, those with a signal first, then those that step, constant ones last."""
+        stepping = {name for step in self.steps for name in step.sizes}
+        return tuple(
+            sorted(
+                self.channels,
+                key=lambda channel: (
+                    channel.signal is None,
+                    channel.name not in stepping,
+                    channel.constant,
+                ),
+            )
+        )
+
     def as_json(self) -> dict[str, Any]:
         """Return the figures."""
         sampling = self.sampling

@@ -125,7 +125,7 @@ def too_fast(system: System, step: float, values: Values, radius: float) -> Simu
         f"; the smallest time constant is {shortest} = {lags[shortest]:g} s" if shortest else ""
     )
     return SimulationError(
-        f"simulation.step: {step:g} s would need {math.ceil(step * rate - ON_GRID)} sub-steps "
+        f"simulation.step: {step:g} s would need {_needed(step, rate):.4g} sub-steps "
         f"(limit {MOST_SUBSTEPS}) for a rate of {rate:.4g} 1/s{smallest}"
     )
 
@@ -147,10 +147,16 @@ def _lag_rates(system: System, p: Array) -> Array:
 
 
 def _parts(step: float, rates: Array) -> NDArray[np.int64]:
-    """Return ceil(step * rate), at least one, and NO_SUBSTEPS beyond MOST_SUBSTEPS."""
-    parts = np.maximum(np.ceil(step * rates - ON_GRID), 1.0)
+    """Return the sub-steps that rates need, and NO_SUBSTEPS beyond MOST_SUBSTEPS."""
+    parts = _needed(step, rates)
     # also where a rate is not a number
     return np.where(parts <= MOST_SUBSTEPS, parts, NO_SUBSTEPS).astype(np.int64)
+
+
+def _needed(step: float, rates: Array | float) -> Array:
+    """Return ceil(step * rate), at least one, inf where that is no number any more."""
+    with np.errstate(over="ignore"):
+        return np.asarray(np.maximum(np.ceil(np.multiply(step, rates) - ON_GRID), 1.0))
 
 
 def _surely_still(rest: AtRest) -> Mask:

@@ -44,6 +44,23 @@ def test_inspect_shows_the_record_and_leaves_its_files(run):
     assert [step["at"] for step in content["steps"]] == pytest.approx([1.0], abs=0.02)
 
 
+def test_of_many_channels_the_foremost_are_shown_and_the_others_counted(run):
+    record = np.genfromtxt(SAMPLE, delimiter=",", names=True)
+    many = 1000 * np.eye(2, 60)[np.arange(len(record)) % 2]  # 58 of them constant
+    columns = np.column_stack([record["t"], many, record["vt"]])
+    names = ["t", *(f"c{k}" for k in range(60)), "vt"]
+    np.savetxt("many.csv", columns, delimiter=",", header=",".join(names), comments="")
+    code, out, err = run("inspect", "many.csv", "--no-plots")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    table = lines[next(k for k, line in enumerate(lines) if line.startswith("channel ")) + 1 :]
+    assert [line.split()[0] for line in table[:3]] == ["vt", "c0", "c1"]
+    assert table.index("... and 21 more in inspect.json") == 40
+    assert "c11, ... and 48 more in inspect.json" in " ".join(out.split())
+    content = json.loads(Path("runs/many.csv-inspect/inspect.json").read_text())
+    assert [channel["name"] for channel in content["channels"]] == names[1:]
+
+
 def test_what_inspect_suggests_makes_a_case(run):
     """The sections are pasted behind a model and a plant, and the case is checked."""
     sections = suggested(run("inspect", "up.csv", "--no-plots")[1])

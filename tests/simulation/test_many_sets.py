@@ -9,7 +9,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.simulation.inputs import Direction, Inputs, InputStep, each
 from exfit.simulation.kernels import linear_kernel, parameters_used, time_constants
 from exfit.simulation.simulator import Simulator
-from exfit.simulation.substeps import NO_SUBSTEPS, spectral_radii, substeps_at_rest
+from exfit.simulation.substeps import NO_SUBSTEPS, spectral_radii, substeps_at_rest, too_fast
 
 CLOCK = np.linspace(0.0, 1.0, 101)
 UP = Inputs(0.0, 1.0, (InputStep(0.1, 0.05),))
@@ -71,6 +71,13 @@ def test_a_set_without_a_start_at_rest_fails_alone():
     for k in (0, 2):
         alone, _ = simulator.samples(sets[k], ("vt",))
         np.testing.assert_array_equal(samples[k], alone)
+
+
+@pytest.mark.parametrize("step", [1e300, 1e308])
+def test_a_message_of_too_many_substeps_is_short_however_many_they_are(step):
+    fault = str(too_fast(system_of("AC1A"), step, lively_values("AC1A"), 1e10))
+    assert fault.startswith(f"simulation.step: {step:g} s would need ")
+    assert len(fault) < 200
 
 
 def test_the_substeps_are_those_of_the_largest_rate(model):

@@ -26,7 +26,7 @@ from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.field_base import shows_power
 from exfit.records.inspection import Inspection
 from exfit.util.sources import TYPICAL
-from exfit.util.text import yaml_number
+from exfit.util.text import first_texts, yaml_number
 
 WIDTH = 80  # columns of a note
 ALONE = "FIRST_ORDER"  # the model whose output is vt itself
@@ -71,7 +71,7 @@ def _heading(unit: UnitData, tests: Sequence[StartingTest]) -> Iterator[str]:
     yield from _wrapped(f"{exciter.name} on {records} {files}: a case to start from.")
     yield from _advice(unit)
     for inspection in inspections:
-        for text in inspection.findings:
+        for text in first_texts(inspection.findings):
             yield from _note(text)
 
 

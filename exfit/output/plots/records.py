@@ -34,15 +34,7 @@ def inspection(inspected: "Inspection", title: str) -> Figure:
     Of many channels those with a signal come first, then those that show a step; the rest are
     named.
     """
-    stepping = {name for step in inspected.steps for name in step.sizes}
-    ordered = sorted(
-        inspected.channels,
-        key=lambda channel: (
-            channel.signal is None,
-            channel.name not in stepping,
-            channel.constant,
-        ),
-    )
+    ordered = inspected.foremost
     drawn = ordered[:MOST_PANELS]
     left_out = [channel.name for channel in ordered[MOST_PANELS:]]
     figure = new_figure(1.2 + 1.5 * len(drawn))

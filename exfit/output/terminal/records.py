@@ -17,6 +17,9 @@ from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
 
 NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers
+MOST_ROWS = 40  # channels, steps or notes of a file that someone reads through
+MOST_NAMES = 12  # of channels in one line
+MORE = "... and {:,} more in inspect.json"
 
 
 def inspection(console: Console, result: Inspection, record: Sequence[str]) -> None:
@@ -29,7 +32,7 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     )
     paragraph(console, in_words(result.sampling))
     console.print()
-    _channels(console, result.channels)
+    _channels(console, result)
     console.print()
     for line in _signals(result.channels):
         paragraph(console, line)
@@ -37,7 +40,9 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     _steps(console, result)
     console.print()
     if result.findings:
-        notes(console, result.findings)
+        findings = result.findings
+        notes(console, findings[:MOST_ROWS])
+        _more(console, len(findings) - MOST_ROWS)
         console.print()
     paragraph(console, "for a case; what is in # comments is a guess to check:")
     console.print()
@@ -60,10 +65,12 @@ def in_words(sampling: Sampling) -> str:
     return text + (f"; {count} gap{'s' if count > 1 else ''}" if count else "; no gaps")
 
 
-def _channels(console: Console, channels: Sequence[InspectedChannel]) -> None:
+def _channels(console: Console, result: Inspection) -> None:
+    """Show the channels; of many those that matter most."""
     heads = ("at rest", "smallest", "largest", "noise", "rounded to")
     table = plain_table("channel", "unit", "is", *heads, numbers=heads)
-    for channel in channels:
+    many = len(result.channels) > MOST_ROWS
+    for channel in result.foremost[:MOST_ROWS] if many else result.channels:
         name = channel.name
         if len(name) > NAME_WIDTH:
             name = name[: NAME_WIDTH - 1] + "…"
@@ -80,6 +87,19 @@ def _channels(console: Console, channels: Sequence[InspectedChannel]) -> None:
         )
         table.add_row(*(Text(cell) for cell in cells))
     show_table(console, table)
+    _more(console, len(result.channels) - MOST_ROWS)
+
+
+def _more(console: Console, count: int) -> None:
+    """Say how many rows are left out, if any are."""
+    if count > 0:
+        console.print(MORE.format(count))
+
+
+def _some(texts: Sequence[str]) -> str:
+    """Return texts in one line, the first of many."""
+    more = [MORE.format(len(texts) - MOST_NAMES)] * (len(texts) > MOST_NAMES)
+    return ", ".join([*texts[:MOST_NAMES], *more])
 
 
 def _signals(channels: Sequence[InspectedChannel]) -> Iterator[str]:
@@ -90,7 +110,7 @@ def _signals(channels: Sequence[InspectedChannel]) -> Iterator[str]:
             yield f"{channel.name} is {channel.signal}: {surely}, by {channel.why}"
     others = [channel.name for channel in channels if not channel.signal]
     if others:
-        yield f"taken for no signal: {', '.join(others)}"
+        yield f"taken for no signal: {_some(others)}"
 
 
 def _steps(console: Console, result: Inspection) -> None:
@@ -98,8 +118,9 @@ def _steps(console: Console, result: Inspection) -> None:
         console.print("no step in any channel")
         return
     table = plain_table("step at (s)", "+- (s)", "changes for good", numbers=("step at (s)",))
-    for step in result.steps:
-        sizes = ", ".join(f"{name} {size:+.4g}" for name, size in step.sizes.items())
+    for step in result.steps[:MOST_ROWS]:
+        sizes = _some([f"{name} {size:+.4g}" for name, size in step.sizes.items()])
         at = f"{step.at:.4f}" if not step.from_start else f"<= {step.at:.4g}"
         table.add_row(at, "-" if step.from_start else f"{step.error:.1g}", Text(sizes))
     show_table(console, table)
+    _more(console, len(result.steps) - MOST_ROWS)

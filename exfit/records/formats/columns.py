@@ -16,7 +16,7 @@ from exfit.records.formats.table import (
     Array,
     column_error,
     increases,
-    position,
+    positions,
     refuse_uneven,
 )
 
@@ -60,7 +60,8 @@ class Columns:
         """
         names = [*names]
         self.refuse_larger(names)
-        columns = {name: self._numbers(name, name in gappy) for name in names}
+        places = positions(self.path, self.names, names)
+        columns = {name: self._numbers(name, at, name in gappy) for name, at in places.items()}
         refuse_uneven(self.path, columns)
         return columns
 
@@ -71,7 +72,8 @@ class Columns:
         min. Raises RecordError where it contradicts the file, and where a sample is missing.
         """
         self.refuse_larger(columns)
-        whole = {name: self._whole(name) for name in columns}
+        places = positions(self.path, self.names, columns)
+        whole = {name: self._whole(name, at) for name, at in places.items()}
         refuse_uneven(self.path, whole)
         first = columns[0]
         if len(whole) == 1 and whole[first].dtype.kind == "f":
@@ -85,15 +87,15 @@ class Columns:
         """Return the place of a sample, counted from 0, as messages name it."""
         return self.where(row)
 
-    def _numbers(self, name: str, gappy: bool) -> Array:
-        column = self.fetch(position(self.path, self.names, name)) if gappy else self._whole(name)
+    def _numbers(self, name: str, at: int, gappy: bool) -> Array:
+        column = self.fetch(at) if gappy else self._whole(name, at)
         if column.dtype.kind != "f":
             raise column_error(self.path, name, "timestamps, not numbers")
         return np.asarray(column, np.float64)
 
-    def _whole(self, name: str) -> NDArray[Any]:
+    def _whole(self, name: str, at: int) -> NDArray[Any]:
         """Return a column that lacks no sample."""
-        column = self.fetch(position(self.path, self.names, name))
+        column = self.fetch(at)
         lost = np.flatnonzero(np.isnan(column))  # NaT too
         if lost.size:
             raise column_error(self.where(int(lost[0])), name, "the sample is missing")

@@ -68,6 +68,16 @@ def position(path: Path, names: Sequence[str], name: str) -> int:
     return places[0]
 
 
+def positions(path: Path, names: Sequence[str], wanted: Iterable[str]) -> dict[str, int]:
+    """Return the positions of many columns; raises RecordError as ``position`` does."""
+    places = {name: at for at, name in enumerate(names)}
+    if len(places) < len(names):
+        return {name: position(path, names, name) for name in wanted}
+    return {
+        name: places[name] if name in places else position(path, names, name) for name in wanted
+    }
+
+
 def listed(names: Sequence[str]) -> str:
     """Return columns as a message lists them, the first of many."""
     first = ", ".join(map(repr, names[:COLUMNS_SHOWN]))

@@ -25,7 +25,15 @@ from exfit.records.formats.dialect import (
     split_rows,
 )
 from exfit.records.formats.memory import MemoryLimit, memory_limit
-from exfit.records.formats.table import NONE, Array, column_error, increases, position, read_bytes
+from exfit.records.formats.table import (
+    NONE,
+    Array,
+    column_error,
+    increases,
+    position,
+    positions,
+    read_bytes,
+)
 from exfit.records.formats.timestamps import (
     WIDEST,
     WIDEST_OF_TWO,
@@ -72,7 +80,7 @@ class TextTable:
         """
         names = [*names]
         self.limit.check_columns([self._count] * len(names), len(self.text.data))
-        places = {name: position(self.path, self.names, name) for name in names}
+        places = positions(self.path, self.names, names)
         if not self._even:
             self._find_fault(places, gappy)
         data = self._load(places, gappy)

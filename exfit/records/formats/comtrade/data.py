@@ -45,8 +45,8 @@ def samples_of(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     if jump.size:
         at = int(jump[0]) + 1
         raise RecordError(
-            f"{parts.sample(at)}: its number is {number[at]:.0f}, that of the sample "
-            f"before {number[at - 1]:.0f}"
+            f"{parts.sample(at)}: its number is {number[at]:.10g}, that of the sample "
+            f"before {number[at - 1]:.10g}"
         )
     return samples
 
