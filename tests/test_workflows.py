@@ -55,6 +55,7 @@ def fits():
     return of
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("strategy", ["lm-then-dgn", "auto"])
 @pytest.mark.parametrize("name", AC1A)
 def test_every_start_reaches_the_noise_inside_its_bounds(fits, name, strategy):

@@ -78,6 +78,7 @@ def test_the_steps_of_every_sample_record_are_found_in_it_and_the_truth_is_accep
         assert found.size == pytest.approx(size, rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sign", ["up", "down"])
 @pytest.mark.parametrize(
     ("unit", "name"),

@@ -44,6 +44,7 @@ def with_fixed(entries):
     return BASE.replace("parameters:\n", f"parameters:\n  fixed: {{{', '.join(entries)}}}\n")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "text",
     [

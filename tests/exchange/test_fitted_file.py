@@ -160,6 +160,7 @@ def there_and_back(fit, definition, random):
     assert exported(data, verified(fit, unit, values_of(unit))).data == data
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DEFINITIONS)
 def test_values_go_into_every_kind_of_record_and_back_and_nothing_else_changes(fit, name):
     for seed in range(3):

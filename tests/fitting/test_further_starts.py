@@ -83,6 +83,7 @@ def test_a_search_leaves_a_false_minimum_by_a_path_that_is_whole(both):
     ]
 
 
+@pytest.mark.long
 def test_what_the_own_start_led_to_is_noted_with_what_the_record_says_of_it(both):
     local, whole = both
     (note,) = [text for text in whole.notes if "start of the case ended" in text]

@@ -40,6 +40,7 @@ def fleet(tmp_path_factory):
     return fleet, events
 
 
+@pytest.mark.long
 def test_the_death_of_a_worker_is_a_row_and_the_rest_goes_on(fleet):
     rows = {case.name: case for case in fleet[0].cases}
     assert {name: row.status for name, row in rows.items()} == {

@@ -21,6 +21,7 @@ def drawn(rng, count, spread, uneven):
     return estimates(units + errors * rng.standard_normal(count), errors)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [FEWEST, 12])
 @pytest.mark.parametrize("spread", [0.5, 3.0, 30.0])
 @pytest.mark.parametrize("uneven", [0.0, 1.0])

@@ -630,6 +630,7 @@ def lines_of(sheet):
     return [" ".join(piece[2] for piece in line) for _, line in groupby(pieces, itemgetter(0))]
 
 
+@pytest.mark.long
 def test_a_heading_is_on_the_page_of_what_follows_it(fits, printed, pages):
     """No heading is the last line of its page, and a record's is on that of its first figure."""
     headings = {" ".join(words.split()) for words in pages("first order").headings}

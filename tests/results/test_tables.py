@@ -3,12 +3,14 @@
 import csv
 import io
 
+import pytest
 from records import case_of, config, recording, several
 
 from exfit.results.tables import history_table, parameter_file
 from exfit.workflows import fit
 
 
+@pytest.mark.long
 def test_the_file_of_parameters_names_every_record_with_its_error(tmp_path):
     content = several(recording("up"), recording("down"), estimate={"iterations": 1})
     found = fit(case_of(content, tmp_path))
@@ -17,6 +19,7 @@ def test_the_file_of_parameters_names_every_record_with_its_error(tmp_path):
         assert f"{one_of.record}: rmse {one_of.rmse:.4g} pu" in heading
 
 
+@pytest.mark.long
 def test_the_history_counts_trials_and_says_where_a_step_was_capped(tmp_path):
     settings = {"strategy": "lm", "lm": {"update": "ratio"}, "iterations": 6}
     result = fit(case_of({**config("ac1a_typical"), "estimate": settings}, tmp_path))

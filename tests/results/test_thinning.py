@@ -15,6 +15,7 @@ SAMPLES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("digits", [3, 9, 12, 17])
 @pytest.mark.parametrize("samples", SAMPLES.values(), ids=[*SAMPLES])
 def test_a_rounded_sample_is_what_its_text_reads_back_as(samples, digits):

@@ -33,6 +33,7 @@ def sexs_on_ac8b():
     return content
 
 
+@pytest.mark.long
 def test_another_model_misses_the_record(tmp_path):
     found = verdict(sexs_on_ac8b(), tmp_path)
     assert found.verdict == MISSES
