@@ -64,6 +64,13 @@ def section_of(text: str, case: Path, key: str) -> Any:
     return content_of(text, case).get(key)
 
 
+def stabiliser_inputs(text: str, case: Path) -> tuple[str, ...]:
+    """Return the input signals that the text of a case gives its stabiliser, () for its own."""
+    section = section_of(text, case, "stabiliser")
+    given = section.get("inputs") if isinstance(section, Mapping) else None
+    return tuple(map(str, given or ()))
+
+
 def _content(case: Path) -> Mapping[str, Any]:
     try:
         return content_of(read_text(case), case)

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from exfit.models.sheet import Parameter
+from exfit.models.machines import Machine
+from exfit.models.sheet import Model, Parameter
 from exfit.util.sources import SOURCES
 from exfit.util.text import yaml_number
 
@@ -23,6 +24,12 @@ def parameter_line(row: Parameter, value: str, indent: str, remark: str = "") ->
 def commented(text: str, comment: str) -> str:
     """Return a line of a case with a comment, at one place where the line is short."""
     return f"{text:{MEANING_AT}}# {comment}" if len(text) < MEANING_AT else f"{text}  # {comment}"
+
+
+def inputs_lines(model: Model | Machine, inputs: tuple[str, ...]) -> Iterator[str]:
+    """Yield the line of a stabiliser's input signals, where they are not those of its model."""
+    if isinstance(model, Model) and inputs and inputs != model.inputs:
+        yield commented(f"  inputs: [{', '.join(inputs)}]", "as the codes of its record say")
 
 
 def in_comment(text: str) -> str:

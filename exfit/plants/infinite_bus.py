@@ -47,7 +47,8 @@ REACTIVE: Sheet = sheet(("Q", 0.0, "pu", (-10.0, 10.0), "reactive power at the s
 SOURCE: Sheet = sheet(("E", 1.0, "pu", (0.01, 10.0), "voltage of the source"))
 
 Given = Literal["Q", "E"]  # what sets the start beside vt0 and P
-HEARD = ("speed", "p", "vt")  # what a stabiliser may listen to
+# what a stabiliser may listen to; pa is the accelerating power, none an input that is not in use
+HEARD = ("speed", "p", "vt", "pa", "none")
 
 
 class Flow(NamedTuple):
@@ -190,7 +191,9 @@ def infinite_bus(
         exciter = rest_of(model, ifd, u, exciter_parameters(p, model, saturation))
         waiting = {**values_of(fluxes, machine.states), "delta": stator.delta, "dw": 0.0}
         if stabiliser is not None:
-            waiting |= stabiliser_rest(stabiliser, Names(speed=0.0, p=n.P, vt=vt), p)
+            waiting |= stabiliser_rest(
+                stabiliser, Names(speed=0.0, p=n.P, vt=vt, pa=0.0, none=0.0), p
+            )
         return Rest(
             {**waiting, **exciter.states},
             {**exciter.setpoints, "Pm": n.P, "source": modulus(at.ex, at.ey)},
@@ -214,7 +217,7 @@ def infinite_bus(
         ifd = machine.field(fluxes, i, of_machine)
         vs = changed.vs
         if stabiliser is not None:
-            heard = Names(speed=dw, p=power, vt=vt)
+            heard = Names(speed=dw, p=power, vt=vt, pa=r["Pm"] - power, none=0.0)
             vs = vs + stabilising(stabiliser, heard, p, x, d)
         vref = r["vref"] + u["vref"]
         vc1 = compensated(v, i, n)

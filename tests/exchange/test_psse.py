@@ -17,6 +17,7 @@ from exfit.errors import DynamicsError
 from exfit.exchange.psse.fields import read_records, text_of
 from exfit.exchange.psse.import_case import case_text, import_unit
 from exfit.exchange.psse.records import (
+    SIGNALS,
     Definition,
     definition_of,
     definitions,
@@ -135,6 +136,25 @@ def each_case_holds_the_numbers_of_its_file(definition, seed):
 def test_a_case_holds_the_numbers_of_its_file(definition):
     if definition_of(definition.record.name) == definition:
         each_case_holds_the_numbers_of_its_file(definition)
+
+
+@pytest.mark.parametrize(("code", "signal"), SIGNALS.items())
+def test_the_codes_of_a_stabiliser_s_inputs_are_its_signals(code, signal):
+    unmodelled = f"{code} is not modelled"
+    for definition in (one for one in DEFINITIONS.values() if one.codes):
+        values = typical(definition.model.sheet) | dict(definition.record.held)
+        codes = dict.fromkeys(definition.codes, code)
+        text = record_text(definition, values | codes, 7, "1")
+        read = read_back(definition, text)
+        assert read.inputs == (signal,) * len(definition.model.inputs)
+        assert not [warning for warning in read.warnings if unmodelled in warning.text]
+        unit = "".join(
+            f"{record_text(other, typical(other.model.sheet), 7, '1')}\n"
+            for other in (GENROU, ESAC1A)
+        )
+        case = yaml.safe_load(case_text(read_unit(f"{unit}{text}\n", "unit.dyr"), "unit.dyr"))
+        given = case["stabiliser"].get("inputs", [*definition.model.inputs])
+        assert given == [signal] * len(definition.model.inputs)
 
 
 # ---- damage
@@ -317,14 +337,18 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         own = typical(definition.model.sheet)
         values = {**own, **dict.fromkeys(record.ignored, 7.5), **dict(record.absent)}
         icons = [(name, value) for name, value in record.icons if name not in own]
-        given = [value + ((name, value) in icons) for name, value in record.icons]
+        # a code that no signal stands for: the slope of the voltage
+        of_icons = {name: value + ((name, value) in icons) for name, value in record.icons}
+        of_icons |= dict.fromkeys(definition.codes, 6)
+        given = [*of_icons.values()]
         absent = dict(record.absent)
         given += [values[name] + (1 if name in absent else 0) for name in record.cons]
         text = f"1 {record.name} 1 " + " ".join(map(repr, given)) + " /"
         read = read_back(definition, text)
         told = "\n".join(warning.text for warning in read.warnings)
         for name, value in (*icons, *record.absent):
-            assert f"{record.name}: {name}: {value + 1:g} is not modelled; {value:g} is" in told
+            other = of_icons.get(name, value + 1)
+            assert f"{record.name}: {name}: {other:g} is not modelled; {value:g} is" in told
         assert record.doubt in told
         listed = (*definition.names, *dict(record.held))
         for row in definition.model.sheet:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.translation.start import Placed
-from exfit.case.peek import section_of
+from exfit.case.peek import section_of, stabiliser_inputs
 from exfit.engine.system import System
 from exfit.errors import ExfitError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
@@ -177,9 +177,7 @@ def _stabiliser(result: FitResult) -> Stabilised | None:
     if name is None or name not in STABILISERS:
         return None
     model = STABILISERS[name]
-    section = section_of(result.case_text, result.case, "stabiliser")
-    given = section.get("inputs") if isinstance(section, Mapping) else None
-    return Stabilised(model, tuple(map(str, given)) if given else model.inputs)
+    return Stabilised(model, stabiliser_inputs(result.case_text, result.case) or model.inputs)
 
 
 def reference_steps(

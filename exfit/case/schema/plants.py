@@ -141,7 +141,8 @@ class Stabiliser(Section):
     inputs: tuple[Heard, ...] | None = Field(
         default=None,
         min_length=1,
-        description="Input signals, one or two of speed, p, vt; default: those of the model.",
+        description="Input signals, one or two of speed, p, vt, pa (accelerating power) and none; "
+        "default: those of the model.",
     )
     parameters: Frozen[Given] = Field(
         default_factory=nothing,

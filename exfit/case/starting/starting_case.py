@@ -21,7 +21,13 @@ from exfit.case.starting.suggestion import (
     weights_section,
     window_lines,
 )
-from exfit.case.templates import commented, in_comment, parameter_line, source_lines
+from exfit.case.templates import (
+    commented,
+    in_comment,
+    inputs_lines,
+    parameter_line,
+    source_lines,
+)
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.field_base import shows_power
 from exfit.records.inspection import Inspection
@@ -204,6 +210,7 @@ def _stabiliser(part: PartData | None) -> Iterator[str]:
         return
     yield "stabiliser:"
     yield commented(f"  model: {part.model.name}", in_comment(part.origin))
+    yield from inputs_lines(part.model, part.inputs)
     yield "  parameters:"
     for row in part.model.sheet:
         yield parameter_line(row, yaml_number(part.values[row.symbol]), "    ")

@@ -18,13 +18,15 @@ from exfit.util.sources import TYPICAL
 class PartData:
     """A model with a value for each parameter, and the sources of these in the words of a case.
 
-    A value without a source is not stated; ``origin`` says in a comment where the data are from.
+    A value without a source is not stated; ``origin`` says in a comment where the data are from;
+    ``inputs`` are the signals of a stabiliser, () for those of its model.
     """
 
     model: Model | Machine
     values: Mapping[str, float]
     sources: Mapping[str, str]
     origin: str = ""
+    inputs: tuple[str, ...] = ()
 
     @classmethod
     def typical(cls, model: Model | Machine) -> "PartData":

@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 from exfit import __version__
+from exfit.case.peek import stabiliser_inputs
 from exfit.errors import ExfitError, FileError
 from exfit.exchange.psse.records import (
+    SIGNALS,
     WIDTH,
     Definition,
     alternatives,
@@ -26,6 +28,8 @@ from exfit.results.translation import Translation
 from exfit.results.typical_values import by_weight, first_of
 from exfit.util.sources import NOT_STATED, TYPICAL, by_source
 from exfit.util.text import near, show
+
+CODES = {signal: code for code, signal in SIGNALS.items()}
 
 
 @dataclass(frozen=True)
@@ -153,7 +157,13 @@ def _stabiliser(result: FitResult, warnings: list[str]) -> Iterator[Written]:
     if not candidates:
         warnings.append(f"stabiliser {name} has no PSS/E record: it is left out")
         return
-    yield _written(result, candidates[0], "stabiliser.")
+    record = _written(result, candidates[0], "stabiliser.")
+    own = getattr(record.definition.model, "inputs", ())
+    inputs = stabiliser_inputs(result.case_text, result.case) or own
+    codes = dict(zip(record.definition.codes, map(CODES.__getitem__, inputs), strict=False))
+    if not codes and inputs != own:
+        warnings.append(f"{name} has no codes of its inputs: {', '.join(inputs)} is lost")
+    yield replace(record, values={**record.values, **codes})
 
 
 def _written(result: FitResult, definition: Definition, prefix: str) -> Written:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import isclose
 from typing import NamedTuple
 
+from exfit.case.peek import stabiliser_inputs
 from exfit.errors import ExfitError
 from exfit.exchange.psse.fields import Field, encoded, number, text_of
 from exfit.exchange.psse.records import UNSATURATED, Definition, read_values
@@ -181,7 +182,20 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[UnitPart,
             advice = f"; exfit translate finds its data for {name}" if not prefix else ""
             raise ExfitError(f"{file}:{part.line}: {name}: the fitted model is {model}{advice}")
         _refuse_other_values(result, part, prefix, file)
+        _refuse_other_inputs(result, part, file)
         yield part, prefix
+
+
+def _refuse_other_inputs(result: FitResult, part: UnitPart, file: str) -> None:
+    """Raise ExfitError where the fitted stabiliser listens to other signals than the record."""
+    if not part.inputs:
+        return
+    own = getattr(part.definition.model, "inputs", ())
+    inputs = stabiliser_inputs(result.case_text, result.case) or own
+    if inputs != part.inputs:
+        name, theirs = part.definition.record.name, ", ".join(part.inputs)
+        text = f"its inputs are {theirs}, the fit has {', '.join(inputs)}"
+        raise ExfitError(f"{file}:{part.line}: {name}: {text}")
 
 
 def _refuse_other_values(result: FitResult, part: UnitPart, prefix: str, file: str) -> None:

@@ -8,6 +8,7 @@ from exfit.case.templates import (
     as_found_lines,
     commented,
     in_comment,
+    inputs_lines,
     parameter_line,
     source_lines,
 )
@@ -50,6 +51,7 @@ def case_text(unit: Unit, file: str) -> str:
     if unit.stabiliser is not None:
         name = unit.stabiliser.definition.model.name
         lines += ["stabiliser:", commented(f"  model: {name}", _origin(unit.stabiliser))]
+        lines += inputs_lines(unit.stabiliser.definition.model, unit.stabiliser.inputs)
         lines += ["  parameters:", *_values(unit.stabiliser, "    "), *_sources(unit.stabiliser)]
     lines += [*TEST.splitlines(), "parameters:"]
     lines += [commented("  fixed:", "what a fit shall find goes under free")]

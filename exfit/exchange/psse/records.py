@@ -12,6 +12,7 @@ from exfit.util.text import show
 
 WIDTH = 80  # columns of a file
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
+SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the input code of a stabiliser
 UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
 
 
@@ -29,6 +30,11 @@ class Definition:
         return (*(name for name, _ in self.record.icons), *self.record.cons)
 
     @property
+    def codes(self) -> tuple[str, ...]:
+        """The integers that say which signals the inputs of a stabiliser are."""
+        return tuple(name for name, _ in self.record.icons if name.startswith("ICS"))
+
+    @property
     def absent(self) -> tuple[str, ...]:
         """The parameters of the model that the record neither lists nor holds at a value."""
         given = (*self.names, *dict(self.record.held))
@@ -37,11 +43,15 @@ class Definition:
 
 @dataclass(frozen=True)
 class Reading:
-    """What the fields of a record say: values by symbol, what is wrong, what must be known."""
+    """What the fields of a record say: values by symbol, what is wrong, what must be known.
+
+    ``inputs`` are the signals of a stabiliser whose record has codes of them.
+    """
 
     values: Mapping[str, float]
     faults: list[DynamicsFault]
     warnings: list[DynamicsFault]
+    inputs: tuple[str, ...] = ()
 
 
 def definitions() -> list[Definition]:
@@ -119,9 +129,8 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         if row.symbol in definition.absent
     ]
     symbols = [row.symbol for row in definition.model.sheet]
-    return Reading(
-        values, placed(wrong), doubt + placed([*_unmodelled(record, symbols, given), *lacking])
-    )
+    warnings = doubt + placed([*_unmodelled(definition, symbols, given), *lacking])
+    return Reading(values, placed(wrong), warnings, _inputs(definition, given))
 
 
 def record_text(
@@ -168,12 +177,21 @@ def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[DynamicsFault]:
             yield DynamicsFault(field.line, f"{name}: {error}")
 
 
+def _inputs(definition: Definition, given: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the input signals of a stabiliser; its model's for codes that nothing stands for."""
+    modelled = dict(definition.record.icons)
+    codes = [(given.get(name, modelled[name]), modelled[name]) for name in definition.codes]
+    return tuple(SIGNALS.get(int(code), SIGNALS[usual]) for code, usual in codes)
+
+
 def _unmodelled(
-    record: DynamicsRecord, symbols: Iterable[str], given: Mapping[str, float]
+    definition: Definition, symbols: Iterable[str], given: Mapping[str, float]
 ) -> Iterable[tuple[str, str]]:
     """Yield (symbol, warning) for what the model, of these symbols, has in one way only."""
-    for name, modelled in (*record.icons, *record.absent):
+    for name, modelled in (*definition.record.icons, *definition.record.absent):
         value = given.get(name, modelled)
+        if name in definition.codes and value in SIGNALS:
+            continue
         if value != modelled and name not in symbols:
             yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
 

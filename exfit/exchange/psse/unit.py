@@ -45,13 +45,15 @@ class Head(NamedTuple):
 class UnitPart:
     """A model of the unit with the values of its record, which begins on ``line``.
 
-    ``fields`` are those behind the id, one for each name of the definition.
+    ``fields`` are those behind the id, one for each name of the definition; ``inputs`` the signals
+    of a stabiliser whose record has codes of them.
     """
 
     definition: Definition
     line: int
     values: Mapping[str, float]
     fields: tuple[Field, ...] = ()
+    inputs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ def _parts(
         reading = read_values(definition, head.line, head.fields)
         faults += reading.faults
         warnings += reading.warnings
-        parts[kind] = UnitPart(definition, head.line, reading.values, head.fields)
+        parts[kind] = UnitPart(definition, head.line, reading.values, head.fields, reading.inputs)
     return parts
 
 

@@ -21,4 +21,5 @@ def unit_data(unit: Unit, file: str) -> UnitData:
 
 def _part(part: UnitPart, file: str) -> PartData:
     absent = dict.fromkeys(part.definition.absent, TYPICAL)
-    return PartData(part.definition.model, part.values, absent, f"those of {Path(file).name}")
+    origin = f"those of {Path(file).name}"
+    return PartData(part.definition.model, part.values, absent, origin, part.inputs)
