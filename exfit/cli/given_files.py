@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from exfit.errors import ExfitError
+from exfit.util.files import refuse_bytes
 
 RECORDS = (
     ".csv", ".tsv", ".txt", ".asc", ".dat", ".cfg", ".cff", ".mat", ".parquet", ".xlsx", ".xlsm",
@@ -52,7 +53,7 @@ class GivenFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Return the path; raises ExfitError with the command or the file that was meant."""
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
-        _refuse_bytes(path)
+        refuse_bytes(path)
         if not path.exists():
             meant = _meant(path)
             if meant is not None:
@@ -65,14 +66,6 @@ class GivenFile(click.Path):
         if kind is Kind.CASE and ctx is not None and Kind.RESULT in self.kinds:
             advice = _fit_first(path, f"exfit {ctx.info_name}")
         raise ExfitError(f"{path}: {kind}, not {self.kinds[0]}; {advice}")
-
-
-def _refuse_bytes(path: Path) -> None:
-    """Raise ExfitError for a name that no text of a case, a result or a report can hold."""
-    try:
-        str(path).encode()
-    except UnicodeEncodeError:
-        raise ExfitError(f"{path}: the name of the file is not UTF-8 text; rename it") from None
 
 
 def _fit_first(case: Path, command: str) -> str:

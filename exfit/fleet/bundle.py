@@ -14,6 +14,7 @@ from exfit.errors import ExfitError
 from exfit.fleet.folder import CaseOutcome, Failure
 from exfit.fleet.task import CaseTask, run_case
 from exfit.util.cache import CACHE
+from exfit.util.files import read_regular, why_unreadable
 from exfit.util.root import ROOT, below
 
 QUICKLY = 1  # the level of compression: the next ones gain little and take several times as long
@@ -74,12 +75,11 @@ def bundle_of(paths: Sequence[Path]) -> Bundle:
     for path in paths:
         place = os.path.normpath(path.absolute())
         try:
-            file = PackedFile.of(place, path.read_bytes())
+            file = PackedFile.of(place, read_regular(path))
         except FileNotFoundError:
             continue
         except (OSError, ValueError) as fault:
-            reason = fault.strerror if isinstance(fault, OSError) else fault
-            raise ExfitError(f"{path}: cannot be read: {reason}") from None
+            raise ExfitError(f"{path}: cannot be read: {why_unreadable(fault)}") from None
         if files.setdefault(place, file) != file:
             raise ExfitError(f"{path}: another file than {place}: a link is before the dots")
     return Bundle(str(paths[0]), str(Path.cwd()), tuple(files.values()))

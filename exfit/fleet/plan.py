@@ -15,6 +15,7 @@ from exfit.errors import CaseError, ExfitError, FileError
 from exfit.fleet.folder import IndexEntry, case_name
 from exfit.fleet.summary import CaseStatus, facts_of
 from exfit.fleet.task import CODE, CaseTask, FitSettings, FurtherFiles, key_of
+from exfit.util.files import read_regular, refuse_bytes
 from exfit.util.text import dotted
 
 SUFFIXES = (".yaml", ".yml")
@@ -57,7 +58,8 @@ def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
 
     Of a folder they are the files *.yaml and *.yml that are cases, faulty or not. Folders whose
     name begins with a dot are left out, and ``folder``, where the batch writes, unless what is
-    given lies in it. Raises ExfitError for what does not exist, and where there is no case at all.
+    given lies in it. Raises ExfitError for what does not exist or has a name that is no text, and
+    where there is no case at all.
     """
     paths: dict[str, Path] = {}
     missing = []
@@ -65,6 +67,7 @@ def case_files(given: Iterable[Path], folder: Path) -> tuple[Path, ...]:
         if not path.exists():
             missing.append(f"{path}: cannot be read: No such file or folder")
         for file in _cases_below(path, folder) if path.is_dir() else [path]:
+            refuse_bytes(file)
             paths.setdefault(case_name(folder, file), file)
     if missing:
         raise FileError(missing)
@@ -91,7 +94,7 @@ def _same(path: Path, other: Path) -> bool:
 def _may_be_case(file: Path) -> bool:
     """Return whether a file of YAML is a case, a programme, or nothing that can be read."""
     try:
-        content = content_of(decoded(file.read_bytes(), file), file)
+        content = content_of(decoded(read_regular(file), file), file)
     except (OSError, CaseError):
         return True
     return not content or bool(KEYS_OF_CASES & content.keys())
@@ -116,7 +119,7 @@ def planned_case(case: Path, folder: Path, settings: BatchSettings) -> PlannedCa
     """Return a case with its key, and the task that its fit is; or why it has none."""
     entry = IndexEntry(case_name(folder, case))
     try:
-        data = case.read_bytes()
+        data = read_regular(case)
     except OSError as fault:
         return _without_task(entry, "refused", f"{case}: cannot be read: {fault.strerror}")
     try:

@@ -13,6 +13,7 @@ from exfit import __version__
 from exfit.errors import ExfitError
 from exfit.fleet.folder import KEY_DIGITS, CaseOutcome, Failure
 from exfit.fleet.summary import summary_of
+from exfit.util.files import read_regular, regular_size
 from exfit.util.root import on_disk
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def _case_of(task: CaseTask) -> "Case | None":
 
     path = task.files[0]
     try:
-        data = on_disk(path).read_bytes()
+        data = read_regular(path)
     except OSError:
         return None
     digests = _digests(task.files, data)
@@ -136,6 +137,7 @@ def _digests(files: Sequence[Path], case: bytes | None) -> list[str | None]:
 
 def _digest(file: Path) -> str | None:
     try:
+        regular_size(file)
         with on_disk(file).open("rb") as content:
             return hashlib.file_digest(content, "sha256").hexdigest()
     except OSError:

@@ -3,6 +3,7 @@
 import os
 import re
 import stat
+import sys
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -39,14 +40,49 @@ def read_regular(path: Path) -> bytes:
     return on_disk(path).read_bytes()
 
 
-def read_limited(path: Path, most: int) -> bytes:
-    """Return the bytes of a file; raises ExfitError for more than ``most``, or one not readable."""
+def refuse_bytes(path: Path) -> None:
+    """Raise ExfitError for a name that no text of a case, a result or a report can hold."""
     try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise ExfitError(f"{path}: {_why_no_text(os.fsencode(path))}") from None
+
+
+def why_unreadable(fault: OSError | ValueError) -> str:
+    """Return why a file cannot be read."""
+    if isinstance(fault, UnicodeEncodeError):
+        return _what_lacks(fault.object)
+    # a ValueError is that of a name with a null character
+    return str(fault.strerror if isinstance(fault, OSError) else fault)
+
+
+def _why_no_text(name: bytes) -> str:
+    """Return why the name of a file is no text: its bytes are none, or the locale lacks letters."""
+    try:
+        return _what_lacks(name.decode())
+    except UnicodeDecodeError:
+        return "the name of the file is not UTF-8 text; rename it"
+
+
+def _what_lacks(name: str) -> str:
+    letters = ascii("".join(dict.fromkeys(letter for letter in name if not letter.isascii())))
+    return (
+        f"the encoding of the locale, {sys.getfilesystemencoding()}, lacks {letters} of the name "
+        "of the file; set PYTHONUTF8=1, or a locale of UTF-8, as LC_ALL=C.UTF-8"
+    )
+
+
+def read_limited(path: Path, most: int) -> bytes:
+    """Return the bytes of a file; raises ExfitError for more than ``most``, or one not readable.
+
+    What is no file, as a folder, a pipe or a device, is refused before it is opened.
+    """
+    try:
+        regular_size(path)
         with on_disk(path).open("rb") as file:
             data = file.read(most + 1)
-    except (OSError, ValueError) as fault:  # ValueError: a name with a null character
-        why = fault.strerror if isinstance(fault, OSError) else fault
-        raise ExfitError(f"{path}: cannot be read: {why}") from None
+    except (OSError, ValueError) as fault:
+        raise ExfitError(f"{path}: cannot be read: {why_unreadable(fault)}") from None
     if len(data) > most:
         raise ExfitError(f"{path}: larger than {most / 1e6:g} MB, the limit of such a file")
     return data

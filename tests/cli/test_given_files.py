@@ -1,6 +1,7 @@
 """A file of another kind, or a name that is nearly right: the message says what was meant."""
 
 import json
+import os
 import shutil
 
 import pytest
@@ -62,3 +63,25 @@ def test_a_column_that_differs_in_capitals_alone_is_the_one_meant(run, folder):
     code, _, err = run("fit", "t.yaml")
     assert code == 1
     assert "no column 'Vt'; did you mean 'vt'? The columns are" in err
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no pipes among its files")
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("a.yaml", "simulate a.yaml"),
+        ("a.yaml", "batch a.yaml -o fleet"),
+        ("a.yaml", "simulate t.yaml --parameters a.yaml"),
+        ("a.dyr", "import a.dyr"),
+        ("a.csv", "new --model AC1A --record up.csv --tests a.csv"),
+        ("a.csv", "batch a.csv -o fleet"),
+        ("a.py", "new --model a.py --record up.csv"),
+        ("result.json", "export ."),
+    ],
+)
+def test_a_pipe_is_refused_at_once_whatever_it_stands_for(run, folder, name, command):
+    """Nobody writes to it: a command that opened it would wait for ever."""
+    os.mkfifo(name)
+    ran = run(*command.split())
+    assert ran.code == 1
+    assert f"{name}: cannot be read: a pipe or a device, not a file" in ran.err + ran.out

@@ -123,6 +123,18 @@ def test_a_name_that_is_not_text_is_refused(run, empty_folder, command):
     assert "not UTF-8 text" in ran.err
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux alone")
+@pytest.mark.parametrize("command", [("fit",), ("batch", "-o", "fleet")])
+def test_a_name_that_the_locale_lacks_is_no_fault_of_the_name(run, empty_folder, command):
+    """In the locale C the two bytes of a letter come as two surrogates, not as the letter."""
+    name = "fall\udcc3\udca4.yaml"
+    (empty_folder / name).write_text("model: AC1A\n")
+    ran = run(*command, name)
+    assert ran.code == 1
+    assert "not UTF-8" not in ran.err
+    assert r"lacks '\xe4' of the name of the file; set PYTHONUTF8=1" in ran.err
+
+
 def test_a_message_quotes_no_name_of_any_length(run, empty_folder):
     (empty_folder / "tests.csv").write_text(f"file,at\n{'x' * 50_000}.csv,1\n")
     ran = run("new", "--model", "AC1A", "--tests", "tests.csv")

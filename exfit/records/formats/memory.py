@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from exfit.errors import RecordError
-from exfit.util.files import regular_size
+from exfit.util.files import regular_size, why_unreadable
 
 GIGABYTE = 1e9
 LEAST_LIMIT = 1.0  # GB, where a case gives none
@@ -74,7 +74,5 @@ def readable(path: Path) -> Iterator[None]:
     """Raise RecordError for what keeps a file from being read."""
     try:
         yield
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a name with a null character
-        raise RecordError(f"{path}: cannot be read: {error}") from None
+    except (OSError, ValueError) as fault:
+        raise RecordError(f"{path}: cannot be read: {why_unreadable(fault)}") from None
