@@ -2,7 +2,13 @@
 
 from exfit.plants.alone import alone
 from exfit.plants.breaker import BREAKER, SPEED
-from exfit.plants.infinite_bus import HEARD, INFINITE_BUS, flow_sheet, infinite_bus
+from exfit.plants.infinite_bus import (
+    HEARD,
+    INFINITE_BUS,
+    flow_sheet,
+    infinite_bus,
+    rests_with_output,
+)
 from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
@@ -55,4 +61,5 @@ __all__ = [
     "machine_playback",
     "open_circuit",
     "playback",
+    "rests_with_output",
 ]

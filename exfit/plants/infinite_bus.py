@@ -1,5 +1,6 @@
 """A machine on load: behind R + jX to a stiff source of constant voltage and frequency."""
 
+from collections.abc import Mapping
 from functools import cache
 from math import pi
 from typing import Literal, NamedTuple
@@ -46,6 +47,7 @@ FLOW: Sheet = sheet(
 REACTIVE: Sheet = sheet(("Q", 0.0, "pu", (-10.0, 10.0), "reactive power at the start"))
 SOURCE: Sheet = sheet(("E", 1.0, "pu", (0.01, 10.0), "voltage of the source"))
 
+ROUNDING_AT_REST = 1e-9  # pu
 Given = Literal["Q", "E"]  # what sets the start beside vt0 and P
 # what a stabiliser may listen to; pa is the accelerating power, none an input that is not in use
 HEARD = ("speed", "p", "vt", "pa", "none")
@@ -134,6 +136,14 @@ def compensated(v: Axes, i: Axes, n: Names) -> Signal:
 def listening(stabiliser: Stabilised, heard: Names) -> Names:
     """Return what a stabiliser sees, ``vsi1`` and ``vsi2``; of the speed, what it deviates."""
     return Names(**{f"vsi{k}": getattr(heard, of) for k, of in enumerate(stabiliser.inputs, 1)})
+
+
+def rests_with_output(stabiliser: Stabilised, values: Mapping[str, float]) -> bool:
+    """Return whether a stabiliser with these values has an output while its unit is at rest."""
+    model, p, x = stabiliser.model, Names(**values), Names()
+    seen = listening(stabiliser, Names(speed=0.0, p=1.0, vt=1.0, pa=0.0, none=0.0))
+    model.rest(0.0, seen, p, x)
+    return bool(abs(model.equations(x, seen, p, Names())) > ROUNDING_AT_REST)
 
 
 def stabiliser_rest(stabiliser: Stabilised, heard: Names, p: Signals) -> dict[str, Signal]:

@@ -198,6 +198,11 @@ def test_a_stabiliser_on_open_circuit_is_said_not_to_act(tmp_path):
         ("inputs: [p]", "inputs: [p, vt]", "stabiliser.inputs: 2 given; PSS1A takes 1"),
         ("inputs: [p]", "inputs: [f]", "stabiliser.inputs[0]: 'f' is not possible; known: speed"),
         ("PSS1A", "PSS9", "'PSS9' is not a stabiliser model; did you mean"),
+        (
+            "PSS1A, inputs: [p], parameters: {KS: 0.5}",
+            "IEEEST, inputs: [p], parameters: {T5: 0}",
+            "stabiliser.parameters: IEEEST does not rest at 0 with inputs p: its washout is left",
+        ),
         ("{KS: 0.5}", "{K: 0.5}", "stabiliser.parameters.K: not a parameter of PSS1A"),
         ("free: {}", "free: {H: {start: 3, min: 1, max: 9}}", "plant.free.H: both fixed and free"),
         ("infinite-bus", "open-circuit", "test.network: not allowed with plant open-circuit"),

@@ -7,9 +7,9 @@ vsi1 ─►[ F ]─►[1 + sT1]─►[1 + sT3]─►[ KS ]─►[ sT5   ]─►[
 F = (1 + sA5 + s²A6) / ((1 + sA1 + s²A2) (1 + sA3 + s²A4)). A2 = 0 or A4 = 0
 leaves a lag, A1 = A2 = 0 or A3 = A4 = 0 no filter; of the numerator acts what
 the filters that remain can make. T2 = 0 or T4 = 0 bypasses its block. T5 = 0
-makes 1 / (1 + sT6) of the washout, as in PSS/E: then an input with a value at
-rest, as the power, moves the voltage from the start. Not modelled: a switch-off
-at terminal voltages beyond VCU and VCL.
+makes 1 / (1 + sT6) of the washout, as in PSS/E; an input with a value at rest,
+as the power, is refused then. Not modelled: a switch-off at terminal voltages
+beyond VCU and VCL.
 """
 
 from exfit.engine.trace import Signal

@@ -10,9 +10,9 @@ v ─►[clip]─► vs
     LSMIN
 
 T1, T2, T6, T8 or T10 = 0 bypasses its block. T3 = 0 makes 1 / (1 + sT4) of the
-washout, as in PSS/E: then an input with a value at rest, as the power, moves
-the voltage from the start. Not modelled: the cut-off where the terminal voltage
-leaves its initial value by more than VCU and VCL.
+washout, as in PSS/E; an input with a value at rest, as the power, is refused
+then. Not modelled: the cut-off where the terminal voltage leaves its initial
+value by more than VCU and VCL.
 """
 
 from exfit.engine.trace import Signal
