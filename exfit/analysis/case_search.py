@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from exfit import estimate
 from exfit.analysis.intervals.determination import Determination, determination
+from exfit.analysis.intervals.samples_at_steps import without_contradicting_samples
 from exfit.analysis.judgement import doubt_of
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
@@ -85,8 +86,24 @@ def with_lines(
 def weighted_search(
     task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
 ) -> tuple[FitProblem, SearchResult]:
-    """Return the problem with the weights that the case asks for, and its search."""
+    """Return the problem with the weights that the case asks for, and its search.
 
+    Without the samples at the instant of a step that contradict all others, which notes name.
+    """
+    problem, found = _weighted_search(task, problem, announce, progress)
+    if found.interrupted or found.best.stop is estimate.Stop.INTERRUPTED:
+        return problem, found
+    fewer, notes = without_contradicting_samples(problem, found.best.x)
+    if not notes:
+        return problem, found
+    task = task._replace(setups=as_fitted(task.setups, fewer))
+    problem, found = _weighted_search(task, fewer, announce, progress)
+    return problem, found._replace(notes=(*found.notes, *notes))
+
+
+def _weighted_search(
+    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
+) -> tuple[FitProblem, SearchResult]:
     def search_of(problem: FitProblem) -> SearchResult:
         doubt = doubt_of(task.case, problem, task.setups, task.unseen)
         return search(

@@ -38,8 +38,10 @@ class FreeInstant(NamedTuple):
 
     @property
     def samples(self) -> Array:
-        """The instants of the samples (M,), in s."""
-        return self.experiment.simulator.times
+        """The instants of the samples (M,) that are compared in a channel that jumps, in s."""
+        channels = [c for c in self.experiment.channels if SIGNALS[c.signal].jumps]
+        times: Array = self.experiment.simulator.times[np.any([c.kept for c in channels], axis=0)]
+        return times
 
 
 def free_instants(problem: FitProblem) -> Iterator[FreeInstant]:
