@@ -13,6 +13,7 @@ import exfit
 from exfit.analysis.translation.search import NOTICEABLE, _unnoticed
 from exfit.analysis.translation.steps import step_plants
 from exfit.errors import ExfitError, ModelError
+from exfit.exchange.psse.export import export
 from exfit.models import MODELS, STABILISERS
 from exfit.models.exciters import sexs
 from exfit.models.sheet import typical
@@ -174,6 +175,21 @@ def test_a_stabiliser_listens_to_what_the_case_says():
         for case_text in (text, "")
     ]
     assert inputs == [("p",), STABILISERS["STAB1"].inputs]
+
+
+def test_an_exported_stabiliser_has_the_codes_of_what_it_listens_to():
+    """With inputs of the case, and without; a record without codes says that they are lost."""
+    text = "stabiliser: {model: NAME, inputs: [p]}"
+    records = []
+    for name, case_text in (("IEEEST", text), ("IEEEST", ""), ("STAB1", text)):
+        stabiliser = typical(STABILISERS[name].sheet)
+        of_stabiliser = {"stabiliser_model": name, "stabiliser": stabiliser}
+        fit = replace(fit_of(FIT, "AC1A"), case_text=case_text, **of_stabiliser)
+        exported = export(fit, 1, "1")
+        records.append((exported.text.split(f"'{name}'")[1].split()[1], exported.warnings))
+    (power, _), (speed, _), (_, warnings) = records
+    assert (power, speed) == ("3", "1")
+    assert "STAB1 has no codes of its inputs: p is lost" in warnings
 
 
 @pytest.mark.long

@@ -9,7 +9,8 @@ vsi2 ─►[  KS2  ]─►[ sTW2  ]───┘
 v ─►[1 + sA5 + s²A6]─►[clip]─► vs
     [1 + sA7 + s²A8]   VSTMIN
 
-The first input is the electrical power (KS1 is negative), the second the speed.
+The first input is the electrical power (KS1 is negative), the second the speed,
+as Dynawo has it (cf. IEC 61970-302, which names them the other way round).
 T1 or T2 = 0 bypasses its block, TW3 = 0 leaves out its washout. A4 = 0 leaves a
 lag, without A2, and A3 = A4 = 0 no filter; so do A7 and A8.
 """

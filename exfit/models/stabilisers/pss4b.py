@@ -26,7 +26,8 @@ ALI = 0 and AH = 0 leave a lag.
 The first input is the speed, the second the electrical power. The standard of
 2005 prints PE; IEC 61970-302 corrects that to -PE, the sign of the swing
 equation, which is taken here. M is 2 H; programs that read M = 0 as the 2 H of
-the machine need its value here. Typical data are the standard's.
+the machine need its value here. Typical data are the standard's, as CIM has
+them, but for M.
 """
 
 from exfit.engine.trace import Signal

@@ -1,6 +1,6 @@
 """STAB2A: power sensitive stabiliser of ASEA (PSS/E).
 
-vsi1 ─►[ sK2T2 ]─►[ sK2T2 ]─►[ sK2T2 ]─┬─►[   K3  ]─►(+)─► v
+vsi1 ─►[ sK2 T2]─►[ sK2 T2]─►[ sK2 T2]─┬─►[   K3  ]─►(+)─► v
        [1 + sT2]  [1 + sT2]  [1 + sT2] │  [1 + sT3]   ▲
                                        └─►[   K4  ]───┘
                             HLIM
