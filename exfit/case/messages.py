@@ -12,6 +12,7 @@ Data = Mapping[str, Any]
 
 FILE_NAME = r"^[A-Za-z0-9][A-Za-z0-9._%-]*$"  # of any system; a percent sign as in up-5%
 KIND_OF_TEST = "_kind_of_test"  # the function by which the schema distinguishes tests
+MAGNITUDE = "magnitude"  # the kind of fault of a number that is too large or too small
 PERCENT = r"^[0-9]+(\.[0-9]+)? ?%$"
 
 
@@ -27,6 +28,7 @@ WORDS: Mapping[str, Callable[[str, Data], str]] = {
     "int_type": lambda value, _: f"{value} is not a whole number",
     "int_from_float": lambda value, _: f"{value} is not a whole number",
     "finite_number": lambda value, _: f"{value} is not a finite number",
+    MAGNITUDE: lambda _, limits: str(limits["fault"]),
     "string_type": lambda value, _: f"{value} is not text; put it in quotes",
     "string_too_short": lambda _, __: "is empty",
     "string_too_long": lambda value, limits: (

@@ -1,7 +1,7 @@
 """Values given beside a case: on the command line, or in the file of a former fit."""
 
 from collections.abc import Iterator, Mapping
-from math import isclose, isfinite
+from math import isclose
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,6 +15,7 @@ from exfit.fitting.nuisances.parameters import names_of
 from exfit.fitting.references import with_recorded_steps
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
+from exfit.util.magnitude import magnitude_fault
 from exfit.util.sources import SOURCES
 from exfit.util.text import near
 
@@ -65,14 +66,14 @@ def with_given_values(
 def _wrong_names(
     case: Case, given: Mapping[str, float], rows: Mapping[str, Parameter]
 ) -> Iterator[str]:
-    """Yield the names that the case does not have, and values without a sheet that are infinite."""
+    """Yield the names that the case does not have, and values without a sheet that are unusable."""
     helpers = [name for name in case.values() if name not in rows]
     names = [*rows, *helpers, *_of_records(case)]
     for name, value in given.items():
         if name not in names:
             yield f"{name}: not a parameter; {near(name, names)}"
-        elif name not in rows and not isfinite(value):
-            yield f"{name}: {value:g} is not a finite number"
+        elif name not in rows and (fault := magnitude_fault(value)):
+            yield f"{name}: {fault}"
 
 
 def _outside(rows: Mapping[str, Parameter], values: Mapping[str, float]) -> Iterator[str]:

@@ -6,6 +6,7 @@ from math import inf, isfinite
 from typing import Any, NamedTuple
 
 from exfit.errors import ModelError
+from exfit.util.magnitude import magnitude_fault
 
 Limits = tuple[float, float]
 
@@ -84,6 +85,9 @@ class Parameter(NamedTuple):
 
     def range_fault(self, value: float) -> str | None:
         """Return why the equations exclude a value, None where they do not."""
+        fault = magnitude_fault(value) if isfinite(value) else None
+        if fault is not None:
+            return fault
         low, high = self.domain
         if isfinite(value) and low <= value <= high:
             return None

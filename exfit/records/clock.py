@@ -10,6 +10,7 @@ import numpy as np
 from exfit.errors import RecordError
 from exfit.records.formats.table import Array, column_error
 from exfit.records.units import SECONDS, alike, bare, usual
+from exfit.util.magnitude import LARGEST
 from exfit.util.sorting import median
 
 TIMESTAMP_NAMES = frozenset(  # date and time of day in one column
@@ -21,8 +22,6 @@ TIME_NAME = re.compile(
     r"t|time|tout|zeit|uhrzeit|tiempo|hora|temps|tempo|tijd|tid|utc|x_value|time_of_day"
     r"|(?:rel|abs|elapsed)[a-z]*_?(?:time|zeit)"
 )
-LARGEST = 1e100  # of a number in a record: its squares and cubes are numbers still
-SMALLEST = 1e-100  # pu: a signal that stays below it all along, but is not 0
 SHORTEST_STEP = 1e-12  # s, between most samples: no recorder is as fast
 WORD_SEPARATOR = re.compile(r"[\s\-/.]+")
 

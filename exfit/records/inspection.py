@@ -21,7 +21,7 @@ from exfit.records.channel_inspection import (
     inspect_channel,
 )
 from exfit.records.channel_recognition import guess_signals, three_phases
-from exfit.records.clock import LARGEST, Clock, check_finite, check_steps, why_unusable
+from exfit.records.clock import Clock, check_finite, check_steps, why_unusable
 from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
 from exfit.records.formats.memory import TooLargeError
@@ -35,6 +35,7 @@ from exfit.records.steps import (
     with_sizes,
 )
 from exfit.records.units import unit_in, usual
+from exfit.util.magnitude import LARGEST
 
 Array = NDArray[np.float64]
 

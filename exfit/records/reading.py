@@ -13,8 +13,6 @@ from exfit.dsp.resampling import resampled
 from exfit.dsp.three_phase import Connection, vt_of_rms, vt_of_waveforms
 from exfit.errors import RecordError
 from exfit.records.clock import (
-    LARGEST,
-    SMALLEST,
     Clock,
     check_finite,
     check_increasing,
@@ -25,6 +23,7 @@ from exfit.records.formats import open_table
 from exfit.records.formats.table import NONE, Table, column_error, read_bytes, refuse_uneven
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
 from exfit.records.units import alike, needs_base, unit_of, usual
+from exfit.util.magnitude import LARGEST, SMALLEST
 
 Rows = NDArray[np.intp]
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from exfit.errors import RecordError
-from exfit.records.clock import LARGEST, check_increasing, check_steps, why_unusable
+from exfit.records.clock import check_increasing, check_steps, why_unusable
+from exfit.util.magnitude import LARGEST
 
 Array = NDArray[np.float64]
 

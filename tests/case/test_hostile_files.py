@@ -132,7 +132,7 @@ def test_a_file_without_an_end_is_refused(case_file):
     path = Path("/dev/zero")
     case = load_case(case_file(BASE))
     for load in (load_case, load_programme, lambda path: read_parameters(case, path)):
-        assert "larger than 4 MB" in refused(path, load)
+        assert "a pipe or a device, not a file" in refused(path, load)
 
 
 def test_a_huge_file_is_not_read(case_file):
@@ -183,3 +183,28 @@ def test_a_table_is_refused_in_few_words(tmp_path, text, words):
         read_test_table(path)
     assert words in str(refusal.value)
     assert len(str(refusal.value)) < LONGEST_MESSAGE
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"test": {"vref": [{"at": 1e-320, "step": 0.05}]}}, "test.vref[0].at: "),
+        ({"test": {"vref": [{"at": 1.0, "step": -1e308}]}}, "test.vref[0].step: -1e+308 exceeds"),
+        ({"simulation": {"step": 1e300}}, "simulation.step: 1e+300 exceeds 1e+100"),
+        ({"simulation": {"step": 1e-300}}, "simulation.step: 1e-300 is not 0, but below 1e-100"),
+        (
+            {"parameters": {"fixed": {"k": "=1e60*1e60", "a": 1.0}}},
+            "parameters.fixed.k: 1e+120 lies outside",
+        ),
+    ],
+)
+def test_numbers_that_nothing_can_be_computed_with_are_refused_in_their_place(
+    case_file, change, says
+):
+    content = {
+        "model": "FIRST_ORDER",
+        "plant": {"type": "none"},
+        "test": {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}]},
+        "parameters": {"fixed": {"k": 1.0, "a": 1.0}},
+    }
+    assert says in refused(case_file(safe_dump(content | change)), load_case)

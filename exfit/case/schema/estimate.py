@@ -8,12 +8,13 @@ from pydantic import BaseModel, Discriminator, Field, Tag
 from exfit.case.schema.values import (
     STATED,
     STD_ERRORS,
+    USABLE,
     Count,
+    Finite,
     FreeSection,
     Frozen,
     Given,
     NotNegative,
-    Number,
     Positive,
     Section,
     Sources,
@@ -113,10 +114,10 @@ class LmSection(Section):
         default=1e-3,
         description="Least damping after an increase; a lower one counts as 0. update: ratio only.",
     )
-    increase: Annotated[Number, Field(gt=1)] = Field(
+    increase: Annotated[Finite, Field(gt=1), USABLE] = Field(
         default=2.0, description="Factor on the damping after a poor trial. update: ratio only."
     )
-    decrease: Annotated[Number, Field(gt=0, lt=1)] = Field(
+    decrease: Annotated[Finite, Field(gt=0, lt=1), USABLE] = Field(
         default=0.5, description="Factor on the damping after a good trial. update: ratio only."
     )
 
@@ -149,7 +150,7 @@ class Estimate(Section):
     jacobian: Literal["exact", "central", "forward", "backward"] = Field(
         default="exact", description="Derivatives: exact, or by differences."
     )
-    difference_step: Annotated[Number, Field(gt=0, le=MOST_DIFFERENCE)] | None = Field(
+    difference_step: Annotated[Finite, Field(gt=0, le=MOST_DIFFERENCE), USABLE] | None = Field(
         default=None,
         description="Step h of the differences, in scaled parameters: on the log scale a share of "
         "the parameter, on the linear scale of the width of its bounds; default: 6.1e-6, and "
@@ -168,7 +169,7 @@ class Estimate(Section):
         description="Ends the search, even before a minimum, where the weighted error of no "
         "channel of any record exceeds this; the weight of vt is 1. Default: never.",
     )
-    armijo: Annotated[Number, Field(gt=0, lt=0.5)] = Field(
+    armijo: Annotated[Finite, Field(gt=0, lt=0.5), USABLE] = Field(
         default=1e-4,
         description="Share of the promised decrease of the cost that a trial must achieve: "
         "Armijo's constant of dgn; lm with update: radius uses it, too.",

@@ -14,9 +14,11 @@ from pydantic import (
     Tag,
     WrapSerializer,
 )
+from pydantic_core import PydanticCustomError
 
-from exfit.case.messages import PERCENT
+from exfit.case.messages import MAGNITUDE, PERCENT
 from exfit.case.ties import is_tie
+from exfit.util.magnitude import magnitude_fault
 from exfit.util.sources import NOT_STATED, SOURCES
 
 if TYPE_CHECKING:
@@ -37,9 +39,19 @@ def thawed(values: Mapping[str, Any], serialize: Callable[[Any], Any]) -> Any:
     return serialize(dict(values))
 
 
-Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0)]
-NotNegative = Annotated[Number, Field(ge=0)]
+def _usable(value: float) -> float:
+    """Return a number; raises PydanticCustomError for one too large or small to compute with."""
+    fault = magnitude_fault(value)
+    if fault is not None:
+        raise PydanticCustomError(MAGNITUDE, "{fault}", {"fault": fault})
+    return value
+
+
+Finite = Annotated[float, Strict(), Field(allow_inf_nan=False)]
+USABLE = AfterValidator(_usable)  # behind other limits, which the JSON Schema loses otherwise
+Number = Annotated[Finite, USABLE]
+Positive = Annotated[Finite, Field(gt=0), USABLE]
+NotNegative = Annotated[Finite, Field(ge=0), USABLE]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Text = Annotated[str, Strict(), Field(min_length=1)]
 MachineId = Annotated[str, Strict(), Field(min_length=1, max_length=2)]
