@@ -73,8 +73,9 @@ def _fault(detail: Data, schema: Data) -> Fault:
     kind, limits = detail["type"], detail.get("ctx", {})
     place = _place_in_file(detail["loc"])
     value = show_value(detail["input"])
-    if kind == "extra_forbidden":
-        return Fault(place, _unknown(str(place[-1]), _known_keys(schema, place[:-1])))
+    if kind == "extra_forbidden":  # the last is a key of the file, whatever it looks like
+        section, key = _place_in_file(detail["loc"][:-1]), detail["loc"][-1]
+        return Fault((*section, key), _unknown(str(key), _known_keys(schema, section)))
     if kind == "missing":
         return Fault(place, "is missing" + _offered(schema, place))
     if kind == "union_tag_not_found":

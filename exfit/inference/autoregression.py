@@ -75,7 +75,10 @@ def described(errors: Array, slopes: Array) -> Iterator[Described]:
     angles = np.empty(0)
     for order in range(1, highest + 1):
         arguments = (products[: order + 1, : order + 1], dof)
-        angles = minimize(_likelihood, np.append(angles, 0.0), arguments, method="BFGS").x
+        try:
+            angles = minimize(_likelihood, np.append(angles, 0.0), arguments, method="BFGS").x
+        except np.linalg.LinAlgError:  # the fit took all but rounding: nothing is left to describe
+            return
         series = Autoregression(tuple((LARGEST_PARTIAL * np.tanh(angles)).tolist()))
         white = np.tensordot(_whitener(angles), lagged[: order + 1], 1)
         amounts = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=None)[0]

@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 
 FEWEST_SAMPLES = 64  # at rest: fewer show no line
 MOST_SAMPLES = 20_000  # of a rest, the last ones
+MOST_FILLED_IN = 4  # times its samples: a rest with longer gaps shows no line
 FEWEST_PERIODS = 8.0  # in the rest: with fewer a line is like a drift
 BY_CHANCE = 1e-5  # probability that white noise has a line as large: a likelier one is none
 LEAST_SHARE = 0.4  # of the standard deviation at rest: a smaller amplitude does no harm
@@ -72,7 +73,10 @@ def ripple_at_rest(time: Array, samples: Array, rests: list[tuple[float, float]]
     if len(t) < FEWEST_SAMPLES:
         return None
     spacing = float(median(np.diff(t)))
-    even = t[0] + spacing * np.arange(int((t[-1] - t[0]) / spacing))
+    count = int((t[-1] - t[0]) / spacing)
+    if count > MOST_FILLED_IN * len(t):
+        return None
+    even = t[0] + spacing * np.arange(count)
     way = np.linspace(-1.0, 1.0, len(even))
     level = np.interp(even, t, y)
     level = level - np.polyval(np.polyfit(way, level, 2), way)

@@ -118,7 +118,7 @@ def _of_points_on_load(result: VCurve) -> Iterator[str]:
 
 
 def _increases(time: Array) -> bool:
-    return time.ndim == 1 and bool(np.all(np.diff(time) > 0.0))
+    return time.ndim == 1 and bool(np.all(time[1:] > time[:-1]))
 
 
 def _alike(rows: Iterable[Array]) -> bool:

@@ -66,6 +66,11 @@ def test_of_thousands_of_faults_the_first_are_reported_with_their_number(case_fi
     assert len(str(refusal.value)) < LONGEST_MESSAGE
 
 
+@pytest.mark.parametrize("key", ["[bold red]markup[/]", "[steps]"])
+def test_a_key_in_brackets_is_a_key(case_file, key):
+    assert f": {key}: unknown key" in refused(case_file(BASE + f"'{key}': 1\n"), load_case)
+
+
 def test_the_same_holds_for_a_programme(case_file):
     tests = "".join(f"  - {{name: t{k}, kind: steady, key: 1}}\n" for k in range(2000))
     shared = BASE.partition("test:")[0]

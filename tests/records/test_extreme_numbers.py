@@ -12,6 +12,7 @@ from exfit.records.formats import open_table
 from exfit.records.inspection import inspect
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
+from exfit.records.ripple import ripple_at_rest
 
 COUNT = 200
 TIME = np.arange(COUNT) * 0.01
@@ -137,3 +138,11 @@ def test_a_sparse_file_of_a_terabyte_is_refused_unread(tmp_path):
         file.truncate(10**12)
     with pytest.raises(RecordError, match=r"1000000000000 bytes: .* the limit is 4 GB"):
         open_table(path)
+
+
+def test_a_rest_that_is_a_gap_shows_no_ripple():
+    """Its even samples would take terabytes."""
+    time = np.arange(200) * 0.01
+    time[150:] += 1e10
+    noise = np.random.default_rng(3).normal(0.0, 1.0, time.size)
+    assert ripple_at_rest(time, noise, [(time[0], time[-1])]) is None

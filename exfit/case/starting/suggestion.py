@@ -233,9 +233,9 @@ def _unit_and_base(channel: InspectedChannel, base: Base | None) -> tuple[str, s
     """Return the unit and the base of a channel that needs both, as far as they are known."""
     known = channel.unit if channel.unit and unit_of(channel.unit) else None
     if base is None:
-        return known or FILL_IN, FILL_IN
-    value = base.in_unit(known, channel.name)
-    return known or base.unit or FILL_IN, yaml_number(value)
+        return plain_text(known) if known else FILL_IN, FILL_IN
+    unit = known or base.unit
+    return plain_text(unit) if unit else FILL_IN, yaml_number(base.in_unit(known, channel.name))
 
 
 def _first_phase(inspection: Inspection, group: InspectedPhases) -> InspectedChannel:
@@ -288,7 +288,7 @@ def _scaling(
     percent = channel.unit == "%"
     if base is not None and (channel.seems_per_unit or percent):
         value = yaml_number(base.in_unit(channel.unit or "pu", channel.name))
-        return {"unit": '"%"' if percent else "pu", "base": value}
+        return {"unit": plain_text("%" if percent else "pu"), "base": value}
     if scale is not None:
         return {"scale": _range(scale.start, scale.low, scale.high)}
     if channel.system_base:

@@ -363,6 +363,11 @@ FAULTS = {
         with_line(4, ASCII[3].replace(b"4,1500", b",1500")),
         ["bump.dat:4", "an empty cell"],
     ),
+    "a line that is none elsewhere": (
+        configuration("ASCII"),
+        with_line(4, ASCII[3] + b"\r\n\x0b"),
+        ["bump.dat: damaged"],
+    ),
     "ASCII cut off": (configuration("ASCII"), b"\r\n".join(ASCII[:20]), ["bump.dat", "20", "50"]),
 }
 

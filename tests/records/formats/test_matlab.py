@@ -14,6 +14,7 @@ from tables import damage, everything, refused
 
 from exfit.errors import RecordError
 from exfit.records.formats.matlab import read_mat
+from exfit.records.formats.table import increases
 
 T = np.arange(6) * 0.01
 UT = 15.75 + 0.1 * T
@@ -207,3 +208,8 @@ def test_whatever_is_damaged_only_record_errors_come_out(tmp_path, options, appl
     path.write_bytes(apply(path.read_bytes()))
     with suppress(RecordError):
         everything(read_mat(path))
+
+
+def test_several_infinite_numbers_are_no_time(mat):
+    table = read_mat(mat({"t": np.append(T[:-2], [np.inf, np.inf])}))
+    assert not increases(table, ["t"])

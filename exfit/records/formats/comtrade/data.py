@@ -82,7 +82,10 @@ def _ascii(parts: ComtradeFiles, config: "Cfg") -> ComtradeSamples:
     except ValueError:
         data = _BLANK_CELL.sub(b"nan", data)
         _find_fault(parts, data, width)
-        cells = _loaded(data, width)
+        try:
+            cells = _loaded(data, width)
+        except ValueError as fault:  # lines that end with a sign that ends no line elsewhere
+            raise RecordError(f"{parts.dat}: damaged: {fault}") from None
     if cells.shape[1] != width:
         _find_fault(parts, data, width)
     stamp = np.where(np.isnan(cells[:, 1]), MISSING_STAMP, cells[:, 1])
