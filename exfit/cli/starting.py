@@ -120,6 +120,7 @@ def new(
     validates. Values are typical, or those of a planner's file. What the record does not show is
     asked on a terminal, or left as "?", and the case is refused until it is filled in.
     """
+    from exfit.case.open_values import open_values
     from exfit.case.starting.bases import bases_of
     from exfit.case.starting.record_settings import RecordSettings
     from exfit.case.starting.starting_case import starting_case
@@ -136,9 +137,12 @@ def new(
     text = starting_case(data, tests, folder, _facts(facts))
     if is_terminal():
         text = _asked(text)
+    still_open = open_values(text)  # refuses what no command would read, before it is written
     write_text(text, output, ())
     if output is not None:
-        _report(text, output)
+        echo(f"written to {output}; next: exfit check {output}")
+        for value in still_open:
+            echo(f"to be filled in: {_question(value)}, line {value.line}")
 
 
 def is_terminal() -> bool:
@@ -248,12 +252,3 @@ def _answer(answer: str, place: str) -> str:
     except ValueError:
         raise ExfitError(f"{place}: {answer!r} is not a number") from None
     return answer
-
-
-def _report(text: str, output: Path) -> None:
-    """Say where the case is, what is still open, and what comes next."""
-    from exfit.case.open_values import open_values
-
-    echo(f"written to {output}; next: exfit check {output}")
-    for value in open_values(text):
-        echo(f"to be filled in: {_question(value)}, line {value.line}")

@@ -18,10 +18,17 @@ def test_a_file_is_read_up_to_its_limit(tmp_path):
         read_limited(path, 99)
 
 
-@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no such file here")
-def test_a_file_without_an_end_is_refused(monkeypatch):
+def test_a_file_that_is_too_large_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(json_files, "LARGEST_FILE", 1_000_000)
+    path = tmp_path / "large.json"
+    path.write_bytes(b" " * 1_000_001)
     with pytest.raises(ExfitError, match="larger than 1 MB"):
+        read_json(path)
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no such file here")
+def test_a_file_without_an_end_is_refused():
+    with pytest.raises(ExfitError, match="a pipe or a device"):
         read_json(Path("/dev/zero"))
 
 
