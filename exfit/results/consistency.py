@@ -19,8 +19,8 @@ def contradictions(result: FitResult) -> Iterator[str]:
     """Yield what of a result contradicts the rest of it, each with its place."""
     if not result.comparisons:
         yield "records: empty"
-    for match in (*result.comparisons, *result.validation):
-        yield from (f"records: {match.name}: {text}" for text in _of_comparison(match))
+    for place, match in _comparisons(result):
+        yield from (f"{place}: {match.name}: {text}" for text in _of_comparison(match))
     yield from _of_search(result)
     if any(
         not {*typical.matters_to} <= typical.shifts.keys() <= result.parameters.keys()
@@ -31,6 +31,15 @@ def contradictions(result: FitResult) -> Iterator[str]:
         yield from (f"knowledge: {text}" for text in _of_uncertainty(result.knowledge))
     if result.behaviour is not None:
         yield from (f"behaviour: {text}" for text in _of_behaviour(result.behaviour))
+
+
+def _comparisons(result: FitResult) -> Iterator[tuple[str, Comparison]]:
+    """Yield all comparisons with a record that a result holds, each with its place."""
+    yield from (("records", match) for match in (*result.comparisons, *result.validation))
+    for end in result.phase_ends:
+        yield from ((f"phase_ends: {end.phase}", match) for match in end.comparisons)
+    if result.as_found is not None:
+        yield from (("as_found", match) for match in result.as_found.comparisons)
 
 
 def _of_search(result: FitResult) -> Iterator[str]:

@@ -80,6 +80,15 @@ def test_a_fitted_parameter_has_value_error_and_interval(texts, tmp_path):
         assert instant.meaning == "instant of a step"
 
 
+def test_a_comparison_without_a_channel_is_refused_wherever_it_is(saved):
+    _, content = saved
+    record = {**content["records"][0], "channels": {}}
+    end = {"phase": "lm", "next_phase": "dgn", "iteration": 1, "cost": 1.0, "values": {}}
+    for changes in ({"records": [record]}, {"phase_ends": [{**end, "records": [record]}]}):
+        with pytest.raises(ExfitError, match="channels: empty"):
+            load_result(written(saved, **changes))
+
+
 def test_a_file_of_a_later_version_is_refused(saved):
     with pytest.raises(ExfitError, match=f"version {VERSION + 1}: written by a later exfit"):
         load_result(written(saved, version=VERSION + 1))
