@@ -131,6 +131,8 @@ def rounded(value: float | None, error: float | None = None) -> str:
     decimals = DIGITS_OF_ERROR - 1 - floor(log10(error))
     if value != 0.0:
         decimals = min(decimals, MOST_DIGITS - 1 - floor(log10(abs(value))))
+    if decimals < -MOST_DECIMALS:
+        return f"{value:.{DIGITS}g}"
     if decimals > MOST_DECIMALS:
         digits = max(decimals + floor(log10(abs(value))), 0) if value else 0
         return f"{value:.{digits}e}"

@@ -3,11 +3,12 @@
 import codecs
 import re
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mutant_runs import CONTROL
 
-from exfit.util.text import printable
+from exfit.util.text import printable, rounded
 
 TEXTS = st.text(st.one_of(st.characters(), st.sampled_from("\x00\x1b\x7f\x9b\u202e\u2066\r\n\t\\")))
 
@@ -26,3 +27,9 @@ def test_the_codes_say_what_was_there(text):
     shown = printable(text)
     code = r"\\x[0-9a-f]{2}|\\u[0-9a-f]{4}|\\r"
     assert re.sub(code, lambda c: codecs.decode(c[0], "unicode_escape"), shown) == text
+
+
+@pytest.mark.parametrize("value", [1.7e308, -1e99, 0.0])
+def test_a_number_of_any_size_is_rounded_to_few_characters(value):
+    assert len(rounded(value, 1e97)) <= 12
+    assert len(rounded(value, 1e306)) <= 12
