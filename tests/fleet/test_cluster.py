@@ -96,12 +96,17 @@ class Killer(Events):
 
 def processes_of(there):
     """Return the processes beside the workers of a cluster that fit cases."""
-    return [
-        process
-        for worker in there.workers
-        for process in psutil.Process(worker.pid).children()
-        if "exfit.fleet.worker" in " ".join(process.cmdline())
-    ]
+    children = (
+        child for worker in there.workers for child in psutil.Process(worker.pid).children()
+    )
+    return [child for child in children if fits_cases(child)]
+
+
+def fits_cases(process):
+    try:
+        return "exfit.fleet.worker" in " ".join(process.cmdline())
+    except (psutil.ZombieProcess, psutil.NoSuchProcess):  # it has just ended
+        return False
 
 
 def none_runs(processes):
