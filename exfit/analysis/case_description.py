@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from exfit.case.case import Case
 from exfit.case.parts import Part
 from exfit.case.schema import (
+    AngleTable,
+    BumpTest,
     ChannelSection,
     FindableStep,
     PhasesSection,
@@ -160,6 +162,7 @@ def _events(case: Case, recording: Recording, identified: Identified) -> Iterato
         yield from _reference(signal, getattr(test, signal), prefix, identified)
     for event in test.E:
         yield f"E {event.step:+g} pu at {event.at:g} s"
+    yield from _source_angle(test)
     for switch in test.network:
         values = {name: getattr(switch, name) for name in ("R", "X", "E")}
         changes = (f"{name} {value:g} pu" for name, value in values.items() if value is not None)
@@ -169,6 +172,19 @@ def _events(case: Case, recording: Recording, identified: Identified) -> Iterato
         drivers = driving_after_opening(case, recording)
         follows = f", then driven by the recorded {' and '.join(drivers)}" if drivers else ""
         yield f"breaker opens at {opens}{follows}"
+
+
+def _source_angle(test: BumpTest) -> Iterator[str]:
+    """Yield what the angle of the source did."""
+    if isinstance(test.angle, AngleTable):
+        (start, first), (end, last) = test.angle.table[0], test.angle.table[-1]
+        rows = f"{len(test.angle.table)} rows, {start:g} ... {end:g} s"
+        change = f"from {first:g} to {last:g} {test.angle.unit}"
+        yield f"angle of the source by a table of {rows}, {change}"
+        return
+    for event in test.angle:
+        change = f"angle of the source {event.step:+g} {event.unit} at {event.at:g} s"
+        yield change if event.ramp is None else f"{change}, in a ramp of {event.ramp:g} s"
 
 
 def _reference(signal: str, given: Reference, prefix: str, identified: Identified) -> Iterator[str]:

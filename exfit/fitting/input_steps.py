@@ -23,7 +23,7 @@ def input_steps(case: Case, test: BumpTest, values: Values) -> list[InputStep]:
     ``values`` are those of the network at the start. Raises CaseError where the source would lose
     its voltage.
     """
-    steps = [*_of_signals(test), *_opening(test)]
+    steps = [*_of_signals(test), *_of_angle(test), *_opening(test)]
     now = {name: values.get(NETWORK + name) for name in ("R", "X", "E")}
     events: list[StepSection | Switch] = [*test.E, *test.network]
     for event in sorted(events, key=lambda event: event.at):
@@ -44,6 +44,12 @@ def _of_signals(test: BumpTest) -> Iterator[InputStep]:
         for event in test.events(signal):
             at, step = start_value(event.at) or 0.0, start_value(event.step) or 0.0
             yield InputStep(at, step, signal, isinstance(event.at, Unknown), event.ramp or 0.0)
+
+
+def _of_angle(test: BumpTest) -> Iterator[InputStep]:
+    """Yield the steps and ramps of the angle of the source, rad."""
+    for event in test.angle_steps:
+        yield InputStep(event.at, event.radians, "angle", ramp=event.ramp or 0.0)
 
 
 def _opening(test: BumpTest) -> Iterator[InputStep]:

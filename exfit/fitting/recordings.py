@@ -17,14 +17,12 @@ from exfit.case.schema import (
     RecordFile,
     Recording,
     ReferenceFile,
-    ReferenceTable,
     Time,
     TimeColumn,
     Unknown,
     start_value,
 )
 from exfit.errors import CaseError, RecordError
-from exfit.plants import REFERENCES
 from exfit.records.clock import Clock
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
@@ -162,14 +160,12 @@ def _refuse_short_tables(
     case: Case, test: BumpTest, covered: tuple[float, float], path: Path
 ) -> None:
     """Raise CaseError where a table does not cover a test from its start to its end (s)."""
-    for signal in REFERENCES:
-        reference = getattr(test, signal)
-        if isinstance(reference, ReferenceTable):
-            first, last = reference.table[0][0], reference.table[-1][0]
-            if not first <= covered[0] <= covered[1] <= last:
-                rows, whole = (f"{show(a)} ... {show(b)} s" for a, b in ((first, last), covered))
-                text = f"{rows} does not cover the test, {whole} of {path}: add a row"
-                raise CaseError([f"{case.path}: test.{signal}.table: {text}"])
+    for signal, table in test.tables.items():
+        first, last = table[0][0], table[-1][0]
+        if not first <= covered[0] <= covered[1] <= last:
+            rows, whole = (f"{show(a)} ... {show(b)} s" for a, b in ((first, last), covered))
+            text = f"{rows} does not cover the test, {whole} of {path}: add a row"
+            raise CaseError([f"{case.path}: test.{signal}.table: {text}"])
 
 
 def clock_of(time: Time) -> Clock:

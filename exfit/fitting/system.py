@@ -65,11 +65,11 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     """
     changed = {"vref"}
     for test in case.tests:
-        changed |= {name for name in ("vs", "E") if getattr(test, name)}
+        changed |= {name for name in ("vs", "E", "angle") if getattr(test, name)}
         for switch in test.network:
             changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
     changed |= _inputs_of_breaker(case, recording)
-    inputs = ("vref", "vs", "E", "R", "X", BREAKER, "efd", SPEED)
+    inputs = ("vref", "vs", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
 
 

@@ -102,7 +102,7 @@ def _stepped(case: Case, test: BumpTest) -> str | None:
 
     Raises CaseError where the test of the case changes the network, or opens the breaker.
     """
-    if test.E or test.network or test.breaker:
+    if test.E or test.angle or test.network or test.breaker:
         text = (
             "changes the network or opens the breaker: the steps of a record by hand are those of "
             "vref or vs"

@@ -34,7 +34,8 @@ from exfit.plants.parts import (
 from exfit.plants.plant import Equipment, PlantKind, Stabilised, compared, present
 
 OUTPUTS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
-SWING = ("delta", "dw")  # the rotor's angle to the source (rad), its speed less 1 (pu)
+# the rotor's angle to where the source is at the start (rad), its speed less 1 (pu)
+SWING = ("delta", "dw")
 
 FLOW: Sheet = sheet(
     ("f0", 60.0, "Hz", (1.0, 400.0), "rated frequency"),
@@ -179,10 +180,11 @@ def infinite_bus(
     2H dw/dt = (Pm - D dw) / (1 + dw) - Te, as in PSS/E. Parameters are the exciter's, those of
     machine, network and stabiliser under their prefixes (``network.X``), and the initial voltage
     ``vt0``. The inputs are changes: of the reference ``vref``, of ``vs`` beside the stabiliser, of
-    ``vc1``, the voltage that the exciter measures, and of ``E``, ``R`` and ``X``. With the input
+    ``vc1``, the voltage that the exciter measures, of ``E`` and its ``angle`` (rad), of ``R`` and
+    ``X``. With the input
     ``breaker`` a breaker opens where that is 1: p, q and it are zero from then on, delta stays, and
     vt follows the speed, which is the simulated one, or 1 and the input ``speed``. All per unit on
-    the machine's base; ``delta`` in rad, ``speed`` 1 when rated.
+    the machine's base; ``delta``, to the source as it is, in rad, ``speed`` 1 when rated.
     """
     of_stabiliser = () if stabiliser is None else stabiliser.model.states
     own = tuple(STABILISER + name for name in of_stabiliser)
@@ -212,11 +214,12 @@ def infinite_bus(
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
         n = named_parameters(p, NETWORK, network)
-        changed = Names(**{name: u.get(name, 0.0) for name in ("E", "R", "X", "vs")})
+        changed = Names(**{name: u.get(name, 0.0) for name in ("E", "R", "X", "angle", "vs")})
         fluxes = values_named(x, machine.states)
         at = machine.source(fluxes, of_machine)
         E, R, X = r["source"] + changed.E, n.R + changed.R, n.X + changed.X
-        closed, dw, factor = current(at, E, R, X, x["delta"]), x["dw"], 1.0
+        delta, dw, factor = x["delta"] - changed.angle, x["dw"], 1.0
+        closed = current(at, E, R, X, delta)
         i = closed
         breaker = breaker_of(u, dw) if BREAKER in inputs else None
         if breaker is not None:
@@ -248,7 +251,7 @@ def infinite_bus(
         outputs = dict(
             zip(
                 OUTPUTS,
-                (vref, vt, efd, ifd, power, reactive, it, x["delta"], 1.0 + dw),
+                (vref, vt, efd, ifd, power, reactive, it, delta, 1.0 + dw),
                 strict=True,
             )
         )
@@ -291,7 +294,7 @@ INFINITE_BUS = PlantKind(
     name="infinite-bus",
     title="on load, behind R + jX to a stiff source",
     needs=("exciter", "machine", "network"),
-    events=("vref", "vs", "E", "network", BREAKER),
+    events=("vref", "vs", "E", "angle", "network", BREAKER),
     signals=compared(OUTPUTS),
     network=lambda given: flow_sheet("E" if "E" in given else "Q"),
     build=_build,

@@ -1,5 +1,7 @@
 """Cases on load: what the file may say, what it must, and what comes of it."""
 
+from math import pi
+
 import numpy as np
 import pytest
 from places import ROOT
@@ -94,6 +96,43 @@ def test_steps_and_switches_of_the_source_follow_each_other(tmp_path):
     gone = events.replace("-0.05", "-1.5")
     with pytest.raises(CaseError, match=r"at 1\.5 s the source falls to -0\.5 pu"):
         simulate(load_case(written(tmp_path, *source, (steps, gone))), {})
+
+
+def test_a_source_jumps_in_angle_by_degrees_or_radians_or_a_table(tmp_path):
+    steps = "  network: [{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}]\n"
+    forms = {
+        "deg": "[{at: 2.0, step: -9, unit: deg}, {at: 3.0, step: 18, unit: deg, ramp: 0.5}]",
+        "rad": f"[{{at: 2, step: {-pi / 20}, unit: rad}}, {{at: 3, step: {pi / 10}, unit: rad, "
+        "ramp: 0.5}]",
+        "table": "{table: [[0, 5], [2, 5], [2, -4], [3, -4], [3.5, 14], [5, 14]], unit: deg}",
+    }
+    powers = []
+    for angle in forms.values():
+        case = load_case(written(tmp_path, (steps, f"  angle: {angle}\n")))
+        assert inputs_of(case) == ("vref", "vs", "angle")
+        powers.append(simulate(case, {}).response.signals["p"])
+    np.testing.assert_allclose(powers[0], powers[1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(powers[0], powers[2], rtol=0, atol=1e-9)
+    assert np.ptp(powers[0]) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("angle", "says"),
+    [
+        ("[{at: 2, step: -9}]", "test.angle[0].unit: is missing"),
+        ("[{at: 2, step: 9, unit: grad}]", "test.angle[0].unit: 'grad' is not possible"),
+        ("[{at: 2, step: 0, unit: deg}]", "test.angle[0].step: 0 is not a step"),
+        ("[{at: 2, step: 1, unit: deg}, {at: 1, step: 1, unit: deg}]", "1 s is not after 2 s"),
+        ("{table: [[0, 1], [4, 2]], unit: deg}", "0 ... 4 s does not cover the test, 0 ... 5 s"),
+        ("recorded", "test.angle: "),
+    ],
+)
+def test_a_fault_of_the_angle_of_the_source_is_reported_with_its_place(tmp_path, angle, says):
+    network = "  network: [{at: 3.0, X: 0.4}, {at: 4.0, X: 0.3}]\n"
+    path = written(tmp_path, (network, f"  angle: {angle}\n"))
+    with pytest.raises(CaseError) as refused:
+        load_case(path)
+    assert any(says in line for line in str(refused.value).splitlines()), str(refused.value)
 
 
 def test_a_machine_that_falls_out_of_step_is_reported(tmp_path):

@@ -176,19 +176,24 @@ class Typed:
 
 
 GAIN, LAG = 50.0, 0.05  # of the regulator
+JUMP, TURN = -0.1, 0.15  # of the source's angle, rad
 
 
 def test_a_line_trip_is_that_of_equations_typed_again(machine):
     """A static exciter of one lag, a switched line, a sagging source, and a step of the reference.
 
-    The start of the equations typed again is found by a root search; the limits stand far away.
+    With the line the angle of the source jumps, and later it moves in a ramp: typed again, the
+    rotor's angle to the source jumps the other way, and its speed to the source is less by the
+    ramp's. The start is found by a root search; the limits stand far away.
     """
     if machine.name == "ONE_AXIS":
         pytest.skip("has no subtransient flux")
     changes = (
         InputStep(0.3, 0.2, "X"),
         InputStep(0.3, 0.01, "R"),
+        InputStep(0.3, JUMP, "angle"),
         InputStep(1.0, -0.03, "E"),
+        InputStep(1.0, TURN, "angle", ramp=0.5),
         InputStep(2.0, 0.02, "vref"),
     )
     values = values_on_load(machine, exciter="SEXS", machine_D=1.5, network_Rc=0.0, network_Xc=0.0)
@@ -211,17 +216,20 @@ def test_a_line_trip_is_that_of_equations_typed_again(machine):
     assert found == 1
     vref = values[VT0] + start[6] / GAIN
     x, rows = start, [start]
-    edges = [0.0, 0.3, 1.0, 2.0, CLOCK[-1]]
+    edges = [0.0, 0.3, 1.0, 1.5, 2.0, CLOCK[-1]]
     levels = {"vref": vref, "E": E, "R": n["R"], "X": n["X"]}
     for begin, end in pairwise(edges):
         for change in changes:
-            if change.at == begin:
+            if change.at == begin and change.signal != "angle":
                 levels[change.signal] += change.step
-        at = dict(levels)
+        if begin == 0.3:
+            x = x - JUMP * np.eye(7)[4]
+        at, turning = dict(levels), TURN / 0.5 if begin == 1.0 else 0.0
 
-        def slopes(t, x, at=at):
+        def slopes(t, x, at=at, turning=turning):
             line = at["E"], at["R"], at["X"]
             moved, _ = typed.slopes(x[:6], x[6], n["P"], *line)
+            moved[4] -= turning
             error = at["vref"] - typed.vt(x[:6], *line)
             return [*moved, (GAIN * error - x[6]) / LAG]
 
@@ -291,6 +299,19 @@ def test_a_source_given_and_the_one_that_follows_from_q_are_the_same_start(machi
     values = values_on_load(machine, "E", network_E=source)
     of_e = LinearKernel(system(machine, "E")).rest(vector(system(machine, "E"), values))
     np.testing.assert_allclose(of_e.x, of_q.x, rtol=1e-9, atol=1e-12)
+
+
+def test_a_source_that_turns_evenly_is_one_of_another_frequency():
+    """After the swing the rotor turns with the source, and the unit is where it was before."""
+    turning = 2.0 * pi * 0.1  # rad/s: 0.1 Hz
+    inputs = Inputs(0.0, 60.0, (InputStep(0.5, turning * 59.5, "angle", ramp=59.5),))
+    values = values_on_load(MACHINES["GENROU"], machine_D=20.0)
+    made = system(MACHINES["GENROU"])
+    got = Simulator(made, inputs, np.linspace(0.0, 60.0, 61), 2e-3).response(values).signals
+    assert got["speed"][-1] == pytest.approx(1.0 + 0.1 / values[NETWORK + "f0"], abs=1e-6)
+    dw = 0.1 / values[NETWORK + "f0"]
+    assert got["p"][-1] == pytest.approx((got["p"][0] - 20.0 * dw) / (1.0 + dw), abs=1e-6)
+    assert np.abs(got["delta"]).max() < 2.0
 
 
 def test_a_droop_lowers_the_voltage_with_reactive_power():

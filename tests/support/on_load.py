@@ -7,7 +7,7 @@ from exfit.models.sheet import typical
 from exfit.plants import MACHINE, NETWORK, SATURATION, VT0, flow_sheet, infinite_bus
 
 QUADRATIC = SATURATION["quadratic"]
-ALL_INPUTS = ("vref", "vs", "E", "R", "X")
+ALL_INPUTS = ("vref", "vs", "E", "angle", "R", "X")
 
 
 def values_on_load(machine, given="Q", exciter="AC8B", **changes):

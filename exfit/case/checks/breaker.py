@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from exfit.case.checks.bump_test import place_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.record import driving_faults
+from exfit.case.checks.reference import moves_of
 from exfit.case.yaml import Fault
 from exfit.plants import BREAKER, EVENTS, SPEED, PlantKind
 from exfit.util.text import show
@@ -66,9 +67,17 @@ def _free_instant_faults(test: ContentNode, driving: tuple[str, ...]) -> Iterato
 
 def _switching_faults(test: ContentNode, opens: float) -> Iterator[Fault]:
     """Yield what is switched in a network from which the machine is already parted."""
-    for name in ("E", "network"):
+    for name in ("E", "angle", "network"):
         for event in test.at(name).entries:
             at = event.at("at").number
             if at is not None and at >= opens:
-                text = f"{show(at)} s: no effect, as the breaker is open from {show(opens)} s on"
-                yield event.at("at").fault(text)
+                yield _no_effect(event.at("at"), at, opens)
+    for place, at in moves_of(test.at("angle")):
+        if at >= opens:
+            yield _no_effect(place, at, opens)
+
+
+def _no_effect(place: ContentNode, at: float, opens: float) -> Fault:
+    """Return a switching that comes too late."""
+    text = f"{show(at)} s: no effect, as the breaker is open from {show(opens)} s on"
+    return place.fault(text)

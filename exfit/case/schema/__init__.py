@@ -21,6 +21,8 @@ from exfit.case.schema.saturation_tests import CurveColumn, SaturationTest
 from exfit.case.schema.steady_tests import PointColumn, SteadyTest
 from exfit.case.schema.tests import (
     MOST_ROWS,
+    AngleStep,
+    AngleTable,
     BumpTest,
     FindableStep,
     Reference,
@@ -34,6 +36,8 @@ from exfit.case.schema.values import FreeSection, Unknown, Value, start_value
 __all__ = [
     "MOST_ROWS",
     "SINGLE",
+    "AngleStep",
+    "AngleTable",
     "AsFoundSection",
     "BumpTest",
     "CaseDocument",

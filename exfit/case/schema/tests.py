@@ -1,6 +1,8 @@
 """The sections of the case file about a test: what was done to the unit."""
 
+from collections.abc import Mapping
 from itertools import pairwise
+from math import pi
 from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
@@ -18,6 +20,9 @@ from exfit.case.schema.values import (
 from exfit.plants import REFERENCES
 
 MOST_ROWS = 1000  # of a table; a longer one is a file
+RADIANS = {"rad": 1.0, "deg": pi / 180.0}  # in each unit of an angle
+AngleUnit = Literal["rad", "deg"]
+Rows = tuple[tuple[Number, Number], ...]
 
 
 class StepSection(Section):
@@ -41,7 +46,7 @@ class FindableStep(Section):
 class ReferenceTable(Section):
     """A signal as a table: lines between its rows."""
 
-    table: tuple[tuple[Number, Number], ...] = Field(
+    table: Rows = Field(
         min_length=2,
         max_length=MOST_ROWS,
         description="Rows [time in s, value in pu], from the start of the test to its end or "
@@ -114,6 +119,56 @@ class Switch(Section):
     )
 
 
+class AngleStep(Section):
+    """A step or ramp of the angle of the source."""
+
+    at: Number = Field(description="Time, s.")
+    step: Number = Field(
+        description="Change, not zero. Positive: the source advances; the unit gives less power."
+    )
+    unit: AngleUnit = Field(description="Unit of the change.")
+    ramp: Positive | None = Field(
+        default=None,
+        description="Time that the change takes, in a line, s; default: it is a step.",
+    )
+
+    @property
+    def radians(self) -> float:
+        """By how much the angle changes, rad."""
+        return self.step * RADIANS[self.unit]
+
+
+class AngleTable(Section):
+    """The angle of the source as a table: lines between its rows."""
+
+    table: Rows = Field(
+        min_length=2,
+        max_length=MOST_ROWS,
+        description="Rows [time in s, angle], given like those of vref.",
+    )
+    unit: AngleUnit = Field(description="Unit of the angles.")
+
+    @property
+    def events(self) -> tuple[AngleStep, ...]:
+        """Its steps and ramps in order of time."""
+        return tuple(
+            AngleStep(at=at, step=then - value, unit=self.unit, ramp=end - at if end > at else None)
+            for (at, value), (end, then) in pairwise(self.table)
+            if then != value
+        )
+
+
+def _kind_of_angle(value: Any) -> str:
+    return "[table]" if isinstance(value, dict | AngleTable) else "[steps]"
+
+
+SourceAngle = Annotated[
+    Annotated[tuple[AngleStep, ...], Field(min_length=1), Tag("[steps]")]
+    | Annotated[AngleTable, Tag("[table]")],
+    Discriminator(_kind_of_angle),
+]
+
+
 class BreakerSection(Section):
     """The opening of the breaker of a unit on load: a load rejection, or a current interruption."""
 
@@ -163,6 +218,11 @@ class BumpTest(Section):
         min_length=1,
         description="Steps of the voltage of the source; infinite-bus only.",
     )
+    angle: SourceAngle = Field(
+        default=(),
+        description="The angle of the source: steps and ramps in order of time, or a table; "
+        "infinite-bus only. Where a line trips it changes with E, R and X.",
+    )
     network: tuple[Switch, ...] = Field(
         default=(), min_length=1, description="Switchings of R, X and E; infinite-bus only."
     )
@@ -187,6 +247,21 @@ class BumpTest(Section):
         return given
 
     @property
+    def angle_steps(self) -> tuple[AngleStep, ...]:
+        """The steps and ramps of the angle of the source in order of time."""
+        return self.angle.events if isinstance(self.angle, AngleTable) else self.angle
+
+    @property
+    def tables(self) -> Mapping[str, Rows]:
+        """The rows of its tables, by signal."""
+        given = {name: getattr(self, name) for name in (*REFERENCES, "angle")}
+        return {
+            name: table.table
+            for name, table in given.items()
+            if isinstance(table, ReferenceTable | AngleTable)
+        }
+
+    @property
     def files(self) -> tuple[str, ...]:
         """The files of its signals, as the case names them."""
         given = map(self.reference, REFERENCES)
@@ -198,6 +273,7 @@ class BumpTest(Section):
         events = (event for signal in REFERENCES for event in self.events(signal))
         instants = {start_value(event.at) for event in events}
         instants |= {event.at for event in self.E} | {switch.at for switch in self.network}
+        instants |= {event.at for event in self.angle_steps}
         if self.breaker is not None:
             instants.add(start_value(self.breaker.opens))
         return tuple(sorted(at for at in instants if at is not None))
