@@ -59,7 +59,7 @@ def _system_of(case: Case, recording: Recording | None) -> System:
 
 
 def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]:
-    """Return the inputs that the tests of a case change; the reference always is one.
+    """Return the inputs that the tests and records of a case change; the reference always is one.
 
     The breaker is one where it opens: in the test of the ``recording``, or else in any.
     """
@@ -68,6 +68,9 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
         changed |= {name for name in ("vs", "E", "angle") if getattr(test, name)}
         for switch in test.network:
             changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
+    if case.kind.plays_back:
+        records = _record_files(case).values()
+        changed |= {"vs"} & {signal for file in records for signal in file.channels}
     changed |= _inputs_of_breaker(case, recording)
     inputs = ("vref", "vs", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
@@ -130,7 +133,7 @@ def _record_files(case: Case) -> dict[str, RecordFile]:
 @cache
 def driven_by(exciter: Model, saturation: SaturationForm) -> frozenset[str]:
     """Return the signals of its plant that reach an exciter."""
-    used = parameters_used(playback(exciter, saturation, DRIVING))
+    used = parameters_used(playback(exciter, saturation, DRIVING), ("efd",))
     return frozenset(signal for signal in DRIVING if initial(signal) in used)
 
 

@@ -18,7 +18,7 @@ from exfit.plants.parts import (
     state_of,
     symbols,
 )
-from exfit.plants.plant import Equipment, PlantKind, present
+from exfit.plants.plant import REFERENCES, Equipment, PlantKind, present
 
 EFD0, VREF0 = "efd0", "vref0"
 DRIVING = ("vt", "ifd", "p", "q")  # what may drive an exciter
@@ -46,15 +46,17 @@ def playback(
     saturation: SaturationForm,
     driving: tuple[str, ...],
     vref_known: bool = False,
+    stabilised: bool = False,
 ) -> System:
     """Return an exciter that recorded signals drive: ``driving`` of vt, ifd, p and q.
 
-    Its inputs are the changes of ``vref`` and of those signals from the levels at the start, which
-    are the parameters ``vt0``, ``ifd0`` ...; ``efd0`` is that of its output. The reference is the
-    one that holds efd0 there; if it is known, it is the parameter ``vref0``, and holds an efd that
-    is found from near efd0. All per unit.
+    Its inputs are the changes of ``vref``, of ``vs`` where it is ``stabilised``, and of those
+    signals from the levels at the start, which are the parameters ``vt0``, ``ifd0`` ...; ``efd0``
+    is that of its output. The reference is the one that holds efd0 there; if it is known, it is the
+    parameter ``vref0``, and holds an efd that is found from near efd0. All per unit.
     """
-    signals = tuple(dict.fromkeys(("vref", "vt", *driving, "efd")))
+    setpoints = ("vref", "vs") if stabilised else ("vref",)
+    signals = tuple(dict.fromkeys((*setpoints, "vt", *driving, "efd")))
     refuse_taken(model, signals)
     levels = tuple(initial(signal) for signal in driving)
 
@@ -72,11 +74,11 @@ def playback(
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         recorded = {signal: p[initial(signal)] + u[signal] for signal in driving}
-        vref, d = r["vref"] + u["vref"], Names()
-        u_exciter = exciter_inputs(vref=vref, **recorded)
+        vref, vs, d = r["vref"] + u["vref"], u.get("vs", 0.0), Names()
+        u_exciter = exciter_inputs(vref=vref, vs=vs, **recorded)
         values = exciter_parameters(p, model, saturation)
         efd = model.equations(state_of(model, x, r), u_exciter, values, d)
-        return motion(d, model.states, {"vref": vref, **recorded, "efd": efd, **x})
+        return motion(d, model.states, {"vref": vref, "vs": vs, **recorded, "efd": efd, **x})
 
     return System(
         parameters=(
@@ -87,7 +89,7 @@ def playback(
         ),
         setpoints=("vref", *model.setpoints),
         states=model.states,
-        inputs=("vref", *driving),
+        inputs=(*setpoints, *driving),
         outputs=(*signals, *model.states),
         time_constants=tuple(seconds("", model.sheet)),
         rest=rest,
@@ -97,17 +99,22 @@ def playback(
 
 def _build(equipment: Equipment) -> System:
     driving = tuple(signal for signal in DRIVING if signal in equipment.recorded)
-    vref_known = "vref" in equipment.given
-    return playback(present(equipment.exciter), equipment.saturation, driving, vref_known)
+    return playback(
+        present(equipment.exciter),
+        equipment.saturation,
+        driving,
+        vref_known="vref" in equipment.given,
+        stabilised="vs" in equipment.inputs,
+    )
 
 
 PLAYBACK = PlantKind(
     name="playback",
     title="the exciter alone, driven by recorded signals",
     needs=("exciter",),
-    events=("vref",),
-    signals=("vref", *DRIVING, "efd"),
-    driving=("vref", *DRIVING),
+    events=REFERENCES,
+    signals=(*REFERENCES, *DRIVING, "efd"),
+    driving=(*REFERENCES, *DRIVING),
     required=("vt", "efd"),
     required_if_used=("ifd",),
     levels=(*DRIVING, "efd"),

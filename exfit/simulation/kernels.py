@@ -35,9 +35,9 @@ def linear_kernel(system: System) -> LinearKernel:
 
 
 @cache
-def parameters_used(system: System) -> frozenset[str]:
-    """Return the parameters that a response of the system can depend on."""
-    traced = trace(system, system.outputs)
+def parameters_used(system: System, outputs: tuple[str, ...] | None = None) -> frozenset[str]:
+    """Return the parameters that a response of the system, or of some outputs, can depend on."""
+    traced = trace(system, system.outputs if outputs is None else outputs)
     targets = [*traced.rest, *traced.slopes, *traced.outputs, *traced.clamped]
     reached = {node.index for node in in_order(targets)}
     pairs = zip(system.parameters, traced.p, strict=True)

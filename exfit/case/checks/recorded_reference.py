@@ -23,6 +23,9 @@ def recorded_reference_faults(
                 yield record.at("resample").fault(text)
         elif channel.value is not None and signal in kind.recorded_inputs:
             yield channel.fault(_not_used(signal, given))
+        elif channel.value is not None and given.value is not None and signal in kind.driving:
+            text = f"the record's channel {signal} gives the signal as well: leave one of them out"
+            yield given.fault(text)
         if signal in kind.recorded_inputs:
             yield from _driving_faults(channel)
         if "file" in given:

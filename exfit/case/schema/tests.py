@@ -211,7 +211,8 @@ class BumpTest(Section):
     )
     vs: Reference = Field(
         default=(),
-        description="The signal at the stabiliser's input of the exciter, given like vref.",
+        description="The signal at the stabiliser's input of the exciter, given like vref; "
+        "in a playback the record's channel vs drives it without.",
     )
     E: tuple[StepSection, ...] = Field(
         default=(),
