@@ -52,6 +52,7 @@ def _system_of(case: Case, recording: Recording | None) -> System:
         recorded=recorded_in_all(case),
         given=frozenset(case.plant.given),
         stabiliser=stabilised(case),
+        swing=getattr(case.plant, "swing", "power"),
     )
     if kind.plays_back and parts.exciter is not None:
         _refuse_missing_drivers(case, parts.exciter, equipment.saturation)

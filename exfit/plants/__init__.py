@@ -2,13 +2,7 @@
 
 from exfit.plants.alone import alone
 from exfit.plants.breaker import BREAKER, SPEED
-from exfit.plants.infinite_bus import (
-    HEARD,
-    INFINITE_BUS,
-    flow_sheet,
-    infinite_bus,
-    rests_with_output,
-)
+from exfit.plants.infinite_bus import INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
@@ -26,8 +20,9 @@ from exfit.plants.parts import (
     exciter_inputs,
     exciter_parameters,
 )
-from exfit.plants.plant import REFERENCES, Equipment, PlantKind, Stabilised
+from exfit.plants.plant import REFERENCES, Equipment, PlantKind, Stabilised, Swing
 from exfit.plants.playback import DRIVING, initial, playback
+from exfit.plants.stabilising import HEARD, rests_with_output
 
 __all__ = [
     "BREAKER",
@@ -51,6 +46,7 @@ __all__ = [
     "PlantKind",
     "SaturationForm",
     "Stabilised",
+    "Swing",
     "alone",
     "exciter_inputs",
     "exciter_parameters",

@@ -7,7 +7,7 @@ from exfit.models.machines import Axes, Machine
 from exfit.models.phasors import modulus
 from exfit.models.sheet import Sheet, sheet
 from exfit.plants.breaker import BREAKER, SPEED, breaker_of
-from exfit.plants.infinite_bus import Flow, rotor_frame
+from exfit.plants.loaded_machine import Flow, rotor_frame
 from exfit.plants.parts import (
     MACHINE,
     NETWORK,

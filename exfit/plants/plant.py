@@ -14,6 +14,7 @@ from exfit.signals import COMPARED
 Component = TypeVar("Component", Model, Machine)
 REFERENCES = ("vref", "vs")  # inputs that are given as steps, ramps, tables or records
 Requirement = Literal["exciter", "machine", "network"]
+Swing = Literal["power", "torque"]  # what Pm is in the equation of the speed
 
 
 class Stabilised(NamedTuple):
@@ -28,6 +29,7 @@ class Equipment(NamedTuple):
 
     ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
     ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
+    ``swing`` is the form of the equation of the speed.
     """
 
     exciter: Model | None
@@ -37,6 +39,7 @@ class Equipment(NamedTuple):
     recorded: frozenset[str] = frozenset()
     given: frozenset[str] = frozenset()
     stabiliser: Stabilised | None = None
+    swing: Swing = "power"
 
 
 def no_network(given: Collection[str]) -> Sheet:

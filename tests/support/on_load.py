@@ -21,5 +21,5 @@ def values_on_load(machine, given="Q", exciter="AC8B", **changes):
     return values | {symbol.replace("_", ".", 1): value for symbol, value in changes.items()}
 
 
-def system(machine, given="Q", exciter="AC8B", inputs=ALL_INPUTS):
-    return infinite_bus(MODELS[exciter], machine, QUADRATIC, inputs, given)
+def system(machine, given="Q", exciter="AC8B", inputs=ALL_INPUTS, swing="power"):
+    return infinite_bus(MODELS[exciter], machine, QUADRATIC, inputs, given, swing=swing)

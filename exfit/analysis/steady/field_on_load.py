@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from exfit.models.machines import Machine
-from exfit.plants.infinite_bus import Flow, loaded_at_rest
+from exfit.plants.loaded_machine import Flow, loaded_at_rest
 from exfit.plants.parts import Names
 
 Array = NDArray[np.float64]

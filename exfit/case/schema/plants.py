@@ -19,7 +19,7 @@ from exfit.case.schema.values import (
     nothing,
 )
 from exfit.models import MACHINE_NAMES
-from exfit.plants import HEARD
+from exfit.plants import HEARD, Swing
 
 if TYPE_CHECKING:
     Heard = str
@@ -30,6 +30,10 @@ MACHINE = Field(description=f"Machine model: {', '.join(MACHINE_NAMES)}.")
 MACHINE_DATA = Field(
     default_factory=nothing,
     description="Machine data; a missing value is the typical one.",
+)
+SWING = (
+    "What drives the speed in 2H d(dw)/dt: power, (Pm - D dw) / (1 + dw) - Te, as in PSS/E, or "
+    "torque, Pm - D dw - Te, as in ANDES."
 )
 MACHINE_FREE = Field(
     default_factory=nothing, description="Machine data that are fitted, as under parameters.free."
@@ -67,6 +71,7 @@ class InfiniteBus(PlantSection):
         description="f0 (Hz); R and X to the source; P and Q, or P and E (voltage of the source) "
         "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
     )
+    swing: Swing = Field(default="power", description=SWING)
     sources: Sources = STATED
     std_errors: StdErrors = STD_ERRORS
 
@@ -173,6 +178,7 @@ class OnLine(PlantSection):
     network: Frozen[Number] = Field(
         description="As plant.network: f0, R and X to the source, P and Q or E, Rc, Xc."
     )
+    swing: Swing = Field(default="power", description=SWING)
     sources: Sources = STATED
 
     @property
