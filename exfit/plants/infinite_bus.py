@@ -25,7 +25,15 @@ from exfit.plants.parts import (
     values_named,
 )
 from exfit.plants.plant import Equipment, PlantKind, Stabilised, Swing, compared, present
-from exfit.plants.unit import ROTOR, Controls, Terminals, Unit, UnitState, unit_at_rest, unit_motion
+from exfit.plants.unit import (
+    ROTOR,
+    Controls,
+    Terminals,
+    UnitOnLoad,
+    UnitState,
+    unit_at_rest,
+    unit_motion,
+)
 
 OUTPUTS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
 
@@ -86,7 +94,7 @@ def infinite_bus(
     ``delta``, to the source as it is, in rad, ``speed`` 1 when rated.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *ROTOR, *machine.states))
-    unit = Unit(model, machine, saturation, stabiliser, swing)
+    unit = UnitOnLoad(model, machine, saturation, stabiliser, swing)
     network = flow_sheet(given)
 
     def rest(p: Signals) -> Rest:

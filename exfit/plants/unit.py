@@ -30,7 +30,7 @@ from exfit.plants.stabilising import stabiliser_rest, stabilising
 ROTOR = ("delta", "dw")
 
 
-class Unit(NamedTuple):
+class UnitOnLoad(NamedTuple):
     """The models of a unit on load, and the form of its swing equation."""
 
     exciter: Model
@@ -131,7 +131,7 @@ class Excited(NamedTuple):
 
 
 def unit_at_rest(
-    unit: Unit, vt: Signal, power: Signal, at: Flow, p: Signals, network: Names
+    unit: UnitOnLoad, vt: Signal, power: Signal, at: Flow, p: Signals, network: Names
 ) -> UnitRest:
     """Return the unit at rest at vt and a power, with the current and the source of ``at``.
 
@@ -167,7 +167,7 @@ def acceleration(swing: Swing, Pm: Signal, power: Signal, dw: Signal, machine: N
 
 
 def unit_motion(
-    unit: Unit, at: Terminals, controls: Controls, given: UnitState, network: Names, d: Names
+    unit: UnitOnLoad, at: Terminals, controls: Controls, given: UnitState, network: Names, d: Names
 ) -> Excited:
     """Write the slopes of a unit's states but delta into ``d``, and return what it shows."""
     p, r, x = given
