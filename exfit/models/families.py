@@ -7,7 +7,14 @@ from typing import Literal
 Family = Literal["DC", "AC", "ST"]
 
 TYPE_IN_NAME = re.compile(r"(DC|AC|ST)\d")  # as in AC8B, ESAC8B, EXDC2
-SIMPLIFIED: dict[str, Family] = {"IEEET1": "DC", "IEEEX1": "DC", "SCRX": "ST", "SEXS": "ST"}
+SIMPLIFIED: dict[str, Family] = {
+    "IEEET1": "DC",
+    "IEEET2": "AC",
+    "IEEET3": "ST",
+    "IEEEX1": "DC",
+    "SCRX": "ST",
+    "SEXS": "ST",
+}
 
 
 def family_of(name: str) -> str | None:

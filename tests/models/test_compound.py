@@ -117,6 +117,13 @@ def st2a(p):
     return Transfer(vb) * regulator / loop, Transfer(p["KE"] / vb * slope) / loop
 
 
+def ieeet3(p):
+    """The source is proportional to VT, as IFD is on this machine: V4 = sqrt(KP^2 - 0.78^2) VT."""
+    regulator, feedback = lag(p["KA"], p["TA"]), washout(p["KF"], p["TF"])
+    loop = Transfer([p["TE"], p["KE"]]) + regulator * feedback
+    return regulator / loop, Transfer(math.sqrt(p["KP"] ** 2 - 0.78**2)) / loop
+
+
 def with_field_voltage_loop(p, regulator, inner, KG):
     vb, slope = bridge(p)
     loop = Transfer(1.0) + Transfer(vb * KG) * inner
@@ -146,6 +153,8 @@ def scrx(p):
 LINEAR = [
     ("ST2A", st2a, {}),
     ("ST2A", st2a, {"KC": 0.3, "KE": 0.8, "VRMIN": -1.0}),
+    ("IEEET3", ieeet3, {}),
+    ("IEEET3", ieeet3, {"KE": 0.7, "KP": 1.4, "KF": 0.1}),
     ("ST3A", st3a, {"VRMIN": -20.0, "VMMIN": -1.0}),
     ("ST3A", st3a, {"VBMAX": 5.0, "KG": 0.5}),
     ("ST3A", st3a, {"VGMAX": 0.5, "KA": 5.0}),
@@ -188,6 +197,7 @@ def behind(p, vt, ifd):
 
 CEILINGS = [
     ("ST2A", {"EFDMAX": 2.5}, lambda p, vt, ifd: 2.5),
+    ("IEEET3", {"VBMAX": 1.6, "TE": 0.05}, lambda p, vt, ifd: 1.6),
     ("ST3A", {"VMMAX": 0.5}, lambda p, vt, ifd: 0.5 * behind(p, vt, ifd)),
     ("ST3A", {"VMMAX": 0.5, "VBMAX": 5.0}, lambda p, vt, ifd: 2.5),
     ("ST4B", {"VMMAX": 0.5}, lambda p, vt, ifd: 0.5 * behind(p, vt, ifd)),

@@ -15,7 +15,7 @@ from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
 CONTINUOUS = ("DC1A", "DC2A", "IEEET1", "IEEEX1", "EXDC2")
-COMPUTING = (*CONTINUOUS, "DC4B")  # where KE = 0 and VRMAX = 0 are computed
+COMPUTING = (*CONTINUOUS, "IEEET2", "DC4B")  # where KE = 0 and VRMAX = 0 are computed
 ALL = (*COMPUTING, "DC3A")
 BUS_FED = ("DC2A", "EXDC2", "DC4B")  # limits proportional to VT
 NOT_NEGATIVE = ("DC1A", "DC2A")  # EFD >= 0
@@ -85,6 +85,14 @@ def continuous_loop(p, vt0):
     return (rated * lag(1.0, TD0)).fed_back(lag(1.0, p["TR"]))
 
 
+def brushless_loop(p, vt0):
+    """Return vt / vref of IEEET2, whose rate feedback is taken from VR through two lags."""
+    feedback = washout(p["KF"], p["TF1"]) * lag(1.0, p["TF2"])
+    regulator = lag(p["KA"], p["TA"]).fed_back(feedback)
+    forward = regulator * field_of(p, effective_KE(p, vt0), vt0)
+    return (forward * lag(1.0, TD0)).fed_back(lag(1.0, p["TR"]))
+
+
 def pid_loop(p, vt0):
     """Return vt / vref of DC4B, whose regulator is fed from the terminals."""
     KE, machine = effective_KE(p, vt0), lag(1.0, TD0)
@@ -102,7 +110,7 @@ def rheostat_loop(p, vt0):
     return forward.fed_back(lag(1.0, p["TR"]))
 
 
-LOOPS = {"DC4B": pid_loop, "DC3A": rheostat_loop}
+LOOPS = {"IEEET2": brushless_loop, "DC4B": pid_loop, "DC3A": rheostat_loop}
 
 
 @pytest.mark.parametrize("vt0", [0.9, 1.1])
@@ -113,7 +121,7 @@ def test_a_small_step_is_that_of_the_transfer_function(name, KE, vt0):
     if name == "DC3A" and KE == 0.0:
         pytest.skip("DC3A computes no KE")
     size = 1e-6
-    gain = {"KA": 25.0} if name in CONTINUOUS else {}
+    gain = {"KA": 25.0} if name in (*CONTINUOUS, "IEEET2") else {}
     limits = {"VRMAX": 9.0, "VRMIN": -9.0} if name in COMPUTING else {}  # far away
     values = values_of(name, vt0, KE=KE, **gain, **limits)
     got = respond(name, values, (0.0, size))[:, 0]

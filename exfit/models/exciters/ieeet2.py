@@ -1,0 +1,64 @@
+"""IEEET2: rotating-rectifier exciter, IEEE type 2 of 1968 (PSS/E IEEET2).
+
+                 VRMAX
+vref + vs ─►(+)─►[  KA  ]─┬─────────────►(+)─►[  1  ]─┬─► efd
+           -▲ ▲- [1+sTA]  │              -▲   [ sTE ] │
+            │ │  VRMIN    └───────┐       │           │
+vc1 ►[  1  ]┘ │                   │       └── VFE ◄───┘
+     [1+sTR]  └──[  1   ]◄─[ sKF  ]
+                 [1+sTF2]  [1+sTF1]
+
+VFE = KE EFD + VX(EFD). The feedback is taken from VR, since the field voltage
+of a rotating rectifier cannot be measured. The limits are non-windup; EFD may
+be negative.
+KE = 0 is self-excited: KE is computed at the start so that VR starts at
+VRMAX / 10, as in PSS/E. VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at
+the higher of E1, E2 (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use
+are the setpoints KE0, VRMAX0, VRMIN0.
+Not modelled: UEL or OEL at the summing point.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import commutator_start, exciter, lag, limited_lag, washout
+from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+    ("VRMAX", 7.3, "pu", (-9999.0, 9999.0), "regulator ceiling, or 0"),
+    ("VRMIN", -7.3, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
+    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    ("KF", 0.03, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
+    ("TF1", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    ("TF2", 0.8, "s", (0.01, 100.0), "second stabilising feedback time constant", LAG_OF_KF),
+    ("E1", 4.18, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.1, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 3.14, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.03, "pu", (0.0, 100.0), "saturation at E2"),
+)
+
+RECORDS = (record("IEEET2", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2"),)
+
+STATES = "VC VR EFD VF1 VF2"
+SETPOINTS = "KE0 VRMAX0 VRMIN0"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = u.vref + u.vs - vc - s.VF2
+    vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, s.VRMIN0, s.VRMAX0)
+    vf, d.VF1 = washout(vr, s.VF1, p.KF, p.TF1)
+    _, d.VF2 = lag(vf, s.VF2, 1.0, p.TF2)
+    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    start = commutator_start(efd, p)
+    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
+    x.VC, x.VR, x.EFD, x.VF1, x.VF2 = u.vc1, start.vr, efd, start.vr, 0.0
+    return u.vc1 + start.vr / p.KA - u.vs
