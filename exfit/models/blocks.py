@@ -193,7 +193,8 @@ def pid(
 ) -> tuple[Signal, Signal, Signal]:
     """KP + KI / s + sKD / (1 + sTD), limited; return the output and the slopes of both states.
 
-    The integral is frozen while it would push the output further beyond its limit.
+    Without a lag, TD = 0, there is no derivative: it is a PI. The integral is frozen while it would
+    push the output further beyond its limit.
     """
     steep, washed = washout(u, derivative, KD, TD)
     y = KP * u + integral + steep

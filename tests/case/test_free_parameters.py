@@ -43,6 +43,21 @@ def test_the_lag_of_a_term_is_free_only_with_its_gain(model, gain, lag):
     assert gain not in free_names(model, **{gain: 0.0})
 
 
+@pytest.mark.parametrize(
+    ("model", "gain", "lag"),
+    [("AC8B", "KDR", "TDR"), ("DC4B", "KD", "TD"), ("ESAC8B", "KD", "TD"), ("ST6B", "KDA", "TDA")],
+)
+def test_a_derivative_without_a_lag_is_none_and_its_gain_not_free(model, gain, lag):
+    assert {gain, lag} <= {*free_names(model, **{gain: 1.0, lag: 0.1})}
+    assert not {gain, lag} & {*free_names(model, **{gain: 1.0, lag: 0.0})}
+    test = {"vt0": 1.0, "vref": [{"at": 1.0, "step": STEP}]}
+    content = {"model": model, "plant": OPEN, "test": test, "record": {"channels": {"vt": "vt"}}}
+    pi, without_lag = (
+        response_of(content, {gain: k, lag: t}, TIME)["vt"] for k, t in ((0.0, 0.1), (1.0, 0.0))
+    )
+    assert np.array_equal(pi, without_lag)
+
+
 def test_of_two_alternatives_the_one_that_acts_is_free():
     """ST1A reduces its gain by a lag and its lead, or stabilises by rate feedback."""
     assert free_names("ST1A") == ["TC", "TB", "KA"]

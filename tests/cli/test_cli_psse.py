@@ -98,7 +98,7 @@ def test_a_unit_among_several_is_chosen(run, workplace):
     ("old", "new", "words"),
     [
         ("ESAC1A", "ESAC1Z", ["unit.dyr:2: ESAC1Z: exfit has no exciter of that name", "ESAC1A"]),
-        ("GENROU", "GENCLS", ["unit.dyr:1: GENCLS: exfit has no machine of that name"]),
+        ("GENROU", "GENCLS", ["unit.dyr:1: GENCLS is a constant voltage", "no unit to verify"]),
         (" 766 ", " ", ["unit.dyr:2: ESAC1A: 18 values", "19", "TR TB TC KA TA"]),
         (" 766 ", " -1 ", ["unit.dyr:2: ESAC1A: KA: -1 lies outside 0.01 ... 100000 pu"]),
         (" 766 ", " 7O6 ", ["unit.dyr:2: ESAC1A: KA: '7O6' is not a number"]),

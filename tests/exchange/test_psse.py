@@ -227,8 +227,13 @@ FAULTS = {
     ),
     "a machine that exfit lacks": (
         "GENROU",
+        "GENTPJ1",
+        "unit.dyr:1: GENTPJ1: exfit has no machine of that name",
+    ),
+    "a classical machine": (
+        "GENROU",
         "GENCLS",
-        "unit.dyr:1: GENCLS: exfit has no machine of that name",
+        "unit.dyr:1: GENCLS is a constant voltage behind a reactance: no unit to verify",
     ),
     "a second exciter": (
         "1 ESAC1A",
@@ -257,6 +262,13 @@ def test_all_faults_of_a_unit_are_reported_at_once_in_the_order_of_their_lines()
         ["unit.dyr:2", "ESAC1A", "KA"],
         ["unit.dyr:3", "ESAC1A", "TE"],
     ]
+
+
+def test_a_derivative_without_a_lag_is_warned_of():
+    record = "1 ESAC8B 1 .02 40 5 10 0 1 0 10 -10 1 1 3 .1 4 .4 /\n"
+    unit = read_unit(SOUND.splitlines()[0] + "\n" + record, "unit.dyr")
+    assert unit.exciter.values["TD"] == 0.0
+    assert "ESAC8B: KD: 10 has no effect, since TD is 0" in [text for _, text in unit.warnings]
 
 
 def test_no_saturation_may_be_written_as_four_zeros():

@@ -57,7 +57,7 @@ def test_a_unit_without_a_model_is_named_with_its_records():
     text = SOUND + "7 GENCLS 1 3 0 /\n8 GENROU 1 1 /\n8 'IEEEG1' 1 0 /\n9 ESACA1A 1 3 /\n"
     no_model = {unit.bus: unit for unit in read_units(text).refused}
     assert [unit.modelled for unit in no_model.values()] == [False] * 3
-    assert "no machine and no exciter of the catalogue: GENCLS" in no_model[7].faults[0].text
+    assert "GENCLS is a constant voltage behind a reactance" in no_model[7].faults[0].text
     assert "no exciter of the catalogue: GENROU, IEEEG1" in no_model[8].faults[0].text + (
         no_model[8].faults[1].text
     )

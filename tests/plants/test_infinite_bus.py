@@ -91,6 +91,32 @@ def test_a_step_on_load_is_that_of_another_simulator(name, power, swing, angle):
     assert np.abs(got["speed"] - columns["omega"]).max() < 5e-6
 
 
+@pytest.mark.parametrize("time", [0.0, 0.7])
+def test_a_round_rotor_without_a_winding_on_its_q_axis_is_a_salient_pole(time):
+    """Xq = X'q, without saturation, whatever T'q0: rounding is all that differs."""
+    network = {"f0": 60.0, "R": 0.0, "X": 0.3, "Rc": 0.0, "Xc": 0.0, "P": 0.6, "E": 1.0}
+    values = {**OF_EXCITER["ieee"], **UNLIMITED, VT0: 1.0}
+    values |= {NETWORK + symbol: value for symbol, value in network.items()}
+    own = {**OF_MACHINE, "Xpq": OF_MACHINE["Xq"], "Tpq0": time, "S10": 0.0, "S12": 0.0}
+    assert not [*MACHINES["GENROU"].faults(own)]
+    values |= {MACHINE + symbol: value for symbol, value in own.items()}
+    instants = np.arange(0.0, 5.0, 0.02)
+    inputs = Inputs(0.0, instants[-1], (InputStep(1.0, 0.05),))
+    round_rotor, salient = (
+        Simulator(system(MACHINES[name], "E", inputs=("vref",)), inputs, instants, 1e-3)
+        .response(values)
+        .signals
+        for name in ("GENROU", "GENSAL")
+    )
+    for signal in ("vt", "p", "q", "speed"):
+        assert np.abs(round_rotor[signal] - salient[signal]).max() < 1e-10, signal
+
+
+def test_a_winding_needs_a_time_constant():
+    faults = MACHINES["GENROU"].faults({**OF_MACHINE, "Tpq0": 0.0})
+    assert [symbol for symbol, _ in faults] == ["Tpq0"]
+
+
 # --- equations typed again ------------------------------------------------------------------------
 
 

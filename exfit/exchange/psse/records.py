@@ -129,7 +129,8 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
         if row.symbol in definition.absent
     ]
     symbols = [row.symbol for row in definition.model.sheet]
-    warnings = doubt + placed([*_unmodelled(definition, symbols, given), *lacking])
+    unmodelled = [*_unmodelled(definition, symbols, given), *_without_effect(rows, of_sheet)]
+    warnings = doubt + placed([*unmodelled, *lacking])
     return Reading(values, placed(wrong), warnings, _inputs(definition, given))
 
 
@@ -194,6 +195,15 @@ def _unmodelled(
             continue
         if value != modelled and name not in symbols:
             yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
+
+
+def _without_effect(rows: Sheet, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for a gain that does nothing without its lag: a PID is then a PI."""
+    for row in rows:
+        lag = "" if row.search is None or not row.symbol.startswith("K") else row.search.needs
+        value = given.get(row.symbol, 0.0)
+        if value != 0.0 and given.get(lag) == 0.0:
+            yield row.symbol, f"{show(value)} has no effect, since {lag} is 0"
 
 
 def outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, str]]:

@@ -30,6 +30,8 @@ OTHERS: Mapping[str, str] = {
     for name in names.split()
 }
 
+CLASSICAL = {"GENCLS": "a constant voltage behind a reactance: no unit to verify"}
+
 
 class Head(NamedTuple):
     """A record by what it begins with, and the fields behind."""
@@ -220,6 +222,10 @@ def _missing(
     missing: Sequence[str], chosen: Sequence[Head], left_out: Iterable[Head]
 ) -> Iterator[DynamicsFault]:
     """Yield a fault for each record that may be the machine or exciter that is missing."""
+    classical = [*classical_machines(chosen)]
+    if classical:
+        yield from classical
+        return
     unknown = [head for head in left_out if head.name not in OTHERS]
     for kind in missing:
         names = names_of(kind)
@@ -230,6 +236,13 @@ def _missing(
         if not candidates:
             unit = f"bus {chosen[0].bus}, id {chosen[0].id}"
             yield DynamicsFault(chosen[0].line, f"{unit}: has no {kind}; known: {', '.join(names)}")
+
+
+def classical_machines(heads: Iterable[Head]) -> Iterator[DynamicsFault]:
+    """Yield that a unit is a classical machine, which has nothing that a record could verify."""
+    for head in heads:
+        if head.name in CLASSICAL:
+            yield DynamicsFault(head.line, f"{head.name} is {CLASSICAL[head.name]}")
 
 
 def names_of(kind: str) -> list[str]:

@@ -11,6 +11,7 @@ from exfit.exchange.psse.unit import (
     Head,
     Unit,
     by_unit,
+    classical_machines,
     heads_of,
     missing_kinds,
     names_of,
@@ -78,7 +79,9 @@ def _refused(heads: Sequence[Head], faults: Sequence[DynamicsFault]) -> RefusedU
 
 def _lacking(heads: Sequence[Head], missing: Sequence[str]) -> Iterator[DynamicsFault]:
     """Yield that a unit has no machine or exciter that exfit knows, and what may be meant."""
-    if not missing:
+    classical = [*classical_machines(heads)]
+    if classical or not missing:
+        yield from classical
         return
     names = [name for kind in NEEDED for name in names_of(kind)]
     unknown = [

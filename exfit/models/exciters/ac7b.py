@@ -42,7 +42,7 @@ SHEET = sheet(
     ("KPR", 4.24, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
     ("KIR", 4.24, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
     ("KDR", 0.0, "pu s", (0.0, 100000.0), "derivative gain of the regulator"),
-    ("TDR", 0.03, "s", (0.001, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
+    ("TDR", 0.03, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
     ("VRMAX", 5.79, "pu", (-9999.0, 9999.0), "regulator ceiling"),
     ("VRMIN", -5.79, "pu", (-9999.0, 9999.0), "regulator floor"),
     ("KPA", 65.36, "pu", (0.0, 100000.0), "proportional gain of the amplifier", FREE),

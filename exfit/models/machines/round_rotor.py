@@ -5,7 +5,7 @@ from functools import partial
 from typing import Literal
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import lag
+from exfit.models.blocks import lag, where
 from exfit.models.machines.d_axis import (
     D_AXIS,
     D_AXIS_DRAWING,
@@ -37,7 +37,7 @@ from exfit.models.sheet import record, sheet
 SHEET = sheet(
     ("Tpd0", 6.35, "s", (0.01, 100.0), "d-axis transient time constant"),
     ("Tppd0", 0.06, "s", (0.0, 1000.0), "d-axis subtransient time constant"),
-    ("Tpq0", 0.5, "s", (0.01, 100.0), "q-axis transient time constant, on load"),
+    ("Tpq0", 0.5, "s", (0.0, 100.0), "q-axis transient time constant, on load"),
     ("Tppq0", 0.077, "s", (0.001, 1000.0), "q-axis subtransient time constant, on load"),
     *SWING,
     ("Xd", 1.8, "pu", (0.01, 10.0), "d-axis synchronous reactance"),
@@ -63,6 +63,7 @@ DRAWING = f"""\
 flux, with a share of each axis. i1q is the same of the q axis, where nothing
 excites. On open circuit id and iq are 0, and the q axis rests."""
 
+LEAST_TIME = 0.01  # s; 0 is written where there is no winding
 CONS = "Tpd0 Tppd0 Tpq0 Tppq0 H D Xd Xq Xpd Xpq Xppd Xl S10 S12"
 
 
@@ -84,8 +85,13 @@ def q_slopes(form: Callable[..., Signal], s: Signal, i: Axes, p: Signal, d: Sign
     coupling = (p.Xpq - p.Xppd) / (inner * inner)
     damped = s.EDP + inner * i.q
     current = (p.Xq - p.Xpq) * (coupling * (damped - s.PSIQ) - i.q)
-    d.EDP = -(s.EDP + current + along_axes(form, source(s, p).voltage, p).d) / p.Tpq0
+    d.EDP = -(s.EDP + current + along_axes(form, source(s, p).voltage, p).d) / transient_time(p)
     _, d.PSIQ = lag(damped, s.PSIQ, 1.0, p.Tppq0)
+
+
+def transient_time(p: Signal) -> Signal:
+    """Return T'q0, or T''q0 where there is no such winding: then only saturation is left to it."""
+    return where(p.Tpq0 < LEAST_TIME, p.Tppq0, p.Tpq0)
 
 
 def rest(form: Callable[..., Signal], v: Axes, i: Axes, p: Signal, x: Signal) -> None:
@@ -99,10 +105,18 @@ def rest(form: Callable[..., Signal], v: Axes, i: Axes, p: Signal, x: Signal) ->
 def faults(order: Callable[..., Faults], values: Mapping[str, float]) -> Faults:
     """Yield what contradicts itself in a data sheet of a round-rotor machine."""
     yield from d_axis_order(values)
-    yield from descending(values, "Xq", "Xpq")
+    yield from not_rising(values, "Xq", "Xpq")
+    yield from winding_time(values)
     yield from not_rising(values, "Xpq", "Xppd")
     yield from descending(values, "Xpq", "Xl")
     yield from order(values)
+
+
+def winding_time(values: Mapping[str, float]) -> Faults:
+    """Yield a fault for a winding without a time constant; Xq = X'q is no winding."""
+    if values["Tpq0"] < LEAST_TIME and values["Xq"] > values["Xpq"]:
+        text = f"{values['Tpq0']:g} is below {LEAST_TIME:g} s; without a winding Xq equals Xpq"
+        yield "Tpq0", text
 
 
 def machine(
