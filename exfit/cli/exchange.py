@@ -78,8 +78,8 @@ def _import_one(
 ) -> None:
     """Write the case of one unit."""
     from exfit.case.starting.suggestion import relative
-    from exfit.exchange.psse.fields import located
-    from exfit.exchange.psse.import_case import case_text, import_unit
+    from exfit.exchange.fields import located
+    from exfit.exchange.import_case import case_text, import_unit
 
     if output is not None:
         refuse_existing(output, force)
@@ -159,7 +159,7 @@ def _export_one(
     force: bool,
 ) -> None:
     """Write the records of one fit, at the bus that is given, or where they were found."""
-    from exfit.exchange.psse.export import export as exported
+    from exfit.exchange.export import export as exported
     from exfit.results.io import load_result, result_file
 
     if output is not None:

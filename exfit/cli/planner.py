@@ -15,8 +15,8 @@ from exfit.util.sources import FITTED
 from exfit.util.text import first_texts
 
 if TYPE_CHECKING:
-    from exfit.exchange.psse.fitted_file import ChangedValue, FittedUnit, LeftUnit
-    from exfit.exchange.psse.import_all import ImportedUnit, ImportPlan, RecordOptions
+    from exfit.exchange.fitted_file import ChangedValue, FittedUnit, LeftUnit
+    from exfit.exchange.import_all import ImportedUnit, ImportPlan, RecordOptions
     from exfit.fleet.folder import Fleet
 
 UNITS = "units.csv"
@@ -45,7 +45,7 @@ class OfRecords:
         """Return them as a case takes them; raises ExfitError, UsageError where they cannot be."""
         from exfit.case.starting.bases import bases_of
         from exfit.case.starting.record_settings import RecordSettings
-        from exfit.exchange.psse.import_all import RecordOptions
+        from exfit.exchange.import_all import RecordOptions
 
         others = (self.sizes, self.bases, self.clock, self.unit, self.sheet)
         if self.records is None and any(others):
@@ -64,7 +64,7 @@ class OfRecords:
 
 def import_every_unit(dyr: Path, given: OfRecords, folder: Path | None, force: bool) -> None:
     """Write a case for every unit of a dynamics file, and a table of all units."""
-    from exfit.exchange.psse.import_all import import_all, plan_import, units_table
+    from exfit.exchange.import_all import import_all, plan_import, units_table
     from exfit.util.files import write_each
 
     if folder is None:
@@ -91,7 +91,7 @@ def _refuse_existing(folder: Path, names: Sequence[str]) -> None:
 
 def _report(plan: "ImportPlan", units: "Sequence[ImportedUnit]", folder: Path) -> None:
     """Say what was written and what was not; raises ExfitError where something was refused."""
-    from exfit.exchange.psse.import_all import NO_MODEL, RECORDED, REFUSED
+    from exfit.exchange.import_all import NO_MODEL, RECORDED, REFUSED
 
     recorded = _lines_of(units, RECORDED)
     cases = [unit.case for unit in units if unit.case]
@@ -119,8 +119,8 @@ def _lines_of(units: "Sequence[ImportedUnit]", status: str) -> list[str]:
 
 def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force: bool) -> None:
     """Write a planner's file with the values of all verified units of a batch."""
-    from exfit.exchange.psse.fitted_file import changes_table, fitted_file
-    from exfit.exchange.psse.import_case import read_file
+    from exfit.exchange.fitted_file import changes_table, fitted_file
+    from exfit.exchange.import_case import read_file
     from exfit.fleet.folder import read_fleet
     from exfit.util.files import write
 
@@ -145,7 +145,7 @@ def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force:
 
 def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
     """Return the fits of a batch that are done, and why the other cases are not."""
-    from exfit.exchange.psse.fitted_file import FittedUnit, LeftUnit
+    from exfit.exchange.fitted_file import FittedUnit, LeftUnit
     from exfit.results.io import load_result
 
     fits, others = list[FittedUnit](), list[LeftUnit]()

@@ -204,9 +204,9 @@ def _refuse_unused(given: UnitSources) -> None:
 def _planner(dyr: Path, bus: int | None, machine_id: str | None, folder: Path) -> "UnitData":
     """Return the data of a unit of a PSS/E file; what of it is left out is reported."""
     from exfit.case.starting.suggestion import relative
-    from exfit.exchange.psse.fields import located
-    from exfit.exchange.psse.import_case import import_unit
-    from exfit.exchange.psse.unit_data import unit_data
+    from exfit.exchange.fields import located
+    from exfit.exchange.import_case import import_unit
+    from exfit.exchange.unit_data import unit_data
 
     unit = import_unit(dyr, bus, machine_id)
     warn(located(unit.warnings, str(dyr)))

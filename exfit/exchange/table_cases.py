@@ -12,12 +12,12 @@ from exfit.case.starting.starting_unit import UnitData, unit_with
 from exfit.case.starting.suggestion import relative
 from exfit.case.starting.table_of_cases import CaseOfTable, read_case_table
 from exfit.errors import DynamicsError, ExfitError
-from exfit.exchange.psse.fields import located, text_of
-from exfit.exchange.psse.import_all import key_of
-from exfit.exchange.psse.import_case import read_file
-from exfit.exchange.psse.unit import Unit
-from exfit.exchange.psse.unit_data import unit_data
-from exfit.exchange.psse.units import DynamicsUnits, RefusedUnit, read_units
+from exfit.exchange.fields import located, text_of
+from exfit.exchange.import_all import key_of
+from exfit.exchange.import_case import read_file
+from exfit.exchange.unit import Unit
+from exfit.exchange.unit_data import unit_data
+from exfit.exchange.units import DynamicsUnits, RefusedUnit, read_units
 from exfit.util.files import write
 
 CASES = "cases"  # the folder of the cases in that of a batch

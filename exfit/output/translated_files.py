@@ -6,8 +6,8 @@ from exfit.analysis.translation.steps import network_of
 from exfit.case.starting.suggestion import relative
 from exfit.case.translated_case import translated_case
 from exfit.errors import ExfitError
-from exfit.exchange.psse.export import comment_lines, export
-from exfit.exchange.psse.records import alternatives
+from exfit.exchange.export import comment_lines, export
+from exfit.exchange.records import alternatives
 from exfit.models.sheet import Model
 from exfit.plants import INFINITE_BUS, MACHINE, NETWORK, OPEN_CIRCUIT
 from exfit.results.model import FitResult

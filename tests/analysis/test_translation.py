@@ -13,7 +13,7 @@ import exfit
 from exfit.analysis.translation.search import NOTICEABLE, _unnoticed
 from exfit.analysis.translation.steps import step_plants
 from exfit.errors import ExfitError, ModelError
-from exfit.exchange.psse.export import export
+from exfit.exchange.export import export
 from exfit.models import MODELS, STABILISERS
 from exfit.models.exciters import sexs
 from exfit.models.sheet import typical

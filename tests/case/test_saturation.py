@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from exfit.case.case import Case
 from exfit.errors import CaseError
-from exfit.exchange.psse.export import export
+from exfit.exchange.export import export
 from exfit.output.report.sections.model import saturation
 from exfit.workflows import check, fit, simulate
 

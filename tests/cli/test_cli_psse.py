@@ -16,8 +16,8 @@ from places import ROOT
 
 from exfit import cli
 from exfit.case.load import load_case
-from exfit.exchange.psse.records import definition_of
-from exfit.exchange.psse.unit import read_unit
+from exfit.exchange.records import definition_of
+from exfit.exchange.unit import read_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record
 from exfit.output.run_folder import write_fit
@@ -187,7 +187,7 @@ STABILISER = replace(
 @pytest.fixture
 def pssx(monkeypatch):
     """Let exfit know one stabiliser of which only the data matter."""
-    monkeypatch.setattr("exfit.exchange.psse.records.STABILISERS", {"PSSX": STABILISER})
+    monkeypatch.setattr("exfit.exchange.records.STABILISERS", {"PSSX": STABILISER})
 
 
 def test_a_stabiliser_goes_into_the_case_with_its_model_and_parameters(run, pssx):

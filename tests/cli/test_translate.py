@@ -8,7 +8,7 @@ from places import ROOT
 
 from exfit import workflows
 from exfit.case.load import load_case
-from exfit.exchange.psse.unit import read_unit
+from exfit.exchange.unit import read_unit
 from exfit.output.run_folder import write_fit
 
 WIDTH = 80

@@ -11,10 +11,10 @@ from loose_records import loose, sound
 from records import TEST, TIME, case_of, one, synthetic
 
 from exfit import workflows
-from exfit.exchange.psse.fields import text_of
-from exfit.exchange.psse.fitted_file import FittedUnit, fitted_file, number_text
-from exfit.exchange.psse.records import contradictions, definition_of, definitions
-from exfit.exchange.psse.units import read_units
+from exfit.exchange.fields import text_of
+from exfit.exchange.fitted_file import FittedUnit, fitted_file, number_text
+from exfit.exchange.records import contradictions, definition_of, definitions
+from exfit.exchange.units import read_units
 from exfit.results.other_values import AsFound
 from exfit.util.sources import FITTED, TYPICAL
 

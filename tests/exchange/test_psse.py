@@ -14,9 +14,10 @@ from loose_records import SWAPPED, loose, sound
 from exfit.case.load import parse_case
 from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
-from exfit.exchange.psse.fields import read_records, text_of
-from exfit.exchange.psse.import_case import case_text, import_unit
-from exfit.exchange.psse.records import (
+from exfit.exchange.fields import text_of
+from exfit.exchange.import_case import case_text, import_unit
+from exfit.exchange.psse.free_format import read_records
+from exfit.exchange.records import (
     SIGNALS,
     Definition,
     definition_of,
@@ -24,7 +25,7 @@ from exfit.exchange.psse.records import (
     read_values,
     record_text,
 )
-from exfit.exchange.psse.unit import read_unit
+from exfit.exchange.unit import read_unit
 from exfit.models import MODELS
 from exfit.models.sheet import record, typical
 

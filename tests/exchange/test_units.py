@@ -5,9 +5,10 @@ import pytest
 from dynamics import SOUND, garbage, replaced
 
 from exfit.errors import DynamicsError
-from exfit.exchange.psse.fields import sound_records, text_of
-from exfit.exchange.psse.unit import read_unit
-from exfit.exchange.psse.units import read_units
+from exfit.exchange.fields import text_of
+from exfit.exchange.psse.free_format import sound_records
+from exfit.exchange.unit import read_unit
+from exfit.exchange.units import read_units
 
 BUSES = range(101, 109)
 

@@ -18,7 +18,7 @@ from rich.console import Console
 
 from exfit.case.case import Case
 from exfit.errors import CaseError, ExfitError
-from exfit.exchange.psse.export import export
+from exfit.exchange.export import export
 from exfit.fitting.build import build_experiments
 from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
 from exfit.fitting.parameters import FreeParameter

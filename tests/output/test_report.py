@@ -21,7 +21,7 @@ from records import one as ac1a
 from exfit import cli, workflows
 from exfit.case.load import load_case
 from exfit.errors import ExfitError
-from exfit.exchange.psse.export import export
+from exfit.exchange.export import export
 from exfit.models import from_file
 from exfit.output import run_folder
 from exfit.output.report import html, write_report

@@ -3,7 +3,7 @@
 import re
 from math import exp, log
 
-from exfit.exchange.psse.records import contradictions
+from exfit.exchange.records import contradictions
 from exfit.models.sheet import typical
 
 TRIES = 500

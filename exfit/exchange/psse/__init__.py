@@ -1,1 +1,1 @@
-"""PSS/E dynamics files (.dyr): their free format, their records, the units they describe."""
+"""PSS/E dynamics files (.dyr): their free format."""

@@ -1,7 +1,7 @@
 """The fit as PSS/E dynamics records."""
 
 from exfit.errors import ExfitError
-from exfit.exchange.psse.export import Exported, export
+from exfit.exchange.export import Exported, export
 from exfit.results.model import FitResult
 
 BUS, MACHINE_ID = 1, "1"  # what a dynamics file needs and no case has

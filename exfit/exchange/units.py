@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from exfit.exchange.psse.fields import DynamicsFault, sound_records
-from exfit.exchange.psse.records import definition_of
-from exfit.exchange.psse.unit import (
+from exfit.exchange.fields import DynamicsFault
+from exfit.exchange.psse.free_format import sound_records
+from exfit.exchange.records import definition_of
+from exfit.exchange.unit import (
     NEEDED,
     OTHERS,
     Head,

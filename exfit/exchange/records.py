@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from exfit.exchange.psse.fields import DynamicsFault, Field, number, whole
+from exfit.exchange.fields import DynamicsFault, Field, number, whole
 from exfit.models import MODELS, STABILISERS, sheet
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import DynamicsRecord, Model, Sheet, typical

@@ -8,7 +8,7 @@ from math import isfinite
 from exfit import __version__
 from exfit.case.peek import stabiliser_inputs
 from exfit.errors import ExfitError, FileError
-from exfit.exchange.psse.records import (
+from exfit.exchange.records import (
     SIGNALS,
     WIDTH,
     Definition,

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from exfit.case.starting.starting_unit import PartData, UnitData
-from exfit.exchange.psse.import_case import as_found
-from exfit.exchange.psse.unit import Unit, UnitPart
+from exfit.exchange.import_case import as_found
+from exfit.exchange.unit import Unit, UnitPart
 from exfit.util.sources import TYPICAL
 
 

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 from exfit.case.peek import stabiliser_inputs
 from exfit.errors import ExfitError
-from exfit.exchange.psse.fields import Field, encoded, number, text_of
-from exfit.exchange.psse.records import UNSATURATED, Definition, read_values
-from exfit.exchange.psse.unit import Unit, UnitPart
-from exfit.exchange.psse.units import DynamicsUnits, read_units
+from exfit.exchange.fields import Field, encoded, number, text_of
+from exfit.exchange.records import UNSATURATED, Definition, read_values
+from exfit.exchange.unit import Unit, UnitPart
+from exfit.exchange.units import DynamicsUnits, read_units
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.util.sources import TYPICAL

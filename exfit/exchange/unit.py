@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from exfit.errors import DynamicsError
-from exfit.exchange.psse.fields import DynamicsFault, Field, Fields, located, read_records, refuse
-from exfit.exchange.psse.records import Definition, definition_of, definitions, read_values
+from exfit.exchange.fields import DynamicsFault, Field, Fields, located, refuse
+from exfit.exchange.psse.free_format import read_records
+from exfit.exchange.records import Definition, definition_of, definitions, read_values
 from exfit.util.text import near, show_value
 
 NEEDED = ("machine", "exciter")

@@ -13,8 +13,8 @@ from exfit.case.templates import (
     source_lines,
 )
 from exfit.errors import DynamicsError, ExfitError
-from exfit.exchange.psse.fields import text_of
-from exfit.exchange.psse.unit import Unit, UnitPart, read_unit
+from exfit.exchange.fields import text_of
+from exfit.exchange.unit import Unit, UnitPart, read_unit
 from exfit.models.sheet import Sheet
 from exfit.util.files import read_limited
 from exfit.util.sources import TYPICAL

@@ -13,11 +13,11 @@ from exfit.case.starting.record_settings import RecordSettings
 from exfit.case.starting.suggestion import relative
 from exfit.case.starting.table_of_cases import CaseOfTable, case_name_of, read_case_table
 from exfit.errors import ExfitError
-from exfit.exchange.psse.fields import DynamicsFault, located, text_of
-from exfit.exchange.psse.import_case import case_text, read_file
-from exfit.exchange.psse.unit import Unit
-from exfit.exchange.psse.unit_data import unit_data
-from exfit.exchange.psse.units import DynamicsUnits, RefusedUnit, read_units
+from exfit.exchange.fields import DynamicsFault, located, text_of
+from exfit.exchange.import_case import case_text, read_file
+from exfit.exchange.unit import Unit
+from exfit.exchange.unit_data import unit_data
+from exfit.exchange.units import DynamicsUnits, RefusedUnit, read_units
 
 WRITTEN, RECORDED, REFUSED, NO_MODEL = "written", "written with records", "refused", "no model"
 
