@@ -161,13 +161,16 @@ def record(
 
 @dataclass(frozen=True)
 class Model:
-    """An exciter or a stabiliser: the content of its file, under one name.
+    """An exciter, a stabiliser or a governor: the content of its file, under one name.
 
     ``equations(s, u, p, d)`` takes states, inputs and parameters, writes the slopes into ``d`` and
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
     ``x`` and returns the reference that does so. Setpoints are what it finds at the start and then
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
     its PSS/E records, its own one first; ``inputs`` the signals that a stabiliser listens to.
+
+    A governor's output is the turbine's power Pm, its reference ``pref``; it sees ``dw``, the speed
+    less 1, and ``p``, the electrical power, all per unit on the machine's base.
     """
 
     name: str

@@ -7,13 +7,16 @@ import pytest
 from oracle import lively_values, system_of
 
 from exfit.errors import SimulationError
-from exfit.models import MODELS, STABILISERS
+from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
 ROWS = [
-    row for models in (MODELS, STABILISERS, MACHINES) for m in models.values() for row in m.sheet
+    row
+    for models in (MODELS, STABILISERS, GOVERNORS, MACHINES)
+    for model in models.values()
+    for row in model.sheet
 ]
 TIMES = np.linspace(0.0, 1.0, 51)
 INPUTS = Inputs(0.0, 1.0, (InputStep(0.2, 0.005),))

@@ -1,0 +1,1 @@
+"""The turbine governors, a file each."""

@@ -1,0 +1,50 @@
+"""GAST: gas turbine governor (PSS/E).
+
+                              VMAX
+pref ─►(+)────►[least  ]─►[   1   ]─►[   1   ]─┬─►(+)─► Pm
+       -▲   ┌─►[of both]  [1 + sT1]  [1 + sT2] │  -▲
+      [1/R] │                 VMIN             │ [Dturb]
+        ▲  (+)◄─ AT                            │   ▲
+        dw  ▲                                  │   dw
+            └──[KT]◄──(+)◄──────[   1   ]◄─────┘
+                   AT ─►▲-      [1 + sT3]
+
+pref is a power. The limits are non-windup. A unit that starts above AT, the
+load that the ambient temperature allows, is not at rest. Typical data are those
+of IEC 61970-302 (GovGAST).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import lag, limited_lag, smaller
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
+    ("T1", 0.5, "s", (0.0, 100.0), "fuel valve lag"),
+    ("T2", 0.5, "s", (0.0, 100.0), "turbine lag"),
+    ("T3", 3.0, "s", (0.001, 100.0), "exhaust temperature lag"),
+    ("AT", 1.0, "pu", (0.001, 10.0), "load limit by the ambient temperature"),
+    ("KT", 3.0, "1", (0.0, 1000.0), "temperature limiter gain"),
+    ("VMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the valve"),
+    ("VMIN", 0.0, "pu", (-10.0, 10.0), "floor of the valve"),
+    ("Dturb", 0.18, "pu", (0.0, 100.0), "turbine damping"),
+)
+
+RECORDS = (record("GAST", "R T1 T2 T3 AT KT VMAX VMIN Dturb"),)
+
+STATES = "V1 V2 V3"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return Pm."""
+    demand = smaller(u.pref - u.dw / p.R, p.AT + p.KT * (p.AT - s.V3))
+    v1, d.V1 = limited_lag(demand, s.V1, 1.0, p.T1, p.VMIN, p.VMAX)
+    v2, d.V2 = lag(v1, s.V2, 1.0, p.T2)
+    _, d.V3 = lag(v2, s.V3, 1.0, p.T3)
+    return v2 - p.Dturb * u.dw
+
+
+def rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states into x that hold Pm at rest and return pref."""
+    x.V1 = x.V2 = x.V3 = pm
+    return pm

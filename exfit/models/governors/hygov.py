@@ -1,0 +1,63 @@
+"""HYGOV: hydro turbine governor with a rigid penstock (PSS/E).
+
+                                 VELM
+pref ─►(+)─►[   1   ]─►[1 + sTr]─►[clip]─┬─► c ─►[   1   ]─► g
+       -▲-  [1 + sTf]  [ r sTr ]         │       [1 + sTg]
+        ├──────────────────────[R]◄──────┘
+dw ─────┘              GMAX, GMIN, -VELM
+
+g ─►[h = (q/g)^2]─►(1 - h)─►[  1  ]─► q ─►[At h (q - qNL)]─►(+)─► Pm
+                            [ sTW ]                         -▲
+dw ─►[Dturb g]───────────────────────────────────────────────┘
+
+c is the desired gate: VELM limits its rate, GMAX and GMIN its position, both
+non-windup. g is the gate, q the flow, h the head. pref is a speed, R times the
+gate at rest. A gate below 0.01 has the head of one of 0.01, where the equation
+of the flow ends. ANDES leaves the factor r Tr out of the integral of c, so it
+agrees where r Tr = 1. Not modelled: dead band and the curve of gate and power
+of later versions. Typical data are those of IEC 61970-302 (GovHydro1).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, lag, larger, limited
+from exfit.models.sheet import record, sheet
+
+SHEET = sheet(
+    ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
+    ("r", 0.3, "pu", (0.001, 100.0), "temporary droop"),
+    ("Tr", 5.0, "s", (0.001, 1000.0), "dashpot time constant"),
+    ("Tf", 0.05, "s", (0.001, 100.0), "filter lag"),
+    ("Tg", 0.5, "s", (0.0, 100.0), "gate servo lag"),
+    ("VELM", 0.2, "pu/s", (0.0001, 1000.0), "fastest motion of the gate"),
+    ("GMAX", 1.0, "pu", (-10.0, 10.0), "ceiling of the gate"),
+    ("GMIN", 0.0, "pu", (-10.0, 10.0), "floor of the gate"),
+    ("TW", 1.0, "s", (0.001, 100.0), "water starting time"),
+    ("At", 1.2, "1", (0.001, 100.0), "turbine gain"),
+    ("Dturb", 0.5, "pu", (0.0, 100.0), "turbine damping"),
+    ("qNL", 0.08, "pu", (0.0, 1.0), "flow at no load"),
+)
+
+RECORDS = (record("HYGOV", "R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL"),)
+
+STATES = "E C G Q"
+SHUT = 0.01  # pu of gate
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return Pm."""
+    c = clip(s.C, p.GMIN, p.GMAX)
+    _, d.E = lag(u.pref - u.dw - p.R * c, s.E, 1.0, p.Tf)
+    velocity = clip((s.E / p.Tr + d.E) / p.r, -p.VELM, p.VELM)
+    d.C = limited(velocity, s.C, p.GMIN, p.GMAX)
+    g, d.G = lag(c, s.G, 1.0, p.Tg)
+    h = s.Q / larger(g, SHUT)
+    h = h * h
+    d.Q = (1.0 - h) / p.TW
+    return p.At * h * (s.Q - p.qNL) - p.Dturb * g * u.dw
+
+
+def rest(pm: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states into x that hold Pm at rest and return pref."""
+    x.E = 0.0
+    x.C = x.G = x.Q = pm / p.At + p.qNL
+    return p.R * x.C

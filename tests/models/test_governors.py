@@ -1,0 +1,550 @@
+"""What every governor of the catalogue keeps to, and each against its transfer function."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from oracle import fastest_rate, float_run, leads_of, tangent_run, vector
+from scipy.integrate import solve_ivp
+
+from exfit.engine.kernel import Kernel, Span, TangentKernel
+from exfit.engine.system import Rest, System
+from exfit.models import GOVERNORS
+from exfit.models.blocks import SHORTEST, Limited
+from exfit.models.sheet import crossed_limits, typical
+from exfit.plants import Names
+from exfit.plants.parts import motion, values_named
+
+FREQUENCIES = np.geomspace(0.001, 10.0, 41)  # Hz
+SIDES = ("dw", "p", "pref")
+POWER = 0.7  # pu at the start, within all limits
+SELECTORS = ("Rselect", "Flag")
+DROOPS = (1.0, 0.0, -1.0, -2.0)  # of GGOV1, by Rselect
+
+
+@pytest.fixture(params=list(GOVERNORS))
+def governor(request):
+    return GOVERNORS[request.param]
+
+
+def seen(**changes):
+    return Names(**{"dw": 0.0, "p": POWER, "pref": 0.0, **changes})
+
+
+def lively(model):
+    """Return typical data with no block bypassed and no band dead."""
+    values = typical(model.sheet)
+    values |= {row.symbol: values[row.symbol] or 0.04 for row in model.sheet if row.is_time}
+    if model.name == "IEEEG1":
+        values |= {"K7": 0.2, "T2": 0.5, "T1": 1.0}
+    if model.name == "GGOV1":
+        values |= {"Kdgov": 0.5, "Tdgov": 0.2, "Kimw": 0.002, "Dm": 0.05, "Flag": 1.0, "Ldref": 2.0}
+        values |= {"Tc": 0.03, "Trate_Mbase": 0.9, "Aset": 9.0}
+    return values
+
+
+def resting(model, p, power=POWER):
+    """Return the states at rest, with the setpoints among them, and the reference."""
+    x = Names()
+    pref = model.rest(power, seen(p=power), p, x)
+    assert vars(x).keys() == {*model.states, *model.setpoints}
+    return x, pref
+
+
+def motion_of(model, p, x, u):
+    """Return the slopes of states (n), with their limits, and the output."""
+    d = Names()
+    pm = model.equations(x, u, p, d)
+    assert vars(d).keys() == set(model.states)
+    slopes = [getattr(d, name) for name in model.states]
+    return np.array([s.slope if isinstance(s, Limited) else s for s in slopes]), pm
+
+
+def frequency_response(model, values, power=POWER):
+    """Return Pm per unit of dw, p and pref (frequencies, 3), from central differences at rest."""
+    p, h = Names(**values), 1e-6
+    x, pref = resting(model, p, power)
+    columns = []
+    for name in (*model.states, *SIDES):
+        ends = []
+        for side in (h, -h):
+            s, u = Names(**vars(x)), seen(p=power, pref=pref)
+            held = u if name in SIDES else s
+            setattr(held, name, getattr(held, name) + side)
+            slopes, pm = motion_of(model, p, s, u)
+            ends.append(np.append(slopes, pm))
+        columns.append((ends[0] - ends[1]) / (2.0 * h))
+    whole = np.array(columns).T
+    n = len(model.states)
+    A, B, C, D = whole[:n, :n], whole[:n, n:], whole[n, :n], whole[n, n:]
+    return np.array(
+        [C @ np.linalg.solve(2j * np.pi * f * np.eye(n) - A, B) + D for f in FREQUENCIES]
+    )
+
+
+# --- the transfer functions, as the block diagrams print them -------------------------------------
+
+
+def lag(s, T):
+    return 1.0 / (1.0 + s * T)
+
+
+def lead(s, T1, T2):
+    return (1.0 + s * T1) / (1.0 + s * T2) if T2 > 0.0 else 1.0
+
+
+def tgov1(s, p):
+    forward = lag(s, p["T1"]) * lead(s, p["T2"], p["T3"]) / p["R"]
+    return [-forward - p["Dt"], 0.0, forward]
+
+
+def ieeeg1(s, p):
+    passes, turbine = 1.0, 0.0
+    for K, T in (("K1", "T4"), ("K3", "T5"), ("K5", "T6"), ("K7", "T7")):
+        passes *= lag(s, p[T])
+        turbine += p[K] * passes
+    forward = lag(s, p["T3"]) * turbine
+    return [-p["K"] * lead(s, p["T2"], p["T1"]) * forward, 0.0, forward]
+
+
+def hygov(s, p):
+    gate0 = POWER / p["At"] + p["qNL"]
+    dashpot = (1.0 + s * p["Tr"]) / (p["r"] * s * p["Tr"]) * lag(s, p["Tf"])
+    gate = dashpot / (1.0 + p["R"] * dashpot) * lag(s, p["Tg"])
+    flow = 1.0 / (1.0 + s * p["TW"] * gate0 / 2.0)
+    head = 2.0 / gate0 * (flow - 1.0)
+    forward = gate * p["At"] * (flow + head * (gate0 - p["qNL"]))
+    return [-forward - p["Dturb"] * gate0, 0.0, forward]
+
+
+def gast(s, p):
+    forward = lag(s, p["T1"]) * lag(s, p["T2"])
+    return [-forward / p["R"] - p["Dturb"], 0.0, forward]
+
+
+def ieesgo(s, p):
+    reheated = p["K2"] * lag(s, p["T5"])
+    crossed = p["K3"] * lag(s, p["T6"])
+    turbine = lag(s, p["T4"]) * (1.0 - p["K2"] + reheated * (1.0 - p["K3"] + crossed))
+    return [-p["K1"] * lag(s, p["T1"]) * lead(s, p["T2"], p["T3"]) * turbine, 0.0, turbine]
+
+
+def ggov1(s, p):
+    ratio, R, select = p["Trate_Mbase"], p["R"], p["Rselect"]
+    pid = p["Kpgov"] + p["Kigov"] / s + p["Kdgov"] * s * lag(s, p["Tdgov"])
+    actuator, turbine = lag(s, p["Tact"]), ratio * p["Kturb"] * lead(s, p["Tc"], p["Tb"])
+    fed_back = {1.0: 0.0, 0.0: 0.0, -1.0: actuator, -2.0: 1.0}[select]
+    valve = pid / (1.0 + R * fed_back * pid) * actuator
+    measured = lag(s, p["Tpelec"]) / ratio
+    of_power = -(p["Kimw"] / s + (R if select == 1.0 else 0.0)) * measured
+    valve0 = (POWER / ratio + max(p["Dm"], 0.0)) / p["Kturb"] + p["Wfnl"]
+    of_speed = p["Flag"] * valve0 * turbine - ratio * max(p["Dm"], 0.0)
+    return [-valve * turbine + of_speed, of_power * valve * turbine, valve * turbine]
+
+
+FUNCTIONS = {
+    "TGOV1": tgov1,
+    "IEEEG1": ieeeg1,
+    "HYGOV": hygov,
+    "GAST": gast,
+    "IEESGO": ieesgo,
+    "GGOV1": ggov1,
+}
+
+
+def assert_is_its_function(model, values):
+    got = frequency_response(model, values)
+    expected = np.array([FUNCTIONS[model.name](2j * np.pi * f, values) for f in FREQUENCIES])
+    # differences of 1e-6 err by 1e-10 of rounding, over rates of up to 100 per second
+    assert np.abs(got - expected).max() < 1e-7 * np.abs(expected).max()
+
+
+def test_every_governor_has_a_transfer_function_here():
+    assert FUNCTIONS.keys() == GOVERNORS.keys()
+
+
+def test_the_response_is_the_product_of_the_blocks(governor):
+    assert_is_its_function(governor, typical(governor.sheet))
+    assert_is_its_function(governor, lively(governor))
+
+
+def test_the_response_is_the_product_of_the_blocks_for_drawn_values(governor):
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        values = lively(governor)
+        moved = {row.symbol for row in governor.sheet if row.unit in ("s", "1/s")}
+        moved |= {"R", "r", "K", "K1", "K2", "KT", "Kpgov"}
+        values |= {name: values[name] * 1.5 ** rng.uniform(-1.0, 1.0) for name in moved & {*values}}
+        assert_is_its_function(governor, values)
+
+
+@pytest.mark.parametrize("select", DROOPS)
+@pytest.mark.parametrize("flag", [0.0, 1.0])
+def test_the_droop_of_GGOV1_is_of_the_signal_that_Rselect_names(select, flag):
+    model = GOVERNORS["GGOV1"]
+    assert_is_its_function(model, lively(model) | {"Rselect": select, "Flag": flag})
+
+
+def test_a_time_constant_of_zero_is_the_limit_of_a_small_one(governor):
+    rows = {row.symbol: row for row in governor.sheet}
+    for row in governor.sheet:
+        if not row.is_time or row.low > 0.0:
+            continue
+        values = lively(governor) | dict.fromkeys(leads_of(row.symbol, rows), 0.0)
+        none, small, twice = (
+            frequency_response(governor, values | {row.symbol: T})
+            for T in (0.0, SHORTEST, 2.0 * SHORTEST)
+        )
+        # a T + b T^2 + ...: the small ones tell a; 2 (2 pi 10 Hz SHORTEST)^2 = 8e-5 remains
+        assert np.abs(2.0 * small - twice - none).max() < 1e-3 * np.abs(none).max(), row.symbol
+
+
+def test_a_turbine_of_another_rating_is_that_of_its_own_base():
+    """Per unit of the turbine the same unit: power and limits are on its base."""
+    model, ratio = GOVERNORS["GGOV1"], 0.8
+    values = lively(model)
+    one = frequency_response(model, values | {"Trate_Mbase": 1.0}, POWER)
+    other = frequency_response(model, values | {"Trate_Mbase": ratio}, ratio * POWER)
+    np.testing.assert_allclose(other, one * [ratio, 1.0, ratio], rtol=1e-6)
+
+
+# --- rest -----------------------------------------------------------------------------------------
+
+
+def test_rest_is_rest_at_any_power(governor):
+    for values in (typical(governor.sheet), lively(governor)):
+        for power in (0.3, 0.6, 0.85):
+            p = Names(**values)
+            x, pref = resting(governor, p, power)
+            slopes, pm = motion_of(governor, p, x, seen(p=power, pref=pref))
+            assert pm == pytest.approx(power, abs=1e-14)
+            assert np.abs(slopes).max() < 1e-13
+
+
+@pytest.mark.parametrize("change", [{"Kpload": 0.0}, {"Ka": 0.0}, {"R": 0.0, "Rselect": 0.0}])
+def test_GGOV1_rests_without_one_of_its_parts(change):
+    model = GOVERNORS["GGOV1"]
+    p = Names(**typical(model.sheet) | change)
+    x, pref = resting(model, p)
+    slopes, pm = motion_of(model, p, x, seen(pref=pref))
+    assert pm == pytest.approx(POWER, abs=1e-14)
+    assert np.abs(slopes).max() < 1e-13
+
+
+def test_a_unit_above_its_load_limit_is_not_at_rest():
+    for name, change in (("GAST", {"AT": 0.6}), ("GGOV1", {"Ldref": 0.6})):
+        model = GOVERNORS[name]
+        p = Names(**typical(model.sheet) | change)
+        x, pref = resting(model, p)
+        slopes, _ = motion_of(model, p, x, seen(pref=pref))
+        assert np.abs(slopes).max() > 0.01, name
+
+
+# --- the compiled code ----------------------------------------------------------------------------
+
+
+def as_system(model):
+    """Return a governor alone; the inputs are changes of the speed, the power and the reference."""
+
+    def rest(p):
+        x, pref = resting(model, sheet_of(p), p["Pm"])
+        states = {name: getattr(x, name) for name in model.states}
+        return Rest(states, {"pref0": pref, **{n: getattr(x, n) for n in model.setpoints}})
+
+    def sheet_of(p):
+        return Names(**{row.symbol: p[row.symbol] for row in model.sheet})
+
+    def course(p, r, x, u):
+        d = Names()
+        at = Names(dw=u["dw"], p=p["Pm"] + u["p"], pref=r["pref0"] + u["pref"])
+        s = Names(**vars(values_named(x, model.states)), **{n: r[n] for n in model.setpoints})
+        pm = model.equations(s, at, sheet_of(p), d)
+        return motion(d, model.states, {"pm": pm, **x})
+
+    return System(
+        parameters=(*(row.symbol for row in model.sheet), "Pm"),
+        setpoints=("pref0", *model.setpoints),
+        states=model.states,
+        inputs=SIDES,
+        outputs=("pm", *model.states),
+        time_constants=tuple(row.symbol for row in model.sheet if row.is_time),
+        rest=rest,
+        motion=course,
+    )
+
+
+def run(model, values, u, step, parts=1):
+    """Return the outputs (n + 1, outputs) of the compiled governor."""
+    system = as_system(model)
+    code, p = Kernel(system, system.outputs), vector(system, values)[:, None]
+    (out,) = code.run(p, code.start(p), [Span(u, step, parts)])
+    return out[:, :, 0]
+
+
+def swing(size, count=2001, step=5e-3):
+    """Return a decaying swing of the speed, with the power and the reference at their start."""
+    time = step * np.arange(count)
+    u = np.zeros((count, len(SIDES)))
+    u[:, 0] = size * np.sin(1.5 * time) * np.exp(-0.1 * time)
+    return u
+
+
+def test_compiled_code_gives_what_the_plain_equations_give(governor):
+    values = lively(governor) | {"Pm": POWER}
+    if "db" in values:
+        values |= {"db": 0.001, "Aset": 0.01, "Ldref": 0.75}
+    u, system = swing(0.05, 601), as_system(governor)
+    u[:, 1] = -0.2 * u[:, 0] / 0.05
+    (expected,) = float_run(system, values, system.outputs, [Span(u, 5e-3, 1)])
+    got = run(governor, values, u, 5e-3)
+    assert np.ptp(got[:, 0]) > 0.05
+    assert np.abs(got - expected).max() < 1e-11 * np.abs(expected).max()
+
+
+def test_a_flat_run_stays_flat_for_a_minute(governor):
+    for values in (typical(governor.sheet), lively(governor)):
+        got = run(governor, values | {"Pm": POWER}, np.zeros((12_001, len(SIDES))), 5e-3)
+        assert np.abs(got[:, 0] - POWER).max() < 1e-12
+
+
+def test_halving_the_step_cuts_the_error_sixteenfold(governor):
+    """In a swing of the speed that meets no limit; the inputs are lines between 51 points."""
+    values = lively(governor) | {"Pm": POWER}
+    u = swing(2e-3, 51, 0.04)
+    parts = int(np.ceil(0.04 * fastest_rate(as_system(governor), values) / 0.5))
+    ends = {k: run(governor, values, u, 0.04, k * parts)[:, 0] for k in (1, 2, 4, 32)}
+    errors = [np.abs(ends[k] - ends[32]).max() for k in (1, 2, 4)]
+    for coarse, fine in pairwise(errors):
+        # the next term of the error is smaller by step * rate
+        assert 14.0 < coarse / fine < 21.0
+
+
+def test_derivatives_are_those_of_the_response(governor):
+    """In a swing that meets the limits, whose instants move with a parameter."""
+    values = lively(governor) | {"Pm": POWER}
+    system, u = as_system(governor), swing(0.02, 801)
+    free = [name for name in system.parameters if values[name] != 0.0 and name not in SELECTORS]
+    code = TangentKernel(system, ("pm",), free)
+    p, names = vector(system, values), list(system.parameters)
+    dp = np.zeros((len(p), len(free)))
+    for k, symbol in enumerate(free):
+        dp[names.index(symbol), k] = values[symbol]
+    _, (slopes,) = tangent_run(code, p, dp, [Span(u, 5e-3, 1)])
+    for k, symbol in enumerate(free):
+        sides = [values | {symbol: values[symbol] * (1.0 + side)} for side in (1e-4, -1e-4)]
+        up, down = (run(governor, side, u, 5e-3)[:, 0] for side in sides)
+        difference, size = (up - down) / 2e-4, np.abs(up - POWER).max()
+        # where a limit is met at another step, the difference is that of two courses
+        assert np.abs(slopes[:, 0, k] - difference).max() < 2e-3 * size, symbol
+
+
+# --- a second typing, integrated by another method ------------------------------------------------
+
+
+def stopped(rate, x, low, high):
+    """Return the rate of something that stands still where it would leave its range."""
+    return 0.0 if (x >= high and rate > 0.0) or (x <= low and rate < 0.0) else rate
+
+
+def typed_tgov1(x, w, pe, ref, p):
+    valve, reheat = np.clip(x[0], p["VMIN"], p["VMAX"]), x[1]
+    opening = ((ref - w) / p["R"] - valve) / p["T1"]
+    share = p["T2"] / p["T3"]
+    return [stopped(opening, x[0], p["VMIN"], p["VMAX"]), (valve - reheat) / p["T3"]], (
+        share * valve + (1.0 - share) * reheat - p["Dt"] * w
+    )
+
+
+def typed_ieeeg1(x, w, pe, ref, p):
+    slow, valve = x[0], np.clip(x[1], p["PMIN"], p["PMAX"])
+    share = p["T2"] / p["T1"]
+    speed = p["K"] * (share * w + (1.0 - share) * slow)
+    opening = max(p["UC"], min(p["UO"], (ref - speed - valve) / p["T3"]))
+    pressures = [valve, *x[2:]]
+    flows = [
+        (before - after) / p[T]
+        for before, after, T in zip(pressures, x[2:], ("T4", "T5", "T6", "T7"), strict=False)
+    ]
+    power = sum(p[K] * level for K, level in zip(("K1", "K3", "K5", "K7"), x[2:], strict=True))
+    return [(w - slow) / p["T1"], stopped(opening, x[1], p["PMIN"], p["PMAX"]), *flows], power
+
+
+def typed_hygov(x, w, pe, ref, p):
+    filtered, wanted, gate, flow = x
+    wanted = np.clip(wanted, p["GMIN"], p["GMAX"])
+    d_filtered = (ref - w - p["R"] * wanted - filtered) / p["Tf"]
+    d_wanted = d_filtered / p["r"] + filtered / (p["r"] * p["Tr"])
+    d_wanted = max(-p["VELM"], min(p["VELM"], d_wanted))
+    head = flow**2 / gate**2
+    power = p["At"] * head * (flow - p["qNL"]) - p["Dturb"] * w * gate
+    return [
+        d_filtered,
+        stopped(d_wanted, x[1], p["GMIN"], p["GMAX"]),
+        (wanted - gate) / p["Tg"],
+        (1.0 - head) / p["TW"],
+    ], power
+
+
+def typed_gast(x, w, pe, ref, p):
+    valve, fuel, exhaust = np.clip(x[0], p["VMIN"], p["VMAX"]), x[1], x[2]
+    demand = min(ref - w / p["R"], (1.0 + p["KT"]) * p["AT"] - p["KT"] * exhaust)
+    return [
+        stopped((demand - valve) / p["T1"], x[0], p["VMIN"], p["VMAX"]),
+        (valve - fuel) / p["T2"],
+        (fuel - exhaust) / p["T3"],
+    ], fuel - p["Dturb"] * w
+
+
+def typed_ieesgo(x, w, pe, ref, p):
+    slow, slower, inlet, reheat, crossed = x
+    share = p["T2"] / p["T3"]
+    demand = min(p["PMAX"], max(p["PMIN"], ref - share * slow - (1.0 - share) * slower))
+    return [
+        (p["K1"] * w - slow) / p["T1"],
+        (slow - slower) / p["T3"],
+        (demand - inlet) / p["T4"],
+        (inlet - reheat / p["K2"]) * p["K2"] / p["T5"],
+        (reheat - crossed / p["K3"]) * p["K3"] / p["T6"],
+    ], inlet * (1.0 - p["K2"]) + reheat * (1.0 - p["K3"]) + crossed
+
+
+def typed_ggov1(x, w, pe, ref, p):
+    measured, mw, slow_error, integral, valve, turbine, warm, hot, load, slow_w, allowed = x
+    base, stiff = p["Trate_Mbase"], p["Kdgov"] / p["Tdgov"]
+    pe0 = POWER / base
+    error = ref + mw - w - p["R"] * measured  # Rselect = 1
+    error = np.sign(error) * max(abs(error) - p["db"], 0.0)
+    error = min(p["MAXERR"], max(p["MINERR"], error))
+    asked = p["Kpgov"] * error + stiff * (error - slow_error) + integral
+    room = p["Ldref"] / p["Kturb"] + p["Wfnl"] - hot
+    may = p["Kpload"] * room + load
+    fuel = min(p["VMAX"], max(p["VMIN"], min(asked, may, 1.0, allowed)))
+    burnt = valve * (1.0 + w)  # Flag = 1
+    into = p["Kturb"] * (burnt - p["Wfnl"])
+    share, shape = p["Tc"] / p["Tb"], p["Tsa"] / p["Tsb"]
+    opening = min(p["Ropen"], max(p["Rclose"], (fuel - valve) / p["Tact"]))
+    return [
+        (pe / base - measured) / p["Tpelec"],
+        stopped(p["Kimw"] * (pe0 - measured), mw, -1.1 * p["R"], 1.1 * p["R"]),
+        (error - slow_error) / p["Tdgov"],
+        p["Kigov"] / p["Kpgov"] * (fuel - stiff * (error - slow_error) - integral),
+        stopped(opening, valve, p["VMIN"], p["VMAX"]),
+        (into - turbine) / p["Tb"],
+        (burnt - warm) / p["Tsb"],
+        (shape * burnt + (1.0 - shape) * warm - hot) / p["Tfload"],
+        p["Kiload"] / p["Kpload"] * (fuel - load),
+        (w - slow_w) / p["Ta"],
+        (fuel - allowed) / 0.01 + p["Ka"] * (p["Aset"] - (w - slow_w) / p["Ta"]),
+    ], base * (share * into + (1.0 - share) * turbine - p["Dm"] * (1.0 + w))
+
+
+TYPED = {
+    "TGOV1": (typed_tgov1, 0.06, {}),
+    "IEEEG1": (typed_ieeeg1, 0.06, {"UC": -0.5, "UO": 0.3, "PMAX": 0.75}),
+    "HYGOV": (typed_hygov, 0.03, {"GMIN": 0.6, "GMAX": 0.72}),
+    "GAST": (typed_gast, 0.06, {"AT": 0.8}),
+    "IEESGO": (typed_ieesgo, 0.1, {}),
+    "GGOV1": (typed_ggov1, 0.05, {"db": 0.002, "Aset": 0.01, "Ldref": 0.8, "VMIN": 0.62}),
+}
+# the states that both limits stop, with these
+STOPPED = {
+    "TGOV1": ("V1", "VMIN", "VMAX"),
+    "IEEEG1": ("VALVE", "PMIN", "PMAX"),
+    "HYGOV": ("C", "GMIN", "GMAX"),
+}
+
+
+def test_every_governor_is_typed_a_second_time():
+    assert TYPED.keys() == GOVERNORS.keys()
+
+
+def test_another_typing_and_method_reach_and_leave_the_limits_together(governor):
+    """The speed swings by so much that the limits act, and the power falls and comes back."""
+    typed, size, change = TYPED[governor.name]
+    values = lively(governor) | {"Pm": POWER} | change
+    step = 2e-3
+    u = swing(size, 5001, step)
+    u[:, 1] = -0.5 * u[:, 0]
+    got = run(governor, values, u, step)
+    time = step * np.arange(len(got))
+    x0, ref = resting(governor, Names(**values))
+
+    def at(t):
+        w = size * np.sin(1.5 * t) * np.exp(-0.1 * t)
+        return w, POWER - 0.5 * w
+
+    start = [getattr(x0, name) for name in governor.states]
+    x = solve_ivp(
+        lambda t, x: typed(x, *at(t), ref, values)[0],
+        (0.0, time[-1]),
+        start,
+        "DOP853",
+        time,
+        rtol=1e-8,
+        atol=1e-10,
+        max_step=0.02,
+    ).y
+    expected = np.array([typed(x[:, k], *at(t), ref, values)[1] for k, t in enumerate(time)])
+    assert np.ptp(expected) > 0.1
+    if governor.name in STOPPED:
+        name, low, high = STOPPED[governor.name]
+        state = got[:, 1 + governor.states.index(name)]
+        assert (state.min(), state.max()) == (values[low], values[high])
+    # a limit is met within a step: what the states do in a part of one
+    assert np.abs(got[:, 0] - expected).max() < 1e-4 * np.ptp(expected)
+
+
+def test_no_parameter_is_inert(governor):
+    rng = np.random.default_rng(2)
+    values = lively(governor)
+    rows = {row.symbol: row for row in governor.sheet}
+    changes = {"Rselect": -2.0, "db": 0.01, "Dt": 1.0, "Ldref": 0.0}
+
+    def felt(changed):
+        motions = []
+        for size in (1e-3, 0.1, 10.0):
+            for _ in range(20):
+                # none beyond zero: a gate or a speed that is negative has no head
+                s = Names(**{name: size * abs(rng.normal()) for name in governor.states})
+                s = Names(**vars(s), **dict.fromkeys(governor.setpoints, POWER))
+                u = Names(dw=size * rng.uniform(-0.09, 0.09), p=size, pref=0.1 * size)
+                slopes, pm = motion_of(governor, Names(**changed), s, u)
+                motions.append([*slopes, pm])
+        return np.array(motions)
+
+    for symbol in rows:
+        rng = np.random.default_rng(2)
+        before = felt(values)
+        rng = np.random.default_rng(2)
+        after = felt(values | {symbol: changes.get(symbol, 0.5 * values[symbol] or 1.0)})
+        assert np.abs(after - before).max() > 1e-6, symbol
+
+
+# --- sheets and records ---------------------------------------------------------------------------
+
+
+def test_a_sheet_names_each_parameter_once_within_its_range(governor):
+    for column in ("symbol", "meaning"):
+        entries = [getattr(row, column) for row in governor.sheet]
+        assert len(set(entries)) == len(entries)
+    for row in governor.sheet:
+        assert row.symbol.isidentifier()
+        assert row.unit
+        assert row.low <= row.typical <= row.high, row.symbol
+    assert list(crossed_limits(typical(governor.sheet))) == []
+
+
+def test_a_drawing_is_narrow_and_shows_every_parameter(governor):
+    text = governor.title + governor.drawing
+    assert governor.title
+    assert max(map(len, governor.drawing.splitlines())) <= 80
+    for row in governor.sheet:
+        assert row.symbol in text, row.symbol
+
+
+def test_a_record_lists_every_parameter_once(governor):
+    for record in governor.records:
+        symbols = [row.symbol for row in governor.sheet]
+        integers = [name for name, _ in record.icons if name in symbols]
+        listed = [*record.cons, *integers, *dict(record.held)]
+        assert sorted(listed) == sorted([*symbols, *dict(record.absent)])
