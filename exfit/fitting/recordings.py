@@ -13,19 +13,25 @@ from exfit.case.checks.record import BEFORE_RECORD
 from exfit.case.schema import (
     BumpTest,
     ChannelSection,
+    CurrentPhasor,
     PhasesSection,
+    PhasorsSection,
     RecordFile,
     Recording,
     ReferenceFile,
+    StatusSection,
     Time,
     TimeColumn,
     Unknown,
+    VoltagePhasor,
     start_value,
 )
 from exfit.errors import CaseError, RecordError
 from exfit.records.clock import Clock
+from exfit.records.phasors import Phasor, Phasors
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
+from exfit.records.status import Status
 from exfit.util.sorting import median
 from exfit.util.text import show
 
@@ -102,6 +108,8 @@ def read_section(file: RecordFile, folder: Path, per_unit: bool) -> Record:
             if per_unit and standing_alone(channel)
         ),
         file.memory,
+        phasors_of(file.phasors),
+        status_of(file.status),
     )
 
 
@@ -175,6 +183,26 @@ def clock_of(time: Time) -> Clock:
     if isinstance(time, TimeColumn):
         return Clock((time.column,), time.unit)
     return Clock(time)
+
+
+def phasors_of(section: PhasorsSection | None) -> Phasors | None:
+    """Return the phasors of a record, None without any."""
+    if section is None:
+        return None
+    current = None if section.current is None else _phasor(section.current)
+    return Phasors(_phasor(section.voltage), current, section.kV, section.MVA)
+
+
+def _phasor(section: VoltagePhasor | CurrentPhasor) -> Phasor:
+    connection = section.connection if isinstance(section, VoltagePhasor) else None
+    return Phasor(section.magnitude, section.angle, section.unit, section.angle_unit, connection)
+
+
+def status_of(section: StatusSection | None) -> Status | None:
+    """Return the flags of a record, None without any."""
+    if section is None:
+        return None
+    return Status(section.column, tuple(map(str, section.accept)))
 
 
 def column_of(channel: ChannelSection) -> Column:

@@ -1,13 +1,14 @@
 """The clock of a record: the columns that hold the time, its unit, and its validity."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from exfit.errors import RecordError
+from exfit.records.epoch import EpochError, from_first, is_epoch, of_soc, soc_columns
 from exfit.records.formats.table import Array, column_error
 from exfit.records.units import SECONDS, alike, bare, usual
 from exfit.util.magnitude import LARGEST
@@ -58,6 +59,9 @@ def find_clock(
 
 def _by_name(words: dict[str, str]) -> tuple[str, ...]:
     """Return the columns of the time, given the plain words of each name."""
+    soc = soc_columns(words)
+    if soc:
+        return soc
     stamps = [name for name, word in words.items() if word in TIMESTAMP_NAMES]
     dates = [name for name, word in words.items() if word in DATE_NAMES]
     times = [name for name, word in words.items() if TIME_NAME.fullmatch(word)]
@@ -70,8 +74,8 @@ def in_seconds(
     """Return the numbers (M,) of a time column in s.
 
     ``stated`` is the unit that the file itself gives, ``requested`` the one that the caller gives;
-    without either it is s. Raises RecordError for a unit that is none of time, and where the two
-    contradict each other.
+    without either it is s, or an epoch. Epochs count from the first sample. Raises RecordError for
+    a unit that is none of time, and where the two contradict each other.
     """
     units = [unit for unit in (stated, requested) if unit is not None]
     for unit in units:
@@ -79,9 +83,24 @@ def in_seconds(
             raise column_error(path, column, f"{unit} is not a unit of time: {', '.join(SECONDS)}")
     if stated is not None and requested is not None and not alike(stated, requested):
         raise column_error(path, column, f"in {stated} as the file says, not in {requested}")
-    factor = SECONDS[usual(units[0])] if units else 1.0
+    if not units:
+        return from_first(numbers)
+    factor = SECONDS[usual(units[0])]
     # the reciprocal is a whole number: no digit of 5 ms is lost
-    return numbers / round(1.0 / factor) if factor < 1.0 else numbers * factor
+    seconds = numbers / round(1.0 / factor) if factor < 1.0 else numbers * factor
+    return seconds - seconds[0] if is_epoch(seconds) else seconds
+
+
+def soc_in_seconds(path: Path, columns: Sequence[str], numbers: Mapping[str, Array]) -> Array:
+    """Return the time (M,) in s since the first sample, of the columns SOC and FRACSEC.
+
+    Raises RecordError where they are no such counts.
+    """
+    second, fraction = columns
+    try:
+        return of_soc(numbers[second], numbers[fraction])
+    except EpochError as fault:
+        raise column_error(path, columns[fault.column], str(fault)) from None
 
 
 def check_finite(time: Array, label: str, place: Callable[[int], str]) -> None:

@@ -1,7 +1,7 @@
 """Read a record: the columns of a recorder's file become signals per unit."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, NamedTuple, Protocol
@@ -21,13 +21,16 @@ from exfit.records.clock import (
 )
 from exfit.records.formats import open_table
 from exfit.records.formats.table import NONE, Table, column_error, read_bytes, refuse_uneven
+from exfit.records.phasors import Phasors, PhasorTable, smooth_angle
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
+from exfit.records.status import Status, bad_rows, status_error
 from exfit.records.units import alike, needs_base, unit_of, usual
 from exfit.util.magnitude import LARGEST, SMALLEST
 
 Rows = NDArray[np.intp]
 
 PERCENT = "%"
+ANGLE = "angle"
 
 
 class ChannelLike(Protocol):
@@ -88,6 +91,8 @@ def read_record(
     rate: float | None = None,
     per_unit: frozenset[str] = NONE,
     memory: float | None = None,
+    phasors: Phasors | None = None,
+    status: Status | None = None,
 ) -> Record:
     """Return the record of a file: each signal is ``column / base * scale + offset``.
 
@@ -104,30 +109,31 @@ def read_record(
         rate: Hz, of a slower, even clock; None: the record's own.
         per_unit: signals whose columns are taken for per unit: the file must not say otherwise.
         memory: what reading may take, GB; None: 1, or four times the file's size up to 4.
+        phasors: of a PMU, from which further columns are computed: phasors.vt and others.
+        status: the flags of the rows; those of a row that is bad are missing samples.
 
     Raises:
         RecordError: a file that cannot be read or needs more memory, a column that is missing, in
             another unit or of another length than the time, a cell that is no finite number, time
             that does not increase, fewer than two samples, a signal without any, waveforms that
-            are none, or a record that cannot be resampled.
+            are none, a record that cannot be resampled, a row that its flags call bad where no
+            sample may be missing, or an angle whose turns cannot be counted.
     """
-    table = open_table(path, sheet, memory)
+    file = open_table(path, sheet, memory)
+    table = file if phasors is None else PhasorTable(file, phasors)
     _check_units(table, channels, per_unit)
-    time = table.instants(clock.columns, clock.unit)
-    check_finite(time, clock.label, table.place)
-    check_increasing(time, clock.label, table.place)
-    check_steps(time, clock.label, table.place)
+    time = _instants(table, clock)
     columns = _columns(table, clock, channels, missing)
     refuse_uneven(path, {clock.columns[0]: time} | columns)
     rows = _rows_in_window(path, time, window)
+    if status is not None:
+        _leave_out(file, status, columns, rows, missing)
     voltages = {
         name: _of_phases(table, time, columns, channel, rows)
         for name, channel in channels.items()
         if isinstance(channel, ThreePhases)
     }
-    for voltage in voltages.values():
-        if voltage.window is not None:
-            rows = rows[np.isfinite(voltage.samples[rows])]
+    rows = _within_windows(voltages.values(), rows)
     signals = {
         name: voltages[name].samples[rows]
         if isinstance(channel, ThreePhases)
@@ -135,6 +141,8 @@ def read_record(
         for name, channel in channels.items()
     }
     time = time[rows]
+    if ANGLE in signals:
+        signals[ANGLE] = _smooth_angle(table, channels[ANGLE], signals[ANGLE], rows)
     if rate is not None:
         time, signals = _resampled(path, time, signals, rate)
     return Record(
@@ -163,6 +171,49 @@ def _columns(
     names = [name for channel in channels.values() for name in _column_names(channel)]
     gappy = frozenset(names) - {*clock.columns} if missing else NONE
     return table.numbers(dict.fromkeys(names), gappy)
+
+
+def _within_windows(voltages: Iterable[_PhaseVoltage], rows: Rows) -> Rows:
+    """Return those rows in which every voltage of waveforms is known."""
+    for voltage in voltages:
+        if voltage.window is not None:
+            rows = rows[np.isfinite(voltage.samples[rows])]
+    return rows
+
+
+def _instants(table: Table, clock: Clock) -> Array:
+    """Return the time (M,) in s; raises RecordError where it does not increase."""
+    time = table.instants(clock.columns, clock.unit)
+    check_finite(time, clock.label, table.place)
+    check_increasing(time, clock.label, table.place)
+    check_steps(time, clock.label, table.place)
+    return time
+
+
+def _smooth_angle(
+    table: Table, channel: ChannelLike | ThreePhases, angle: Array, rows: Rows
+) -> Array:
+    """Return the angle (M,) in the given rows without jumps by whole turns."""
+    label = f"column {_column_names(channel)[0]!r}"
+    return smooth_angle(lambda row: table.place(int(rows[row])), label, angle)
+
+
+def _leave_out(
+    table: Table, status: Status, columns: dict[str, Array], rows: Rows, missing: bool
+) -> None:
+    """Put nan into those of the given rows that their flags call bad.
+
+    Raises RecordError where no sample may be missing.
+    """
+    considered = {*map(int, rows)}
+    bad = [row for row in bad_rows(table, status) if row.row in considered]
+    if not bad:
+        return
+    if not missing:
+        raise status_error(table, status, bad)
+    for name, column in columns.items():
+        columns[name] = np.array(column)
+        columns[name][[row.row for row in bad]] = np.nan
 
 
 def _of_phases(

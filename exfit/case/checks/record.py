@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from exfit.case.checks.bump_test import instants_of
 from exfit.case.checks.node import ContentNode
+from exfit.case.checks.phasors import phasors_faults
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
 from exfit.records.units import needs_base
@@ -28,6 +29,7 @@ def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
         yield record.at("resample").fault(text)
     for interval in record.at("mask").entries:
         yield from _order_faults(interval)
+    yield from phasors_faults(record)
     yield from _start_faults(test, record.at("channels"))
     yield from _order_faults(record.at("window"))
     yield from _window_faults(test, record.at("window").pair)

@@ -6,6 +6,12 @@ The descriptions reach editors through the JSON Schema, and the documentation of
 from exfit.case.schema.columns import Filter, MedianSection, Time, TimeColumn
 from exfit.case.schema.document import CaseDocument
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
+from exfit.case.schema.phasors import (
+    CurrentPhasor,
+    PhasorsSection,
+    StatusSection,
+    VoltagePhasor,
+)
 from exfit.case.schema.plants import InfiniteBus, OpenCircuit, Plant, SaturationName, Stabiliser
 from exfit.case.schema.programme import RecordedBump, RecordedRejection, TestOfProgramme
 from exfit.case.schema.records import (
@@ -43,6 +49,7 @@ __all__ = [
     "CaseDocument",
     "ChannelSection",
     "CriteriaSection",
+    "CurrentPhasor",
     "CurveColumn",
     "Estimate",
     "Filter",
@@ -54,6 +61,7 @@ __all__ = [
     "OpenCircuit",
     "Parameters",
     "PhasesSection",
+    "PhasorsSection",
     "Plant",
     "PointColumn",
     "RecordFile",
@@ -69,6 +77,7 @@ __all__ = [
     "SimulationSection",
     "SineSection",
     "Stabiliser",
+    "StatusSection",
     "SteadyTest",
     "StepSection",
     "Switch",
@@ -77,5 +86,6 @@ __all__ = [
     "TimeColumn",
     "Unknown",
     "Value",
+    "VoltagePhasor",
     "start_value",
 ]

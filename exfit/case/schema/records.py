@@ -15,6 +15,7 @@ from pydantic import (
 
 from exfit.case.messages import FILE_NAME
 from exfit.case.schema.columns import Filter, Time
+from exfit.case.schema.phasors import PhasorsSection, StatusSection
 from exfit.case.schema.plants import AloneOnLoad, OffLine, OnLine
 from exfit.case.schema.tests import BumpTest
 from exfit.case.schema.values import Count, Findable, Number, Positive, Section, Text, thawed
@@ -145,6 +146,16 @@ class RecordFile(Section):
         AfterValidator(MappingProxyType),
         WrapSerializer(thawed),
     ] = Field(description="Measured signals: the name of a column, or a mapping.")
+    phasors: PhasorsSection | None = Field(
+        default=None,
+        description="Voltage and current phasors of a PMU, from which the columns phasors.vt, "
+        "phasors.angle, phasors.p, phasors.q and phasors.it are computed.",
+    )
+    status: StatusSection | None = Field(
+        default=None,
+        description="Column with the flags of a PMU: rows that are not valid are refused, or left "
+        "out with gaps: skip.",
+    )
     window: tuple[Number, Number] | None = Field(
         default=None,
         description="Start and end of the part that is used, s; default: the whole record.",

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.clock import find_clock, in_seconds
+from exfit.records.clock import find_clock, in_seconds, soc_in_seconds
+from exfit.records.epoch import are_soc
 from exfit.records.formats.table import (
     NONE,
     Array,
@@ -66,11 +67,13 @@ class Columns:
         return columns
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s; of timestamps, since the first of them.
+        """Return the time (M,) in s; of timestamps and epochs, since the first of them.
 
         ``columns`` are one, or a date and a time of day; ``unit`` is that of numbers: s, ms, us or
         min. Raises RecordError where it contradicts the file, and where a sample is missing.
         """
+        if are_soc(columns):
+            return soc_in_seconds(self.path, columns, self.numbers(columns))
         self.refuse_larger(columns)
         places = positions(self.path, self.names, columns)
         whole = {name: self._whole(name, at) for name, at in places.items()}

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from exfit.errors import RecordError
 from exfit.records.formats.cells import CELL_SHOWN, INFINITE, NUMBER, is_missing
 from exfit.records.formats.decoding import Text
-from exfit.records.formats.heads import is_units, names_of, units_of
+from exfit.records.formats.heads import are_channel_types, is_units, names_of, units_of
 from exfit.records.formats.memory import MemoryLimit
 from exfit.records.formats.timestamps import is_timestamp
 
@@ -284,7 +284,7 @@ def _heading(above: Sequence[TextRow], first: TextRow, shape: _Shape) -> _Headin
     """Return what the rows above the ``first`` row of numbers call its columns."""
     plain = [row for row in above if not row.comment]
     for rows in (plain, [row for row in above if row.comment]):
-        heading = _named(rows, shape)
+        heading = _named_above_types(rows, shape) or _named(rows, shape)
         if heading is not None:
             return heading
     return _Heading(fault=_fault_of_names(plain, first, shape))
@@ -304,6 +304,18 @@ def _named(rows: Sequence[TextRow], shape: _Shape) -> _Heading | None:
     if shape.ends_empty and not names[-1]:
         names = names[:-1]
     return _Heading(names, units)
+
+
+def _named_above_types(rows: Sequence[TextRow], shape: _Shape) -> _Heading | None:
+    """Return the names and units about a row of types of channels, None without one.
+
+    A JSIS file has rows of names, types, units and descriptions.
+    """
+    types = next((at for at, row in enumerate(rows) if are_channel_types(row.cells)), 0)
+    if not 0 < types < len(rows) - 1:
+        return None
+    names, units = (_fitted(rows[at], shape) for at in (types - 1, types + 1))
+    return _Heading(names, units) if any(names) and is_units(units) else None
 
 
 def _fault_of_names(plain: Sequence[TextRow], first: TextRow, shape: _Shape) -> str | None:

@@ -9,6 +9,13 @@ from collections.abc import Mapping, Sequence
 
 from exfit.records.units import unit_in, unit_of
 
+# the types of channels in the second row of a JSIS file (WECC, 2013)
+CHANNEL_TYPES = frozenset(
+    ("T", "VMP", "VAP", "VMA", "VAA", "VMB", "VAB", "VMC", "VAC", "VMN", "VAN", "VP", "IMP", "IAP",
+     "IMA", "IAA", "IMB", "IAB", "IMC", "IAC", "IMN", "IAN", "IP", "F", "R", "P", "Q", "S", "Z",
+     "CP", "CQ", "D", "SC", "OTHER")
+)  # fmt: skip
+FEWEST_TYPES = 3
 NO_UNIT = ("", "-", "1", "[-]", "[1]")
 
 
@@ -20,6 +27,12 @@ def names_of(cells: Sequence[str]) -> tuple[str, ...]:
 def is_units(cells: Sequence[str]) -> bool:
     """Return whether a row is one of units: each cell is a unit, or the mark that there is none."""
     return all(cell.strip() in NO_UNIT or unit_of(cell) for cell in cells)
+
+
+def are_channel_types(cells: Sequence[str]) -> bool:
+    """Return whether a row is that of the types of channels in a JSIS file."""
+    filled = [cell.strip().upper() for cell in cells if cell.strip()]
+    return len(filled) >= FEWEST_TYPES and CHANNEL_TYPES.issuperset(filled)
 
 
 def units_of(names: Sequence[str], row: Sequence[str] = ()) -> dict[str, str]:

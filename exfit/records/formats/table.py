@@ -47,7 +47,7 @@ class Table(Protocol):
         """
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s; of timestamps, since the first of them.
+        """Return the time (M,) in s; of timestamps and epochs, since the first of them.
 
         ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
         RecordError where it contradicts the file, or a cell is neither number nor timestamp.

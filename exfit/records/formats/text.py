@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.errors import RecordError
-from exfit.records.clock import find_clock, in_seconds
+from exfit.records.clock import find_clock, in_seconds, soc_in_seconds
+from exfit.records.epoch import are_soc
 from exfit.records.formats.cells import is_missing, is_number, quoted, why_not
 from exfit.records.formats.decoding import Text, decoded
 from exfit.records.formats.dialect import (
@@ -87,12 +88,14 @@ class TextTable:
         return {name: data[:, at] for at, name in enumerate(places)}
 
     def instants(self, columns: Sequence[str], unit: str | None = None) -> Array:
-        """Return the time (M,) in s; of timestamps, since the first of them.
+        """Return the time (M,) in s; of timestamps and epochs, since the first of them.
 
         ``unit`` is that of the numbers: s, ms, us or min; None: as the file says, else s. Raises
         RecordError where it contradicts the file, or a cell is neither number nor timestamp.
         """
         places = [position(self.path, self.names, name) for name in columns]
+        if are_soc(columns):
+            return soc_in_seconds(self.path, columns, self.numbers(columns))
         _, first = next(self.rows())
         stamped = len(places) > 1 or (places[0] < len(first) and is_timestamp(first[places[0]]))
         if not stamped:

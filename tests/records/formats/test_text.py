@@ -820,3 +820,15 @@ def test_damaged_files_are_read_or_refused(tmp_path_factory, text, at, cut, junk
 def test_windows_letters_beyond_latin_1_are_read(file):
     table = read_text_table(file("t;Preis €;U\n0;1;2\n1;2;3\n".encode("cp1252")))
     assert table.names == ("t", "Preis €", "U")
+
+
+def test_a_jsis_file_has_its_names_above_the_types_and_its_units_below(tmp_path):
+    path = tmp_path / "jsis.csv"
+    path.write_text(
+        "Time,GEN V,GEN VA,GEN F\nT,VMP,VAP,F\nsec,KV,DEG,Hz\nTime,voltage,angle,frequency\n"
+        "0.0,18.0,10.0,60.0\n0.1,18.1,11.0,60.0\n"
+    )
+    table = open_table(path)
+    assert table.names == ("Time", "GEN V", "GEN VA", "GEN F")
+    assert dict(table.units) == {"Time": "sec", "GEN V": "KV", "GEN VA": "DEG", "GEN F": "Hz"}
+    assert [*table.numbers(["GEN V"])["GEN V"]] == [18.0, 18.1]
