@@ -24,7 +24,7 @@ from exfit.case.load import load_case
 from exfit.cli import main
 from exfit.cli.options import NOT_CONVERGED
 from exfit.errors import CaseError
-from exfit.fitting.recordings import measured
+from exfit.fitting.recordings import measured, phasors_of
 from exfit.models import MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import run_folder
@@ -235,6 +235,14 @@ def test_the_records_of_the_page_are_a_valid_part_of_a_case(cases):
     case = load_case(cases / "case.yaml")
     assert [recording.name for recording in case.recordings] == ["up", "on-line"]
     assert case.on_load
+
+
+def test_the_phasors_of_the_page_are_a_valid_part_of_a_case(cases):
+    text = MACHINE + "test: {vref: [{at: 1.0, step: 0.01}]}\n" + block("pmu.md", "yaml")
+    # a machine with its breaker open has no power
+    shown = text.replace(", p: phasors.p, q: phasors.q", "")
+    (cases / "case.yaml").write_text(shown, encoding="utf-8")
+    assert phasors_of(load_case(cases / "case.yaml").record.phasors).kv == 18.0
 
 
 def test_the_forms_of_the_reference_are_read(cases):
