@@ -8,11 +8,16 @@ import hypothesis
 import pytest
 from oracle import EXCITERS, SATURATED, SURROUNDED
 
-from exfit.models import MODELS
+from exfit.models import MODELS, STABILISERS
+from exfit.models.machines import MACHINES
 
+CATALOGUE = {*MODELS, *MACHINES, *STABILISERS}
 # a few of each family: without a plant; commutators; rotating rectifiers; static; compound;
-# names of PSS/E
-FEW = ("FIRST_ORDER", "DC1A", "AC1A", "AC8B", "ST1A", "ST4B", "SEXS")
+# names of PSS/E; a round rotor and salient poles; a stabiliser of one input, one of two
+FEW = (
+    "FIRST_ORDER", "DC1A", "AC1A", "AC8B", "ST1A", "ST4B", "SEXS", "GENROU", "GENSAE", "STAB1",
+    "PSS2B",
+)  # fmt: skip
 
 hypothesis.settings.register_profile("few", max_examples=30, deadline=None, derandomize=True)
 hypothesis.settings.register_profile("all", max_examples=200, deadline=None, derandomize=True)
@@ -88,7 +93,7 @@ def _is_left_out(item):
         return True
     given = item.callspec.params.values() if hasattr(item, "callspec") else ()
     firsts = [value[0] if isinstance(value, tuple) and value else value for value in given]
-    names = [name for name in firsts if isinstance(name, str) and name in MODELS]
+    names = [name for name in firsts if isinstance(name, str) and name in CATALOGUE]
     return any(name not in FEW for name in names)
 
 

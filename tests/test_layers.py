@@ -8,10 +8,8 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
+from sources import MODULES, ROOT, nodes_of, tree_of, trees
 
-import exfit
-
-ROOT = Path(exfit.__file__).parent
 BASE = {"util", "errors"}  # what every package may import
 MAY_IMPORT = {
     "errors": set(),
@@ -69,17 +67,6 @@ NOT_OF_A_FIT = {
 }  # fmt: skip
 
 
-def module_name(path):
-    parts = path.relative_to(ROOT.parent).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py"))}
-
-
-TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
-
-
 def package(name):
     """Return the room of a module: what follows exfit in its name, "" for exfit itself."""
     return ([*name.split("."), ""])[1]
@@ -87,8 +74,7 @@ def package(name):
 
 def imports(name, everywhere=True):
     """Yield the modules a module imports; only those at its top unless ``everywhere``."""
-    tree = TREES[name]
-    for node in ast.walk(tree) if everywhere else at_the_top(tree):
+    for node in nodes_of(name) if everywhere else at_the_top(tree_of(name)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -164,8 +150,8 @@ def test_no_folder_of_the_package_has_more_than_25_entries():
 
 def test_no_class_is_defined_in_two_modules():
     homes = defaultdict(list)
-    for name, tree in TREES.items():
-        for node in ast.walk(tree):
+    for name in MODULES:
+        for node in nodes_of(name):
             if isinstance(node, ast.ClassDef):
                 homes[node.name].append(name)
     assert {name: modules for name, modules in homes.items() if len(modules) > 1} == {}
@@ -201,12 +187,12 @@ def changes(function, names):
 def test_no_module_remembers_what_it_did():
     """State lies in values that are handed on; what stands at the top of a module is a table."""
     faults = []
-    for name, tree in TREES.items():
+    for name, tree in trees():
         assigned = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
         targets = [t for node in assigned for t in getattr(node, "targets", None) or [node.target]]
         names = {target.id for target in targets if isinstance(target, ast.Name)}
         names -= REMEMBERED.get(name, set())
-        functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+        functions = [node for node in nodes_of(name) if isinstance(node, ast.FunctionDef)]
         places = {node.lineno for function in functions for node in changes(function, names)}
         faults += [f"{name}:{line}" for line in sorted(places)]
     assert faults == []

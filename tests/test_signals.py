@@ -1,12 +1,11 @@
 """The table of signals, and that whoever uses it covers every row."""
 
 import ast
-from pathlib import Path
 
 import pytest
 from on_load import ALL_INPUTS, system
+from sources import ROOT, nodes
 
-import exfit
 from exfit.case.schema import RecordFile
 from exfit.cli.completion import noises
 from exfit.models import MODELS
@@ -89,12 +88,10 @@ def test_the_shell_completes_each_signal_that_is_compared():
 
 def test_no_other_room_has_a_table_of_signals():
     """Three signals side by side are a table, unless they are those of a plant."""
-    root = Path(exfit.__file__).parent
     tables = [
-        f"{path.relative_to(root)}:{node.lineno}"
-        for path in root.rglob("*.py")
-        if path != root / "signals.py" and path.parent != root / "plants"
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path, node in nodes()
+        if path != ROOT / "signals.py" and path.parent != ROOT / "plants"
         if isinstance(node, ast.Tuple | ast.List | ast.Set | ast.Dict)
         for entries in [node.keys if isinstance(node, ast.Dict) else node.elts]
         if len({*COMPARED} & {one.value for one in entries if isinstance(one, ast.Constant)}) > 2

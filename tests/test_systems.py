@@ -8,7 +8,7 @@ import sys
 
 import pytest
 from places import ROOT
-from test_layers import TREES
+from sources import nodes_of, trees
 
 # modules and names of the standard library that Windows, or macOS, does not have
 MODULES = {
@@ -107,20 +107,20 @@ def listed(faults):
 
 
 def test_what_only_some_systems_have_stands_behind_a_question():
-    faults = [(name, node) for name, tree in TREES.items() for node in unguarded(tree)]
+    faults = [(name, node) for name, tree in trees() for node in unguarded(tree)]
     assert listed(faults) == []
 
 
 def test_text_is_read_in_an_encoding_that_is_named_and_written_as_bytes():
-    faults = [(name, node) for name, tree in TREES.items() for node in without_encoding(tree)]
+    faults = [(name, node) for name, tree in trees() for node in without_encoding(tree)]
     assert listed(faults) == []
 
 
 def test_dates_are_written_by_letters_that_all_systems_know():
     texts = [
         (name, node)
-        for name, tree in TREES.items()
-        for node in ast.walk(tree)
+        for name, _ in trees()
+        for node in nodes_of(name)
         if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "strftime"
         for argument in node.args
         if OF_A_SYSTEM.search(ast.unparse(argument))

@@ -33,6 +33,7 @@ def test_finds_six_certified_digits_from_nearly_every_start(method):
     assert sum(enough) >= 50
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", CERTIFIED_METHODS)
 def test_claims_no_success_where_nist_has_no_minimum(method):
     assert [start for start, end in on_certified_sets(method).items() if end.wrong] == []

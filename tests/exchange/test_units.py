@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from dynamics import SOUND, garbage, replaced
+from tiers import few_of
 
 from exfit.errors import DynamicsError
 from exfit.exchange.fields import text_of
@@ -66,7 +67,7 @@ def test_a_unit_without_a_model_is_named_with_its_records():
     assert len(no_model[7].faults) == 1
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", few_of(range(100), 25))
 def test_damage_to_a_file_of_units_is_reported_or_harmless(seed):
     random = np.random.default_rng(seed)
     sound = "".join(at_bus(bus) for bus in BUSES)

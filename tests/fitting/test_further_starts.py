@@ -91,6 +91,7 @@ def test_what_the_own_start_led_to_is_noted_with_what_the_record_says_of_it(both
     assert f"KF {local.values['KF']:.4g} (here {whole.values['KF']:.4g})" in note
 
 
+@pytest.mark.long
 def test_the_minima_of_a_search_are_counted_and_judged(both):
     local, whole = both
     assert local.minima is None

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from batches import Events, case_file, here, record_file, table_of, troubled
+from tiers import few_of
 
 import exfit
 from exfit.errors import ExfitError
@@ -106,7 +107,7 @@ def test_code_runs_only_in_a_batch_that_trusts_it(cases, tmp_path):
     assert fleet.cases[0].status == "failed"  # it is no model
 
 
-@pytest.mark.parametrize("parts", [2, 4])
+@pytest.mark.parametrize("parts", few_of([2, 4], 1))
 def test_parts_come_to_the_same_as_one_run(cases, parts):
     run(folder="whole")
     tables = []

@@ -175,6 +175,7 @@ def refusal(address):
     return str(refused.value)
 
 
+@pytest.mark.long
 def test_an_address_without_a_scheduler_is_refused_in_a_line(monkeypatch, capfd):
     monkeypatch.setattr(cluster, "CONNECTED_WITHIN", 0.3)
     free = f"127.0.0.1:{free_port()}"

@@ -60,18 +60,19 @@ def test_the_death_of_a_worker_is_a_row_and_the_rest_goes_on(fleet):
     assert "pickle" in rows["unpicklable"].reason
 
 
+@pytest.mark.long
 def test_every_case_is_announced_once(fleet):
     kinds = Counter(event[0] for event in fleet[1].events)
     assert kinds == {"begun": 1, "started": 8, "done": 4, "crashed": 3, "timed out": 1}
 
 
-def test_workers_compute_what_this_process_does(fleet):
-    folder = fleet[0].folder
-    names = ["1", "2", "3"]
-    cases = [folder.parent / "cases" / f"{name}.yaml" for name in names]
-    exfit.batch(cases, folder.parent / "here", compute=here, further=[troubled])
-    rows = [row for row in table_of(folder) if row["name"] in names]
-    assert rows == table_of(folder.parent / "here")
+def test_workers_compute_what_this_process_does(tmp_path):
+    for seed in range(2):
+        record = record_file(tmp_path / f"{seed}.csv", seed)
+        case_file(tmp_path / f"cases/{seed}.yaml", record)
+    exfit.batch(tmp_path / "cases", tmp_path / "fleet", workers=1)
+    exfit.batch(tmp_path / "cases", tmp_path / "here", compute=here)
+    assert table_of(tmp_path / "fleet") == table_of(tmp_path / "here")
 
 
 def test_workers_that_cannot_be_started_end_the_batch_with_the_reason(tmp_path, monkeypatch):

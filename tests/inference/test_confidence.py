@@ -82,6 +82,7 @@ def test_the_covariance_is_that_of_curve_fit(seed, absolute):
     assert confidence(lin).covariance == pytest.approx(covariance, rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_interval_holds_the_truth_in_nineteen_of_twenty_records_with_white_noise():
     rng = np.random.default_rng(1)
     covered = [is_covered(confidence(lin)) for lin in lines(rng.standard_normal((PROBLEMS, 200)))]
@@ -101,6 +102,7 @@ def test_few_samples_ask_for_students_t():
     assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
 
 
+@pytest.mark.long
 def test_a_logarithmic_interval_holds_the_truth_as_often():
     rng = np.random.default_rng(3)
     t = np.linspace(0.0, 3.0, 60)
@@ -143,6 +145,7 @@ def test_what_no_autoregression_describes_widens_by_one_factor():
     assert described.effective == pytest.approx(effective_samples(lin.errors))
 
 
+@pytest.mark.long
 def test_a_prior_that_is_right_narrows_the_interval_and_keeps_its_promise():
     rng = np.random.default_rng(5)
     sigma, std = 0.2, 0.02

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tiers import few_of
 
 from exfit.inference.outliers import FEWEST, LEVEL, SHARE, Estimates, deviations
 
@@ -34,7 +35,7 @@ def test_an_outlier_is_called_among_units_that_are_alike_no_more_often_than_stat
 
 
 @pytest.mark.parametrize(("count", "size"), [(FEWEST, 30.0), (6, 10.0), (8, 10.0), (30, 7.0)])
-@pytest.mark.parametrize("spread", [0.0, 5.0])
+@pytest.mark.parametrize("spread", few_of([0.0, 5.0], 1))
 def test_an_outlier_of_some_standard_deviations_is_found(count, size, spread):
     """In a study of 400 runs each of these was found in 97 % at least."""
     rng = np.random.default_rng(count)

@@ -7,6 +7,7 @@ import pytest
 import yaml
 from cases import FIRST_ORDER, TIME, TRUTH
 from places import ROOT
+from tiers import few_of
 
 import exfit
 from exfit import cli
@@ -88,7 +89,7 @@ def test_a_model_that_changed_since_the_fit_is_refused_before_it_is_run(case, co
     assert run(*command, "--no-plots", "--quiet") == 0
 
 
-@pytest.mark.parametrize("command", ["validate", "simulate"])
+@pytest.mark.parametrize("command", few_of(["validate", "simulate"], 1))
 @pytest.mark.parametrize("text", [None, "model: mine.py"])
 def test_a_file_without_parameters_is_refused_before_the_model_is_run(case, command, text, capsys):
     """It says nothing of the hash of the model, so nothing could be compared."""

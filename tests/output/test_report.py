@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from cases import FIRST_ORDER, TIME, TRUTH
+from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 from pages import Page
 from places import ROOT
 from records import TEST, config, found_in, recording, several, synthetic, write
@@ -45,6 +45,7 @@ def made(folder, content, strategy=None, watch=lambda _: None):
     """Fit a case in a folder; return the folder that the fit left."""
     folder.mkdir(exist_ok=True)
     path = folder / "case.yaml"
+    content = with_local_search(content)
     path.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
     result = workflows.fit(load_case(path), strategy, watch)
     run_folder.write_fit(result, folder / "run")
@@ -92,6 +93,9 @@ def fits(tmp_path_factory):
         "first order": lambda: first_order(room / "first", about=ABOUT),
         "ac1a": lambda: made(room / "ac1a", config("ac1a_typical")),
         "ac8b": lambda: made(room / "ac8b", config("ac8b_unit1")),
+        "searched": lambda: made(
+            room / "searched", {**config("ac8b_unit1"), "estimate": {"search": "global"}}
+        ),
         "machine alone": lambda: made(room / "machine", config("machine_playback")),
         "playback": lambda: made(room / "playback", config("exciter_playback")),
         "on load": on_load,
@@ -161,7 +165,7 @@ def rounding_error(parameter):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", [*EVERY, "searched"])
 def test_every_fitted_parameter_is_reported_with_its_interval_or_the_reason_why_there_is_none(
     fits, pages, name
 ):

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from pydantic import TypeAdapter
+from sources import ROOT, nodes
 
-import exfit
 from exfit.case import schema
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
@@ -64,11 +64,9 @@ def test_a_record_may_hold_what_drives_and_what_is_compared(kind):
 
 def test_no_room_but_that_of_the_plants_and_the_schema_knows_a_plant_by_its_name():
     names = KINDS.keys() - {"none"}  # which is a word of other things too
-    root = Path(exfit.__file__).parent
     knowing = {
-        path.relative_to(root).as_posix()
-        for path in root.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        path.relative_to(ROOT).as_posix()
+        for path, node in nodes()
         if isinstance(node, ast.Constant) and node.value in names
     }
     rest = {path for path in knowing if not path.startswith("plants/")}

@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 from places import REFERENCE, SAMPLES
 from step_records import step_record
 from tables import read_columns
+from tiers import few_of
 
 from exfit.case.starting.suggestion import bump_section, record_section, weights_section
 from exfit.errors import RecordError
@@ -70,7 +71,7 @@ BUMPS = [path.stem for path in SAMPLES.glob("*.csv") if not path.stem.startswith
 RECORDS = sorted({*BUMPS} - {REJECTION})
 
 
-@pytest.mark.parametrize("record", RECORDS)
+@pytest.mark.parametrize("record", few_of(RECORDS, 4))
 def test_every_step_of_a_sample_record_is_found_in_time_and_size(record):
     inspection = inspect(sample(SAMPLES / f"{record}.csv"))
     voltage = inspection.channel_of("vt").name
@@ -287,7 +288,7 @@ def test_the_unit_of_a_channel_and_the_origin_of_time_do_not_matter(scale, origi
         assert scaled.sizes["x"] == pytest.approx(scale * step.sizes["x"], rel=1e-9)
 
 
-@pytest.mark.parametrize("count", [30_000, 300_000])
+@pytest.mark.parametrize("count", few_of([30_000, 300_000], 1))
 def test_a_long_record_shows_its_steps_as_well_as_a_short_one(count):
     clean = reference("reference_ac1a.csv")
     time = np.linspace(0.0, 300.0, count)

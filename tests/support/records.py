@@ -52,6 +52,8 @@ def several(*records, free=None, **sections):
     content["records"] = list(records)
     if free is not None:
         content["parameters"]["free"] = free
+        known = {name: value for name, value in UNIT.items() if name not in free}
+        content["parameters"]["fixed"] |= known
     return {**content, **sections}
 
 

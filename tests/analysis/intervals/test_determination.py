@@ -150,6 +150,7 @@ def test_a_parameter_on_its_bound_and_those_that_lean_on_it_are_profiled(unit2):
     )
 
 
+@pytest.mark.long
 def test_the_hull_holds_both_minima_within_the_bounds(unit2):
     residuals, minima, _, uncertainty = unit2
     for k, free in enumerate(residuals.free):

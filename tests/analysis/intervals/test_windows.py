@@ -30,6 +30,7 @@ def test_a_time_constant_that_moves_after_the_step_down_is_found_by_the_windows(
     assert moving.windows.moves
 
 
+@pytest.mark.long
 def test_its_interval_is_then_the_one_over_windows_and_the_fit_says_so(moving):
     parameter = moving.parameters["machine.Tpd0"]
     low, high = parameter.interval
@@ -39,6 +40,7 @@ def test_its_interval_is_then_the_one_over_windows_and_the_fit_says_so(moving):
     assert any("more than noise spreads them" in note for note in moving.notes)
 
 
+@pytest.mark.long
 def test_a_constant_one_keeps_the_interval_of_the_fit(tmp_path):
     result = fitted(tmp_path, 5.0, 5.0)
     assert not result.windows.moves

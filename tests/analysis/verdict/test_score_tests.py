@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from faulty_cases import drawn
 from records import TEST, TIME, case_of, one, synthetic
+from tiers import few_of
 
 from exfit.analysis.causes.trials import freed_within, refitted, with_freed
 from exfit.analysis.verdict import rule
@@ -75,7 +76,10 @@ def test_the_scores_of_noise_are_chi_square(evidence):
 
 @pytest.mark.parametrize(
     ("of_case", "words"),
-    [({"step": 0.0499}, "the step of +0.0499 pu"), ({"at": 1.004}, "the instant of the step")],
+    few_of(
+        [({"step": 0.0499}, "the step of +0.0499 pu"), ({"at": 1.004}, "the instant of the step")],
+        1,
+    ),
     ids=str,
 )
 def test_a_step_that_is_hardly_another_is_contradicted(tmp_path, of_case, words):

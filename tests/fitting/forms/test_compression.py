@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from records import UNIT, case_of, found_in, one, synthetic
+from tiers import few_of
 
 from exfit.fitting.build import build_experiments
 from exfit.fitting.forms import compression as module
@@ -103,7 +104,7 @@ def test_a_fit_ends_where_that_of_all_samples_ends(tmp_path, monkeypatch):
         assert ours.values[name] == pytest.approx(value, rel=1e-6)
 
 
-@pytest.mark.parametrize("channels", [{"vt": "vt"}, CHANNELS], ids=["vt", "vt and efd"])
+@pytest.mark.parametrize("channels", few_of([{"vt": "vt"}, CHANNELS], 1), ids=["vt", "vt and efd"])
 def test_errors_and_intervals_are_those_of_all_samples(tmp_path, channels):
     """Several channels share out their degrees of freedom by samples, as they are too few to fit.
 

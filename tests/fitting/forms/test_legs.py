@@ -20,6 +20,7 @@ def legs(name):
     return legs_of(problem.residuals, own), own
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LOWEST)
 def test_by_way_of_the_linear_phase_every_start_reaches_the_lowest_minimum(name):
     """Without it two in three do: tests/studies/global_search.py counts more of them."""

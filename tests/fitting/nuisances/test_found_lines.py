@@ -114,6 +114,7 @@ def test_a_given_frequency_leaves_the_amplitudes_which_are_linear(response):
     assert error(fitted) == pytest.approx(error(automatic), rel=0.2)
 
 
+@pytest.mark.long
 def test_a_global_search_and_profiles_find_the_same(response):
     rng = np.random.default_rng(4)
     given = case(response + white(rng) + sway(rng), AUTO, free=("KA", "TE"))

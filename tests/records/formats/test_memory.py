@@ -7,6 +7,7 @@ from limited_memory import inspected_in_a_process
 from exfit.records.formats.memory import GIGABYTE
 
 pytest.importorskip("resource", reason="the system limits no memory")
+pytestmark = pytest.mark.long
 
 FARTHEST = "1048576 rows of 16384 columns, up to its farthest cell: reading needs about 2.23e+03 GB"
 TOO_LARGE = {
