@@ -60,7 +60,7 @@ def cluster_workers(address: str, time_limit: float) -> Compute:
 
     def compute(cases: Iterator[PlannedCase], begin: Begin, end: End) -> None:
         with connected(address) as client:
-            dispatch = Dispatch(client, cases, begin, end, time_limit)
+            dispatch = Dispatch(client, Waiting(cases), begin, end, time_limit)
             try:
                 dispatch.wait_for_workers()
                 dispatch.run()
@@ -91,13 +91,11 @@ class Dispatch:
     """
 
     client: "Client"
-    cases: Iterator[PlannedCase]
+    waiting: Waiting
     begin: Begin
     end: End
     time_limit: float
     batch: str = field(default_factory=lambda: uuid4().hex)
-    waiting: Waiting = field(default_factory=Waiting)
-    exhausted: bool = False
     begun: set[str] = field(default_factory=set)
     sent: dict[str, Sent] = field(default_factory=dict)
     threads: dict[str, int] = field(default_factory=dict)
@@ -130,9 +128,9 @@ class Dispatch:
 
         Raises ClusterError where the scheduler is lost, or where no worker is left.
         """
-        while not self.exhausted or self.waiting or self.sent:
-            if not self.exhausted and self.arrived.empty():
-                self._plan_one()
+        while not self.waiting.exhausted or self.waiting or self.sent:
+            if not self.waiting.exhausted and self.arrived.empty():
+                self.waiting.plan_one()
             else:
                 self._fetch()
             if monotonic() - self.looked >= LOOK:
@@ -144,13 +142,6 @@ class Dispatch:
         with suppress(Exception):  # of a connection that is lost already
             self.client.cancel([sent.future for sent in self.sent.values()], force=True)
             stop(self.client, [*self.threads], self.batch)
-
-    def _plan_one(self) -> None:
-        case = next(self.cases, None)
-        if case is None:
-            self.exhausted = True
-        else:
-            self.waiting.add(case)
 
     def _look(self) -> None:
         """Look which workers there are; what those that are gone had waits again."""

@@ -43,13 +43,25 @@ def local_workers(workers: int, time_limit: float) -> Compute:
 
 
 class Waiting:
-    """Cases that wait for a worker, by the group whose machine code they share."""
+    """Cases that wait for a worker, by the group whose machine code they share.
 
-    def __init__(self) -> None:
+    They come from an iterator, which plans each as it is asked for it.
+    """
+
+    def __init__(self, cases: Iterator[PlannedCase]) -> None:
+        self._cases, self.exhausted = cases, False
         self._groups: dict[str, deque[PlannedCase]] = {}
 
     def __len__(self) -> int:
         return sum(map(len, self._groups.values()))
+
+    def plan_one(self) -> None:
+        """Add the next case of the iterator, or note that it is exhausted."""
+        case = next(self._cases, None)
+        if case is None:
+            self.exhausted = True
+        else:
+            self.add(case)
 
     def add(self, case: PlannedCase) -> None:
         """Add a case behind the others of its group."""
@@ -86,9 +98,8 @@ class Pool:
         most_workers: int,
         time_limit: float,
     ) -> None:
-        self.cases, self.begin, self.end = cases, begin, end
+        self.waiting, self.begin, self.end = Waiting(cases), begin, end
         self.most_workers, self.time_limit = most_workers, time_limit
-        self.waiting, self.exhausted = Waiting(), False
         self.workers: list[WorkerProcess] = []
         self.answers: SimpleQueue[Answer] = SimpleQueue()
         self.failed_starts = 0
@@ -96,9 +107,10 @@ class Pool:
 
     def run(self) -> None:
         """Fit all cases: while no worker has an answer, the next case is planned."""
-        while not self.exhausted or self.waiting or any(worker.case for worker in self.workers):
-            if not self.exhausted and self.answers.empty():
-                self._plan_one()
+        waiting = self.waiting
+        while not waiting.exhausted or waiting or any(worker.case for worker in self.workers):
+            if not waiting.exhausted and self.answers.empty():
+                waiting.plan_one()
             else:
                 self._listen()
             self._end_overdue()
@@ -110,13 +122,6 @@ class Pool:
             worker.dismiss()
         for worker in self.workers:
             worker.gone()
-
-    def _plan_one(self) -> None:
-        case = next(self.cases, None)
-        if case is None:
-            self.exhausted = True
-        else:
-            self.waiting.add(case)
 
     def _employ(self) -> None:
         """Give cases to the workers that have none, and start those that are missing."""

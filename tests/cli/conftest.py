@@ -2,6 +2,7 @@
 
 import pytest
 from commands import Ran
+from writers import prepare
 
 from exfit import cli
 
@@ -30,3 +31,17 @@ def empty_folder(tmp_path, monkeypatch):
     place.mkdir()
     monkeypatch.chdir(place)
     return place
+
+
+@pytest.fixture(scope="module")
+def prepared_folder(tmp_path_factory):
+    """Return a folder with all that the commands read but for a fit."""
+    folder = tmp_path_factory.mktemp("place")
+    prepare(folder)
+    return folder
+
+
+@pytest.fixture
+def in_prepared_folder(prepared_folder, monkeypatch):
+    """Work in that folder."""
+    monkeypatch.chdir(prepared_folder)

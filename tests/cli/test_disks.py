@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from writers import FIT_BEFORE, WRITERS, prepare
+from writers import FIT_BEFORE, WRITERS
 
 from exfit.util import files
 
@@ -17,30 +17,18 @@ READ_ONLY = (errno.EROFS, "Read-only file system")
 FEW = ("simulate", "new", "import")  # the others take longer
 LATER = 3  # writes after which a disk is full
 
-
-@pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    """Return a folder with all that the commands read but for a fit."""
-    place = tmp_path_factory.mktemp("place")
-    prepare(place)
-    return place
-
-
-@pytest.fixture(autouse=True)
-def there(place, monkeypatch):
-    """Work in that folder."""
-    monkeypatch.chdir(place)
+pytestmark = pytest.mark.usefixtures("in_prepared_folder")
 
 
 @pytest.fixture
-def done(run, place):
+def done(run, prepared_folder):
     """Return a function that runs a command once, and what it reads of a fit before that."""
 
     def command(name):
         if "fit/parameters.yaml" in WRITERS[name] or "fit" in WRITERS[name][1:]:
             assert Path("fit").is_dir() or run(*FIT_BEFORE).code in (0, 3)
         assert run(*WRITERS[name]).code in (0, 3)
-        return state(place)
+        return state(prepared_folder)
 
     return command
 
@@ -75,7 +63,7 @@ def refusing(monkeypatch, fault, at=1):
     ],
 )
 def test_a_place_that_takes_nothing_leaves_all_files_as_they_were(
-    run, done, place, monkeypatch, name, fault
+    run, done, prepared_folder, monkeypatch, name, fault
 ):
     before = done(name)
     with monkeypatch.context() as patch:
@@ -83,18 +71,20 @@ def test_a_place_that_takes_nothing_leaves_all_files_as_they_were(
         ran = run(*WRITERS[name])
     assert ran.code == 1
     assert ran.err.endswith(f": cannot be written: {fault[1]}\n")
-    assert state(place) == before
+    assert state(prepared_folder) == before
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", WRITERS)
-def test_a_disk_that_becomes_full_leaves_no_half_of_a_file(run, done, place, monkeypatch, name):
+def test_a_disk_that_becomes_full_leaves_no_half_of_a_file(
+    run, done, prepared_folder, monkeypatch, name
+):
     before = done(name)
     with monkeypatch.context() as patch:
         writes = refusing(patch, FULL, LATER)
         ran = run(*WRITERS[name])
     assert ran.code == 1 if len(writes) >= LATER else ran.code in (0, 3)
-    assert set(state(place)) == set(before)  # no temporary file, and none is gone
+    assert set(state(prepared_folder)) == set(before)  # no temporary file, and none is gone
 
 
 @pytest.mark.long
@@ -147,7 +137,7 @@ def test_a_file_cannot_be_in_a_file(run):
     ("name", "code"), [("models", 0), ("run", 1), ("import", 1), ("simulate", 1)]
 )
 def test_a_working_folder_that_is_gone_is_a_message_where_it_matters(
-    run, place, tmp_path, name, code
+    run, prepared_folder, tmp_path, name, code
 ):
     gone = tmp_path / "gone"
     gone.mkdir()
@@ -155,9 +145,9 @@ def test_a_working_folder_that_is_gone_is_a_message_where_it_matters(
     gone.rmdir()
     arguments = {
         "models": (),
-        "run": (place / "case.yaml", "--no-plots"),
-        "import": (place / "unit.dyr", "-o", "unit.yaml"),
-        "simulate": (place / "case.yaml", "--no-plots"),
+        "run": (prepared_folder / "case.yaml", "--no-plots"),
+        "import": (prepared_folder / "unit.dyr", "-o", "unit.yaml"),
+        "simulate": (prepared_folder / "case.yaml", "--no-plots"),
     }[name]
     ran = run(name, *arguments)
     assert ran.code == code

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from ended_commands import contents, fault_of, undisturbed
-from writers import FIT_BEFORE, WRITERS, prepare
+from writers import FIT_BEFORE, WRITERS
 
 from exfit.util import files
 
@@ -20,28 +20,17 @@ MET = {  # tests/studies/interrupts.py sends each of these commands hundreds of 
     "export": "SIGKILL",
 }
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-
-
-@pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    """Return a folder with all that the commands read but for a fit."""
-    place = tmp_path_factory.mktemp("place")
-    prepare(place)
-    return place
-
-
-@pytest.fixture(autouse=True)
-def there(place, monkeypatch):
-    """Work in that folder, with the fit that some commands read."""
-    monkeypatch.chdir(place)
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX"),
+    pytest.mark.usefixtures("in_prepared_folder"),
+]
 
 
 @pytest.fixture
-def former_fit(run, place, request):
+def former_fit(run, prepared_folder, request):
     """Have the fit that some commands read."""
     needed = request.node.callspec.params["name"] not in FEW
-    if needed and not (place / "fit" / "result.json").is_file():
+    if needed and not (prepared_folder / "fit" / "result.json").is_file():
         assert run(*FIT_BEFORE).code in (0, 3)
 
 
@@ -50,9 +39,11 @@ def former_fit(run, place, request):
     "name",
     [name if name in FEW else pytest.param(name, marks=pytest.mark.long) for name in WRITERS],
 )
-def test_sigterm_while_a_file_is_written_waits_until_all_are_whole(run, place, monkeypatch, name):
+def test_sigterm_while_a_file_is_written_waits_until_all_are_whole(
+    run, prepared_folder, monkeypatch, name
+):
     done = run(*WRITERS[name])
-    before = contents(place)
+    before = contents(prepared_folder)
     real, raised = files._write_new, []
 
     def terminated(path, data):
@@ -68,12 +59,14 @@ def test_sigterm_while_a_file_is_written_waits_until_all_are_whole(run, place, m
     assert done.code in (0, 3)
     assert ran.code == 128 + signal.SIGTERM
     assert "Traceback" not in ran.err
-    assert {*contents(place)} == {*before}
+    assert {*contents(prepared_folder)} == {*before}
 
 
 @pytest.mark.long
 @pytest.mark.usefixtures("former_fit")
 @pytest.mark.parametrize("name", MET)
-def test_a_signal_at_any_moment_leaves_whole_files_and_the_next_run_clears_the_rest(place, name):
-    moment = random.Random(f"{SEED} {name}").uniform(0.3, 1.0) * undisturbed(name, place)
-    assert fault_of(name, MET[name], moment, place) == ""
+def test_a_signal_at_any_moment_leaves_whole_files_and_the_next_run_clears_the_rest(
+    prepared_folder, name
+):
+    moment = random.Random(f"{SEED} {name}").uniform(0.3, 1.0) * undisturbed(name, prepared_folder)
+    assert fault_of(name, MET[name], moment, prepared_folder) == ""

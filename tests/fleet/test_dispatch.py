@@ -16,6 +16,7 @@ from exfit.fleet import dispatch, remote
 from exfit.fleet.cluster import ClusterError
 from exfit.fleet.dispatch import AHEAD, MOST_DEATHS, MOST_LOSSES, Dispatch
 from exfit.fleet.folder import CaseOutcome, Failure, IndexEntry
+from exfit.fleet.local import Waiting
 from exfit.fleet.plan import PlannedCase
 from exfit.fleet.remote import Reply
 from exfit.fleet.task import CaseTask
@@ -116,7 +117,7 @@ class Run:
 
     def __init__(self, client, cases, begin=lambda _: True):
         self.client, self.ended = client, {}
-        self.dispatch = Dispatch(client, iter(cases), begin, self._end, 60.0)
+        self.dispatch = Dispatch(client, Waiting(iter(cases)), begin, self._end, 60.0)
         self.dispatch.wait_for_workers()
 
     def _end(self, case, outcome):
@@ -126,8 +127,8 @@ class Run:
     def until_done(self, reply, most=100_000):
         """Go on, and let ``reply(client)`` act between two steps."""
         run, steps = self.dispatch, count()
-        while not run.exhausted:
-            run._plan_one()
+        while not run.waiting.exhausted:
+            run.waiting.plan_one()
         while run.waiting or run.sent:
             assert next(steps) < most
             run._look()
@@ -196,7 +197,7 @@ def test_a_worker_that_is_lost_gives_back_what_it_had_and_nothing_counts_twice(t
 def test_what_comes_late_from_a_worker_that_was_lost_is_not_counted(tmp_path):
     client = WordyClient(a=1)
     run = Run(client, planned(["m1"], tmp_path)).dispatch
-    run._plan_one()
+    run.waiting.plan_one()
     run._send()
     late = client.under_way[0]
     client.threads = {"b": 1}
@@ -344,8 +345,8 @@ def test_without_workers_the_message_names_the_command_that_starts_one(tmp_path,
 def test_what_is_under_way_is_ended_with_the_batch(tmp_path):
     client = WordyClient(a=1, b=2)
     run = Run(client, planned([f"m{number}" for number in range(9)], tmp_path)).dispatch
-    run._plan_one()
-    run._plan_one()
+    run.waiting.plan_one()
+    run.waiting.plan_one()
     run._send()
     assert len(client.under_way) == 2
     run.stop()

@@ -83,7 +83,7 @@ def test_workers_that_cannot_be_started_end_the_batch_with_the_reason(tmp_path, 
 
 
 def waiting(*groups):
-    cases = Waiting()
+    cases = Waiting(iter(()))
     for number, group in enumerate(groups):
         cases.add(PlannedCase(IndexEntry(f"{number}"), CaseTask((), "", Path(), group=group)))
     return cases
