@@ -66,6 +66,7 @@ class Case:
     about: Mapping[str, float | str]
     model: str | None
     saturation: SaturationName
+    efd_times_speed: bool
     plant: Plant
     stabiliser: Stabiliser | None
     test: BumpTest | None

@@ -10,6 +10,7 @@ from exfit.case.starting.free_parameters import bounds_of, free_of
 from exfit.case.ties import Tie, Ties
 from exfit.errors import CaseError
 from exfit.models.sheet import Model, Parameter
+from exfit.models.speed_multiplier import times_speed
 
 
 def with_exciter(case: Case, name: str, model: Model) -> Case:
@@ -25,14 +26,15 @@ def with_exciter(case: Case, name: str, model: Model) -> Case:
     ties = {tied: tie for tied, tie in case.ties.by_name.items() if tied not in own}
     _refuse_ties(case, ties, own)
     others = (part for part in case.parts.all if part.kind != "exciter")
-    exciter = exciter_part(model, exponential=False)
+    multiplied = times_speed(model) if case.efd_times_speed else model
+    exciter = exciter_part(multiplied, exponential=False)
     return replace(
         case,
         path=case.folder / f"{case.path.stem}-{model.name}",
         from_file=False,
         model=name,
         saturation="quadratic",
-        parts=replace(case.parts, exciter=model, all=(exciter, *others)),
+        parts=replace(case.parts, exciter=multiplied, all=(exciter, *others)),
         ties=Ties(ties),
         parameters=Parameters(free={row.symbol: _section(row) for row in free_of(model)}),
         given_values={key: given for key, given in case.given_values.items() if key not in own},

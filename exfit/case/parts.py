@@ -15,6 +15,7 @@ from exfit.models import STABILISERS, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
+from exfit.models.speed_multiplier import times_speed
 from exfit.plants import (
     EVENTS,
     KINDS,
@@ -274,7 +275,8 @@ def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Mode
     if not isinstance(name, str) or not name:
         return None
     try:
-        return find(name, folder, sha256)
+        model = find(name, folder, sha256)
+        return times_speed(model) if data.get("efd_times_speed") is True else model
     except ModelError as error:
         faults.append(Fault(("model",), str(error)))
         return None

@@ -1,12 +1,12 @@
 """The PSS/E records of a fit, as a dynamics file."""
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
 from exfit import __version__
-from exfit.case.peek import stabiliser_inputs
+from exfit.case.peek import section_of, stabiliser_inputs
 from exfit.errors import ExfitError, FileError
 from exfit.exchange.records import (
     SIGNALS,
@@ -76,7 +76,9 @@ def export(
         raise ExfitError(f"{result.model} has no PSS/E record")
     for record in written:
         warnings += _warnings(record)
+    warnings += _of_speed(result, written)
     comments = [*origin, *(f"{text}." for text in _of_fit(result))]
+    comments += [f"{text}." for text in _of_speed(result, written)]
     comments += [text for record in written for text in _comments(record)]
     lines = [line for text in comments for line in comment_lines(text)]
     lines += [record_text(entry.definition, entry.values, bus, machine_id) for entry in written]
@@ -107,6 +109,17 @@ def _of_fit(result: FitResult) -> Iterator[str]:
         yield f"what was fitted depends on typical values: {first_of(weighty)}"
     if result.saturation != "quadratic":
         yield f"fitted with saturation: {result.saturation}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
+
+
+def _of_speed(result: FitResult, written: Iterable[Written]) -> Iterator[str]:
+    """Yield that a fit took efd times the speed, which the record does not."""
+    if section_of(result.case_text, result.case, "efd_times_speed") is not True:
+        return
+    for record in (
+        entry.definition.record for entry in written if entry.definition.kind == "exciter"
+    ):
+        if not record.times_speed:
+            yield f"fitted with efd_times_speed; {record.name} does not multiply efd by the speed"
 
 
 def _exciter(result: FitResult, name: str | None) -> Iterator[Written]:

@@ -89,6 +89,9 @@ def _exciter_name(exciter: UnitPart) -> Iterator[str]:
     yield commented(f"model: {exciter.definition.model.name}", _origin(exciter))
     if {"E1", "SE1", "E2", "SE2"} <= exciter.values.keys():
         yield commented("saturation: quadratic", "as PSS/E")
+    if exciter.definition.record.times_speed:
+        origin = f"as InterPSS and ANDES have {exciter.definition.record.name}"
+        yield commented("efd_times_speed: true", f"{origin}; acts where the speed is not rated")
 
 
 def _plant(machine: UnitPart) -> Iterator[str]:

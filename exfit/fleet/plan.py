@@ -168,6 +168,7 @@ def _group(content: Mapping[str, Any]) -> str:
         else None
         for section in (content.get("plant"), content.get("stabiliser"))
     )
-    models = [content.get("model"), content.get("saturation"), plant, stabiliser]
+    keys = ("model", "saturation", "efd_times_speed")
+    models = [*map(content.get, keys), plant, stabiliser]
     names = sorted(map(str, free)) if isinstance(free, Mapping) else []
     return json.dumps([*models, names], default=str, sort_keys=True)

@@ -125,7 +125,7 @@ class DynamicsRecord:
     the only value that it stands for; ``held`` are those of the model that the record does not
     have, with the value that makes the model that of the record; ``ignored`` are symbols that act
     only where a limiter does, which none is here: any value will do; ``doubt`` says what is not
-    settled about the order.
+    settled about the order. ``times_speed`` says that efd is multiplied by the speed there.
     """
 
     name: str
@@ -135,6 +135,7 @@ class DynamicsRecord:
     ignored: tuple[str, ...]
     doubt: str
     held: tuple[tuple[str, float], ...] = ()
+    times_speed: bool = False
 
 
 def record(
@@ -146,6 +147,7 @@ def record(
     ignored: str = "",
     doubt: str = "",
     held: Mapping[str, float] | None = None,
+    times_speed: bool = False,
 ) -> DynamicsRecord:
     """Return a PSS/E record from its symbols in one text, ``"TR KA TA"``."""
     return DynamicsRecord(
@@ -156,6 +158,7 @@ def record(
         tuple(ignored.split()),
         doubt,
         tuple((held or {}).items()),
+        times_speed,
     )
 
 

@@ -41,10 +41,11 @@ def exciter_inputs(**given: Signal) -> Names:
     """Return what an exciter sees, per unit: what is not given does not act.
 
     ``vt`` terminal voltage, ``vc1`` the same with load compensation, ``ifd`` field current, ``p``
-    and ``q`` active and reactive power of the machine, ``vref`` reference, ``vs`` stabiliser,
-    ``vuel`` and ``voel`` under- and overexcitation limiter, at their gates.
+    and ``q`` active and reactive power of the machine, ``speed`` of the machine, ``vref``
+    reference, ``vs`` stabiliser, ``vuel`` and ``voel`` under- and overexcitation limiter, at their
+    gates.
     """
-    still = {"vs": 0.0, "p": 0.0, "q": 0.0, "vuel": -inf, "voel": inf}
+    still = {"vs": 0.0, "p": 0.0, "q": 0.0, "speed": 1.0, "vuel": -inf, "voel": inf}
     compensated = {"vc1": given["vt"]} if "vt" in given else {}
     return Names(**{**still, **compensated, **given})
 

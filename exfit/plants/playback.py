@@ -21,7 +21,7 @@ from exfit.plants.parts import (
 from exfit.plants.plant import REFERENCES, Equipment, PlantKind, present
 
 EFD0, VREF0 = "efd0", "vref0"
-DRIVING = ("vt", "ifd", "p", "q")  # what may drive an exciter
+DRIVING = ("vt", "ifd", "p", "q", "speed")  # what may drive an exciter
 NEWTON_STEPS = 6  # to the efd that a reference holds; each costs two rests
 DIFFERENCE = 1e-6  # pu of efd, for its slope
 
@@ -48,7 +48,7 @@ def playback(
     vref_known: bool = False,
     stabilised: bool = False,
 ) -> System:
-    """Return an exciter that recorded signals drive: ``driving`` of vt, ifd, p and q.
+    """Return an exciter that recorded signals drive: ``driving`` of vt, ifd, p, q, speed.
 
     Its inputs are the changes of ``vref``, of ``vs`` where it is ``stabilised``, and of those
     signals from the levels at the start, which are the parameters ``vt0``, ``ifd0`` ...; ``efd0``
@@ -116,7 +116,7 @@ PLAYBACK = PlantKind(
     signals=(*REFERENCES, *DRIVING, "efd"),
     driving=(*REFERENCES, *DRIVING),
     required=("vt", "efd"),
-    required_if_used=("ifd",),
+    required_if_used=("ifd", "speed"),
     levels=(*DRIVING, "efd"),
     build=_build,
 )

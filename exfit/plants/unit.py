@@ -187,6 +187,7 @@ def unit_motion(
         ifd=ifd,
         p=power,
         q=reactive,
+        speed=1.0 + at.dw,
     )
     values = exciter_parameters(p, unit.exciter, unit.saturation)
     efd = unit.exciter.equations(state_of(unit.exciter, x, r), u, values, d)

@@ -361,6 +361,17 @@ def test_a_form_of_saturation_that_psse_does_not_have_is_warned_of(run, fitted):
     assert "PSS/E takes E1 SE1 E2 SE2 as quadratic" in run("export", fitted)[2]
 
 
+def test_a_multiplier_that_the_record_does_not_have_is_warned_of(run, fitted):
+    assert "efd_times_speed" not in run("export", fitted)[2]
+    text = result_of(fitted)["case_text"]
+    named(fitted, case_text=f"efd_times_speed: true\n{text}")
+    code, out, err = run("export", fitted)
+    words = "fitted with efd_times_speed; ESAC1A does not multiply efd by the speed"
+    assert code == 0
+    assert words in err
+    assert f"// {words}." in out.splitlines()
+
+
 def test_an_order_that_is_in_doubt_is_reported_twice(run, fitted_ac8b):
     doubt = MODELS["AC8B"].records[0].doubt
     code, out, err = run("export", fitted_ac8b)

@@ -303,6 +303,18 @@ def test_a_chosen_unit_is_the_one_that_is_read():
     assert read_unit(THREE, "unit.dyr", 9).bus == 9
 
 
+def test_a_record_that_multiplies_by_the_speed_makes_a_case_that_does():
+    """EXDC2 alone, by public implementations; a record of another exciter says nothing of it."""
+    values = " ".join(
+        "0" if symbol == "Switch" else f"{typical(MODELS['EXDC2'].sheet)[symbol]:g}"
+        for symbol in definition_of("EXDC2").record.cons
+    )
+    machine, _, exciter = SOUND.partition("\n")
+    texts = f"{machine}\n1 EXDC2 1 {values} /\n", f"{machine}\n{exciter}"
+    cases = [yaml.safe_load(case_text(read_unit(text, "u.dyr"), "u.dyr")) for text in texts]
+    assert [case.get("efd_times_speed") for case in cases] == [True, None]
+
+
 def test_a_long_list_of_units_is_cut():
     many = "".join(f"{bus} IEELBL 1 0 /\n" for bus in range(1, 101))
     faults = fault_of(many)

@@ -16,7 +16,7 @@ def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
         if "model" not in content:
             yield content.at("model").fault("is missing")
         return
-    for key in ("model", "saturation", "parameters", "stabiliser"):
+    for key in ("model", "saturation", "efd_times_speed", "parameters", "stabiliser"):
         if key in content:
             text = f"not allowed with plant {kind.name}: it has no exciter"
             yield content.at(key).fault(text)

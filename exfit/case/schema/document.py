@@ -33,6 +33,11 @@ class CaseDocument(Section):
         description="Form of the exciter's saturation curve, given by E1, SE1, E2, SE2 or, if "
         "it is exponential, by AEX and BEX.",
     )
+    efd_times_speed: bool = Field(
+        default=False,
+        description="Whether the exciter's output is multiplied by the speed of the machine, as "
+        "spdmlt in PSLF; it acts where the speed is simulated or recorded.",
+    )
     plant: Annotated[Plant, Field(discriminator="type")] = Field(
         description="The plant: what surrounds the exciter during the test."
     )

@@ -11,13 +11,13 @@ vc1 ►[  1  ]┘ │                        └── VFE ◄───┤
 VFE = KE EFD + VX(EFD). The limits are non-windup; EFD may be negative.
 The limits are proportional to VT, as in the DC2 of 1981, Opal-RT and InterPSS
 (ANDES and GridPACK hold them constant). InterPSS and ANDES multiply efd by the
-speed, Opal-RT does not: at rated speed, as here, it is the same.
+speed, Opal-RT does not; import takes it as multiplied (efd_times_speed).
 KE = 0 is self-excited: KE is computed at the start so that VR starts at
 VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0; ANDES takes 0 as it is).
 VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of E1, E2
 (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the setpoints
 KE0, VRMAX0, VRMIN0.
-Not modelled: speed, UEL or OEL at the summing point, SWITCH (unused in PSS/E).
+Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 """
 
 from exfit.engine.trace import Signal
@@ -47,6 +47,7 @@ RECORDS = (
         "EXDC2",
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
         absent={"Switch": 0.0},
+        times_speed=True,
     ),
 )
 
