@@ -67,7 +67,8 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         nuisances,
         recording.name,
     )
-    plain = ExperimentSetup(case.path, test, record, experiment, free, references.files)
+    played = tuple(driving) if view.kind.plays_back else ()
+    plain = ExperimentSetup(case.path, test, record, experiment, free, references.files, played)
     return _with_given_starts(case, with_sines(case, recording, plain, values))
 
 

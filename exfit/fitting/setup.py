@@ -37,6 +37,7 @@ class ExperimentSetup:
 
     ``test`` has a number for everything; ``free`` are those of its values that a fit finds,
     ``references`` the files of the test's signals beside the record, by signal;
+    ``driving`` are the signals of the record that drive it in place of a plant;
     ``automatic_sines`` are the signals of which residuals may show a periodic disturbance, with
     the range of its frequency, Hz.
     """
@@ -47,6 +48,7 @@ class ExperimentSetup:
     experiment: Experiment
     free: tuple[FreeParameter, ...]
     references: Mapping[str, Record] = field(default_factory=dict)
+    driving: tuple[str, ...] = ()
     automatic_sines: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property

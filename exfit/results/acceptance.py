@@ -28,54 +28,70 @@ def judged(
         accept: the limit of the case (pu), which judges alone. Without it a validation must match
             better than a constant would, and its rmse must not exceed three times the largest one
             of the fit in the same signal, or three times the noise of its own record where that is
-            larger: no model comes below the noise.
+            larger: no model comes below the noise. Of a grid event that was played in, P and Q
+            are judged so.
     """
-    limit = _largest_error(validation, fitted, channels) if accept is None else accept
-    reason = _why_not(validation, fitted, limit, accept is not None)
+    limits = {
+        channel.signal: _largest_error(channel, fitted) if accept is None else accept
+        for channel in channels
+        if channel.signal in validation.judging
+    }
+    reasons = (
+        _why_not(validation, signal, fitted, limits[signal], accept is not None)
+        for signal in validation.judging
+    )
+    reason = next(filter(None, reasons), "")
+    limit = limits[validation.judging[0]]
     return replace(validation, validation=True, limit=limit, accepted=not reason, reason=reason)
 
 
-def _largest_error(
-    validation: Comparison, fitted: Sequence[Comparison], channels: Sequence[Channel]
-) -> float | None:
+def _largest_error(channel: Channel, fitted: Sequence[Comparison]) -> float | None:
     """Return the largest rmse (pu) that is accepted; None where no fit has an error to compare."""
-    fit_error = _error_of_fit(validation, fitted)
+    fit_error = _error_of_fit(channel.signal, fitted)
     if fit_error is None:
         return None
-    channel = next(each for each in channels if each.signal == validation.judged_by)
     return MUCH_WORSE * max(fit_error, noise_of(channel) * noise_shape(channel).gain)
 
 
-def _error_of_fit(validation: Comparison, fitted: Sequence[Comparison]) -> float | None:
-    """Return the largest rmse (pu) of the fit in the signal that a validation is judged by."""
-    signal = validation.judged_by
+def _error_of_fit(signal: str, fitted: Sequence[Comparison]) -> float | None:
+    """Return the largest rmse (pu) of the fit in a signal."""
     errors = [match.channels[signal].rmse for match in fitted if signal in match.channels]
     return max(errors, default=None)
 
 
 def _why_not(
-    validation: Comparison, fitted: Sequence[Comparison], limit: float | None, given: bool
+    validation: Comparison,
+    signal: str,
+    fitted: Sequence[Comparison],
+    limit: float | None,
+    given: bool,
 ) -> str:
-    """Return why a validation is not accepted, "" where it is; ``given``: the case sets the limit.
+    """Return why a signal of a validation is not accepted, "" where it is.
 
-    An error that is not a number is not accepted.
+    ``given``: the case sets the limit. An error that is not a number is not accepted.
     """
-    name, rmse = validation.name, validation.rmse
+    name, rmse = validation.name, validation.channels[signal].rmse
+    of_signal = f" of {signal}" if len(validation.judging) > 1 else ""
     within = limit is None or rmse <= limit
     if given:
-        text = f"on {name} the error, rmse {rmse:.3e} pu, exceeds the limit of accept, {limit:g} pu"
-        return "" if within else text
-    if not validation.judged.describes:
+        error = f"on {name} the error{of_signal}, rmse {rmse:.3e} pu"
+        return "" if within else f"{error}, exceeds the limit of accept, {limit:g} pu"
+    if not validation.channels[signal].describes:
+        if validation.played is not None:
+            return (
+                f"{signal} of {name} is matched no better than by a constant: check its sign, base "
+                "and unit, the state of rest, and whether it is a record of this unit"
+            )
         return (
             f"the response matches {name} no better than a constant would: check vt0 and the "
             "sign, size and instant of its step, and whether it is a record of this unit"
         )
     if within:
         return ""
-    fit_error = _error_of_fit(validation, fitted)
+    fit_error = _error_of_fit(signal, fitted)
     times = np.inf if not fit_error else rmse / fit_error
     return (
-        f"on {name} the error is {times:.1f} times that of the fit, more than {MUCH_WORSE:g} "
-        "times: the fitted record does not determine what matters there, or the record is of "
-        "another unit or test"
+        f"on {name} the error{of_signal} is {times:.1f} times that of the fit, more than "
+        f"{MUCH_WORSE:g} times: the fitted record does not determine what matters there, or the "
+        "record is of another unit or test"
     )

@@ -14,6 +14,7 @@ from exfit.results.comparisons import (
     StepFeatures,
     match_of,
 )
+from exfit.results.played_records import PlayedRecord, driving_signals, played_errors
 from exfit.simulation.inputs import Inputs, InputStep
 
 Array = NDArray[np.float64]
@@ -62,7 +63,20 @@ def compare_with_record(
         substeps=substeps,
         time=setup.record.time,
         overlays=overlays,
+        played=_played(setup, overlays) if setup.driving else None,
     )
+
+
+def _played(setup: ExperimentSetup, overlays: Mapping[str, Overlay]) -> PlayedRecord:
+    """Return what drove a simulation, and how its signals depart from their record."""
+    time, steady = setup.record.time, setup.test.steady
+    begins = float(time[0]) if steady is None else steady
+    recorded = {signal: setup.record.signals[signal] for signal in setup.driving}
+    errors = {
+        signal: played_errors(time, begins, overlay.measured, overlay.simulated)
+        for signal, overlay in overlays.items()
+    }
+    return PlayedRecord(begins, driving_signals(time, begins, recorded), errors)
 
 
 def _reference(setup: ExperimentSetup, values: Values, vt0: float) -> Array | None:

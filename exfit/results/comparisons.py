@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.features import Features
+from exfit.results.played_records import PlayedRecord
 from exfit.util.typed import IN_FILE
 
 Array = NDArray[np.float64]
 
+POWERS = ("p", "q")  # what a unit gives to the grid
 REFERENCE = "vref, from where vt rests"  # how figures call the reference beside vt
 
 
@@ -126,7 +128,8 @@ class Comparison:
     ``record`` is the name of its file, ``cost`` that of the weighted residuals of all signals.
     ``channels`` says how well each signal matches, ``overlays`` holds its samples at ``time`` (M,)
     in s: of a result that is read back they are thinned, and missing in files of an earlier
-    version. ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse
+    version. ``played`` says what of the record drove the simulation, where it did in place of a
+    plant. ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse
     (pu) that is accepted, ``reason`` why it is not accepted, and ``of_record`` what was found about
     the record itself; ``steps`` are those of a record that was given by hand, ``notes`` what must
     be known of it. ``rmse``, ``max_error`` and ``fit_percent`` are those of
@@ -156,11 +159,18 @@ class Comparison:
     time: Array = field(default_factory=lambda: np.zeros(0), metadata=IN_FILE)
     overlays: Mapping[str, Overlay] = field(default_factory=dict, metadata=IN_FILE)
     iteration_responses: IterationResponses | None = field(default=None, metadata=IN_FILE)
+    played: PlayedRecord | None = field(default=None, metadata=IN_FILE)
 
     @property
     def judged_by(self) -> str:
         """The name of the signal that the match is judged by."""
         return judged_of(self.channels)
+
+    @property
+    def judging(self) -> tuple[str, ...]:
+        """The signals that a validation must match: of a grid event that was played in, P and Q."""
+        powers = tuple(signal for signal in POWERS if signal in self.channels)
+        return (self.judged_by,) if self.played is None or not powers else powers
 
     @property
     def judged(self) -> Match:

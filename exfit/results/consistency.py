@@ -9,6 +9,7 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.results.comparisons import Comparison
 from exfit.results.description import Behaviour
 from exfit.results.model import FitResult
+from exfit.results.played_records import PlayedRecord
 from exfit.results.saturation import SaturationResult
 from exfit.results.v_curve import VCurve
 
@@ -61,6 +62,8 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
             yield f"overlays: {signal} is none of its channels"
         if any(line is not None and line.shape != match.time.shape for line in lines):
             yield f"overlays: {signal}: not one sample for each instant"
+    if match.played is not None:
+        yield from _of_played(match.played, match)
     responses = match.iteration_responses
     if responses is not None:
         shape = (len(responses.numbers), len(responses.time))
@@ -68,6 +71,14 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
             yield "iteration_responses: not one sample for each instant"
         if not _increases(responses.time):
             yield "iteration_responses: time: does not increase"
+
+
+def _of_played(played: PlayedRecord, match: Comparison) -> Iterator[str]:
+    for signal, driving in played.driving.items():
+        if driving.samples.shape != match.time.shape:
+            yield f"played: {signal}: not one sample for each instant"
+    if not played.errors.keys() <= match.channels.keys():
+        yield "played: its errors are not those of the channels"
 
 
 def _of_uncertainty(uncertainty: UncertaintyAnalysis) -> Iterator[str]:

@@ -82,15 +82,12 @@ def judged_by_criteria(result: FitResult) -> CriteriaVerdict:
 def _judged(match: Comparison, fitted: bool, criteria: Criteria) -> Iterator[JudgedCriterion]:
     """Yield the criteria that a record can be judged by."""
     measured, simulated = match.features.measured, match.features.simulated
-    change = _change(match, measured)
-    if not change > 0.0:
-        return
-    label = f"rms of the difference, {match.judged_by}"
-    rmse = 100.0 * match.rmse / change
-    met = bool(rmse <= criteria.rmse)
-    unit = "% of the change"
-    yield JudgedCriterion(match.name, fitted, label, rmse, criteria.rmse, unit, met)
-    if measured is None or simulated is None:
+    changes = {signal: _change(match, signal, measured) for signal in match.judging}
+    for signal, change in changes.items():
+        if change > 0.0:
+            yield _rmse(match, fitted, signal, change, criteria.rmse)
+    change = changes[match.judging[0]]
+    if measured is None or simulated is None or not change > 0.0:
         return
     for name in ("final_value", "overshoot_percent", *TIMES):
         limit = _limit(name, measured, change, criteria)
@@ -98,11 +95,21 @@ def _judged(match: Comparison, fitted: bool, criteria: Criteria) -> Iterator[Jud
             yield _feature(match.name, fitted, name, (measured, simulated), limit)
 
 
-def _change(match: Comparison, measured: Features | None) -> float:
+def _rmse(
+    match: Comparison, fitted: bool, signal: str, change: float, limit: float
+) -> JudgedCriterion:
+    """Return whether the rms of a signal's difference is within a limit, in % of its change."""
+    rmse = 100.0 * match.channels[signal].rmse / change
+    label = f"rms of the difference, {signal}"
+    unit = "% of the change"
+    return JudgedCriterion(match.name, fitted, label, rmse, limit, unit, bool(rmse <= limit))
+
+
+def _change(match: Comparison, signal: str, measured: Features | None) -> float:
     """Return by how much a signal changed in its record: the step, else its range (pu)."""
-    if measured is not None and match.judged_by == "vt":
+    if measured is not None and signal == "vt":
         return abs(measured.final_value - measured.initial_value)
-    samples = match.overlays.get(match.judged_by)
+    samples = match.overlays.get(signal)
     if samples is None or not np.isfinite(samples.measured).any():
         return 0.0
     return float(np.nanmax(samples.measured) - np.nanmin(samples.measured))

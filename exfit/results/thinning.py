@@ -12,6 +12,7 @@ from exfit.results.comparisons import Comparison, IterationResponses, Overlay
 from exfit.results.description import Behaviour, SmallSignalView
 from exfit.results.model import FitResult
 from exfit.results.other_values import AsFound
+from exfit.results.played_records import PlayedRecord
 from exfit.results.tables import DIGITS, clock_digits
 from exfit.simulation.small_signal import Bode, SmallSignal
 from exfit.util.sorting import distinct
@@ -77,6 +78,9 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
         )
         if samples is not None
     ]
+    played = comparison.played
+    if played is not None and signals:
+        signals += [driving.samples for driving in played.driving.values()]
     rows = _rows(signals, MOST_ROWS) if signals else np.arange(0)
     responses = comparison.iteration_responses
     return replace(
@@ -86,7 +90,16 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
             signal: _overlay(overlay, rows) for signal, overlay in comparison.overlays.items()
         },
         iteration_responses=None if responses is None else _responses(responses, iterations),
+        played=None if played is None else _played(played, rows),
     )
+
+
+def _played(played: PlayedRecord, rows: NDArray[np.intp]) -> PlayedRecord:
+    driving = {
+        name: replace(signal, samples=rounded(signal.samples[rows]))
+        for name, signal in played.driving.items()
+    }
+    return replace(played, driving=driving)
 
 
 def _overlay(overlay: Overlay, rows: NDArray[np.intp]) -> Overlay:

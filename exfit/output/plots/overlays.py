@@ -1,7 +1,9 @@
 """Measured against simulated."""
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from exfit.dsp.decimation import envelope
 from exfit.output.plots.style import (
@@ -15,23 +17,42 @@ from exfit.output.plots.style import (
     tidy,
 )
 from exfit.results.comparisons import REFERENCE, Comparison, Overlay
+from exfit.results.played_records import DrivingSignal
 from exfit.signals import label_of
+
+Array = NDArray[np.float64]
 
 
 def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
     """Return measured and simulated signals on one axis each, with their difference below.
 
+    Above them are the recorded signals that drove the simulation, if any did in place of a plant.
     ``label`` names the simulated ones, by default fitted or simulated.
     """
-    count = len(comparison.overlays)
-    figure = new_figure(1.0 + 4.2 * count)
-    axes = panels(figure, 2 * count, sharex=True, height_ratios=[3.0, 1.0] * count)
-    for k, (signal, overlaid) in enumerate(comparison.overlays.items()):
-        _signal(axes[2 * k, 0], comparison, signal, overlaid, label)
-        _error(axes[2 * k + 1, 0], comparison, overlaid)
-    axes[-1, 0].set_xlabel("time (s)")
+    played = comparison.played
+    driving = () if played is None else tuple(played.driving.items())
+    count, above = len(comparison.overlays), len(driving)
+    figure = new_figure(1.0 + 4.2 * count + 1.5 * above)
+    ratios = [1.5] * above + [3.0, 1.0] * count
+    axes = panels(figure, above + 2 * count, sharex=True, height_ratios=ratios)[:, 0]
+    for own, (name, signal) in zip(axes[:above], driving, strict=True):
+        _driving(own, comparison.time, name, signal)
+    for k, (name, overlaid) in enumerate(comparison.overlays.items()):
+        _signal(axes[above + 2 * k], comparison, name, overlaid, label)
+        _error(axes[above + 2 * k + 1], comparison, overlaid)
+    axes[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=11)
     return figure
+
+
+def _driving(axes: Axes, time: Array, name: str, signal: DrivingSignal) -> None:
+    """Draw a recorded signal that drove the simulation."""
+    axes.plot(*envelope(time, signal.samples), "-", color=START, linewidth=1.1)
+    axes.set_ylabel(f"{name} ({signal.unit})")
+    departure = signal.excursion
+    departs = "" if departure is None else f"; from rest by {departure.text(signal.unit)}"
+    axes.set_title(f"recorded {name}, played in{departs}", fontsize=9, loc="right")
+    tidy(axes)
 
 
 def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay, label: str) -> None:

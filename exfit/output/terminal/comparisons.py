@@ -9,6 +9,7 @@ from exfit.dsp.features import LABELS
 from exfit.output.terminal.terminal import paragraph, plain_table, remarks, show_table
 from exfit.results.comparisons import Comparison
 from exfit.results.feature_digits import feature_cells
+from exfit.results.played_records import Excursion
 
 BETWEEN_COLUMNS = 2  # characters
 FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interval
@@ -21,6 +22,7 @@ def comparisons(console: Console, all_of_them: Sequence[Comparison]) -> None:
     for beside in _beside_each_other(console, all_of_them, ("simulated",)):
         console.print()
         show_table(console, _error_table(beside))
+    played(console, all_of_them)
     stepped = [
         match for match in all_of_them if match.features.measured or match.features.simulated
     ]
@@ -28,6 +30,18 @@ def comparisons(console: Console, all_of_them: Sequence[Comparison]) -> None:
         console.print()
         show_table(console, _feature_table(beside))
         remarks(console, "-", _hidden(beside), "dim")
+
+
+def played(console: Console, all_of_them: Sequence[Comparison]) -> None:
+    """Show what of records was played in, and how the signals that are compared depart."""
+    events = [match for match in all_of_them if match.played is not None]
+    if not events:
+        return
+    console.print()
+    for match in events:
+        remarks(console, f"{match.name}: played in:", _driving(match), "")
+    paragraph(console, "simulated less recorded, pu, and the peaks of both from rest:")
+    show_table(console, _played_table(events), ("at rest", "at"))
 
 
 def rejections(console: Console, all_of_them: Iterable[Comparison]) -> None:
@@ -77,6 +91,33 @@ def _error_table(comparisons: Sequence[Comparison]) -> Table:
     table.add_row("maximum error", "pu", *(f"{match.max_error:.3e}" for match in comparisons))
     table.add_row("fit", "%", *(f"{comparison.fit_percent:.2f}" for comparison in comparisons))
     return table
+
+
+def _played_table(comparisons: Sequence[Comparison]) -> Table:
+    """Return how the signals of records that were played in depart from them, pu and s."""
+    numbers = ("rms", "largest", "at", "at rest", "peak rec.", "peak sim.")
+    table = plain_table("record", "signal", *numbers, numbers=numbers)
+    for match in comparisons:
+        errors = {} if match.played is None else match.played.errors
+        for signal, error in errors.items():
+            peaks = (_peak(peak) for peak in (error.measured, error.simulated))
+            cells = (f"{error.largest:+.2e}", f"{error.largest_at:.4g}", f"{error.at_rest:+.1e}")
+            table.add_row(match.name, signal, f"{match.channels[signal].rmse:.2e}", *cells, *peaks)
+    return table
+
+
+def _driving(comparison: Comparison) -> Iterator[str]:
+    """Yield in one sentence what of a record drove the simulation, and how far it went."""
+    driving = {} if comparison.played is None else comparison.played.driving
+    texts = (
+        name if signal.excursion is None else f"{name} ({signal.excursion.text(signal.unit)})"
+        for name, signal in driving.items()
+    )
+    yield ", ".join(texts)
+
+
+def _peak(excursion: Excursion | None) -> str:
+    return "-" if excursion is None else f"{excursion.value:+.4g}"
 
 
 def _rmse(comparison: Comparison, signal: str) -> str:

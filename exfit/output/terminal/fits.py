@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from exfit.inference import ParameterEffect
-from exfit.output.terminal.comparisons import comparisons, rejections
+from exfit.output.terminal.comparisons import comparisons, played, rejections
 from exfit.output.terminal.terminal import (
     NO_BREAK,
     error_of,
@@ -68,6 +68,8 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     notes(console, result.notes)
     if result.validation or several:
         comparisons(console, [*result.comparisons, *result.validation])
+    else:
+        played(console, result.comparisons)
 
 
 def verdict(console: Console, result: FitResult) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.decimation import envelope, kept_rows
 from exfit.output.report.charts import Chart, Panel, Series
-from exfit.output.report.layout import BINS, LEVEL, LOW, MILLI, TALL, TIME
+from exfit.output.report.layout import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.results.comparisons import REFERENCE, Comparison
 from exfit.results.model import FitResult
 from exfit.results.tables import clock_digits
@@ -36,10 +36,14 @@ class OverlayChart:
 
 @dataclass(frozen=True)
 class MatchView:
-    """A record beside its simulation; without charts where the result holds no samples."""
+    """A record beside its simulation; without charts where the result holds no samples.
+
+    ``played`` shows what of a record drove the simulation above what came of it.
+    """
 
     comparison: Comparison
     overlays: tuple[OverlayChart, ...]
+    played: Chart | None = None
 
 
 def fitted_matches(result: FitResult) -> tuple[MatchView, ...]:
@@ -65,8 +69,38 @@ def _matches(result: FitResult) -> tuple[MatchView, ...]:
                 )
                 for signal in comparison.overlays
             ),
+            played(f"played-{k}", comparison, bins) if comparison.overlays else None,
         )
         for k, comparison in enumerate(comparisons)
+    )
+
+
+def played(key: str, comparison: Comparison, bins: int = BINS) -> Chart | None:
+    """Return the driving signals of a record above those that are compared; None without any."""
+    if comparison.played is None:
+        return None
+    time, driving = comparison.time, comparison.played.driving
+    panels = [
+        Panel(
+            f"{signal.label}: recorded, played in",
+            (Series("", *envelope(time, signal.samples, bins), "other thin"),),
+            HALF,
+        )
+        for signal in driving.values()
+    ]
+    for name, samples in comparison.overlays.items():
+        measured = Series("recorded", *envelope(time, samples.measured, bins), "measured", True)
+        simulated = Series("simulated", *envelope(time, samples.simulated, bins), "simulated")
+        panels.append(Panel(label_of(name), (measured, simulated), HALF))
+    signals = ", ".join(comparison.overlays)
+    return Chart(
+        key=key,
+        title=f"{comparison.name}: {comparison.record} played into the unit",
+        text=f"Recorded {', '.join(driving)} played in; recorded and simulated {signals} from "
+        f"{show(time[0])} to {show(time[-1])} s.",
+        x_title=TIME,
+        panels=tuple(panels),
+        x_range=(float(time[0]), float(time[-1])),
     )
 
 
