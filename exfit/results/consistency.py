@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.fitting.uncertainty import UncertaintyAnalysis
-from exfit.results.comparisons import Comparison
+from exfit.results.comparisons import Comparison, IterationResponses
 from exfit.results.description import Behaviour
 from exfit.results.model import FitResult
 from exfit.results.played_records import PlayedRecord
@@ -64,13 +64,16 @@ def _of_comparison(match: Comparison) -> Iterator[str]:
             yield f"overlays: {signal}: not one sample for each instant"
     if match.played is not None:
         yield from _of_played(match.played, match)
-    responses = match.iteration_responses
-    if responses is not None:
-        shape = (len(responses.numbers), len(responses.time))
-        if responses.samples.shape != shape or responses.measured.shape != shape[1:]:
-            yield "iteration_responses: not one sample for each instant"
-        if not _increases(responses.time):
-            yield "iteration_responses: time: does not increase"
+    if match.iteration_responses is not None:
+        yield from _of_responses(match.iteration_responses)
+
+
+def _of_responses(responses: IterationResponses) -> Iterator[str]:
+    shape = (len(responses.numbers), len(responses.time))
+    if responses.samples.shape != shape or responses.measured.shape != shape[1:]:
+        yield "iteration_responses: not one sample for each instant"
+    if not _increases(responses.time):
+        yield "iteration_responses: time: does not increase"
 
 
 def _of_played(played: PlayedRecord, match: Comparison) -> Iterator[str]:

@@ -320,6 +320,18 @@ def test_the_dynamics_record_is_reported_with_its_warnings_or_why_there_is_none(
     assert "FIRST_ORDER has no PSS/E record" in pages("first order").text
 
 
+def test_a_playback_shows_what_was_played_in_and_no_features_of_a_step(pages):
+    page = pages("playback")
+    title = "fit: simulated less recorded, and the largest departures of both from rest"
+    heads, *rows = page.tables[title]
+    assert [row[:2] for row in rows] == [
+        ["vt", "played in"], ["ifd", "played in"], ["efd", "compared"]
+    ]  # fmt: skip
+    assert heads[2:6] == ["rms", "largest", "at (s)", "at rest"]
+    assert "played-0" in page.ids
+    assert "features" not in page.text
+
+
 def test_a_machine_alone_has_no_drawing_and_no_loop(pages):
     page = pages("machine alone")
     assert "a machine without an exciter" in page.text

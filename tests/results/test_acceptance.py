@@ -1,5 +1,6 @@
 """A validation is judged against the fit, unless the case says by what."""
 
+from dataclasses import replace
 from math import nan
 
 import numpy as np
@@ -10,6 +11,7 @@ from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import noise_of
 from exfit.results.acceptance import MUCH_WORSE, judged
 from exfit.results.comparisons import Comparison, Match, StepFeatures
+from exfit.results.played_records import PlayedRecord
 
 TIME = np.arange(0.0, 10.0, 0.01)
 STEP = np.where(TIME < 1.0, 1.0, 1.05)
@@ -45,6 +47,24 @@ def test_without_accept_a_validation_is_held_against_the_worst_record_of_the_fit
     assert (f"on down the error is {times:.1f} times that of the fit" in found.reason) is (
         not found.accepted
     )
+
+
+@pytest.mark.parametrize("bad", ["p", "q", "efd"])
+def test_of_a_grid_event_p_and_q_must_match_both(bad):
+    """The field voltage, whose base is often in doubt, judges no event."""
+    played = PlayedRecord(1.0, {}, {})
+
+    def event(name, error):
+        rmse = dict.fromkeys(("p", "q", "efd"), 0.0001) | {bad: error}
+        match = comparison(name, 1e-4, signal="p")
+        return replace(
+            match, played=played, channels={name: Match(e, e, 99.0) for name, e in rmse.items()}
+        )
+
+    channels = [channel(signal=signal) for signal in ("efd", "q", "p")]
+    validation = judged(event("trip", 1e-3), [event("fit", 1e-4)], channels)
+    assert validation.accepted is (bad == "efd")
+    assert (f"on trip the error of {bad} is 10.0 times" in validation.reason) is (bad != "efd")
 
 
 @pytest.mark.parametrize("fit_percent", [0.0, -206.0, nan])

@@ -9,6 +9,7 @@ import pytest
 from exfit.dsp.features import features
 from exfit.results.comparisons import Comparison, Overlay, StepFeatures, match_of
 from exfit.results.criteria import judged_by_criteria
+from exfit.results.played_records import PlayedRecord
 from exfit.util.criteria import Criteria
 
 TIME = np.arange(0.0, 10.0, 0.01)
@@ -51,6 +52,20 @@ def judged(*matches, validation=(), criteria=None):
 
 def by_label(verdict):
     return {criterion.label: criterion for criterion in verdict.criteria}
+
+
+def test_of_a_grid_event_p_and_q_are_judged_and_no_feature_of_a_step():
+    p, q = Overlay(response(), response(damping=0.1)), Overlay(response(), response())
+    overlays = {"p": p, "q": q, "efd": q}
+    event = replace(
+        comparison(response()),
+        channels={name: match_of(overlay) for name, overlay in overlays.items()},
+        features=StepFeatures(None, None),
+        overlays=overlays,
+        played=PlayedRecord(1.0, {}, {}),
+    )
+    met = {criterion.label: criterion.met for criterion in judged(event).criteria}
+    assert met == {"rms of the difference, p": False, "rms of the difference, q": True}
 
 
 def test_a_response_that_is_its_record_meets_all_criteria():
