@@ -130,14 +130,15 @@ def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force:
     for path in (output, table):
         refuse_existing(path, force)
     fits, others = _fits_of(read_fleet(fleet))
+    if not fits:
+        raise ExfitError("\n".join([*_reasons(others), f"{fleet}: no case has a finished fit"]))
     original = dyr or _original(fits)
     if output.exists() and original.exists() and output.samefile(original):
         raise ExfitError(f"{output}: is the planner's own file: name another one with -o")
     fitted = fitted_file(read_file(original), str(original), fits)
     left = [*fitted.left, *others]
     if not fitted.changes:
-        listed = [f"{unit.name}: {unit.reason}" for unit in left]
-        raise ExfitError("\n".join([*first_texts(listed), f"{original}: no unit to change"]))
+        raise ExfitError("\n".join([*_reasons(left), f"{original}: no unit to change"]))
     write(output, fitted.data)
     write(table, changes_table(fitted.changes))
     _report_export(output, table, fitted.changes, left)
@@ -164,6 +165,11 @@ def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":
     return fits, others
 
 
+def _reasons(left: "Sequence[LeftUnit]") -> list[str]:
+    """Return why units are left as they were, a line each."""
+    return first_texts([f"{unit.name}: {unit.reason}" for unit in left])
+
+
 def _original(fits: "Sequence[FittedUnit]") -> Path:
     """Return the file that all cases were made of; raises ExfitError where it is not one alone."""
     files = {
@@ -171,9 +177,11 @@ def _original(fits: "Sequence[FittedUnit]") -> Path:
         for _, result in fits
         if (found := result.as_found) is not None and found.file is not None
     }
-    if len(files) != 1:
-        named = ", ".join(first_texts([*files])) or "none"
-        raise ExfitError(f"--dyr: missing; files that the cases name: {named}")
+    if not files:
+        raise ExfitError("--dyr: required: no case names the planner's file that it was made of")
+    if len(files) > 1:
+        named = ", ".join(first_texts([*files]))
+        raise ExfitError(f"--dyr: required: the cases were made of several files: {named}")
     return Path(next(iter(files)))
 
 
@@ -185,7 +193,7 @@ def _report_export(
     echo(f"written to {output}; units changed: {len(units)}, values: {len(changes)}")
     echo(f"what was changed: {table}")
     warn(first_texts(_undetermined(changes)))
-    for line in first_texts([f"{unit.name}: {unit.reason}" for unit in left if not unit.verified]):
+    for line in _reasons([unit for unit in left if not unit.verified]):
         echo(f"left as it was: {line}", err=True)
     refused = [f"{unit.name}: {unit.reason}" for unit in left if unit.verified]
     if refused:

@@ -6,7 +6,7 @@ from exfit.errors import ExfitError
 from exfit.output.plots import overlay
 from exfit.output.terminal.terminal import interval, number
 from exfit.results.model import FitResult, FittedParameter
-from exfit.util.text import near, rounded
+from exfit.util.text import near, percentage, rounded
 
 __all__ = ["Figure", "fit_figure", "fit_html"]
 
@@ -14,7 +14,7 @@ TABLE = """\
 <div>
 <p><b>{{ result.model }}</b> fitted to {{ records }}:
 {{ verdict }},
-rmse {{ "%.3g" | format(result.rmse) }} pu, fit {{ "%.2f" | format(fit_percent) }} %</p>
+rmse {{ "%.3g" | format(result.rmse) }} pu, fit {{ fit_percent }} %</p>
 <table>
 <thead><tr>
 {% for heading in ("parameter", "start", "fitted", "standard error", "95 % interval", "unit") %}
@@ -49,7 +49,7 @@ def fit_html(result: FitResult) -> str:
         result=result,
         verdict=result.outcome if result.verdict is None else result.verdict.sentence,
         records=", ".join(comparison.record for comparison in result.comparisons),
-        fit_percent=result.comparison.fit_percent,
+        fit_percent=percentage(result.comparison.fit_percent),
         rows=[
             (parameter.meaning, _cells(name, parameter))
             for name, parameter in result.parameters.items()

@@ -64,6 +64,7 @@ DIGITS = 5  # of a number without an error
 DIGITS_OF_ERROR = 2  # that a number is printed to
 MOST_DIGITS = 7  # of a number whose error is as good as none
 MOST_DECIMALS = 7  # of a number: a smaller one has an exponent
+LARGEST_PERCENTAGE = 1e6  # with two decimals: a larger one has an exponent
 MOST_TEXTS = 20  # faults or warnings that are listed
 LONGEST_TEXT = 1000  # characters of one of them
 MOST_NAMES = 60  # that are listed
@@ -137,6 +138,11 @@ def rounded(value: float | None, error: float | None = None) -> str:
         digits = max(decimals + floor(log10(abs(value))), 0) if value else 0
         return f"{value:.{digits}e}"
     return f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
+
+
+def percentage(value: float) -> str:
+    """Return a percentage with two decimals, in few characters where it is beyond all measure."""
+    return f"{value:.2e}" if abs(value) >= LARGEST_PERCENTAGE else f"{value:.2f}"
 
 
 def show_value(value: Any) -> str:

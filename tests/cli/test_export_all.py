@@ -148,6 +148,16 @@ def test_the_file_must_be_one_that_the_cases_name(run, fleet):
     assert run("export", "--all", fleet, "-o", "fitted.dyr", "--dyr", "moved.dyr").code == 0
 
 
+def test_a_batch_without_a_finished_fit_says_what_came_of_its_cases(run, fleet):
+    case = case_name(Path("fleet"), Path("cases", "bus-102-1.yaml"))
+    write_entry(Path("fleet"), IndexEntry(case, status="refused", reason="vt: missing"))
+    ran = run("export", "--all", fleet, "-o", "fitted.dyr")
+    assert (ran.code, ran.out) == (1, "")
+    first, last = (line.strip() for line in ran.err.splitlines())
+    assert first == "Error: bus-102-1: refused: vt: missing"
+    assert last == "fleet: no case has a finished fit"
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mutant_runs import CONTROL
 
-from exfit.util.text import printable, rounded
+from exfit.util.text import percentage, printable, rounded
 
 TEXTS = st.text(st.one_of(st.characters(), st.sampled_from("\x00\x1b\x7f\x9b\u202e\u2066\r\n\t\\")))
 
@@ -33,3 +33,13 @@ def test_the_codes_say_what_was_there(text):
 def test_a_number_of_any_size_is_rounded_to_few_characters(value):
     assert len(rounded(value, 1e97)) <= 12
     assert len(rounded(value, 1e306)) <= 12
+    assert len(percentage(value)) <= 10
+
+
+def test_a_percentage_has_two_decimals():
+    assert [percentage(value) for value in (99.987, -3.0, 999_999.0)] == [
+        "99.99",
+        "-3.00",
+        "999999.00",
+    ]
+    assert percentage(float("nan")) == "nan"

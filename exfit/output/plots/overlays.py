@@ -19,6 +19,7 @@ from exfit.output.plots.style import (
 from exfit.results.comparisons import REFERENCE, Comparison, Overlay
 from exfit.results.played_records import DrivingSignal
 from exfit.signals import label_of
+from exfit.util.text import percentage
 
 Array = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay, 
     axes.set_ylabel(label_of(signal))
     axes.legend(loc="best", frameon=False)
     match = comparison.channels[signal]
-    text = f"rmse {match.rmse:.3g} pu, fit {match.fit_percent:.2f} %"
+    text = f"rmse {match.rmse:.3g} pu, fit {percentage(match.fit_percent)} %"
     axes.set_title(text, fontsize=9, loc="right")
     tidy(axes)
 

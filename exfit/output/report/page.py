@@ -21,7 +21,7 @@ from exfit.output.report.sections.matches import MatchView, OverlayChart, live_d
 from exfit.output.report.verdict import Headline, headline
 from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
-from exfit.util.text import rounded
+from exfit.util.text import percentage, rounded
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -142,7 +142,12 @@ def environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    shared.filters |= {"number": _number, "rounded": rounded, "feature_cells": feature_cells}
+    shared.filters |= {
+        "number": _number,
+        "rounded": rounded,
+        "percentage": percentage,
+        "feature_cells": feature_cells,
+    }
     shared.filters |= {"drawing": drawing, "command": shlex.join}
     shared.tests |= {"finite": _is_finite}
     shared.globals |= {"version": __version__, "features": LABELS, "long": LONG}

@@ -14,7 +14,7 @@ from exfit.output.terminal.terminal import (
     plain_table,
     show_table,
 )
-from exfit.util.text import rounded
+from exfit.util.text import percentage, rounded
 
 
 def agreement(console: Console, result: Agreement) -> None:
@@ -53,7 +53,7 @@ def _matches(result: Agreement) -> Table:
     numbers = ("f, pu²", "rmse, pu", "fit, %", "samples")
     table = plain_table("", "signal", *numbers, numbers=numbers)
     for entry in result.from_reference:
-        cells = (f"{entry.f:.4e}", f"{entry.rmse:.3e}", f"{entry.fit_percent:.2f}")
+        cells = (f"{entry.f:.4e}", f"{entry.rmse:.3e}", percentage(entry.fit_percent))
         table.add_row(entry.second, entry.signal, *cells, str(entry.count))
     return table
 

@@ -10,6 +10,7 @@ from exfit.output.terminal.terminal import paragraph, plain_table, remarks, show
 from exfit.results.comparisons import Comparison
 from exfit.results.feature_digits import feature_cells
 from exfit.results.played_records import Excursion
+from exfit.util.text import percentage
 
 BETWEEN_COLUMNS = 2  # characters
 FEATURE_COLUMNS = ("measured", "+-", "simulated")  # +-: half of the 95 % interval
@@ -89,7 +90,7 @@ def _error_table(comparisons: Sequence[Comparison]) -> Table:
         label = "rmse" if len(signals) == 1 else f"rmse {signal}"
         table.add_row(label, "pu", *(_rmse(comparison, signal) for comparison in comparisons))
     table.add_row("maximum error", "pu", *(f"{match.max_error:.3e}" for match in comparisons))
-    table.add_row("fit", "%", *(f"{comparison.fit_percent:.2f}" for comparison in comparisons))
+    table.add_row("fit", "%", *(percentage(comparison.fit_percent) for comparison in comparisons))
     return table
 
 

@@ -24,7 +24,7 @@ from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
 from exfit.results.verdict import GOOD, MATCHES
 from exfit.util.sources import by_source
-from exfit.util.text import rounded
+from exfit.util.text import percentage, rounded
 
 STYLES = {GOOD: "bold green", MATCHES: "bold yellow"}  # of verdicts; of the others bold red
 
@@ -45,7 +45,7 @@ def fit(console: Console, result: FitResult, before: FitResult | None = None) ->
     figures = [f"cost {result.start_cost:.4e} -> {result.cost:.4e}"]
     if not several:
         comparison = result.comparison
-        figures += [f"rmse {comparison.rmse:.3e} pu", f"fit {comparison.fit_percent:.2f} %"]
+        figures += [f"rmse {comparison.rmse:.3e} pu", f"fit {percentage(comparison.fit_percent)} %"]
     paragraph(console, in_groups(figures), indent=2)
     effort = (
         f"{result.nit} iterations",

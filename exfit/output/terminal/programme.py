@@ -28,7 +28,7 @@ from exfit.results.model import FitResult, Iteration
 from exfit.results.saturation import SaturationResult
 from exfit.results.v_curve import VCurve
 from exfit.results.verdict import GOOD, NOT_CONVERGED
-from exfit.util.text import rounded
+from exfit.util.text import percentage, rounded
 
 KIND, VERDICT, SECONDS = 10, 27, 7  # characters of the columns behind the name
 FEWEST_OF_NAME = 12  # characters: on a narrower terminal verdicts are shortened
@@ -79,7 +79,9 @@ class ProgrammeProgress:
             for match in (*test.result.comparisons, *test.result.validation):
                 judged = "validated" if match.validation else "fitted"
                 word = judged if match.accepted else "not accepted"
-                line = self._line(f"  {match.name}", "", f"{word}, {match.fit_percent:.2f} %", "")
+                line = self._line(
+                    f"  {match.name}", "", f"{word}, {percentage(match.fit_percent)} %", ""
+                )
                 self.console.print(Text(line, "" if match.accepted else "yellow"), soft_wrap=True)
 
     def _line(self, name: str, kind: str, verdict: str, seconds: str) -> str:

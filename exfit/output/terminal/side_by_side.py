@@ -8,7 +8,7 @@ from rich.console import Console
 from exfit.output.terminal.terminal import number, paragraph, plain_table, show_table
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import ParameterValue, parameters_beside
-from exfit.util.text import rounded
+from exfit.util.text import percentage, rounded
 
 COST = "f"  # label of its row
 BETWEEN_COLUMNS = 2  # characters
@@ -38,7 +38,7 @@ MODEL: tuple[Figure, ...] = (
 MATCH: tuple[Figure, ...] = (
     (COST, "pu²", lambda fit: f"{fit.cost:.3e}"),
     ("rmse", "pu", lambda fit: f"{fit.rmse:.3e}"),
-    ("fit", "%", lambda fit: f"{fit.comparison.fit_percent:.2f}"),
+    ("fit", "%", lambda fit: percentage(fit.comparison.fit_percent)),
 )
 EFFORT: tuple[Figure, ...] = (
     ("iterations", "", lambda fit: f"{fit.nit}"),
