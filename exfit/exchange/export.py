@@ -1,4 +1,4 @@
-"""The PSS/E records of a fit, as a dynamics file."""
+"""The records of a fit, as a planner's file."""
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -8,16 +8,16 @@ from math import isfinite
 from exfit import __version__
 from exfit.case.peek import section_of, stabiliser_inputs
 from exfit.errors import ExfitError, FileError
+from exfit.exchange.file_format import WIDTH, FileFormat
+from exfit.exchange.psse.files import PSSE_FILES
 from exfit.exchange.records import (
     SIGNALS,
-    WIDTH,
     Definition,
     alternatives,
     contradictions,
     definition_of,
     definitions,
     outside,
-    record_text,
 )
 from exfit.models import MODELS
 from exfit.models.counterparts import OUT_OF_REACH
@@ -55,8 +55,9 @@ def export(
     machine_id: str,
     name: str | None = None,
     translation: Translation | None = None,
+    files: FileFormat = PSSE_FILES,
 ) -> Exported:
-    """Return the PSS/E records of a fit, of its exciter as its ``translation`` has it.
+    """Return the records of a fit for a program, of its exciter as its ``translation`` has it.
 
     ``name`` is the record of the exciter in place of the model's own. Raises ExfitError where the
     model has no record, or a value is missing or lies outside the range of its data sheet.
@@ -66,23 +67,24 @@ def export(
         verdict = f"{translation.source} as {translation.target}: {translation.verdict}"
         origin += [f"{text}." for text in (verdict, *translation.notes)]
         result = _translated(result, translation)
-    warnings = [*_of_fit(result)]
+    program = files.program
+    of_fit = [*_of_fit(result, program)]
+    warnings = list[str]()
     written = [
-        *_machine(result, warnings),
-        *_exciter(result, name),
-        *_stabiliser(result, warnings),
+        *_machine(result, program, warnings),
+        *_exciter(result, program, name),
+        *_stabiliser(result, program, warnings),
     ]
     if not written:
-        raise ExfitError(f"{result.model} has no PSS/E record")
+        raise ExfitError(f"{result.model} has no {program} record")
     for record in written:
         warnings += _warnings(record)
-    warnings += _of_speed(result, written)
-    comments = [*origin, *(f"{text}." for text in _of_fit(result))]
-    comments += [f"{text}." for text in _of_speed(result, written)]
+    of_fit += _of_speed(result, written)
+    comments = [*origin, *(f"{text}." for text in of_fit)]
     comments += [text for record in written for text in _comments(record)]
-    lines = [line for text in comments for line in comment_lines(text)]
-    lines += [record_text(entry.definition, entry.values, bus, machine_id) for entry in written]
-    return Exported("\n".join(lines) + "\n", tuple(warnings))
+    lines = [line for text in comments for line in comment_lines(text, files)]
+    lines += [files.record_text(own.definition, own.values, bus, machine_id) for own in written]
+    return Exported("\n".join(lines) + "\n", (*of_fit, *warnings))
 
 
 def _translated(result: FitResult, translation: Translation) -> FitResult:
@@ -100,7 +102,7 @@ def _translated(result: FitResult, translation: Translation) -> FitResult:
     )
 
 
-def _of_fit(result: FitResult) -> Iterator[str]:
+def _of_fit(result: FitResult, program: str) -> Iterator[str]:
     """Yield what of the fit itself the reader must know."""
     if not result.holds:
         yield f"the fit does not hold: {outcome_of(result)}: {explanation_of(result)}"
@@ -108,7 +110,10 @@ def _of_fit(result: FitResult) -> Iterator[str]:
     if weighty:
         yield f"what was fitted depends on typical values: {first_of(weighty)}"
     if result.saturation != "quadratic":
-        yield f"fitted with saturation: {result.saturation}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
+        yield (
+            f"fitted with saturation: {result.saturation}; {program} takes E1 SE1 E2 SE2 as "
+            "quadratic"
+        )
 
 
 def _of_speed(result: FitResult, written: Iterable[Written]) -> Iterator[str]:
@@ -122,53 +127,57 @@ def _of_speed(result: FitResult, written: Iterable[Written]) -> Iterator[str]:
             yield f"fitted with efd_times_speed; {record.name} does not multiply efd by the speed"
 
 
-def _exciter(result: FitResult, name: str | None) -> Iterator[Written]:
+def _exciter(result: FitResult, program: str, name: str | None) -> Iterator[Written]:
     if result.model == result.machine_model:  # it stood alone
         if name is not None:
             raise ExfitError(f"--model {name}: the fit is of {result.model}, without an exciter")
         return
     model = MODELS.get(result.model)
     if model is None or "model" in result.inputs:
-        raise ExfitError(f"{result.model} is not a model of the catalogue: it has no PSS/E record")
-    candidates = {entry.record.name: entry for entry in alternatives(model)}
+        raise ExfitError(
+            f"{result.model} is not a model of the catalogue: it has no {program} record"
+        )
+    candidates = {entry.record.name.upper(): entry for entry in alternatives(model, program)}
     if not candidates:
-        raise ExfitError(f"{result.model} has no PSS/E record")
+        raise ExfitError(f"{result.model} has no {program} record")
     wanted = next(iter(candidates)) if name is None else name.upper()
     if wanted not in candidates:
         raise ExfitError(
             f"--model {name}: not a record of {result.model}; "
-            f"{_other_model(wanted) or near(wanted, candidates)}"
+            f"{_other_model(wanted, program) or near(wanted, candidates)}"
         )
     yield _written(result, candidates[wanted], "")
 
 
-def _other_model(name: str) -> str:
+def _other_model(name: str, program: str) -> str:
     """Return a hint where a record is that of another exciter."""
-    definition = definition_of(name)
+    definition = definition_of(name, program)
     if definition is None or definition.kind != "exciter":
         return ""
     return f"`exfit translate RESULT --model {name}` finds the data of {definition.model.name}"
 
 
-def _machine(result: FitResult, warnings: list[str]) -> Iterator[Written]:
+def _machine(result: FitResult, program: str, warnings: list[str]) -> Iterator[Written]:
     name = result.machine_model
-    candidates = alternatives(MACHINES[name]) if name in MACHINES else []
+    candidates = alternatives(MACHINES[name], program) if name in MACHINES else []
     if not candidates:
-        what = "no machine is named" if name is None else f"machine {name} has no PSS/E record"
+        what = "no machine is named" if name is None else f"machine {name} has no {program} record"
         warnings.append(f"{what}: only the exciter is written")
         return
     yield _written(result, candidates[0], "machine.")
 
 
-def _stabiliser(result: FitResult, warnings: list[str]) -> Iterator[Written]:
+def _stabiliser(result: FitResult, program: str, warnings: list[str]) -> Iterator[Written]:
     name = result.stabiliser_model
     if name is None:
         return
     candidates = [
-        entry for entry in definitions() if entry.kind == "stabiliser" and entry.model.name == name
+        entry
+        for entry in definitions(program)
+        if entry.kind == "stabiliser" and entry.model.name == name
     ]
     if not candidates:
-        warnings.append(f"stabiliser {name} has no PSS/E record: it is left out")
+        warnings.append(f"stabiliser {name} has no {program} record: it is left out")
         return
     record = _written(result, candidates[0], "stabiliser.")
     own = getattr(record.definition.model, "inputs", ())
@@ -237,9 +246,13 @@ def _comments(entry: Written) -> Iterator[str]:
         yield f"{warning}."
 
 
-def comment_lines(text: str) -> list[str]:
-    """Return a comment of a dynamics file in lines; what is not ASCII is not sure to be read."""
+def comment_lines(text: str, files: FileFormat = PSSE_FILES) -> list[str]:
+    """Return a comment of a planner's file in lines; what is not ASCII is not sure to be read."""
     plain = "".join(letter if " " <= letter <= "~" else "?" for letter in text)
     return textwrap.wrap(
-        plain, WIDTH, initial_indent="// ", subsequent_indent="//   ", break_on_hyphens=False
+        plain,
+        WIDTH,
+        initial_indent=files.comment,
+        subsequent_indent=f"{files.comment}  ",
+        break_on_hyphens=False,
     )

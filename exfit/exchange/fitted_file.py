@@ -85,7 +85,7 @@ def fitted_file(data: bytes, file: str, fits: Iterable[FittedUnit]) -> FittedFil
     Raises DynamicsError for a file that is none.
     """
     text = text_of(data, file)
-    units = read_units(text)
+    units = read_units(text, file)
     verified, left = list[FittedUnit](), list[LeftUnit]()
     for fit in fits:
         if fit.result.holds:

@@ -91,7 +91,7 @@ def plan_import(dyr: Path, records: Path | None = None) -> ImportPlan:
 
     Raises DynamicsError where the file cannot be read, ExfitError where the folder or table cannot.
     """
-    units = read_units(text_of(read_file(dyr), str(dyr)))
+    units = read_units(text_of(read_file(dyr), str(dyr)), dyr)
     known = [key_of(unit) for unit in units.units]
     faults = located(units.faults, str(dyr))
     if records is None:

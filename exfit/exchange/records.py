@@ -1,33 +1,54 @@
-"""The records that exfit has models for: constants in PSS/E's order, read and written."""
+"""The records that exfit has models for: constants in a program's order, read and written."""
 
-import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from exfit.exchange.fields import DynamicsFault, Field, number, whole
 from exfit.models import MODELS, STABILISERS, sheet
+from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import DynamicsRecord, Model, Sheet, typical
-from exfit.util.text import show
+from exfit.util.text import near, show, show_value
 
-WIDTH = 80  # columns of a file
+PSSE, PSLF = "PSS/E", "PSLF"
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
+LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the input code of a stabiliser
 UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
 
 
 @dataclass(frozen=True)
 class Definition:
-    """A record and the model that it gives the data of; ``kind``: machine, exciter, stabiliser."""
+    """A record of a program and the model that it gives the data of.
+
+    ``kind``: machine, exciter, stabiliser.
+    """
 
     kind: str
     model: Model | Machine
     record: DynamicsRecord
+    program: str = PSSE
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of what follows the id: integers, then constants."""
-        return (*(name for name, _ in self.record.icons), *self.record.cons)
+        """The names of what follows the id: integers that are not listed, then what is."""
+        cons = self.record.cons
+        return (*(name for name, _ in self.record.icons if name not in cons), *cons)
+
+    @property
+    def fewest(self) -> int:
+        """How many values a record has at least: PSLF's may lack those at its end that do nothing.
+
+        Files of older releases end before them.
+        """
+        idle = {*dict(self.record.absent), *self.record.ignored}
+        last = [number for number, name in enumerate(self.names, 1) if name not in idle]
+        return last[-1] if self.program == PSLF else len(self.names)
+
+    def name_in_file(self, symbol: str) -> str:
+        """Return how a file that names its values names one."""
+        return dict(self.record.spelled).get(symbol, symbol).lower()
 
     @property
     def codes(self) -> tuple[str, ...]:
@@ -45,41 +66,45 @@ class Definition:
 class Reading:
     """What the fields of a record say: values by symbol, what is wrong, what must be known.
 
-    ``inputs`` are the signals of a stabiliser whose record has codes of them.
+    ``inputs`` are the signals of a stabiliser whose record has codes of them; ``fields`` are those
+    of the definition's names, in their order.
     """
 
     values: Mapping[str, float]
     faults: list[DynamicsFault]
     warnings: list[DynamicsFault]
     inputs: tuple[str, ...] = ()
+    fields: tuple[Field, ...] = ()
 
 
-def definitions() -> list[Definition]:
-    """Return every record of every model."""
+def definitions(program: str = PSSE) -> list[Definition]:
+    """Return every record of every model that a program has."""
     catalogues: Iterable[tuple[str, Mapping[str, Model | Machine]]] = (
         ("machine", MACHINES),
         ("exciter", MODELS),
         ("stabiliser", STABILISERS),
     )
     return [
-        Definition(kind, model, record)
+        Definition(kind, model, record, program)
         for kind, catalogue in catalogues
         for model in catalogue.values()
-        for record in model.records
+        for record in (model.records if program == PSSE else model.pslf_records)
     ]
 
 
-def definition_of(name: str) -> Definition | None:
+def definition_of(name: str, program: str = PSSE) -> Definition | None:
     """Return the record that a file means by a name, None where exfit has no model of it.
 
     A further record of a model is meant only where the model is known by that very name: PSS/E's
     ESAC8B is another model than the AC8B that can be written as one.
     """
     of_that_name = [
-        definition for definition in definitions() if definition.record.name == name.upper()
+        definition
+        for definition in definitions(program)
+        if definition.record.name.upper() == name.upper()
     ]
     for definition in of_that_name:
-        if definition.record == definition.model.records[0]:
+        if program == PSLF or definition.record == definition.model.records[0]:
             return definition
     for definition in of_that_name:
         model = definition.model
@@ -88,9 +113,9 @@ def definition_of(name: str) -> Definition | None:
     return None
 
 
-def alternatives(model: Model | Machine) -> list[Definition]:
+def alternatives(model: Model | Machine, program: str = PSSE) -> list[Definition]:
     """Return the records that a model can be written as, its own first."""
-    return [definition for definition in definitions() if definition.model is model]
+    return [definition for definition in definitions(program) if definition.model is model]
 
 
 def contradictions(
@@ -103,9 +128,14 @@ def contradictions(
 def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) -> Reading:
     """Return what the fields behind a record's id say; ``line`` is where the record begins."""
     record, names = definition.record, definition.names
-    if len(fields) != len(names):
+    if definition.program == PSLF and any(field.quoted for field in fields):
+        fields, faults = _named_fields(definition, line, fields)
+        if faults:
+            return Reading({}, faults, [])
+    if not definition.fewest <= len(fields) <= len(names):
         count = DynamicsFault(line, _wrong_count(definition, len(fields)))
         return Reading({}, [count, *_no_numbers(record.name, fields)], [])
+    fields += tuple(_idle(definition, name, line) for name in names[len(fields) :])
     lines = dict(zip(names, (field.line for field in fields), strict=True))
 
     def placed(texts: Iterable[tuple[str, str]]) -> list[DynamicsFault]:
@@ -131,27 +161,63 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     symbols = [row.symbol for row in definition.model.sheet]
     unmodelled = [*_unmodelled(definition, symbols, given), *_without_effect(rows, of_sheet)]
     warnings = doubt + placed([*unmodelled, *lacking])
-    return Reading(values, placed(wrong), warnings, _inputs(definition, given))
+    return Reading(values, placed(wrong), warnings, _inputs(definition, given), fields)
 
 
-def record_text(
-    definition: Definition, values: Mapping[str, float], bus: int, machine_id: str
-) -> str:
-    """Return a record as a dynamics file has it, each number in the digits that give it back."""
+def record_fields(definition: Definition, values: Mapping[str, float]) -> list[str]:
+    """Return the fields behind a record's id, each number in the digits that give it back."""
     given = {**dict.fromkeys(definition.record.ignored, 0.0), **values}
     given |= dict(definition.record.absent)
     if {"E1", "SE1", "E2", "SE2"} <= given.keys() and given["E1"] > given["E2"]:
         for first, second in zip(*SORTED, strict=True):
             given[first], given[second] = given[second], given[first]
-    fields = [
-        str(bus),
-        f"'{definition.record.name}'",
-        machine_id if machine_id.isalnum() else f"'{machine_id}'",
-        *(str(int(given.get(name, value))) for name, value in definition.record.icons),
-        *(repr(float(given[name])).upper() for name in definition.record.cons),
-        "/",
+    integers = dict(definition.record.icons)
+    return [
+        str(int(given.get(name, integers[name])))
+        if name in integers
+        else repr(float(given[name])).upper()
+        for name in definition.names
     ]
-    return textwrap.fill("  ".join(fields), WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+
+
+def _named_fields(
+    definition: Definition, line: int, fields: tuple[Field, ...]
+) -> tuple[tuple[Field, ...], list[DynamicsFault]]:
+    """Return the values of fields "name" value "name" value in the order of the record."""
+    name = definition.record.name
+    known = {definition.name_in_file(symbol): symbol for symbol in definition.names}
+    given: dict[str, Field] = {}
+    faults = []
+    for label, value in zip_longest(fields[::2], fields[1::2]):
+        symbol = known.get(_bare(label.text))
+        if not label.quoted or value is None or value.quoted:
+            text = f"{name}: {show_value(label.text)}: not a name in quotes and its value"
+            return (), [DynamicsFault(label.line, text)]
+        if symbol is None:
+            text = near(label.text.lower(), known)
+            faults.append(DynamicsFault(label.line, f"{name}: no value {label.text!r}; {text}"))
+        elif symbol in given:
+            faults.append(DynamicsFault(label.line, f"{name}: {label.text}: given twice"))
+        else:
+            given[symbol] = value
+    idle = {*dict(definition.record.absent), *definition.record.ignored}
+    missing = [symbol for symbol in definition.names if symbol not in given.keys() | idle]
+    if missing and not faults:
+        listed = ", ".join(map(definition.name_in_file, missing))
+        faults.append(DynamicsFault(line, f"{name}: missing: {listed}"))
+    ordered = (given.get(symbol) or _idle(definition, symbol, line) for symbol in definition.names)
+    return tuple(ordered) if not faults else (), faults
+
+
+def _bare(name: str) -> str:
+    """Return the name of a value without capitals and blanks: of "Ang p" angp."""
+    return "".join(name.lower().split())
+
+
+def _idle(definition: Definition, name: str, line: int) -> Field:
+    """Return a field that a record need not have: what the model stands for."""
+    modelled = dict(definition.record.absent).get(name, 0.0)
+    return Field(repr(modelled), line)
 
 
 def _numbers(
@@ -163,10 +229,20 @@ def _numbers(
     faults = []
     for name, field in zip(definition.names, fields, strict=True):
         try:
-            values[name] = whole(field) if name in integers else number(field)
+            values[name] = _whole(definition, field) if name in integers else number(field)
         except ValueError as error:
             faults.append((name, str(error)))
     return values, faults
+
+
+def _whole(definition: Definition, field: Field) -> int:
+    """Return an integer of a record, which PSLF writes as a number; raises ValueError."""
+    if definition.program == PSSE:
+        return whole(field)
+    value = number(field)
+    if not value.is_integer():
+        raise ValueError(f"{show_value(field.text)} is not a whole number")
+    return int(value)
 
 
 def _no_numbers(name: str, fields: Iterable[Field]) -> Iterable[DynamicsFault]:
@@ -193,6 +269,8 @@ def _unmodelled(
         value = given.get(name, modelled)
         if name in definition.codes and value in SIGNALS:
             continue
+        if name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH:
+            continue
         if value != modelled and name not in symbols:
             yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
 
@@ -216,7 +294,8 @@ def outside(rows: Sheet, values: Mapping[str, float]) -> Iterable[tuple[str, str
 
 
 def _wrong_count(definition: Definition, count: int) -> str:
-    icons, cons = len(definition.record.icons), len(definition.record.cons)
+    icons = len(definition.record.icons)
+    cons = len(definition.names) - icons
     parts = f"{icons} integers and {cons} constants" if icons else f"{cons} constants"
     order = " ".join(definition.names)
     plural = "value" if count == 1 else "values"

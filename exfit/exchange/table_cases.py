@@ -94,7 +94,7 @@ def cases_of_table(
 def _units_in(file: Path) -> DynamicsUnits | str:
     """Return the units of a planner's file, or why it cannot be read."""
     try:
-        return read_units(text_of(read_file(file), str(file)))
+        return read_units(text_of(read_file(file), str(file)), file)
     except DynamicsError as fault:
         return str(fault)
 

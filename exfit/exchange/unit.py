@@ -2,19 +2,16 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from exfit.errors import DynamicsError
-from exfit.exchange.fields import DynamicsFault, Field, Fields, located, refuse
-from exfit.exchange.psse.free_format import read_records
+from exfit.exchange.fields import DynamicsFault, Field, located, refuse
+from exfit.exchange.file_format import Head
+from exfit.exchange.formats import format_of
 from exfit.exchange.records import Definition, definition_of, definitions, read_values
-from exfit.util.text import near, show_value
+from exfit.util.text import near
 
 NEEDED = ("machine", "exciter")
 MOST_LISTED = 20  # units in a message
-LONGEST_ID = 2
-LONGEST_BUS = 10  # digits that are looked at
-MOST_BUSES = 10**6
 OTHERS: Mapping[str, str] = {
     name: kind
     for kind, names in {
@@ -32,16 +29,6 @@ OTHERS: Mapping[str, str] = {
 }
 
 CLASSICAL = {"GENCLS": "a constant voltage behind a reactance: no unit to verify"}
-
-
-class Head(NamedTuple):
-    """A record by what it begins with, and the fields behind."""
-
-    bus: int
-    name: str
-    id: str
-    line: int
-    fields: tuple[Field, ...]
 
 
 @dataclass(frozen=True)
@@ -78,13 +65,15 @@ def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | No
     where the unit is not in the file, is not the only one, or has no machine or exciter that exfit
     knows.
     """
-    faults: list[DynamicsFault] = []
-    heads = [head for record in read_records(text, file) for head in heads_of(record, faults)]
+    files = format_of(file)
+    heads, faults = files.heads(text)
     refuse(faults, file)
+    if not heads:
+        raise DynamicsError([f"{file}: holds no record of a unit: {files.begins}"])
     chosen = _chosen(by_unit(heads), file, bus, machine_id)
     unit, faults = unit_of(chosen)
     if unit is None:
-        left_out = [head for head in chosen if definition_of(head.name) is None]
+        left_out = [head for head in chosen if head.definition is None]
         faults += _missing(missing_kinds(chosen), chosen, left_out)
         raise DynamicsError(located(faults, file))
     return unit
@@ -96,7 +85,7 @@ def unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     It is None, too, where it has no machine or exciter that exfit knows.
     """
     faults: list[DynamicsFault] = []
-    left_out = [head for head in heads if definition_of(head.name) is None]
+    left_out = [head for head in heads if head.definition is None]
     warnings = [DynamicsFault(head.line, _left_out(head)) for head in left_out]
     parts = _parts(heads, faults, warnings)
     if faults or not parts.keys() >= {*NEEDED}:
@@ -114,7 +103,7 @@ def unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
 
 def missing_kinds(heads: Iterable[Head]) -> list[str]:
     """Return what a unit needs and none of its records is: machine, exciter."""
-    known = {definition.kind for head in heads if (definition := definition_of(head.name))}
+    known = {head.definition.kind for head in heads if head.definition is not None}
     return [kind for kind in NEEDED if kind not in known]
 
 
@@ -132,7 +121,7 @@ def _parts(
     """Return the models of a unit by their kind; add what is wrong and what must be known."""
     parts: dict[str, UnitPart] = {}
     for head in chosen:
-        definition = definition_of(head.name)
+        definition = head.definition
         if definition is None:
             continue
         kind, name = definition.kind, head.name
@@ -144,45 +133,10 @@ def _parts(
         reading = read_values(definition, head.line, head.fields)
         faults += reading.faults
         warnings += reading.warnings
-        parts[kind] = UnitPart(definition, head.line, reading.values, head.fields, reading.inputs)
+        parts[kind] = UnitPart(
+            definition, head.line, reading.values, reading.fields, reading.inputs
+        )
     return parts
-
-
-def heads_of(record: Fields, faults: list[DynamicsFault]) -> Iterator[Head]:
-    """Yield the head of a record that belongs to a unit; add a fault where it has none."""
-    line, fields = record
-    if len(fields) < 3 or not fields[1].text[:1].isalpha():
-        if len(fields) < 3 or any(definition_of(field.text) for field in fields[:2]):
-            begin = " ".join(field.text for field in fields[:3])
-            faults.append(DynamicsFault(line, f"{show_value(begin)} is not bus, 'model' and id"))
-        return  # of a line or a device: their records begin otherwise
-    bus, name, machine_id = (field.text for field in fields[:3])
-    wrong = [*_wrong_bus(fields[0]), *_wrong_id(machine_id)]
-    if not wrong:
-        yield Head(int(bus), _label(fields), machine_id, line, fields[3:])
-    elif definition_of(name) is not None:
-        faults += [DynamicsFault(line, f"{name.upper()}: {text}") for text in wrong]
-
-
-def _wrong_bus(field: Field) -> Iterator[str]:
-    """Yield why a field is not the number of a bus."""
-    bus = field.text
-    whole = not field.quoted and bus.isascii() and bus.isdigit()
-    if not whole or not 0 < int(bus[:LONGEST_BUS]) < MOST_BUSES:
-        yield f"{show_value(bus)} is not the number of a bus"
-
-
-def _wrong_id(machine_id: str) -> Iterator[str]:
-    """Yield why a text is not the id of a machine."""
-    if not 0 < len(machine_id) <= LONGEST_ID or not machine_id.isprintable():
-        yield f"{show_value(machine_id)} is not a machine id of one or two characters"
-
-
-def _label(fields: Sequence[Field]) -> str:
-    """Return the name of a record's model; of a user's model with its own name."""
-    name = fields[1].text
-    label = f"{name} {fields[3].text}" if name.upper() == "USRMDL" and fields[3:] else name
-    return "".join(letter if letter.isprintable() else "?" for letter in label).upper()
 
 
 def _chosen(
@@ -196,10 +150,6 @@ def _chosen(
     }
     if len(meant) == 1:
         return next(iter(meant.values()))
-    if not units:
-        raise DynamicsError(
-            [f"{file}: holds no record of a unit: bus, 'model', id, values and '/'"]
-        )
     if meant:
         raise DynamicsError(
             [f"{file}: {len(meant)} units; choose by --bus and --id", *_list(meant)]
@@ -227,9 +177,9 @@ def _missing(
     if classical:
         yield from classical
         return
-    unknown = [head for head in left_out if head.name not in OTHERS]
+    unknown = [head for head in left_out if head.name.upper() not in OTHERS]
     for kind in missing:
-        names = names_of(kind)
+        names = names_of(kind, chosen[0].program)
         candidates = [head for head in unknown if len(missing) == 1 or _looks_like(head) == kind]
         for head in candidates:
             text = f"exfit has no {kind} of that name; {near(head.name, names)}"
@@ -242,26 +192,26 @@ def _missing(
 def classical_machines(heads: Iterable[Head]) -> Iterator[DynamicsFault]:
     """Yield that a unit is a classical machine, which has nothing that a record could verify."""
     for head in heads:
-        if head.name in CLASSICAL:
-            yield DynamicsFault(head.line, f"{head.name} is {CLASSICAL[head.name]}")
+        if head.name.upper() in CLASSICAL:
+            yield DynamicsFault(head.line, f"{head.name} is {CLASSICAL[head.name.upper()]}")
 
 
-def names_of(kind: str) -> list[str]:
-    """Return the names by which a file may have a machine or an exciter."""
+def names_of(kind: str, program: str) -> list[str]:
+    """Return the names by which a file of a program may have a machine or an exciter."""
     return sorted(
         definition.record.name
-        for definition in definitions()
-        if definition.kind == kind and definition_of(definition.record.name) == definition
+        for definition in definitions(program)
+        if definition.kind == kind and definition_of(definition.record.name, program) == definition
     )
 
 
 def _looks_like(head: Head) -> str:
     """Return what a record is by its name: PSS/E's machines are GENROU, GENSAL, GENCLS ..."""
-    return "machine" if head.name.startswith("GEN") else "exciter"
+    return "machine" if head.name.upper().startswith("GEN") else "exciter"
 
 
 def _left_out(head: Head) -> str:
-    kind = OTHERS.get(head.name)
+    kind = OTHERS.get(head.name.upper())
     return (
         f"{kind} {head.name} is left out" if kind else f"{head.name} is left out: not a known model"
     )

@@ -2,18 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from exfit.exchange.fields import DynamicsFault
-from exfit.exchange.psse.free_format import sound_records
-from exfit.exchange.records import definition_of
+from exfit.exchange.file_format import Head
+from exfit.exchange.formats import format_of
 from exfit.exchange.unit import (
     NEEDED,
     OTHERS,
-    Head,
     Unit,
     by_unit,
     classical_machines,
-    heads_of,
     missing_kinds,
     names_of,
     unit_of,
@@ -47,14 +46,13 @@ class DynamicsUnits:
     faults: tuple[DynamicsFault, ...]
 
 
-def read_units(text: str) -> DynamicsUnits:
-    """Return every unit of a dynamics file; what is wrong with one does not hinder the others.
+def read_units(text: str, file: str | Path) -> DynamicsUnits:
+    """Return every unit of a dynamics file, whose name says the program that it is of.
 
-    A unit is what has a bus and a machine id: loads and other devices whose records begin so count
-    as units without a machine.
+    What is wrong with one does not hinder the others. A unit is what has a bus and a machine id:
+    loads and other devices whose records begin so count as units without a machine.
     """
-    records, faults = sound_records(text)
-    heads = [head for record in records for head in heads_of(record, faults)]
+    heads, faults = format_of(file).heads(text)
     units, refused = list[Unit](), list[RefusedUnit]()
     for own in by_unit(heads).values():
         unit, wrong = unit_of(own)
@@ -84,9 +82,9 @@ def _lacking(heads: Sequence[Head], missing: Sequence[str]) -> Iterator[Dynamics
     if classical or not missing:
         yield from classical
         return
-    names = [name for kind in NEEDED for name in names_of(kind)]
+    names = [name for kind in NEEDED for name in names_of(kind, heads[0].program)]
     unknown = [
-        head for head in heads if definition_of(head.name) is None and head.name not in OTHERS
+        head for head in heads if head.definition is None and head.name.upper() not in OTHERS
     ]
     text = f"no {' and no '.join(missing)} of the catalogue: "
     text += ", ".join(head.name for head in heads)

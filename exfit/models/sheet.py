@@ -118,14 +118,16 @@ def sheet(*rows: Row) -> Sheet:
 
 @dataclass(frozen=True)
 class DynamicsRecord:
-    """How a PSS/E file lists a model: the symbols of its constants (CONs) in their order.
+    """How a planner's file lists a model: the symbols of its constants (CONs) in their order.
 
-    ``icons`` are the integers before them, each a symbol and the only value that the model stands
-    for, unless its sheet has the symbol; ``absent`` are symbols that the model does not have, with
-    the only value that it stands for; ``held`` are those of the model that the record does not
-    have, with the value that makes the model that of the record; ``ignored`` are symbols that act
-    only where a limiter does, which none is here: any value will do; ``doubt`` says what is not
-    settled about the order. ``times_speed`` says that efd is multiplied by the speed there.
+    ``icons`` are the integers before or, where they are listed, among them, each a symbol and the
+    only value that the model stands for, unless its sheet has the symbol; ``absent`` are symbols
+    that the model does not have, with the only value that it stands for; ``held`` are those of the
+    model that the record does not have, with the value that makes the model that of the record;
+    ``ignored`` are symbols that act only where a limiter does, which none is here: any value will
+    do; ``doubt`` says what is not settled about the order; ``spelled`` are symbols with their names
+    in the file, where these differ by more than capitals. ``times_speed`` says that efd is
+    multiplied by the speed there.
     """
 
     name: str
@@ -136,6 +138,7 @@ class DynamicsRecord:
     doubt: str
     held: tuple[tuple[str, float], ...] = ()
     times_speed: bool = False
+    spelled: tuple[tuple[str, str], ...] = ()
 
 
 def record(
@@ -148,8 +151,9 @@ def record(
     doubt: str = "",
     held: Mapping[str, float] | None = None,
     times_speed: bool = False,
+    spelled: Mapping[str, str] | None = None,
 ) -> DynamicsRecord:
-    """Return a PSS/E record from its symbols in one text, ``"TR KA TA"``."""
+    """Return a record from its symbols in one text, ``"TR KA TA"``."""
     return DynamicsRecord(
         name,
         tuple(cons.split()),
@@ -159,7 +163,13 @@ def record(
         doubt,
         tuple((held or {}).items()),
         times_speed,
+        tuple((spelled or {}).items()),
     )
+
+
+# what is not settled about orders of PSLF
+OF_A_LIST = "its order is that of a public list of parameters, not confirmed by a file"
+AS_IN_PSSE = "its order is taken to be that of PSS/E, not confirmed by a file"
 
 
 @dataclass(frozen=True)
@@ -170,7 +180,8 @@ class Model:
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
     ``x`` and returns the reference that does so. Setpoints are what it finds at the start and then
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
-    its PSS/E records, its own one first; ``inputs`` the signals that a stabiliser listens to.
+    its PSS/E records, its own one first, ``pslf_records`` those of PSLF; ``inputs`` the signals
+    that a stabiliser listens to.
 
     A governor's output is the turbine's power Pm, its reference ``pref``; it sees ``dw``, the speed
     less 1, and ``p``, the electrical power, all per unit on the machine's base.
@@ -187,6 +198,7 @@ class Model:
     inputs: tuple[str, ...]
     equations: Callable[..., Any]
     rest: Callable[..., Any]
+    pslf_records: tuple[DynamicsRecord, ...] = ()
 
 
 def model(name: str, parts: Mapping[str, Any]) -> Model:
@@ -212,6 +224,7 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         inputs=tuple(parts.get("INPUTS", ())),
         equations=parts["equations"],
         rest=parts["rest"],
+        pslf_records=tuple(parts.get("PSLF_RECORDS", ())),
     )
 
 

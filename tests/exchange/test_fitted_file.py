@@ -41,7 +41,9 @@ def fit(tmp_path_factory):
 
 def unit_of(data, bus, machine_id="1"):
     """Return a unit of a file."""
-    units = {(unit.bus, unit.id.upper()): unit for unit in read_units(text_of(data, "f")).units}
+    units = {
+        (unit.bus, unit.id.upper()): unit for unit in read_units(text_of(data, "f"), "f").units
+    }
     return units[bus, machine_id.upper()]
 
 

@@ -17,6 +17,7 @@ from exfit.case.yaml import read_yaml
 from exfit.errors import DynamicsError
 from exfit.exchange.fields import text_of
 from exfit.exchange.import_case import case_text, import_unit
+from exfit.exchange.psse.files import record_text
 from exfit.exchange.psse.free_format import read_records
 from exfit.exchange.records import (
     SIGNALS,
@@ -24,7 +25,6 @@ from exfit.exchange.records import (
     definition_of,
     definitions,
     read_values,
-    record_text,
 )
 from exfit.exchange.unit import read_unit
 from exfit.models import MODELS

@@ -21,7 +21,7 @@ def at_bus(bus, text=SOUND):
 
 def test_every_unit_is_read_as_it_is_alone():
     text = "".join(at_bus(bus) for bus in BUSES)
-    units = read_units(text)
+    units = read_units(text, "f")
     assert [unit.bus for unit in units.units] == [*BUSES]
     assert (units.refused, units.faults) == ((), ())
     assert units.units == tuple(read_unit(text, "unit.dyr", bus) for bus in BUSES)
@@ -38,7 +38,7 @@ def test_every_unit_is_read_as_it_is_alone():
 )
 def test_a_fault_of_one_unit_leaves_the_others(old, new, words):
     text = at_bus(102) + at_bus(103, replaced(old, new)) + at_bus(104)
-    units = read_units(text)
+    units = read_units(text, "f")
     assert [unit.bus for unit in units.units] == [102, 104]
     (refused,) = units.refused
     assert (refused.bus, refused.modelled) == (103, True)
@@ -50,14 +50,14 @@ def test_a_fault_of_one_unit_leaves_the_others(old, new, words):
 def test_a_record_without_an_end_leaves_the_other_units(damaged):
     whole = at_bus(103)
     text = at_bus(102) + replaced(damaged, damaged[:-1], whole) + at_bus(104)
-    units = read_units(text)
+    units = read_units(text, "f")
     assert [unit.bus for unit in units.units] == [102, 104]
     assert "has no '/' before the next one" in units.faults[0].text
 
 
 def test_a_unit_without_a_model_is_named_with_its_records():
     text = SOUND + "7 GENCLS 1 3 0 /\n8 GENROU 1 1 /\n8 'IEEEG1' 1 0 /\n9 ESACA1A 1 3 /\n"
-    no_model = {unit.bus: unit for unit in read_units(text).refused}
+    no_model = {unit.bus: unit for unit in read_units(text, "f").refused}
     assert [unit.modelled for unit in no_model.values()] == [False] * 3
     assert "GENCLS is a constant voltage behind a reactance" in no_model[7].faults[0].text
     assert "no exciter of the catalogue: GENROU, IEEEG1" in no_model[8].faults[0].text + (
@@ -75,7 +75,7 @@ def test_damage_to_a_file_of_units_is_reported_or_harmless(seed):
         text = text_of(garbage(sound.encode(), random), "unit.dyr")
     except DynamicsError:
         return
-    units = read_units(text)
+    units = read_units(text, "f")
     whole = [unit for unit in units.units if unit.bus in BUSES]
     # a damage hurts a record, or joins it to the next; only what is cut off takes more with it
     assert len(whole) >= len(BUSES) - 2 or len(text) < len(sound)

@@ -61,6 +61,7 @@ class Machine:
     faults: Callable[[Mapping[str, float]], Faults]
     records: tuple[DynamicsRecord, ...] = ()
     saturation: Literal["quadratic", "exponential"] = "quadratic"
+    pslf_records: tuple[DynamicsRecord, ...] = ()
 
     @property
     def states(self) -> tuple[str, ...]:

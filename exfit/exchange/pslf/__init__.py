@@ -1,0 +1,1 @@
+"""PSLF dynamics files (.dyd): their lines."""

@@ -1,0 +1,171 @@
+"""The dynamics files of PSLF (.dyd): their records, read and written.
+
+    genrou 101 "NORTH G1" 15.75 "1 " : #9 mva=120.0  6.0 0.035 0.5 ... /
+      0.25 0.2 0.12 0.4
+
+A '/' at the end of a line continues the record on the next one. Values stand in their order, or
+behind their names in quotes. Lines that begin with # are comments; ! stands for what is not given.
+"""
+
+import re
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from exfit.exchange.fields import DynamicsFault, Field, lines_of, number
+from exfit.exchange.file_format import WIDTH, FileFormat, Head, Heads, wrong_bus, wrong_id
+from exfit.exchange.records import PSLF, Definition, definition_of, record_fields
+from exfit.util.text import show_value
+
+FIELD = re.compile(
+    r"""(?P<end>/\s*$) | "(?P<double>[^"]*)" | (?P<open>") | (?P<colon>:)
+    | (?P<comment>\#(?=\s|$)) | (?P<plain>[^\s,":/]+|/)""",
+    re.VERBOSE,
+)
+WORD = re.compile(r"[A-Za-z]\w*")
+HEAD = re.compile(r"""\s*[A-Za-z]\w*\s+-?\d+\s+("|!|\d)""")  # a model, a bus and what follows
+LEVEL = re.compile(r"#\d+")  # of what a model reports
+BASE = re.compile(r"(mva|mwcap|mvab?|tbase)=(.*)", re.IGNORECASE)
+OPTION = re.compile(r"[A-Za-z]\w*=.*")
+HEAD_FIELDS = 5  # model, bus, its name, its kV, id
+UNKNOWN = "!"
+
+
+class _Line(NamedTuple):
+    """The fields of a line, how many stand before its ':', and how it ends."""
+
+    number: int
+    fields: tuple[Field, ...]
+    before: int | None
+    continued: bool
+    unclosed: bool
+
+
+def heads(text: str) -> Heads:
+    """Return the records of a file that belong to a unit."""
+    faults: list[DynamicsFault] = []
+    found: list[Head] = []
+    for record in _records(text, faults):
+        found += _heads_of(record, faults)
+    return Heads(found, faults)
+
+
+def record_text(
+    definition: Definition, values: Mapping[str, float], bus: int, machine_id: str
+) -> str:
+    """Return a record as a dynamics file has it; the name of the bus and its kV are not known."""
+    begin = f'{definition.record.name} {bus} {UNKNOWN} {UNKNOWN} "{machine_id}" : #9'
+    text = "  ".join([begin, *record_fields(definition, values)])
+    lines = textwrap.wrap(
+        text, WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False, break_long_words=False
+    )
+    return " /\n".join(lines)
+
+
+def _records(text: str, faults: list[DynamicsFault]) -> Iterator[_Line]:
+    """Yield each record as one line, whatever lines it stands on; add what is wrong with others."""
+    open_: _Line | None = None
+    for place, (start, line) in enumerate(lines_of(text), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        read = _line(line, place, start)
+        if open_ is not None and not HEAD.match(line):
+            read = _joined(open_, read)
+        elif open_ is not None:
+            yield open_
+        open_ = None
+        if read.unclosed:
+            fault = "a quote is opened and not closed on the line"
+            faults.append(DynamicsFault(place, fault))
+        elif read.continued:
+            open_ = read
+        else:
+            yield read
+    if open_ is not None:
+        yield open_
+
+
+def _line(line: str, place: int, start: int) -> _Line:
+    """Return what a line holds; ``start`` is where it starts in the text of the file."""
+    fields: list[Field] = []
+    before = None
+    for match in FIELD.finditer(line):
+        kind, text = match.lastgroup, match[match.lastgroup or 0]
+        if kind == "open":
+            return _Line(place, tuple(fields), before, continued=False, unclosed=True)
+        if kind == "end":
+            return _Line(place, tuple(fields), before, continued=True, unclosed=False)
+        if match["comment"] is not None and before is not None:
+            break
+        if kind == "colon":
+            before = len(fields) if before is None else before
+            continue
+        begin, end = (start + edge for edge in match.span())
+        fields.append(Field(text.strip(), place, kind == "double", begin, end))
+    return _Line(place, tuple(fields), before, continued=False, unclosed=False)
+
+
+def _joined(first: _Line, second: _Line) -> _Line:
+    """Return a record with the line that continues it."""
+    before = first.before
+    if before is None and second.before is not None:
+        before = len(first.fields) + second.before
+    fields = first.fields + second.fields
+    return _Line(first.number, fields, before, second.continued, second.unclosed)
+
+
+def _heads_of(record: _Line, faults: list[DynamicsFault]) -> Iterator[Head]:
+    """Yield the head of a record that belongs to a unit; add a fault where it has none."""
+    line, fields = record.number, record.fields
+    name = fields[0].text if fields and not fields[0].quoted else ""
+    definition = definition_of(name, PSLF)
+    if not WORD.fullmatch(name):
+        begin = " ".join(field.text for field in fields[:3])
+        text = f"{show_value(begin)} begins no record; does the line before lack its '/'?"
+        faults.append(DynamicsFault(line, text))
+        return
+    if record.before is None:
+        if definition is not None or (len(fields) > 1 and _is_bus(fields[1])):
+            faults.append(DynamicsFault(line, f"{name}: the record has no ':' behind its id"))
+        return  # a word that begins a section, as models
+    own = fields[: record.before]
+    if len(own) != HEAD_FIELDS:
+        if definition is not None:
+            text = f"{name}: {len(own)} fields before ':', not model, bus, name, kV and id"
+            faults.append(DynamicsFault(line, text))
+        return  # of a line or a device: their records begin otherwise
+    bus, machine_id = own[1], own[4].text
+    wrong = [*wrong_bus(bus), *wrong_id(machine_id)]
+    if not wrong:
+        values, base, more = _values(name, fields[record.before :])
+        faults += more
+        yield Head(int(bus.text), name.lower(), machine_id, line, values, definition, PSLF, base)
+    elif definition is not None:
+        faults += [DynamicsFault(line, f"{name}: {text}") for text in wrong]
+
+
+def _is_bus(field: Field) -> bool:
+    return not field.quoted and field.text.lstrip("-").isdigit()
+
+
+def _values(
+    name: str, fields: tuple[Field, ...]
+) -> tuple[tuple[Field, ...], float | None, list[DynamicsFault]]:
+    """Return the values of a record, the base that they are on, and what is wrong with it."""
+    base, values, faults = None, [], []
+    for field in fields:
+        if field.quoted:
+            values.append(field)
+        elif match := BASE.fullmatch(field.text):
+            try:
+                base = number(field._replace(text=match[2]))
+            except ValueError as error:
+                faults.append(DynamicsFault(field.line, f"{name}: {match[1]}: {error}"))
+        elif not LEVEL.fullmatch(field.text) and not OPTION.fullmatch(field.text):
+            values.append(field)
+    return tuple(values), base, faults
+
+
+PSLF_FILES = FileFormat(
+    PSLF, ".dyd", "# ", "model, bus, name, kV, id, ':' and values", heads, record_text
+)
