@@ -18,7 +18,7 @@ class Head(NamedTuple):
     """A record by what it begins with, and the fields behind.
 
     ``definition`` is what exfit has a model of, None if it has none; ``base`` the MVA or MW that
-    its values are on, where the record says so.
+    its values are on, where the record says so; ``faults`` are those of its fields.
     """
 
     bus: int
@@ -29,6 +29,7 @@ class Head(NamedTuple):
     definition: Definition | None
     program: str = PSSE
     base: float | None = None
+    faults: tuple[DynamicsFault, ...] = ()
 
 
 class Heads(NamedTuple):

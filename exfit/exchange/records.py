@@ -2,14 +2,13 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import zip_longest
 
 from exfit.exchange.fields import DynamicsFault, Field, number, whole
 from exfit.models import MODELS, STABILISERS, sheet
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import DynamicsRecord, Model, Sheet, typical
-from exfit.util.text import near, show, show_value
+from exfit.util.text import show, show_value
 
 PSSE, PSLF = "PSS/E", "PSLF"
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
@@ -37,20 +36,6 @@ class Definition:
         return (*(name for name, _ in self.record.icons if name not in cons), *cons)
 
     @property
-    def fewest(self) -> int:
-        """How many values a record has at least: PSLF's may lack those at its end that do nothing.
-
-        Files of older releases end before them.
-        """
-        idle = {*dict(self.record.absent), *self.record.ignored}
-        last = [number for number, name in enumerate(self.names, 1) if name not in idle]
-        return last[-1] if self.program == PSLF else len(self.names)
-
-    def name_in_file(self, symbol: str) -> str:
-        """Return how a file that names its values names one."""
-        return dict(self.record.spelled).get(symbol, symbol).lower()
-
-    @property
     def codes(self) -> tuple[str, ...]:
         """The integers that say which signals the inputs of a stabiliser are."""
         return tuple(name for name, _ in self.record.icons if name.startswith("ICS"))
@@ -66,15 +51,13 @@ class Definition:
 class Reading:
     """What the fields of a record say: values by symbol, what is wrong, what must be known.
 
-    ``inputs`` are the signals of a stabiliser whose record has codes of them; ``fields`` are those
-    of the definition's names, in their order.
+    ``inputs`` are the signals of a stabiliser whose record has codes of them.
     """
 
     values: Mapping[str, float]
     faults: list[DynamicsFault]
     warnings: list[DynamicsFault]
     inputs: tuple[str, ...] = ()
-    fields: tuple[Field, ...] = ()
 
 
 def definitions(program: str = PSSE) -> list[Definition]:
@@ -128,14 +111,9 @@ def contradictions(
 def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) -> Reading:
     """Return what the fields behind a record's id say; ``line`` is where the record begins."""
     record, names = definition.record, definition.names
-    if definition.program == PSLF and any(field.quoted for field in fields):
-        fields, faults = _named_fields(definition, line, fields)
-        if faults:
-            return Reading({}, faults, [])
-    if not definition.fewest <= len(fields) <= len(names):
+    if len(fields) != len(names):
         count = DynamicsFault(line, _wrong_count(definition, len(fields)))
         return Reading({}, [count, *_no_numbers(record.name, fields)], [])
-    fields += tuple(_idle(definition, name, line) for name in names[len(fields) :])
     lines = dict(zip(names, (field.line for field in fields), strict=True))
 
     def placed(texts: Iterable[tuple[str, str]]) -> list[DynamicsFault]:
@@ -161,7 +139,7 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     symbols = [row.symbol for row in definition.model.sheet]
     unmodelled = [*_unmodelled(definition, symbols, given), *_without_effect(rows, of_sheet)]
     warnings = doubt + placed([*unmodelled, *lacking])
-    return Reading(values, placed(wrong), warnings, _inputs(definition, given), fields)
+    return Reading(values, placed(wrong), warnings, _inputs(definition, given))
 
 
 def record_fields(definition: Definition, values: Mapping[str, float]) -> list[str]:
@@ -178,46 +156,6 @@ def record_fields(definition: Definition, values: Mapping[str, float]) -> list[s
         else repr(float(given[name])).upper()
         for name in definition.names
     ]
-
-
-def _named_fields(
-    definition: Definition, line: int, fields: tuple[Field, ...]
-) -> tuple[tuple[Field, ...], list[DynamicsFault]]:
-    """Return the values of fields "name" value "name" value in the order of the record."""
-    name = definition.record.name
-    known = {definition.name_in_file(symbol): symbol for symbol in definition.names}
-    given: dict[str, Field] = {}
-    faults = []
-    for label, value in zip_longest(fields[::2], fields[1::2]):
-        symbol = known.get(_bare(label.text))
-        if not label.quoted or value is None or value.quoted:
-            text = f"{name}: {show_value(label.text)}: not a name in quotes and its value"
-            return (), [DynamicsFault(label.line, text)]
-        if symbol is None:
-            text = near(label.text.lower(), known)
-            faults.append(DynamicsFault(label.line, f"{name}: no value {label.text!r}; {text}"))
-        elif symbol in given:
-            faults.append(DynamicsFault(label.line, f"{name}: {label.text}: given twice"))
-        else:
-            given[symbol] = value
-    idle = {*dict(definition.record.absent), *definition.record.ignored}
-    missing = [symbol for symbol in definition.names if symbol not in given.keys() | idle]
-    if missing and not faults:
-        listed = ", ".join(map(definition.name_in_file, missing))
-        faults.append(DynamicsFault(line, f"{name}: missing: {listed}"))
-    ordered = (given.get(symbol) or _idle(definition, symbol, line) for symbol in definition.names)
-    return tuple(ordered) if not faults else (), faults
-
-
-def _bare(name: str) -> str:
-    """Return the name of a value without capitals and blanks: of "Ang p" angp."""
-    return "".join(name.lower().split())
-
-
-def _idle(definition: Definition, name: str, line: int) -> Field:
-    """Return a field that a record need not have: what the model stands for."""
-    modelled = dict(definition.record.absent).get(name, 0.0)
-    return Field(repr(modelled), line)
 
 
 def _numbers(

@@ -131,11 +131,9 @@ def _parts(
             faults.append(DynamicsFault(head.line, f"{name}: a second {kind}; {other}"))
             continue
         reading = read_values(definition, head.line, head.fields)
-        faults += reading.faults
+        faults += head.faults or reading.faults
         warnings += reading.warnings
-        parts[kind] = UnitPart(
-            definition, head.line, reading.values, reading.fields, reading.inputs
-        )
+        parts[kind] = UnitPart(definition, head.line, reading.values, head.fields, reading.inputs)
     return parts
 
 

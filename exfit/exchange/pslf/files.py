@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from exfit.exchange.fields import DynamicsFault, Field, lines_of, number
 from exfit.exchange.file_format import WIDTH, FileFormat, Head, Heads, wrong_bus, wrong_id
+from exfit.exchange.pslf.values import arranged
 from exfit.exchange.records import PSLF, Definition, definition_of, record_fields
 from exfit.util.text import show_value
 
@@ -119,29 +120,52 @@ def _heads_of(record: _Line, faults: list[DynamicsFault]) -> Iterator[Head]:
     line, fields = record.number, record.fields
     name = fields[0].text if fields and not fields[0].quoted else ""
     definition = definition_of(name, PSLF)
+    fault = _head_fault(record, name, definition)
+    if fault:
+        faults.append(DynamicsFault(line, fault))
+    elif record.before == HEAD_FIELDS:
+        bus, machine_id = fields[1], fields[4].text
+        wrong = [*wrong_bus(bus), *wrong_id(machine_id)]
+        if not wrong:
+            yield _head(definition, record)
+        elif definition is not None:
+            faults += [DynamicsFault(line, f"{name}: {text}") for text in wrong]
+
+
+def _head_fault(record: _Line, name: str, definition: Definition | None) -> str:
+    """Return what is wrong with the fields before the ':' of a record, "" where nothing is.
+
+    Other devices have other fields there; a line without a ':' is a word that begins a section.
+    """
+    fields, before = record.fields, record.before
     if not WORD.fullmatch(name):
         begin = " ".join(field.text for field in fields[:3])
-        text = f"{show_value(begin)} begins no record; does the line before lack its '/'?"
-        faults.append(DynamicsFault(line, text))
-        return
-    if record.before is None:
-        if definition is not None or (len(fields) > 1 and _is_bus(fields[1])):
-            faults.append(DynamicsFault(line, f"{name}: the record has no ':' behind its id"))
-        return  # a word that begins a section, as models
-    own = fields[: record.before]
-    if len(own) != HEAD_FIELDS:
-        if definition is not None:
-            text = f"{name}: {len(own)} fields before ':', not model, bus, name, kV and id"
-            faults.append(DynamicsFault(line, text))
-        return  # of a line or a device: their records begin otherwise
-    bus, machine_id = own[1], own[4].text
-    wrong = [*wrong_bus(bus), *wrong_id(machine_id)]
-    if not wrong:
-        values, base, more = _values(name, fields[record.before :])
+        return f"{show_value(begin)} begins no record; does the line before lack its '/'?"
+    if before is None and (definition is not None or (len(fields) > 1 and _is_bus(fields[1]))):
+        return f"{name}: the record has no ':' behind its id"
+    if definition is not None and before != HEAD_FIELDS:
+        return f"{name}: {before} fields before ':', not model, bus, name, kV and id"
+    return ""
+
+
+def _head(definition: Definition | None, record: _Line) -> Head:
+    """Return the head of a record with its values, in the order of its definition."""
+    name, bus, _, _, machine_id = (field.text for field in record.fields[:HEAD_FIELDS])
+    values, base, faults = _values(name, record.fields[HEAD_FIELDS:])
+    if definition is not None:
+        values, more = arranged(definition, record.number, values)
         faults += more
-        yield Head(int(bus.text), name.lower(), machine_id, line, values, definition, PSLF, base)
-    elif definition is not None:
-        faults += [DynamicsFault(line, f"{name}: {text}") for text in wrong]
+    return Head(
+        int(bus),
+        name.lower(),
+        machine_id,
+        record.number,
+        values,
+        definition,
+        PSLF,
+        base,
+        tuple(faults),
+    )
 
 
 def _is_bus(field: Field) -> bool:
