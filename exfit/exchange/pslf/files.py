@@ -32,7 +32,7 @@ HEAD_FIELDS = 5  # model, bus, its name, its kV, id
 UNKNOWN = "!"
 
 
-class _Line(NamedTuple):
+class _LogicalLine(NamedTuple):
     """The fields of a line, how many stand before its ':', and how it ends."""
 
     number: int
@@ -63,9 +63,9 @@ def record_text(
     return " /\n".join(lines)
 
 
-def _records(text: str, faults: list[DynamicsFault]) -> Iterator[_Line]:
+def _records(text: str, faults: list[DynamicsFault]) -> Iterator[_LogicalLine]:
     """Yield each record as one line, whatever lines it stands on; add what is wrong with others."""
-    open_: _Line | None = None
+    open_: _LogicalLine | None = None
     for place, (start, line) in enumerate(lines_of(text), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
@@ -86,16 +86,16 @@ def _records(text: str, faults: list[DynamicsFault]) -> Iterator[_Line]:
         yield open_
 
 
-def _line(line: str, place: int, start: int) -> _Line:
+def _line(line: str, place: int, start: int) -> _LogicalLine:
     """Return what a line holds; ``start`` is where it starts in the text of the file."""
     fields: list[Field] = []
     before = None
     for match in FIELD.finditer(line):
         kind, text = match.lastgroup, match[match.lastgroup or 0]
         if kind == "open":
-            return _Line(place, tuple(fields), before, continued=False, unclosed=True)
+            return _LogicalLine(place, tuple(fields), before, continued=False, unclosed=True)
         if kind == "end":
-            return _Line(place, tuple(fields), before, continued=True, unclosed=False)
+            return _LogicalLine(place, tuple(fields), before, continued=True, unclosed=False)
         if match["comment"] is not None and before is not None:
             break
         if kind == "colon":
@@ -103,19 +103,19 @@ def _line(line: str, place: int, start: int) -> _Line:
             continue
         begin, end = (start + edge for edge in match.span())
         fields.append(Field(text.strip(), place, kind == "double", begin, end))
-    return _Line(place, tuple(fields), before, continued=False, unclosed=False)
+    return _LogicalLine(place, tuple(fields), before, continued=False, unclosed=False)
 
 
-def _joined(first: _Line, second: _Line) -> _Line:
+def _joined(first: _LogicalLine, second: _LogicalLine) -> _LogicalLine:
     """Return a record with the line that continues it."""
     before = first.before
     if before is None and second.before is not None:
         before = len(first.fields) + second.before
     fields = first.fields + second.fields
-    return _Line(first.number, fields, before, second.continued, second.unclosed)
+    return _LogicalLine(first.number, fields, before, second.continued, second.unclosed)
 
 
-def _heads_of(record: _Line, faults: list[DynamicsFault]) -> Iterator[Head]:
+def _heads_of(record: _LogicalLine, faults: list[DynamicsFault]) -> Iterator[Head]:
     """Yield the head of a record that belongs to a unit; add a fault where it has none."""
     line, fields = record.number, record.fields
     name = fields[0].text if fields and not fields[0].quoted else ""
@@ -132,7 +132,7 @@ def _heads_of(record: _Line, faults: list[DynamicsFault]) -> Iterator[Head]:
             faults += [DynamicsFault(line, f"{name}: {text}") for text in wrong]
 
 
-def _head_fault(record: _Line, name: str, definition: Definition | None) -> str:
+def _head_fault(record: _LogicalLine, name: str, definition: Definition | None) -> str:
     """Return what is wrong with the fields before the ':' of a record, "" where nothing is.
 
     Other devices have other fields there; a line without a ':' is a word that begins a section.
@@ -148,7 +148,7 @@ def _head_fault(record: _Line, name: str, definition: Definition | None) -> str:
     return ""
 
 
-def _head(definition: Definition | None, record: _Line) -> Head:
+def _head(definition: Definition | None, record: _LogicalLine) -> Head:
     """Return the head of a record with its values, in the order of its definition."""
     name, bus, _, _, machine_id = (field.text for field in record.fields[:HEAD_FIELDS])
     values, base, faults = _values(name, record.fields[HEAD_FIELDS:])
