@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import __version__, estimate
-from exfit.analysis.case_description import (
+from exfit.analysis.case_search import SearchTask, search_outcome, with_lines
+from exfit.analysis.descriptions.case_description import (
     criteria_of,
     fixed_values,
     identified_values,
@@ -23,7 +24,6 @@ from exfit.analysis.case_description import (
     tests_of,
     values_by_part,
 )
-from exfit.analysis.case_search import SearchTask, search_outcome, with_lines
 from exfit.analysis.diagnostics import rest_notes, simulation_notes
 from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
 from exfit.analysis.iteration_responses import (

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from exfit.analysis.case_description import fixed_values
+from exfit.analysis.descriptions.case_description import fixed_values
 from exfit.case.case import Case
 from exfit.case.schema import AsFoundSection
 from exfit.errors import CaseError, SimulationError

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from exfit import estimate, workflows
-from exfit.analysis.case_description import parts_of
+from exfit.analysis.descriptions.case_description import parts_of
 from exfit.analysis.steady.points import points_of
 from exfit.analysis.steady.saturation_test import saturation
 from exfit.analysis.steady.steady_test import steady

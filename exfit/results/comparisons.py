@@ -170,7 +170,12 @@ class Comparison:
     def judging(self) -> tuple[str, ...]:
         """The signals that a validation must match: of a grid event that was played in, P and Q."""
         powers = tuple(signal for signal in POWERS if signal in self.channels)
-        return (self.judged_by,) if self.played is None or not powers else powers
+        return powers if self.is_event else (self.judged_by,)
+
+    @property
+    def is_event(self) -> bool:
+        """Whether the record is a grid event that was played in, and P or Q is compared."""
+        return self.played is not None and any(signal in self.channels for signal in POWERS)
 
     @property
     def judged(self) -> Match:

@@ -140,6 +140,10 @@ def _responses(result: FitResult) -> str:
     names = ", ".join(match.name for match in result.comparisons)
     unseen = ", ".join(match.name for match in result.validation)
     text = f"fitted: {names}; " + (f"validated on: {unseen}" if unseen else "no validation")
+    every = (*result.comparisons, *result.validation)
+    events = ", ".join(match.name for match in every if match.is_event)
+    if events:
+        text += f"; measured system disturbances, played in: {events}"
     return f"{text}; {judged_by_criteria(result).sentence}"
 
 

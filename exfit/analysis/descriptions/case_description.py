@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from exfit.analysis.descriptions.played_description import played_in
 from exfit.case.case import Case
 from exfit.case.parts import Part
 from exfit.case.schema import (
@@ -131,7 +132,7 @@ def tests_of(
             role=role,
             file=recording.record.file,
             plant=view.kind.title,
-            done="; ".join(_events(view, recording, identified)) or "no step of its own",
+            done="; ".join(_done(view, recording, setup, identified)) or "no step of its own",
             channels="; ".join(_channel(*entry) for entry in recording.record.channels.items()),
             samples=len(time),
             first=float(time[0]),
@@ -151,6 +152,14 @@ def _network(view: Case) -> dict[str, NetworkParameter]:
         for part in networks
         for row in part.sheet
     }
+
+
+def _done(
+    view: Case, recording: Recording, setup: ExperimentSetup, identified: Identified
+) -> Iterator[str]:
+    """Yield what was done to the unit, or what the grid did, in words."""
+    yield from played_in(view, recording, setup)
+    yield from _events(view, recording, identified)
 
 
 def _events(case: Case, recording: Recording, identified: Identified) -> Iterator[str]:

@@ -1,0 +1,1 @@
+"""A case and its records in words, as a report shows them."""

@@ -1,0 +1,60 @@
+"""How a record was played into a unit, in words: what drove it, from which rest, and how."""
+
+from collections.abc import Iterator
+
+from exfit.case.case import Case
+from exfit.case.schema import ChannelSection, MedianSection, PhasesSection, Recording
+from exfit.fitting.setup import ExperimentSetup
+from exfit.plants import initial
+from exfit.signals import unit_of_signal
+from exfit.util.text import show
+
+RESTING = ("vt", "p", "q", "efd", "ifd", "speed")  # in the order in which a rest is described
+SWING = {
+    "power": "swing equation with the power Pm: 2H dw/dt = (Pm - D dw) / (1 + dw) - Te",
+    "torque": "swing equation with the torque Pm: 2H dw/dt = Pm - D dw - Te",
+}
+
+
+def played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Iterator[str]:
+    """Yield how a record was played in; nothing where it was not.
+
+    ``view`` is the case with the plant of the record.
+    """
+    if not setup.driving:
+        return
+    yield f"recorded {', '.join(setup.driving)} played in"
+    if setup.test.steady is not None:
+        levels = ", ".join(_levels(setup))
+        yield f"at rest until {show(setup.test.steady)} s" + (f" with {levels}" if levels else "")
+    if view.kind.has_machine and view.kind.has_exciter:
+        yield SWING[getattr(view.plant, "swing", "power")]
+    left_out = ", ".join(f"{show(start)} ... {show(end)} s" for start, end in recording.record.mask)
+    if left_out:
+        yield f"left out of the comparison: {left_out}"
+    yield from _filters(recording)
+
+
+def _levels(setup: ExperimentSetup) -> Iterator[str]:
+    """Yield the levels at the start that the record gives."""
+    for signal in RESTING:
+        level = setup.experiment.own.get(initial(signal))
+        if level is not None and signal in setup.record.signals:
+            yield f"{signal} {level:.5g} {unit_of_signal(signal)}"
+
+
+def _filters(recording: Recording) -> Iterator[str]:
+    """Yield the filters of the channels."""
+    for signal, channel in recording.record.channels.items():
+        text = _filter(channel)
+        if text:
+            yield f"{signal} {text}"
+
+
+def _filter(channel: ChannelSection | PhasesSection) -> str:
+    given = channel.filter
+    if given is None:
+        return ""
+    if isinstance(given, MedianSection):
+        return f"as medians of {given.median} samples"
+    return f"below {show(given.lowpass)} Hz"
