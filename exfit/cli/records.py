@@ -60,7 +60,7 @@ def inspect_(
     inspect.json and inspect.png to runs/FILE-inspect, or to DIR.
     """
     from exfit.case.starting.record_settings import RecordSettings
-    from exfit.case.starting.suggestion import bump_section, record_section, weights_section
+    from exfit.case.starting.suggested_sections import suggested_sections
     from exfit.output import run_folder
 
     # files of one record in several formats have one stem
@@ -73,14 +73,6 @@ def inspect_(
         from exfit.output import terminal
 
         console = terminal.console()
-        terminal.inspection(
-            console,
-            inspection,
-            [
-                *record_section(inspection, file.as_posix()),
-                *bump_section(inspection),
-                *weights_section(inspection),
-            ],
-        )
+        terminal.inspection(console, inspection, suggested_sections(inspection, file.as_posix()))
         terminal.written(console, folder)
     output.draw(figures)

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from exfit.case.starting.starting_unit import UnitData
 
 
+RATING = click.FloatRange(min=0.0, min_open=True)
+
+
 @dataclass(frozen=True)
 class UnitSources:
     """Where the data of a unit come from, as the options say."""
@@ -61,7 +64,7 @@ class UnitSources:
     "file",
     type=GivenFile(Kind.RECORD),
     metavar="FILE",
-    help="Record of one or several bump tests.",
+    help="Record of bump tests, or of a grid event by a PMU.",
 )
 @steps_option
 @click.option(
@@ -72,6 +75,15 @@ class UnitSources:
     help="Table of tests: file, at, step, base, validates.",
 )
 @bases_option
+@click.option(
+    "--kv", type=RATING, metavar="KV", help="Rated voltage of the unit: for --base vt=..kV."
+)
+@click.option(
+    "--mva",
+    type=RATING,
+    metavar="MVA",
+    help="Rated power of the unit: for --base p=..MW, q=..Mvar.",
+)
 @click.option(
     "--dyr",
     type=GivenFile(Kind.DYNAMICS),
@@ -102,6 +114,8 @@ def new(
     sizes: tuple[str, ...],
     table: Path | None,
     bases: tuple[str, ...],
+    kv: float | None,
+    mva: float | None,
     dyr: Path | None,
     bus: int | None,
     machine_id: str | None,
@@ -116,12 +130,13 @@ def new(
 ) -> None:
     """Make a commented case from a record: its tests, the data of the unit, what is free.
 
+    The file of a phasor measurement unit is a grid event, which is played back into the unit.
     Of several tests in a record, each is a record of the case with a window; every other one
     validates. Values are typical, or those of a planner's file. What the record does not show is
     asked on a terminal, or left as "?", and the case is refused until it is filled in.
     """
     from exfit.case.open_values import open_values
-    from exfit.case.starting.bases import bases_of
+    from exfit.case.starting.bases import bases_of, rated_bases
     from exfit.case.starting.record_settings import RecordSettings
     from exfit.case.starting.starting_case import starting_case
     from exfit.case.starting.starting_tests import doubtful_bases
@@ -132,7 +147,7 @@ def new(
     sources = UnitSources(model, machine, dyr, bus, machine_id, machine_from)
     data = _unit(sources, folder)
     reading = RecordSettings(clock, unit, sheet, memory=memory)
-    tests = _tests(file, table, sizes, bases_of(bases), reading)
+    tests = _tests(file, table, sizes, rated_bases(bases_of(bases), kv, mva), reading)
     warn(doubtful_bases(tests))
     text = starting_case(data, tests, folder, _facts(facts))
     if is_terminal():

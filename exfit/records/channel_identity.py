@@ -31,16 +31,18 @@ def identified(
     channels: Sequence[InspectedChannel],
     steps: Sequence[RecordedStep],
     groups: Sequence[InspectedPhases] = (),
+    of_pmu: Collection[str] = (),
 ) -> tuple[InspectedChannel, ...]:
     """Return the channels with the signals that they are by name, unit, level and steps.
 
-    Those of ``groups`` are phases, and no signal by themselves.
+    Those of ``groups`` are phases, and no signal by themselves; nor are those ``of_pmu``, the
+    phasors of a measurement unit.
     """
-    candidates = _candidates(channels, groups)
+    candidates = _candidates(channels, groups, of_pmu)
     units = {name: channel.unit for name, channel in candidates.items() if channel.unit}
     moving = {name for step in steps for name in step.sizes}
     guesses = guess_signals([*candidates], units, moving)
-    taken = {guess.signal for guess in guesses.values()} | {"vt" for _ in groups[:1]}
+    taken = {guess.signal for guess in guesses.values()} | {"vt" for _ in (*groups[:1], *of_pmu)}
     identities = {}
     for name, channel in candidates.items():
         if name in guesses:
@@ -51,10 +53,12 @@ def identified(
 
 
 def _candidates(
-    channels: Sequence[InspectedChannel], groups: Sequence[InspectedPhases]
+    channels: Sequence[InspectedChannel],
+    groups: Sequence[InspectedPhases],
+    of_pmu: Collection[str],
 ) -> dict[str, InspectedChannel]:
     """Return the channels that may be a signal, by name."""
-    phases = {name for group in groups for name in group.columns}
+    phases = {name for group in groups for name in group.columns}.union(of_pmu)
     return {
         channel.name: channel
         for channel in channels

@@ -70,6 +70,11 @@ class InspectedChannel:
         return self.low == self.high
 
     @property
+    def missing_samples(self) -> str:
+        """How many samples are missing, as a sentence; "" where none is."""
+        return f"{self.name}: {self.missing} samples are missing" if self.missing else ""
+
+    @property
     def findings(self) -> tuple[str, ...]:
         """What must be known before the channel is used, in sentences."""
         return tuple(f"{self.name}: {finding}" for finding in self._findings())

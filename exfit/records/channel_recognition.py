@@ -63,7 +63,7 @@ def three_phases(names: Sequence[str], units: Mapping[str, str]) -> tuple[tuple[
     groups: list[tuple[str, ...]] = []
     by_lower_case = {name.lower(): name for name in names}
     for name in names:
-        for triple in _triples(name, by_lower_case):
+        for triple in triples(name, by_lower_case):
             quantities = {quantity_of(units.get(column)) for column in triple}
             voltage = quantities == {"voltage"} or (
                 quantities == {None} and OF_VOLTAGE.match(bare(name).lower())
@@ -82,7 +82,7 @@ def connection_of(columns: Sequence[str]) -> str:
     return "phase-to-ground"
 
 
-def _triples(name: str, by_lower_case: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
+def triples(name: str, by_lower_case: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
     """Yield the columns that differ from one in the mark of the phase alone."""
     text = name.lower()
     for marks in TRIPLES:

@@ -26,6 +26,7 @@ from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
 from exfit.records.formats.memory import TooLargeError
 from exfit.records.formats.table import Table, column_error, listed, refuse_uneven
+from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
 from exfit.records.steps import (
@@ -46,7 +47,8 @@ REFERENCE = "vref"
 class Inspection:
     """What a file holds; ``unreadable`` says by column why it has no numbers.
 
-    ``opening`` is that of the breaker in a load rejection; ``sheet`` and ``memory`` (GB) are what
+    ``opening`` is that of the breaker in a load rejection, ``pmu`` what there is of a phasor
+    measurement unit; ``sheet`` and ``memory`` (GB) are what
     the user gave for reading, None where nothing.
 
     ``time`` (M,) in s and ``samples``, each (M,), are those whose time increases.
@@ -64,6 +66,7 @@ class Inspection:
     time: Array
     samples: Mapping[str, Array]
     opening: BreakerOpening | None = None
+    pmu: PmuContent | None = None
     sheet: str | None = None
     memory: float | None = None
 
@@ -86,6 +89,9 @@ class Inspection:
     @property
     def findings(self) -> tuple[str, ...]:
         """What must be known before the record is used, in sentences."""
+        if self.pmu is not None:
+            lacking = (channel.missing_samples for channel in self.channels)
+            return (*_clock_findings(self), *filter(None, lacking))
         of_channels = (finding for channel in self.channels for finding in channel.findings)
         opening = self.opening
         of_reference = [step for step in self.steps if not (opening and opening.causes(step.at))]
@@ -126,6 +132,7 @@ class Inspection:
             "phases": [asdict(group) for group in self.phases],
             "steps": [asdict(step) for step in self.steps],
             "breaker_opens": None if self.opening is None else asdict(self.opening),
+            "pmu": None if self.pmu is None else asdict(self.pmu),
             "unreadable": dict(self.unreadable),
             "findings": list(self.findings),
         }
@@ -153,15 +160,18 @@ def inspect(
     time, samples = stamps[rows], {name: column[rows] for name, column in columns.items()}
     units = {name: _unit(table, name) for name in samples}
     stated = {name: unit for name, (unit, _) in units.items() if unit}
-    groups = tuple(_phase_groups(time, samples, stated))
+    pmu = pmu_content(samples, stated, table.names)
+    plain = samples if pmu is None else pmu.without_phasors(samples)
+    groups = tuple(_phase_groups(time, plain, stated))
     signals = samples | {group.name: effective_value(samples, group.columns) for group in groups}
-    own_steps, steps = steps_of_signals(time, signals, *_recognised(samples, groups, stated))
+    own_steps, steps = steps_of_signals(time, signals, *_recognised(plain, groups, stated))
     channels = tuple(
         inspect_channel(name, units[name], time, column, own_steps[name], steps)
         for name, column in samples.items()
     )
     steps = _with_sizes(steps, time, signals, channels)
-    channels = identified([_with_sizes_of(channel, steps) for channel in channels], steps, groups)
+    sized = [_with_sizes_of(channel, steps) for channel in channels]
+    channels = identified(sized, steps, groups, {*samples} - {*plain})
     opening = breaker_opening(time, samples, channels)
     return Inspection(
         table.path,
@@ -176,6 +186,7 @@ def inspect(
         time,
         samples,
         opening,
+        pmu,
     )
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import sqrt
 from pathlib import Path
 from typing import NamedTuple
@@ -85,11 +84,10 @@ class PhasorTable:
         """The columns of the file, and those that are computed."""
         return (*self.table.names, *self.phasors.names)
 
-    @cached_property
+    @property
     def units(self) -> Mapping[str, str]:
-        """The units by column."""
-        computed = dict.fromkeys(self.phasors.names, "pu")
-        return {**self.table.units, **computed, f"{PREFIX}angle": "rad"}
+        """The units that the file gives, by column; those that are computed need none."""
+        return self.table.units
 
     @property
     def clock(self) -> tuple[str, ...]:

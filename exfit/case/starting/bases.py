@@ -1,6 +1,7 @@
 """The bases of channels: what 1 pu is, as an engineer gives it."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from exfit.errors import ExfitError
@@ -47,3 +48,11 @@ def bases_of(texts: tuple[str, ...]) -> dict[str, Base]:
             raise ExfitError(f"--base {text}: not a signal and its base; {hint}")
         bases[signal] = base_of(value, f"--base {text}")
     return bases
+
+
+def rated_bases(bases: Mapping[str, Base], kv: float | None, mva: float | None) -> dict[str, Base]:
+    """Return bases with those that the ratings of a unit give to signals without one."""
+    rated = {} if kv is None else {"vt": Base(kv, "kV")}
+    if mva is not None:
+        rated |= {"p": Base(mva, "MW"), "q": Base(mva, "Mvar")}
+    return {**rated, **bases}

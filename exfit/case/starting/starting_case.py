@@ -5,6 +5,7 @@ from pathlib import Path
 from textwrap import wrap
 
 from exfit.case.open_values import FILL_IN
+from exfit.case.starting.event_suggestion import event_plant, event_section
 from exfit.case.starting.free_parameters import bounds_of, free_of
 from exfit.case.starting.starting_tests import StartingTest
 from exfit.case.starting.starting_unit import PartData, UnitData
@@ -85,12 +86,32 @@ def _recordings(
     tests: Sequence[StartingTest], names: Mapping[Path, str], exciter: str
 ) -> tuple[list[str], list[str]]:
     """Return the sections of what is fitted, and of what validates."""
+    if tests[0].inspection.pmu is not None:
+        return _events(tests, names)
     if len(tests) == 1:
         level = _voltage_before(exciter, tests[0])
         return _single(tests[0], names[tests[0].inspection.path], level), _validation_to_come()
     fitted, validations = _several(tests, names, exciter)
     validating = ["validate:", *validations] if validations else _validation_to_come()
     return ["records:", *fitted], validating
+
+
+def _events(
+    tests: Sequence[StartingTest], names: Mapping[Path, str]
+) -> tuple[list[str], list[str]]:
+    """Return the sections of grid events: the first, or every other one, is fitted."""
+    sections = [
+        event_section(test.inspection, test.inspection.pmu, names[test.inspection.path], test.bases)
+        for test in tests
+        if test.inspection.pmu is not None
+    ]
+    if len(tests) == 1:
+        return sections[0], []
+    fitted, validations = list[str](), list[str]()
+    for test, section in zip(tests, sections, strict=True):
+        lines = [f"  - name: {test.name}", *(f"{IN_A_LIST}{line}" for line in section)]
+        (validations if test.validates else fitted).extend(lines)
+    return ["records:", *fitted], ["validate:", *validations]
 
 
 def _advice(unit: UnitData) -> list[str]:
@@ -186,6 +207,10 @@ def _channels_once(test: StartingTest, anchors: dict[str, str]) -> list[str]:
 
 def _plant(unit: UnitData, inspection: Inspection) -> Iterator[str]:
     machine = unit.machine
+    if inspection.pmu is not None:
+        yield from event_plant(inspection.pmu)
+        yield from _machine(machine, {"R": TYPICAL, "X": TYPICAL})
+        return
     yield "plant:"
     if unit.exciter.model.name == ALONE:
         yield "  type: none"
@@ -197,6 +222,11 @@ def _plant(unit: UnitData, inspection: Inspection) -> Iterator[str]:
         sources = _network_sources(inspection)
     else:
         yield commented("  type: open-circuit", "the breaker is open, at rated speed")
+    yield from _machine(machine, sources)
+
+
+def _machine(machine: PartData, sources: Mapping[str, str]) -> Iterator[str]:
+    """Yield the machine of a plant, and where its values and those of the network come from."""
     origin = machine.origin or machine.model.title
     yield commented(f"  machine: {machine.model.name}", in_comment(origin))
     yield "  parameters:"

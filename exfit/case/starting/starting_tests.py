@@ -46,9 +46,9 @@ def starting_tests(
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
     for a record in which the breaker opens, and for one of several that shows no step.
     """
-    for inspection in inspections:
-        if inspection.opening is not None:
-            _refuse_rejection(inspection, inspection.opening)
+    if any(inspection.pmu is not None for inspection in inspections):
+        return _events(inspections, sizes, bases or {})
+    _refuse_rejections(inspections)
     recorded = [(inspection, test) for inspection in inspections for test in tests_of(inspection)]
     given = bases or {}
     if not recorded and len(inspections) == 1:
@@ -62,6 +62,29 @@ def starting_tests(
         )
     ]
     return renamed(made, [test for _, test in recorded])
+
+
+def _events(
+    inspections: Sequence[Inspection], sizes: Sequence[str], bases: Mapping[str, Base]
+) -> tuple[StartingTest, ...]:
+    """Return the grid events that phasor measurement units recorded, one a record.
+
+    Raises ExfitError for sizes of steps, and for a record of another kind beside them.
+    """
+    _refuse_unused(sizes, [])
+    for inspection in inspections:
+        if inspection.pmu is None:
+            raise ExfitError(
+                f"{inspection.path}: no phasors of a measurement unit, which the other records "
+                "have: give bump tests a case of their own"
+            )
+    single = len(inspections) == 1
+    return tuple(
+        StartingTest(
+            "fit" if single else f"event{k}", inspection, (), bases=bases, validates=k % 2 == 0
+        )
+        for k, inspection in enumerate(inspections, 1)
+    )
 
 
 def _amounts(
@@ -137,6 +160,12 @@ def started(
         bases,
         validates,
     )
+
+
+def _refuse_rejections(inspections: Sequence[Inspection]) -> None:
+    for inspection in inspections:
+        if inspection.opening is not None:
+            _refuse_rejection(inspection, inspection.opening)
 
 
 def _refuse_rejection(inspection: Inspection, opening: BreakerOpening) -> NoReturn:

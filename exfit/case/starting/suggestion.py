@@ -270,6 +270,11 @@ def _about(channel: InspectedChannel, scale: ScaleRange | None, loaded: bool) ->
     return f"{why}; {channel.level:.5g} {channel.unit or '?'} at rest; base: {base}"
 
 
+def channel_entry(channel: InspectedChannel, base: Base | None) -> str:
+    """Return the entry of a channel that is compared, as a case has it."""
+    return _channel(channel, drives=False, base=base, scale=None)
+
+
 def _channel(
     channel: InspectedChannel, drives: bool, base: Base | None, scale: ScaleRange | None
 ) -> str:

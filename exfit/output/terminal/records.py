@@ -15,6 +15,7 @@ from exfit.output.terminal.terminal import (
 )
 from exfit.records.channel_inspection import InspectedChannel
 from exfit.records.inspection import Inspection
+from exfit.records.pmu_recognition import PmuContent
 
 NAME_WIDTH = 22  # letters of a channel's name that leave room for its numbers
 MOST_ROWS = 40  # channels, steps or notes of a file that someone reads through
@@ -34,10 +35,14 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     console.print()
     _channels(console, result)
     console.print()
-    for line in _signals(result.channels):
+    of_pmu = frozenset[str]() if result.pmu is None else result.pmu.columns
+    for line in _signals([each for each in result.channels if each.name not in of_pmu]):
         paragraph(console, line)
     console.print()
-    _steps(console, result)
+    if result.pmu is None:
+        _steps(console, result)
+    else:
+        paragraph(console, _of_pmu(result.pmu))
     console.print()
     if result.findings:
         findings = result.findings
@@ -48,6 +53,26 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     console.print()
     console.print("\n".join(record), markup=False, soft_wrap=True)
     console.print()
+
+
+def _of_pmu(pmu: PmuContent) -> str:
+    """Return what a file holds of a phasor measurement unit as a sentence."""
+    phasors = [phasor for phasor in (pmu.voltage, pmu.current) if phasor is not None]
+    parts = [
+        f"{phasor.quantity} {_some(phasor.magnitudes)} with the angle {_some(phasor.angles)}"
+        f"{f', wrapped {phasor.wraps} times' if phasor.wraps else ''}"
+        for phasor in phasors
+    ]
+    parts += [
+        f"{what} {name}"
+        for what, name in (
+            ("frequency", pmu.frequency),
+            ("its rate", pmu.rate),
+            ("flags", pmu.status),
+        )
+        if name is not None
+    ]
+    return f"a phasor measurement unit: {'; '.join(parts)}"
 
 
 def in_words(sampling: Sampling) -> str:

@@ -1,0 +1,62 @@
+"""Cases of grid events from the files of phasor measurement units."""
+
+import pytest
+import yaml
+from pmu_records import KV, MVA, pmu_columns, smooth_course, write_table
+
+from exfit.case.open_values import open_values
+from exfit.case.record_section import record_section
+from exfit.case.starting.bases import rated_bases
+from exfit.case.starting.event_suggestion import event_section
+from exfit.case.starting.record_settings import RecordSettings
+from exfit.case.starting.starting_case import starting_case
+from exfit.case.starting.starting_tests import starting_tests
+from exfit.case.starting.starting_unit import unit_with
+from exfit.fitting.recordings import read_section
+
+RATED = rated_bases({}, KV, MVA)
+
+
+def inspected(folder, **changes):
+    columns = {**pmu_columns(smooth_course()), **changes}
+    return RecordSettings().inspect(write_table(folder / "event.csv", columns))
+
+
+def section(inspection, bases):
+    text = "\n".join(event_section(inspection, inspection.pmu, "event.csv", bases))
+    return text, yaml.safe_load(text)["record"]
+
+
+def test_with_the_ratings_of_the_unit_the_suggested_record_can_be_read(tmp_path):
+    text, content = section(inspected(tmp_path), RATED)
+    assert not open_values(text)
+    del content["channels"]["angle"]  # of no plant with a bump test
+    record = read_section(record_section(content), tmp_path, per_unit=True)
+    assert record.signals["p"][0] == pytest.approx(0.8, abs=1e-6)
+
+
+def test_the_connection_is_that_of_the_rated_voltage_and_its_comment_says_so(tmp_path):
+    text, content = section(inspected(tmp_path), RATED)
+    assert content["phasors"]["voltage"]["connection"] == "phase-to-ground"
+    assert "rests at 0.583 = 1.01 / sqrt(3) of the rated kV" in text
+    line_to_line = {"UNIT1-PM1 (V)": 1e3 * KV * smooth_course().vt}
+    _, content = section(inspected(tmp_path, **line_to_line), RATED)
+    assert content["phasors"]["voltage"]["connection"] == "phase-to-phase"
+
+
+@pytest.mark.parametrize("bases", [{}, rated_bases({}, 2.0 * KV, MVA)])
+def test_without_a_fitting_rating_the_connection_is_asked_for(tmp_path, bases):
+    text, _ = section(inspected(tmp_path), bases)
+    places = {value.place for value in open_values(text)}
+    assert "record.phasors.voltage.connection" in places
+    assert ("record.phasors.kV" in places) == (not bases)
+
+
+def test_a_case_of_an_event_has_no_test_and_plays_its_record_back(tmp_path):
+    tests = starting_tests([inspected(tmp_path)], (), RATED)
+    text = starting_case(unit_with("AC8B", None, None, tmp_path), tests, tmp_path)
+    content = yaml.safe_load(text)
+    assert content["plant"]["type"] == "grid-playback"
+    assert content["plant"]["network"]["f0"] == 60
+    assert "test" not in content
+    assert content["record"]["channels"]["vt"] == "phasors.vt"
