@@ -17,8 +17,8 @@ class SignalRow(NamedTuple):
     recognition of a recorder's columns: the ``quantity`` of the column's unit and the ``place``
     where it is measured, in whatever words of the vocabulary; the ``words`` that are its own, the
     surest first, and the ``vague_words`` that may be something else; whether the unit alone is
-    enough, and the ``turn`` in which it takes its column. ``base`` says what 1 pu is. A signal
-    without words is in no record.
+    enough, and the ``turn`` in which it takes its column. ``base`` says what 1 pu is; a signal
+    whose unit is not pu has none. A signal without words is in no record.
     """
 
     symbol: str
@@ -90,6 +90,14 @@ ROWS = (
         "vs", "stabiliser signal", turn=8,
         words=("vpss", "upss", "pss output", "pss", "stabiliser", "stabilizer", "vs"),
     ),
+    SignalRow(
+        "angle", "angle of the voltage", "rad", quantity="angle", turn=10,
+        words=("angle", "voltage angle", "vt angle", "v angle", "theta", "vang", "phasor angle"),
+    ),
+    SignalRow(
+        "frequency", "frequency", "Hz", quantity="frequency", turn=11,
+        words=("frequency", "freq", "frequenz", "frequence", "frecuencia", "frequencia"),
+    ),
     SignalRow("vc1", "measured voltage"),
     SignalRow("breaker", "breaker open", ""),
     SignalRow("E", "source voltage"),
@@ -100,6 +108,7 @@ ROWS = (
 SIGNALS: Mapping[str, SignalRow] = {row.symbol: row for row in ROWS}
 RECORDED = tuple(row.symbol for row in ROWS if row.words)
 COMPARED = tuple(row.symbol for row in ROWS if row.noise is not None)
+OF_EVENT = ("angle", "frequency")  # what drives a unit beside vt, and is in no bump test
 OF_BUMP_TEST = ("vt", "efd", "ifd")  # what a record of a bump test mostly holds
 TERMINALS, FIELDS = ("p", "q", "vt"), ("ifd", "efd")  # what is read of a unit at rest on load
 POSITIVE_AT_REST = tuple(row.symbol for row in ROWS if row.positive)

@@ -15,7 +15,9 @@ from exfit.plants import (
     DRIVING,
     SATURATION,
     SPEED,
+    UnitOnLoad,
     alone,
+    grid_playback,
     machine_on_load,
     machine_playback,
     open_circuit,
@@ -27,6 +29,7 @@ from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
 MACHINE, EXCITER, QUADRATIC = MACHINES["GENROU"], MODELS["AC8B"], SATURATION["quadratic"]
 SYSTEMS = {
     "infinite-bus": system(MACHINE, inputs=ALL_INPUTS),
+    "grid-playback": grid_playback(UnitOnLoad(EXCITER, MACHINE, QUADRATIC)),
     "open-circuit": open_circuit(EXCITER, MACHINE, QUADRATIC, ("vref", "vs")),
     "machine-on-load": machine_on_load(MACHINE, (BREAKER, "efd", SPEED)),
     "playback": playback(EXCITER, QUADRATIC, DRIVING),
@@ -44,7 +47,8 @@ def test_all_that_a_plant_puts_out_or_takes_has_a_row(plant):
 
 def test_every_row_is_a_signal_of_some_plant():
     signals = {name for one in SYSTEMS.values() for name in (*one.inputs, *one.outputs)}
-    assert SIGNALS.keys() - {"vc1"} <= signals  # vc1 is added where the loop is opened
+    # vc1 is added where the loop is opened; a frequency drives as the angle that it makes
+    assert SIGNALS.keys() - {"vc1", "frequency"} <= signals
 
 
 def test_a_signal_stands_once():

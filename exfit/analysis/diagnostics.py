@@ -20,7 +20,7 @@ from exfit.case.schema import BumpTest, ReferenceTable
 from exfit.dsp.reference_moves import scatter
 from exfit.fitting.experiment import Channel
 from exfit.fitting.global_search import AT_TOLERANCE
-from exfit.fitting.references import is_table
+from exfit.fitting.recorded.references import is_table
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.wording import listed

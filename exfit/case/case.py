@@ -207,10 +207,11 @@ class Case:
     @property
     def recordings(self) -> tuple[Recording, ...]:
         """The records that are fitted; a single one is named fit."""
-        if self.records or self.record is None or self.test is None:
+        test = BumpTest() if self.test is None and self.kind.finds_rest else self.test
+        if self.records or self.record is None or test is None:
             return self.records
         # both sections are checked already
-        return (Recording.model_construct(name=SINGLE, test=self.test, record=self.record),)
+        return (Recording.model_construct(name=SINGLE, test=test, record=self.record),)
 
     @property
     def tests(self) -> tuple[BumpTest, ...]:

@@ -248,9 +248,11 @@ def network_part(given: Data, kind: PlantKind, place: Place = ("plant", "network
     symbols = [row.symbol for row in sheet]
 
     def check(values: Mapping[str, float]) -> Contradictions:
-        for symbol in ("f0", "X", "P"):
-            if symbol in symbols and symbol not in given:
+        for symbol in kind.network_required:
+            if symbol not in given:
                 yield symbol, "is missing"
+        if "P" not in kind.network_required:
+            return
         if "Q" not in given and "E" not in given:
             either = "either Q or E, the voltage of the source, must be given with P"
             yield "Q", f"is missing{f': {either}' if 'X' in symbols else ''}"

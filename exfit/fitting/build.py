@@ -10,21 +10,23 @@ from exfit.case.case import Case
 from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
 from exfit.errors import CaseError
 from exfit.fitting.channels import channel_of, without_masked
-from exfit.fitting.detected_steps import with_detected_steps
 from exfit.fitting.experiment import Channel, Experiment, Nuisance
 from exfit.fitting.input_steps import input_steps
 from exfit.fitting.levels import deviation, levels_of
 from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
 from exfit.fitting.nuisances.sine_parameters import with_sines
 from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.recorded.detected_steps import with_detected_steps
+from exfit.fitting.recorded.event import event_inputs, with_rest
+from exfit.fitting.recorded.references import references_of, span_of
 from exfit.fitting.recordings import record_of
-from exfit.fitting.references import references_of, span_of
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.fitting.system import system_of
 from exfit.plants import NETWORK, REFERENCES, VT0
 from exfit.records.record import Record
 from exfit.simulation.inputs import MOST_STEPS, Inputs, RecordedInput
 from exfit.simulation.simulator import Simulator
+from exfit.simulation.splines import SplinedInput
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -37,11 +39,14 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     """
     view, file = case.seen_from(recording), recording.record
     system = system_of(view, recording)
-    driving = [signal for signal in file.channels if signal in system.inputs]
+    turning = view.kind.required_one_of
+    driving = [s for s in file.channels if s in system.inputs or s in turning]
     record = without_masked(record_of(case, recording), file, driving)
     references = references_of(case, recording.test, span_of(recording.test, record), record, file)
     resolved = recording.model_copy(update={"test": references.test})
     test = with_detected_steps(case, resolved, record)
+    if view.kind.finds_rest:
+        test = with_rest(test, record)
     network = {} if view is case else _network_values(view)
     steps = tuple(input_steps(view, test, {**values, **network}))
     nuisances, free = nuisance_parameters(
@@ -109,11 +114,13 @@ def _earliest_reading(nuisances: Sequence[Nuisance], free: Sequence[FreeParamete
 
 def _driving(
     case: Case, test: BumpTest, record: Record, file: RecordFile, driving: Sequence[str]
-) -> dict[str, RecordedInput]:
+) -> dict[str, RecordedInput | SplinedInput]:
     """Return the signals of a record that drive the simulation, but for recorded references.
 
     One whose scale is found is without any: the system multiplies it.
     """
+    if case.kind.finds_rest:
+        return event_inputs(test, record)
     if not case.kind.plays_back:
         driving = [signal for signal in driving if signal not in REFERENCES]
     return {

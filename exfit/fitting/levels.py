@@ -18,7 +18,7 @@ POSSIBLE_VOLTAGES = (0.1, 2.0)  # pu: voltages beyond are those of another unit 
 def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     """Return the parameters that a record gives: the levels of its signals at the start."""
     kind, vt0 = case.kind, initial_voltage(test, record)
-    if kind.per_unit and not kind.levels:
+    if kind.per_unit and (kind.has_machine or not kind.levels):
         _refuse_impossible(vt0, record)
     levels = {
         initial(signal): initial_level(test, record, signal)
@@ -27,7 +27,8 @@ def levels_of(case: Case, test: BumpTest, record: Record) -> dict[str, float]:
     }
     given = {initial(name): v for name, v in case.plant.given.items() if name in kind.driving}
     scales = {DRIVING_SCALE: 1.0} if kind.scaled else {}
-    return {**levels, VT0: vt0, **scales, **given}
+    rated = {initial("speed"): 1.0} if "speed" in kind.levels else {}
+    return {**rated, **levels, VT0: vt0, **scales, **given}
 
 
 def _refuse_impossible(vt0: float, record: Record) -> None:

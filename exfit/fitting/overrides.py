@@ -12,7 +12,7 @@ from exfit.case.ties import TieError
 from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.fitting.nuisances.parameters import names_of
-from exfit.fitting.references import with_recorded_steps
+from exfit.fitting.recorded.references import with_recorded_steps
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
 from exfit.util.magnitude import magnitude_fault

@@ -32,6 +32,8 @@ from exfit.records.phasors import Phasor, Phasors
 from exfit.records.reading import ThreePhases, read_record
 from exfit.records.record import Record
 from exfit.records.status import Status
+from exfit.records.units import base_of_own
+from exfit.signals import OF_EVENT, SIGNALS
 from exfit.util.sorting import median
 from exfit.util.text import show
 
@@ -83,21 +85,22 @@ def measured(case: Case, test: BumpTest, file: RecordFile) -> Record:
 
     Raises RecordError where it cannot be read, or where the steps of the test lie outside it.
     """
-    record = read_section(file, case.folder, case.kind.per_unit)
+    f0 = case.plant.given.get("f0", 1.0)
+    record = read_section(file, case.folder, case.kind.per_unit, f0)
     _refuse_steps_outside(case, test, record, record.source)
     return record
 
 
-def read_section(file: RecordFile, folder: Path, per_unit: bool) -> Record:
+def read_section(file: RecordFile, folder: Path, per_unit: bool, f0: float = 1.0) -> Record:
     """Return the record that a section describes, its file relative to a folder.
 
     ``per_unit``: numbers that the section takes as they are must not be in another unit by the
-    file. Raises RecordError where it cannot be read.
+    file. ``f0`` is the rated frequency, Hz. Raises RecordError where it cannot be read.
     """
     return read_record(
         folder / file.file,
         clock_of(file.time),
-        {signal: source_of(channel) for signal, channel in file.channels.items()},
+        {signal: source_of(channel, signal, f0) for signal, channel in file.channels.items()},
         file.window,
         file.gaps == "skip",
         file.sheet,
@@ -220,10 +223,15 @@ def standing_alone(channel: ChannelSection | PhasesSection | ReferenceFile) -> b
     return channel.unit is None and channel.base is None and channel.scale == 1.0
 
 
-def source_of(channel: ChannelSection | PhasesSection) -> Column | ThreePhases:
-    """Return the place of a signal: a column, or three."""
+def source_of(
+    channel: ChannelSection | PhasesSection, signal: str, f0: float
+) -> Column | ThreePhases:
+    """Return the place of a signal: a column, or three; ``f0`` is the rated frequency, Hz."""
     if isinstance(channel, ChannelSection):
-        return column_of(channel)
+        column = column_of(channel)
+        if signal in OF_EVENT and channel.unit is not None:
+            return column._replace(base=base_of_own(channel.unit, SIGNALS[signal].unit, f0))
+        return column
     return ThreePhases(
         channel.phases,
         channel.kind,

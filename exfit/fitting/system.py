@@ -53,6 +53,7 @@ def _system_of(case: Case, recording: Recording | None) -> System:
         given=frozenset(case.plant.given),
         stabiliser=stabilised(case),
         swing=getattr(case.plant, "swing", "power"),
+        power_at=getattr(case.plant, "power_at", "recorded-voltage"),
     )
     if kind.plays_back and parts.exciter is not None:
         _refuse_missing_drivers(case, parts.exciter, equipment.saturation)

@@ -22,7 +22,7 @@ from exfit.case.schema import (
 from exfit.dsp.quality import noise_of
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.detected_steps import SIZE_WITHIN
+from exfit.fitting.recorded.detected_steps import SIZE_WITHIN
 from exfit.fitting.recordings import clock_of, read_section
 from exfit.fitting.setup import ExperimentSetup
 from exfit.records.formats import open_table

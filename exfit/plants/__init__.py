@@ -2,6 +2,7 @@
 
 from exfit.plants.alone import alone
 from exfit.plants.breaker import BREAKER, SPEED
+from exfit.plants.grid_playback import RESTING, grid_playback
 from exfit.plants.infinite_bus import INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.machine_on_load import machine_on_load
@@ -20,9 +21,10 @@ from exfit.plants.parts import (
     exciter_inputs,
     exciter_parameters,
 )
-from exfit.plants.plant import REFERENCES, Equipment, PlantKind, Stabilised, Swing
+from exfit.plants.plant import REFERENCES, Equipment, PlantKind, PowerAt, Stabilised, Swing
 from exfit.plants.playback import DRIVING, initial, playback
 from exfit.plants.stabilising import HEARD, rests_with_output
+from exfit.plants.unit import UnitOnLoad
 
 __all__ = [
     "BREAKER",
@@ -37,6 +39,7 @@ __all__ = [
     "NETWORK",
     "OPEN_CIRCUIT",
     "REFERENCES",
+    "RESTING",
     "SATURATION",
     "SPEED",
     "STABILISER",
@@ -44,13 +47,16 @@ __all__ = [
     "Equipment",
     "Names",
     "PlantKind",
+    "PowerAt",
     "SaturationForm",
     "Stabilised",
     "Swing",
+    "UnitOnLoad",
     "alone",
     "exciter_inputs",
     "exciter_parameters",
     "flow_sheet",
+    "grid_playback",
     "infinite_bus",
     "initial",
     "machine_on_load",

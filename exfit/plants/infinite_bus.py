@@ -165,5 +165,6 @@ INFINITE_BUS = PlantKind(
     events=("vref", "vs", "E", "angle", "network", BREAKER),
     signals=compared(OUTPUTS),
     network=lambda given: flow_sheet("E" if "E" in given else "Q"),
+    network_required=("f0", "X", "P"),
     build=_build,
 )

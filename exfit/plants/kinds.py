@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from exfit.plants.alone import ALONE
+from exfit.plants.grid_playback import GRID_PLAYBACK
 from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.plants.machine_playback import MACHINE_PLAYBACK
@@ -15,6 +16,7 @@ KINDS: Mapping[str, PlantKind] = {
     for kind in (
         OPEN_CIRCUIT,
         INFINITE_BUS,
+        GRID_PLAYBACK,
         MACHINE_ON_LOAD,
         PLAYBACK,
         MACHINE_PLAYBACK,

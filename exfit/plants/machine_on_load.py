@@ -98,5 +98,6 @@ MACHINE_ON_LOAD = PlantKind(
     signals=OUTPUTS,
     driving=("efd",),
     network=lambda given: LOAD,
+    network_required=("P",),
     build=_build,
 )

@@ -15,6 +15,7 @@ Component = TypeVar("Component", Model, Machine)
 REFERENCES = ("vref", "vs")  # inputs that are given as steps, ramps, tables or records
 Requirement = Literal["exciter", "machine", "network"]
 Swing = Literal["power", "torque"]  # what Pm is in the equation of the speed
+PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
 
 
 class Stabilised(NamedTuple):
@@ -29,7 +30,7 @@ class Equipment(NamedTuple):
 
     ``inputs`` are the signals that tests change, ``recorded`` those that all records hold, and
     ``given`` what is known of the plant beside its data: of a network E or Q, of a playback vref.
-    ``swing`` is the form of the equation of the speed.
+    ``swing`` is the form of the equation of the speed, ``power_at`` the place of recorded powers.
     """
 
     exciter: Model | None
@@ -40,6 +41,7 @@ class Equipment(NamedTuple):
     given: frozenset[str] = frozenset()
     stabiliser: Stabilised | None = None
     swing: Swing = "power"
+    power_at: PowerAt = "recorded-voltage"
 
 
 def no_network(given: Collection[str]) -> Sheet:
@@ -53,11 +55,12 @@ class PlantKind:
 
     ``needs`` are the parts that a case gives, ``events`` what a test may change, ``signals`` what
     a record may hold. Of these ``driving`` drive the simulation in place of the plant: ``required``
-    ones must be recorded, those ``required_if_used`` where the exciter uses them; ``levels`` are
-    recorded signals whose level at the start is a parameter, ``scaled`` driving ones whose scale is
-    one. ``network`` is the data sheet of the
-    network of which these values are given. ``per_unit`` says that voltages are those of a
-    machine: per unit, and above zero at rest.
+    ones must be recorded, ``required_one_of`` some others, those ``required_if_used`` where the
+    exciter uses them; ``levels`` are recorded signals whose level at the start is a parameter,
+    ``scaled`` driving ones whose scale is one. ``network`` is the data sheet of the network of
+    which these values are given, ``network_required`` those that must be. ``per_unit`` says that
+    voltages are those of a machine: per unit, and above zero at rest; ``finds_rest`` that the rest
+    before the event is found in the record.
     """
 
     name: str
@@ -68,11 +71,14 @@ class PlantKind:
     build: Callable[[Equipment], System]
     driving: tuple[str, ...] = ()
     required: tuple[str, ...] = ()
+    required_one_of: tuple[str, ...] = ()
     required_if_used: tuple[str, ...] = ()
     levels: tuple[str, ...] = ()
     scaled: tuple[str, ...] = ()
     network: Callable[[Collection[str]], Sheet] = no_network
+    network_required: tuple[str, ...] = ()
     per_unit: bool = True
+    finds_rest: bool = False
 
     @property
     def has_exciter(self) -> bool:
@@ -91,8 +97,8 @@ class PlantKind:
 
     @property
     def closed_loop(self) -> bool:
-        """Whether an exciter controls a machine."""
-        return self.has_exciter and self.has_machine
+        """Whether an exciter controls a machine in a simulated plant."""
+        return self.has_exciter and self.has_machine and not self.plays_back
 
     @property
     def plays_back(self) -> bool:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
+from math import pi
 
 # body of a unit, folded -> its usual spelling, and the quantity that it measures
 BODIES: Mapping[str, tuple[str, str]] = {
@@ -16,13 +17,15 @@ WORDS: Mapping[str, str] = {
     "second": "s", "seconds": "s", "sec": "s", "sek": "s", "seg": "s",
     "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "microseconds": "us",
     "pu": "pu", "p.u.": "pu", "p.u": "pu", "p. u.": "pu", "per unit": "pu",
-    "percent": "%", "deg": "deg", "°": "deg", "grad": "deg", "min": "min", "h": "h",
+    "percent": "%", "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "grad": "deg",
+    "radian": "rad", "radians": "rad", "min": "min", "h": "h",
 }  # fmt: skip
 OTHER_UNITS = frozenset(
     ("%", "‰", "-", "rad", "rad/s", "el.deg", "°C", "K", "rpm", "r/min", "1/min", "min-1", "U/min",
      "1/s", "m/s", "bar", "dB")
 )  # fmt: skip
 PER_UNIT = frozenset(("", "-", "1", "pu"))  # of numbers that need no base
+ANGLES: Mapping[str, float] = {"rad": 1.0, "deg": pi / 180.0, "el.deg": pi / 180.0}  # in rad
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 
 # a prefix depends on its case; S is a phase, and so is a small a
@@ -69,6 +72,8 @@ def quantity_of(unit: str | None) -> str | None:
     symbol = usual(unit)
     if symbol in SECONDS or symbol == "h":
         return "time"
+    if symbol in ANGLES:
+        return "angle"
     prefixed = _prefixed(symbol)
     return prefixed[1] if prefixed else None
 
@@ -156,10 +161,22 @@ def _prefixed(unit: str) -> tuple[str, str] | None:
 def scale_between(unit: str, other: str) -> float | None:
     """Return how many of another unit one of a unit is: 1000 V for a kV; None for no such pair."""
     symbol, wanted = usual(unit), usual(other)
+    if symbol in ANGLES and wanted in ANGLES:
+        return ANGLES[symbol] / ANGLES[wanted]
     first, second = _prefixed(symbol), _prefixed(wanted)
     if first is None or second is None or first[1] != second[1]:
         return None
     return _factor(symbol, first[1]) / _factor(wanted, second[1])
+
+
+def base_of_own(unit: str, own: str, rated: float = 1.0) -> float | None:
+    """Return how many of a ``unit`` are one of a signal's ``own``; None where none are.
+
+    1 pu of a frequency is the ``rated`` one, Hz.
+    """
+    if usual(unit) == "pu" and own == "Hz":
+        return 1.0 / rated
+    return scale_between(own, unit)
 
 
 def _factor(symbol: str, quantity: str) -> float:

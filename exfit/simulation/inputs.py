@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from exfit.errors import SimulationError
 from exfit.simulation.grid import ON_GRID, GridSegment
+from exfit.simulation.splines import SplinedInput
 from exfit.util.sorting import median
 
 Array = NDArray[np.float64]
@@ -139,7 +140,7 @@ class Inputs:
     start: float
     end: float
     steps: tuple[InputStep, ...]
-    recorded: Mapping[str, RecordedInput] = field(default_factory=dict)
+    recorded: Mapping[str, RecordedInput | SplinedInput] = field(default_factory=dict)
 
     def level(self, signal: str, at: float) -> float:
         """Return the sum of an input's exact steps at an instant; each counts when complete."""

@@ -187,7 +187,6 @@ FORM = {
     "number for a record": (("records", 0), 5, ("records", 0), "5 is not a mapping"),
     "record without name": (("records", 1, "name"), GONE, ("records", 1, "name"), "is missing"),
     "name with a slash": (("records", 1, "name"), "a/b", ("records", 1, "name"), "letters, digits"),
-    "record without test": (("records", 1, "test"), GONE, ("records", 1, "test"), "is missing"),
     "text for a plant": (
         ("records", 1, "plant"),
         "x",

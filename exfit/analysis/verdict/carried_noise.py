@@ -11,6 +11,7 @@ from exfit.errors import SimulationError
 from exfit.fitting.setup import ExperimentSetup
 from exfit.simulation.inputs import RecordedInput
 from exfit.simulation.simulator import Simulator
+from exfit.simulation.splines import SplinedInput
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -55,11 +56,11 @@ def _noisier(simulator: Simulator, generator: "np.random.Generator", steady: flo
     Their level is the mean until the instant ``steady`` (s), and as uncertain.
     """
 
-    def noisier(recorded: RecordedInput) -> RecordedInput:
+    def noisier(recorded: RecordedInput | SplinedInput) -> RecordedInput | SplinedInput:
         added = generator.normal(0.0, noise(recorded.samples), len(recorded.samples))
         at_rest = recorded.time < steady
         level = float(np.mean(added[at_rest])) if at_rest.any() else 0.0
-        return RecordedInput(recorded.time, recorded.samples + added - level)
+        return replace(recorded, samples=recorded.samples + added - level)
 
     recorded = {signal: noisier(own) for signal, own in simulator.inputs.recorded.items()}
     inputs = replace(simulator.inputs, recorded=recorded)

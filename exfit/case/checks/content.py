@@ -12,6 +12,7 @@ from exfit.case.checks.nuisance import nuisance_faults
 from exfit.case.checks.plant import model_faults, plants_of_records_faults, stabiliser_faults
 from exfit.case.checks.record import (
     channels_faults,
+    level_faults,
     name_faults,
     noise_faults,
     record_faults,
@@ -47,7 +48,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from stabiliser_faults(content, parts, kind)
     yield from source_faults(content, parts, kind)
     yield from plants_of_records_faults(content, kind)
-    yield from _single_record_faults(content)
+    yield from _missing_test_faults(content, kind)
     if "records" not in content:
         yield from _recording_faults(content, content, kind)
     for recording in several:
@@ -71,11 +72,13 @@ def _fact_faults(about: ContentNode) -> Iterator[Fault]:
             yield about.at(key).fault(text)
 
 
-def _single_record_faults(content: ContentNode) -> Iterator[Fault]:
-    """Yield a test that is missing, or is given beside several records."""
+def _missing_test_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield tests that are missing, and one that is given beside several records."""
+    several = (*content.at("records").entries, *content.at("validate").entries)
+    for recording in several if "records" in content else (content, *several):
+        if "test" not in recording and recording.is_section and not kind.finds_rest:
+            yield recording.at("test").fault("is missing")
     if "records" not in content:
-        if "test" not in content:
-            yield content.at("test").fault("is missing")
         return
     for key in ("test", "record"):
         if key in content:
@@ -110,6 +113,7 @@ def _recording_faults(
     if has_record:
         yield from record_faults(test, record)
         yield from channels_faults(record.at("channels"), kind)
+        yield from level_faults(record.at("channels"), plant.at("network"), kind)
     elif kind.plays_back:
         yield record.fault(f"is missing: plant {kind.name} plays it back")
     elif recording is content:

@@ -7,7 +7,8 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.checks.phasors import phasors_faults
 from exfit.case.yaml import Fault
 from exfit.plants import PlantKind
-from exfit.records.units import needs_base
+from exfit.records.units import base_of_own, needs_base
+from exfit.signals import OF_EVENT, SIGNALS
 from exfit.util.file_names import taken_names
 from exfit.util.text import show
 
@@ -84,15 +85,33 @@ def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     for signal in kind.required:
         if signal not in channels:
             yield channels.at(signal).fault(f"is missing: plant {kind.name} needs it")
+    driving = [signal for signal in kind.required_one_of if signal in channels]
+    if kind.required_one_of and not driving:
+        either = " or ".join(kind.required_one_of)
+        yield channels.fault(
+            f"neither {' nor '.join(kind.required_one_of)}: plant {kind.name} needs {either}"
+        )
+    for signal in driving[1:]:
+        yield channels.at(signal).fault(f"not allowed with {driving[0]}, which drives the unit")
     if not {*kind.compared} & {*channels.content, *kind.required}:
         lacking = f"neither {' nor '.join(kind.compared)}"
         yield channels.fault(f"{lacking}: there is nothing to compare")
 
 
+def level_faults(channels: ContentNode, network: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield the powers at the start of an event that neither its record nor its network gives."""
+    for signal in ("p", "q") if kind.finds_rest and channels.content else ():
+        symbol = signal.upper()
+        if signal not in channels and symbol not in network:
+            yield network.at(symbol).fault(
+                f"is missing: the record has no {signal} to take it from"
+            )
+
+
 def channel_faults(signal: str, channel: ContentNode, per_unit: bool) -> Iterator[Fault]:
     """Yield what contradicts itself in a channel, whose signal may have to be ``per_unit``."""
     yield from _scale_faults(channel)
-    yield from _unit_faults(channel, per_unit)
+    yield from _unit_faults(channel, signal, per_unit)
     yield from _phase_faults(channel, signal)
 
 
@@ -112,15 +131,27 @@ def _scale_faults(channel: ContentNode) -> Iterator[Fault]:
         yield channel.at("scale").fault("must not be 0")
 
 
-def _unit_faults(channel: ContentNode, per_unit: bool) -> Iterator[Fault]:
+def _unit_faults(channel: ContentNode, signal: str, per_unit: bool) -> Iterator[Fault]:
     """Yield a base of no unit, and a unit that nothing makes per unit, as a machine's must be."""
     unit = channel.at("unit").text
+    if signal in OF_EVENT:
+        yield from _own_unit_faults(channel, SIGNALS[signal].unit)
+        return
     if "base" in channel and "unit" not in channel:
         yield channel.at("unit").fault("is missing: in which unit is base?")
     if "base" in channel or "scale" in channel or not unit:
         return
     if per_unit and needs_base(unit):
         yield channel.at("base").fault(f"is missing: what is 1 pu in {unit}?")
+
+
+def _own_unit_faults(channel: ContentNode, own: str) -> Iterator[Fault]:
+    """Yield a unit of an angle or a frequency that is none, and a base, which it does not have."""
+    unit = channel.at("unit").text
+    if "base" in channel:
+        yield channel.at("base").fault(f"not allowed: the signal is in {own}, and not per unit")
+    if unit and base_of_own(unit, own) is None:
+        yield channel.at("unit").fault(f"{unit!r} cannot be converted to {own}")
 
 
 def _phase_faults(channel: ContentNode, signal: str) -> Iterator[Fault]:

@@ -19,7 +19,7 @@ from exfit.case.schema.values import (
     nothing,
 )
 from exfit.models import MACHINE_NAMES
-from exfit.plants import HEARD, Swing
+from exfit.plants import HEARD, PowerAt, Swing
 
 if TYPE_CHECKING:
     Heard = str
@@ -72,6 +72,36 @@ class InfiniteBus(PlantSection):
         "at the start; Rc and Xc of the load compensation; pu on the base of the machine."
     )
     swing: Swing = Field(default="power", description=SWING)
+    sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """The values of the network."""
+        return self.network
+
+
+class GridPlayback(PlantSection):
+    """A unit driven by the voltage and the angle or frequency that were recorded in a grid event.
+
+    Its p and q, and what else was recorded, are compared.
+    """
+
+    type: Literal["grid-playback"] = Field(description="Kind of plant.")
+    machine: Text = MACHINE
+    parameters: Frozen[Given] = MACHINE_DATA
+    free: Frozen[FreeSection] = MACHINE_FREE
+    network: Frozen[Number] = Field(
+        description="f0 (Hz); R and X of the step-up transformer, where vt and its angle are "
+        "recorded on its other side; P and Q at the start where p or q is not recorded; Rc and Xc "
+        "of the load compensation; pu on the base of the machine."
+    )
+    swing: Swing = Field(default="power", description=SWING)
+    power_at: PowerAt = Field(
+        default="recorded-voltage",
+        description="Where p and q are recorded, and given: at the recorded voltage, or at the "
+        "terminals.",
+    )
     sources: Sources = STATED
     std_errors: StdErrors = STD_ERRORS
 
@@ -135,7 +165,9 @@ class NoPlant(PlantSection):
     type: Literal["none"] = Field(description="Kind of plant.")
 
 
-Plant = OpenCircuit | InfiniteBus | Playback | MachinePlayback | MachineOnLoad | NoPlant
+Plant = (
+    OpenCircuit | InfiniteBus | GridPlayback | Playback | MachinePlayback | MachineOnLoad | NoPlant
+)
 SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 

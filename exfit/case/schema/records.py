@@ -193,5 +193,8 @@ class Recording(Section):
     plant: Annotated[OffLine | OnLine | AloneOnLoad, Field(discriminator="type")] | None = Field(
         default=None, description="Plant of this record, if it differs from that of the case."
     )
-    test: BumpTest = Field(description="The steps that were made.")
+    test: BumpTest = Field(
+        default_factory=BumpTest,
+        description="The steps that were made; only a record of a grid event needs none.",
+    )
     record: RecordFile = Field(description="The measured signals.")

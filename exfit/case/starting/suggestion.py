@@ -18,7 +18,7 @@ from exfit.records.inspection import Inspection
 from exfit.records.rejection import POWERS, BreakerOpening
 from exfit.records.steps import INSTANT_WITHIN, RecordedStep
 from exfit.records.units import unit_of
-from exfit.signals import COMPARED, RECORDED, SIGNALS
+from exfit.signals import COMPARED, OF_EVENT, RECORDED, SIGNALS
 from exfit.util.text import yaml_number
 
 NO_BASES: Mapping[str, Base] = MappingProxyType({})
@@ -50,7 +50,11 @@ def channel_lines(
     inspection: Inspection, only: tuple[str, ...], bases: Mapping[str, Base]
 ) -> list[str]:
     """Return the entries of all channels, those that are not compared as comments."""
-    channels = [channel for signal in RECORDED if (channel := inspection.channel_of(signal))]
+    channels = [
+        channel
+        for signal in RECORDED
+        if (channel := inspection.channel_of(signal)) and (signal not in OF_EVENT or signal in only)
+    ]
     return [
         *_voltage_lines(inspection, bases.get("vt")),
         *_channel_lines(channels, only, inspection, bases),

@@ -1,0 +1,1 @@
+"""What records show of a test: its steps, its references, the rest before an event, its inputs."""

@@ -1,0 +1,87 @@
+"""What a record of a grid event gives a unit that it drives: the rest before it, the inputs."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.case.schema import BumpTest
+from exfit.dsp.reference_moves import FEWEST_SAMPLES, rest_end
+from exfit.errors import RecordError
+from exfit.fitting.levels import deviation, initial_level
+from exfit.plants import RESTING
+from exfit.records.record import Record
+from exfit.simulation.inputs import RecordedInput
+from exfit.simulation.splines import SplinedInput
+from exfit.util.text import show
+
+Array = NDArray[np.float64]
+
+TURN = 2.0 * np.pi
+
+
+def with_rest(test: BumpTest, record: Record) -> BumpTest:
+    """Return a test of an event with the end of the rest before it, as the record shows it.
+
+    Raises RecordError where the record shows no rest, or nothing that moves.
+    """
+    if test.steady_until is not None:
+        _refuse_short_rest(test.steady_until, record)
+        return test
+    ends: list[int] = []
+    for signal, samples in _showing_rest(record):
+        if np.ptp(samples) == 0.0:
+            continue
+        try:
+            ends.append(rest_end(samples))
+        except ValueError as fault:
+            if "never" not in str(fault):
+                text = f"{signal}: {fault}; give test.steady_until, or a record that begins earlier"
+                raise RecordError(f"{record.source}: {text}") from None
+    if not ends:
+        text = "no signal moves out of its noise: there is no event; test.steady_until says"
+        raise RecordError(f"{record.source}: {text} until when the record is at rest")
+    first = min([float(record.time[min(ends)]), *test.instants])
+    return test.model_copy(update={"steady_until": first})
+
+
+def _refuse_short_rest(until: float, record: Record) -> None:
+    samples = int(np.count_nonzero(record.time < until))
+    if samples < FEWEST_SAMPLES:
+        text = f"{samples} samples before test.steady_until = {show(until)} s"
+        raise RecordError(f"{record.source}: {text}; the rest needs {FEWEST_SAMPLES}")
+
+
+def _showing_rest(record: Record) -> Iterator[tuple[str, Array]]:
+    """Yield the signals (M,) that rest before an event; of an angle, what it turns by."""
+    for signal in RESTING:
+        if signal in record.signals:
+            samples = record.signals[signal]
+            yield signal, samples[np.isfinite(samples)]
+    if "angle" in record.signals:
+        yield "angle", np.diff(unwrapped(record)) / np.diff(record.time)
+
+
+def unwrapped(record: Record) -> Array:
+    """Return the angle (M,) of a record without jumps by whole turns, rad."""
+    return np.unwrap(record.signals["angle"])
+
+
+def angle_of_event(test: BumpTest, record: Record) -> SplinedInput:
+    """Return how the angle of the recorded voltage deviates from its even course before the event.
+
+    It is recorded, or the integral of the recorded frequency, less the mean of that at rest.
+    """
+    time = record.time
+    if "angle" not in record.signals:
+        frequency = record.signals["frequency"] - initial_level(test, record, "frequency")
+        return SplinedInput(time, TURN * frequency, integrated=True)
+    angle, resting = unwrapped(record), time < (test.steady or np.inf)
+    slope, level = np.polyfit(time[resting] - time[0], angle[resting], 1)
+    return SplinedInput(time, angle - level - slope * (time - time[0]))
+
+
+def event_inputs(test: BumpTest, record: Record) -> dict[str, RecordedInput | SplinedInput]:
+    """Return the inputs that a record of an event drives: vt and its angle."""
+    voltage = SplinedInput(record.time, deviation(test, record, "vt"))
+    return {"vt": voltage, "angle": angle_of_event(test, record)}

@@ -1,0 +1,184 @@
+"""A unit on load in whose place of measurement the grid's recorded voltage and angle are played."""
+
+from functools import cache
+from math import pi
+
+from exfit.engine.system import Motion, Rest, Signals, System
+from exfit.engine.trace import Signal, cos, sin, sqrt
+from exfit.models.machines import Axes
+from exfit.models.phasors import modulus
+from exfit.models.sheet import Sheet, sheet
+from exfit.plants.loaded_machine import Flow, behind, current
+from exfit.plants.parts import (
+    MACHINE,
+    MEASURED,
+    NETWORK,
+    VT0,
+    Names,
+    motion,
+    named_parameters,
+    refuse_taken,
+    symbols,
+    values_named,
+)
+from exfit.plants.plant import Equipment, PlantKind, PowerAt, present
+from exfit.plants.playback import initial
+from exfit.plants.unit import (
+    ROTOR,
+    Controls,
+    Terminals,
+    UnitOnLoad,
+    UnitState,
+    unit_at_rest,
+    unit_motion,
+)
+
+OUTPUTS = ("vref", "vt", "efd", "ifd", "p", "q", "it", "delta", "speed")
+DRIVING_ANGLE = ("angle", "frequency")  # of which one drives, beside vt
+LEVELS = ("p", "q", "speed")
+RESTING = ("vt", "frequency", "p", "q")  # what shows the rest before an event
+
+TRANSFORMER: Sheet = sheet(
+    ("f0", 60.0, "Hz", (1.0, 400.0), "rated frequency"),
+    ("R", 0.0, "pu", (0.0, 10.0), "resistance from the terminals to the recorded voltage"),
+    ("X", 0.0, "pu", (0.0, 10.0), "reactance from the terminals to the recorded voltage"),
+    ("Rc", 0.0, "pu", (-10.0, 10.0), "resistance of the load compensation"),
+    ("Xc", 0.0, "pu", (-10.0, 10.0), "reactance of the load compensation"),
+)
+AT_START: Sheet = sheet(
+    ("P", 0.8, "pu", (-10.0, 10.0), "active power at the start"),
+    ("Q", 0.0, "pu", (-10.0, 10.0), "reactive power at the start"),
+)
+
+
+def transformer_sheet(given: frozenset[str]) -> Sheet:
+    """Return the network's data sheet; P and Q are in it where the case gives them."""
+    return (*TRANSFORMER, *(row for row in AT_START if row.symbol in given))
+
+
+def voltage_behind(v: Signal, p: Signal, q: Signal, R: Signal, X: Signal) -> Signal:
+    """Return the voltage behind R + jX at which p and q leave, where v is recorded.
+
+    From v = |vt - (R + jX)(p - jq) / vt|, a quadratic equation in vt^2: the larger one.
+    """
+    sum_of_both = v * v + 2.0 * (R * p + X * q)
+    drop = (R * R + X * X) * (p * p + q * q)
+    return sqrt(0.5 * (sum_of_both + sqrt(sum_of_both * sum_of_both - 4.0 * drop)))
+
+
+def terminals_at_rest(
+    v: Signal, p: Signal, q: Signal, n: Names, power_at: PowerAt
+) -> tuple[Signal, Signal, Flow]:
+    """Return the terminals' voltage and active power, and their flow to the recorded voltage v."""
+    if power_at == "terminals":
+        vt = voltage_behind(v, p, q, n.R, n.X)
+        return vt, p, behind(vt, p, q, n.R, n.X)
+    square = (p * p + q * q) / (v * v)
+    vt = modulus(v + (n.R * p + n.X * q) / v, (n.X * p - n.R * q) / v)
+    power = p + n.R * square
+    return vt, power, behind(vt, power, q + n.X * square, n.R, n.X)
+
+
+@cache
+def grid_playback(
+    unit: UnitOnLoad,
+    inputs: tuple[str, ...] = ("vref", "vt", "angle"),
+    given: frozenset[str] = frozenset(),
+    power_at: PowerAt = "recorded-voltage",
+) -> System:
+    """Return a unit behind R + jX to a recorded voltage.
+
+    Its inputs are the changes of the recorded voltage ``vt`` and its ``angle`` (rad) from what they
+    are at the start, where the angle may grow evenly; and of ``vref`` and ``vs``. The parameters
+    are those of exciter, machine, network and stabiliser, and the levels at the start: ``vt0`` of
+    the recorded voltage, ``p0`` and ``q0`` unless the network has P or Q, ``speed0``. The powers,
+    and the current, are those at the recorded voltage or at the ``terminals``. All per unit on the
+    machine's base; ``delta``, to the recorded voltage, in rad.
+    """
+    machine = unit.machine
+    refuse_taken(unit.exciter, (*OUTPUTS, MEASURED, *ROTOR, *machine.states))
+    network = transformer_sheet(given)
+    levels = tuple(
+        initial(signal)
+        for signal in LEVELS
+        if signal.upper() not in {row.symbol for row in network}
+    )
+
+    def rest(p: Signals) -> Rest:
+        n = named_parameters(p, NETWORK, network)
+        power, reactive = (
+            p[NETWORK + name] if name in given else p[initial(name.lower())] for name in ("P", "Q")
+        )
+        vt, at_terminals, at = terminals_at_rest(p[VT0], power, reactive, n, power_at)
+        return Rest(*unit_at_rest(unit, vt, at_terminals, at, p, n))
+
+    def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
+        of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
+        n = named_parameters(p, NETWORK, network)
+        fluxes = values_named(x, machine.states)
+        at, recorded, delta = machine.source(fluxes, of_machine), p[VT0] + u["vt"], x["delta"]
+        delta = delta - u["angle"]
+        i = current(at, recorded, n.R, n.X, delta)
+        v = Axes(at.voltage.d + at.xq * i.q, at.voltage.q - at.xd * i.d)
+        terminals = Terminals(fluxes, v, i, x["dw"])
+        vref = r["vref"] + u["vref"]
+        controls = Controls(vref, u.get("vs", 0.0))
+        efd, ifd, vc1 = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
+        d.delta = 2.0 * pi * n.f0 * x["dw"]
+        measured = terminals
+        if power_at == "recorded-voltage":
+            measured = terminals._replace(v=Axes(recorded * sin(delta), recorded * cos(delta)))
+        outputs = {
+            "vref": vref,
+            "vt": recorded,
+            "efd": efd,
+            "ifd": ifd,
+            "p": measured.p,
+            "q": measured.q,
+            "it": modulus(i.d, i.q),
+            "delta": delta,
+            "speed": p[initial("speed")] + x["dw"],
+            MEASURED: vc1,
+        }
+        return motion(d, unit.states, {**x, **outputs})
+
+    return System(
+        parameters=(*unit.parameters(symbols(NETWORK, network)), VT0, *levels),
+        setpoints=unit.setpoints,
+        states=unit.states,
+        inputs=inputs,
+        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.states))),
+        time_constants=unit.time_constants,
+        rest=rest,
+        motion=equations,
+    )
+
+
+def _build(equipment: Equipment) -> System:
+    unit = UnitOnLoad(
+        present(equipment.exciter),
+        present(equipment.machine),
+        equipment.saturation,
+        equipment.stabiliser,
+        equipment.swing,
+    )
+    inputs = tuple(name for name in ("vref", "vs") if name in equipment.inputs)
+    given = equipment.given & {row.symbol for row in AT_START}
+    return grid_playback(unit, (*inputs, "vt", "angle"), given, equipment.power_at)
+
+
+GRID_PLAYBACK = PlantKind(
+    name="grid-playback",
+    title="on load, driven by the grid's recorded voltage and angle",
+    needs=("exciter", "machine", "network"),
+    events=("vref", "vs"),
+    signals=("vt", *DRIVING_ANGLE, "efd", "ifd", "p", "q", "it", "speed"),
+    driving=("vt", *DRIVING_ANGLE),
+    required=("vt",),
+    required_one_of=DRIVING_ANGLE,
+    levels=LEVELS,
+    network=lambda given: transformer_sheet(frozenset(given)),
+    network_required=("f0",),
+    finds_rest=True,
+    build=_build,
+)

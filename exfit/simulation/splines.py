@@ -1,0 +1,61 @@
+"""A recorded input that runs between its samples in splines, as smooth as what was recorded."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exfit.simulation.grid import GridSegment
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+NO_JUMPS = np.zeros(0, np.intp)
+
+
+@dataclass(frozen=True, eq=False)
+class SplinedInput:
+    """A recorded input: by how much its ``samples`` (M,) at ``time`` (s) deviate from the start.
+
+    Cubic splines run through them, from jump to jump: after each of the samples ``jumps`` it jumps
+    in a line to the next one. ``integrated`` it is the integral of that from the first sample on.
+    Beyond the first and last sample it stays.
+    """
+
+    time: Array
+    samples: Array
+    jumps: Places = field(default_factory=lambda: NO_JUMPS)
+    integrated: bool = False
+
+    def on(self, part: GridSegment) -> Array:
+        """Return it at the grid points (n + 1,) of a segment."""
+        return self.at(part.times)
+
+    def at(self, times: Array) -> Array:
+        """Return it at some instants (n,), s."""
+        values: Array = self._polynomials(times.clip(self.time[0], self.time[-1]))
+        return values
+
+    @cached_property
+    def _polynomials(self) -> Any:
+        """The polynomials between the samples, as SciPy evaluates them."""
+        from scipy.interpolate import CubicSpline, PPoly
+
+        first, parts = 0, []
+        for last in (*self.jumps.tolist(), len(self.time) - 1):
+            if last > first:
+                own = slice(first, last + 1)
+                parts.append(CubicSpline(self.time[own], self.samples[own]).c)
+            if last < len(self.time) - 1:
+                parts.append(self._line(last))
+            first = last + 1
+        polynomials = PPoly(np.concatenate(parts, axis=1), self.time)
+        return polynomials.antiderivative() if self.integrated else polynomials
+
+    def _line(self, after: int) -> Array:
+        """Return the coefficients (4, 1) of the line from a sample to the next one."""
+        change = self.samples[after + 1] - self.samples[after]
+        slope = change / (self.time[after + 1] - self.time[after])
+        return np.array([[0.0], [0.0], [slope], [self.samples[after]]])
