@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
+from exfit.engine.system import System
 from exfit.errors import CaseError
 from exfit.fitting.channels import channel_of, without_masked
 from exfit.fitting.experiment import Channel, Experiment, Nuisance
@@ -22,7 +23,7 @@ from exfit.fitting.recorded.references import references_of, span_of
 from exfit.fitting.recordings import record_of
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.fitting.system import system_of
-from exfit.plants import NETWORK, REFERENCES, VT0
+from exfit.plants import NETWORK, REFERENCES, VT0, PlantKind
 from exfit.records.record import Record
 from exfit.simulation.inputs import MOST_STEPS, Inputs, RecordedInput
 from exfit.simulation.simulator import Simulator
@@ -39,14 +40,12 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     """
     view, file = case.seen_from(recording), recording.record
     system = system_of(view, recording)
-    turning = view.kind.required_one_of
-    driving = [s for s in file.channels if s in system.inputs or s in turning]
+    driving = _driving_channels(view.kind, file, system)
     record = without_masked(record_of(case, recording), file, driving)
     references = references_of(case, recording.test, span_of(recording.test, record), record, file)
     resolved = recording.model_copy(update={"test": references.test})
     test = with_detected_steps(case, resolved, record)
-    if view.kind.finds_rest:
-        test = with_rest(test, record)
+    test = with_rest(test, record) if view.kind.finds_rest else test
     network = {} if view is case else _network_values(view)
     steps = tuple(input_steps(view, test, {**values, **network}))
     nuisances, free = nuisance_parameters(
@@ -60,10 +59,9 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     if any(nuisance.kind == "shift" for nuisance in nuisances):
         steps = tuple(step._replace(smooth=False) for step in steps)
     delay = start_value(file.delay) or 0.0
-    beyond = max(0.0, _earliest_reading(nuisances, free) - delay)
     recorded = {**_driving(view, test, record, file, driving), **references.recorded}
     begin, end = span_of(test, record)
-    inputs = Inputs(begin, end + beyond, steps, recorded)
+    inputs = Inputs(begin, end + _beyond(nuisances, free, delay), steps, recorded)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
     experiment = Experiment(
         simulator.with_inputs(steps, delay) if delay else simulator,
@@ -75,6 +73,12 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     played = tuple(driving) if view.kind.plays_back else ()
     plain = ExperimentSetup(case.path, test, record, experiment, free, references.files, played)
     return _with_given_starts(case, with_sines(case, recording, plain, values))
+
+
+def _driving_channels(kind: PlantKind, file: RecordFile, system: System) -> list[str]:
+    """Return the channels of a record that drive its simulation, some in another form."""
+    inputs = (*system.inputs, *kind.required_one_of)
+    return [signal for signal in file.channels if signal in inputs]
 
 
 def _with_given_starts(case: Case, setup: ExperimentSetup) -> ExperimentSetup:
@@ -103,13 +107,14 @@ def _network_values(view: Case) -> dict[str, float]:
     return {name: value for name, value in view.values().items() if name.startswith(NETWORK)}
 
 
-def _earliest_reading(nuisances: Sequence[Nuisance], free: Sequence[FreeParameter]) -> float:
-    """Return by how much earlier than at the start, s, a fit may read the record."""
-    return sum(
+def _beyond(nuisances: Sequence[Nuisance], free: Sequence[FreeParameter], delay: float) -> float:
+    """Return by how much longer than the record, s, a fit that may read it earlier simulates."""
+    earlier = sum(
         parameter.start - parameter.low
         for parameter, nuisance in zip(free, nuisances, strict=True)
         if nuisance.kind in ("delay", "shift")
     )
+    return max(0.0, earlier - delay)
 
 
 def _driving(

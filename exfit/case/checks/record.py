@@ -85,17 +85,20 @@ def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     for signal in kind.required:
         if signal not in channels:
             yield channels.at(signal).fault(f"is missing: plant {kind.name} needs it")
-    driving = [signal for signal in kind.required_one_of if signal in channels]
-    if kind.required_one_of and not driving:
-        either = " or ".join(kind.required_one_of)
-        yield channels.fault(
-            f"neither {' nor '.join(kind.required_one_of)}: plant {kind.name} needs {either}"
-        )
-    for signal in driving[1:]:
-        yield channels.at(signal).fault(f"not allowed with {driving[0]}, which drives the unit")
+    yield from _either_faults(channels, kind)
     if not {*kind.compared} & {*channels.content, *kind.required}:
         lacking = f"neither {' nor '.join(kind.compared)}"
         yield channels.fault(f"{lacking}: there is nothing to compare")
+
+
+def _either_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield that none of some signals is recorded of which a plant needs one, or that two are."""
+    driving = [signal for signal in kind.required_one_of if signal in channels]
+    if kind.required_one_of and not driving:
+        lacking = f"neither {' nor '.join(kind.required_one_of)}"
+        yield channels.fault(f"{lacking}: plant {kind.name} needs one of them")
+    for signal in driving[1:]:
+        yield channels.at(signal).fault(f"not allowed with {driving[0]}, which drives the unit")
 
 
 def level_faults(channels: ContentNode, network: ContentNode, kind: PlantKind) -> Iterator[Fault]:
