@@ -102,6 +102,10 @@ class FieldsOnLoad:
             problem,
             free=tuple(saliency if each is quadrature else each for each in problem.free),
             following=following,
+            leading=lambda values: {
+                SALIENCY: (1.0 - min(values["Xq"] / values["Xd"], 1.0)) ** 2,
+                **values,
+            },
         )
 
     @property

@@ -33,7 +33,7 @@ POINTS_OF_PROFILE = 3  # of a side: only its end is asked for
 STRATEGY = "lm-then-dgn"
 MOST_DESCENTS = 4  # each to a lower minimum than the one before
 ENDS = {
-    estimate.ProfileEnd.FAILED: "the machine has no rest beyond",
+    estimate.ProfileEnd.FAILED: "beyond, its data contradict each other or the machine has no rest",
     estimate.ProfileEnd.FLAT: "the residuals hardly change",
     estimate.ProfileEnd.INTERRUPTED: "interrupted",
 }
@@ -47,7 +47,7 @@ class PointProblem:
     contradict each other; ``given`` are the values of all that is not free; ``blocks`` say which
     errors belong to which signal. An error of 1 is as large as its noise, as far as that is known.
     ``priors`` are those of values by name; ``following`` adds the values that follow from the free
-    ones.
+    ones, ``leading`` the free ones that some values follow from.
     """
 
     errors: Callable[[Values], Array]
@@ -56,6 +56,7 @@ class PointProblem:
     blocks: tuple[ResidualBlock, ...]
     priors: Mapping[str, Prior]
     following: Callable[[dict[str, float]], dict[str, float]] = dict
+    leading: Callable[[Values], Values] = dict
 
     def values(self, theta: Array) -> dict[str, float]:
         """Return all values at scaled parameters (N,)."""
@@ -65,7 +66,8 @@ class PointProblem:
 
     def theta(self, values: Values) -> Array:
         """Return the scaled parameters (N,) of some values."""
-        return np.array([each.scaled(values[each.name]) for each in self.free])
+        known = self.leading(values)
+        return np.array([each.scaled(known[each.name]) for each in self.free])
 
     def residuals(self, theta: Array) -> Array:
         """Return the weighted errors, then what priors add, (M + P,)."""

@@ -75,7 +75,7 @@ def v_curve(
         given=dict(data),
         machine_data=machine_data,
         parameters=fitted,
-        verdict=_verdict(readings, fitted, fit, causes_of(fields, values, {*fitted})),
+        verdict=_verdict(readings, fitted, fit, causes_of(fields, values, problem)),
         undetermined=() if fit is None else fit.undetermined,
         notes=() if fit is None else fit.notes,
         levels=tuple(power_levels(machine, machine_data, points)),

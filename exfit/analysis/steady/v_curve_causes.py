@@ -1,6 +1,7 @@
 """Why points on load are not matched: the one thing that, if it were another, would match them."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,17 +32,17 @@ class TrialOfPoints(NamedTuple):
     cause: Cause
 
 
-def causes_of(fields: FieldsOnLoad, values: Values, fitted: set[str]) -> tuple[Cause, ...]:
+def causes_of(fields: FieldsOnLoad, values: Values, problem: PointProblem) -> tuple[Cause, ...]:
     """Return what would match the points much better if it were another, the likeliest first.
 
-    One by one Xd, Xq, the saturation and each base that is not ``fitted`` is fitted, and the
-    reactive power reversed.
+    One by one Xd, Xq, the saturation and each base that the problem does not fit is fitted as well,
+    and the reactive power reversed; what the problem fits is fitted again from its start.
     """
     if len(fields.points.p) < FEWEST_POINTS:
         return ()
     cost = cost_of(fields, values)
     trials = sorted(
-        (each for each in _trials(fields, values, fitted) if each.cost < MUCH_BETTER * cost),
+        (each for each in _trials(fields, problem) if each.cost < MUCH_BETTER * cost),
         key=lambda each: each.cost,
     )
     return tuple(each.cause for each in trials if each.cost <= AS_GOOD * trials[0].cost)
@@ -53,16 +54,20 @@ def cost_of(fields: FieldsOnLoad, values: Values) -> float:
     return 0.5 * float(errors @ errors)
 
 
-def _trials(fields: FieldsOnLoad, values: Values, fitted: set[str]) -> Iterator[TrialOfPoints]:
-    reverse = fields.points._replace(q=-fields.points.q)
-    yield TrialOfPoints(cost_of(FieldsOnLoad(fields.machine, reverse), values), REVERSED)
+def _trials(fields: FieldsOnLoad, problem: PointProblem) -> Iterator[TrialOfPoints]:
+    values = problem.given
+    reversed_fields = replace(fields, points=fields.points._replace(q=-fields.points.q))
+    for better in _descended(reversed_fields, replace(problem, errors=reversed_fields.errors)):
+        yield TrialOfPoints(cost_of(reversed_fields, better), REVERSED)
     rows = {row.symbol: row for row in fields.machine.sheet}
     groups: list[tuple[str, ...]] = [(symbol,) for symbol in OF_MACHINE]
     groups += [SATURATION] if values["S10"] > 0.0 else []
     groups += [(base_of(signal),) for signal in fields.points.measurements]
+    fitted = {each.name for each in problem.free}
     for names in groups:
         if not fitted & {*names}:
-            yield from _trial(fields, values, [_freed(name, values, rows) for name in names])
+            freed = tuple(_freed(name, values, rows) for name in names)
+            yield from _trial(fields, replace(problem, free=(*freed, *problem.free)), names)
 
 
 def _freed(name: str, values: Values, rows: dict[str, Parameter]) -> FreeParameter:
@@ -73,19 +78,26 @@ def _freed(name: str, values: Values, rows: dict[str, Parameter]) -> FreeParamet
 
 
 def _trial(
-    fields: FieldsOnLoad, values: Values, free: list[FreeParameter]
+    fields: FieldsOnLoad, problem: PointProblem, names: tuple[str, ...]
 ) -> Iterator[TrialOfPoints]:
-    problem = PointProblem(fields.errors, values, tuple(free), fields.blocks, {})
+    for better in _descended(fields, problem):
+        words = " and ".join(f"{name} = {better[name]:.4g}" for name in names)
+        given = " and ".join(f"{problem.given[name]:.4g}" for name in names)
+        cause = Cause(
+            f"the points are matched much better by {words} than by {given}",
+            f"check {'the base' if names[0] not in fields.symbols else 'it'}, or let it be fitted",
+        )
+        yield TrialOfPoints(cost_of(fields, better), cause)
+
+
+def _descended(fields: FieldsOnLoad, problem: PointProblem) -> Iterator[Values]:
+    """Yield the values at the minimum that a descent from those of a problem reaches, if any."""
+    if not problem.free:
+        yield problem.given
+        return
     search = fields.search(problem)
     try:
         end = descended(search, np.array([each.scaled(each.start) for each in search.free]))
     except NotFinite:
         return
-    better = search.values(end.x)
-    words = " and ".join(f"{each.name} = {better[each.name]:.4g}" for each in free)
-    given = " and ".join(f"{values[each.name]:.4g}" for each in free)
-    cause = Cause(
-        f"the points are matched much better by {words} than by {given}",
-        f"check {'the base' if free[0].name not in fields.symbols else 'it'}, or let it be fitted",
-    )
-    yield TrialOfPoints(end.cost, cause)
+    yield search.values(end.x)

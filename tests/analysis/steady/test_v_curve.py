@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from exfit.analysis.steady.field_on_load import field_on_load
-from exfit.analysis.steady.fields_on_load import FieldMeasurement, PointsOnLoad
+from exfit.analysis.steady.fields_on_load import FieldMeasurement, FieldsOnLoad, PointsOnLoad
 from exfit.analysis.steady.v_curve import v_curve
 from exfit.errors import ModelError
 from exfit.fitting.parameters import FreeParameter
@@ -96,6 +96,22 @@ def test_what_would_match_the_points_is_named_where_the_machine_data_do_not():
     curve = v_curve(SALIENT, TRUTH | {"Xd": 1.3}, points())
     (cause,) = curve.verdict.causes
     assert cause.cause.startswith("the points are matched much better by Xd = 1.07")
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.3, 1.2), (0.05, 5.0), (0.001, 1000.0)])
+def test_what_would_match_is_named_alone_whatever_the_bounds_of_what_is_fitted(low, high):
+    curve = v_curve(SALIENT, TRUTH | {"Xd": 1.6}, points(), [free("Xq", 0.7, low, high)])
+    (cause,) = curve.verdict.causes
+    assert cause.cause.startswith("the points are matched much better by Xd = 1.07")
+
+
+def test_values_lead_back_to_the_saliency_that_is_searched_in_place_of_xq():
+    fields = FieldsOnLoad(SALIENT, points())
+    problem = fields.problem(TRUTH, [free("Xq", 0.7, 0.3, 1.2)])
+    search = fields.search(problem)
+    assert search.values(search.theta(problem.values(problem.theta(TRUTH))))["Xq"] == pytest.approx(
+        TRUTH["Xq"]
+    )
 
 
 def test_a_reactive_power_with_the_other_sign_is_named():
