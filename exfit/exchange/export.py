@@ -12,6 +12,7 @@ from exfit.exchange.file_format import WIDTH, FileFormat
 from exfit.exchange.psse.files import PSSE_FILES
 from exfit.exchange.records import (
     SIGNALS,
+    SPEED_FLAG,
     Definition,
     alternatives,
     contradictions,
@@ -118,12 +119,12 @@ def _of_fit(result: FitResult, program: str) -> Iterator[str]:
 
 def _of_speed(result: FitResult, written: Iterable[Written]) -> Iterator[str]:
     """Yield that a fit took efd times the speed, which the record does not."""
-    if section_of(result.case_text, result.case, "efd_times_speed") is not True:
+    if not _times_speed(result):
         return
     for record in (
         entry.definition.record for entry in written if entry.definition.kind == "exciter"
     ):
-        if not record.times_speed:
+        if not record.times_speed and SPEED_FLAG not in record.cons:
             yield f"fitted with efd_times_speed; {record.name} does not multiply efd by the speed"
 
 
@@ -146,7 +147,14 @@ def _exciter(result: FitResult, program: str, name: str | None) -> Iterator[Writ
             f"--model {name}: not a record of {result.model}; "
             f"{_other_model(wanted, program) or near(wanted, candidates)}"
         )
-    yield _written(result, candidates[wanted], "")
+    written = _written(result, candidates[wanted], "")
+    flag = {SPEED_FLAG: 1.0} if _times_speed(result) else {}
+    yield replace(written, values={**written.values, **flag})
+
+
+def _times_speed(result: FitResult) -> bool:
+    """Return whether a fit took efd times the speed."""
+    return section_of(result.case_text, result.case, "efd_times_speed") is True
 
 
 def _other_model(name: str, program: str) -> str:

@@ -14,6 +14,7 @@ from exfit.case.templates import (
 )
 from exfit.errors import DynamicsError, ExfitError
 from exfit.exchange.fields import text_of
+from exfit.exchange.records import PSSE, SPEED_FLAG
 from exfit.exchange.unit import Unit, UnitPart, read_unit
 from exfit.models.sheet import Sheet
 from exfit.util.files import read_limited
@@ -88,9 +89,12 @@ def _heading(unit: Unit, file: str) -> Iterator[str]:
 def _exciter_name(exciter: UnitPart) -> Iterator[str]:
     yield commented(f"model: {exciter.definition.model.name}", _origin(exciter))
     if {"E1", "SE1", "E2", "SE2"} <= exciter.values.keys():
-        yield commented("saturation: quadratic", "as PSS/E")
-    if exciter.definition.record.times_speed:
-        origin = f"as InterPSS and ANDES have {exciter.definition.record.name}"
+        of_psse = exciter.definition.program == PSSE
+        yield commented("saturation: quadratic", "as PSS/E" if of_psse else "taken as in PSS/E")
+    if exciter.times_speed:
+        name = exciter.definition.record.name
+        of_record = exciter.definition.record.times_speed
+        origin = f"as InterPSS and ANDES have {name}" if of_record else f"{SPEED_FLAG} of {name}"
         yield commented("efd_times_speed: true", f"{origin}; acts where the speed is not rated")
 
 

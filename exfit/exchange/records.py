@@ -12,6 +12,7 @@ from exfit.util.text import show, show_value
 
 PSSE, PSLF = "PSS/E", "PSLF"
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
+SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
 LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the input code of a stabiliser
 UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
@@ -51,13 +52,15 @@ class Definition:
 class Reading:
     """What the fields of a record say: values by symbol, what is wrong, what must be known.
 
-    ``inputs`` are the signals of a stabiliser whose record has codes of them.
+    ``inputs`` are the signals of a stabiliser whose record has codes of them; ``times_speed`` says
+    that efd is multiplied by the speed.
     """
 
     values: Mapping[str, float]
     faults: list[DynamicsFault]
     warnings: list[DynamicsFault]
     inputs: tuple[str, ...] = ()
+    times_speed: bool = False
 
 
 def definitions(program: str = PSSE) -> list[Definition]:
@@ -131,15 +134,10 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
     wrong = [*unreadable, *outside(rows, of_sheet)]
     wrong = wrong or [*contradictions(definition.model, values)]
     doubt = [DynamicsFault(line, f"{record.name}: {record.doubt}")] if record.doubt else []
-    lacking = [
-        (row.symbol, f"not in the record; the typical value {show(row.typical)} is taken")
-        for row in definition.model.sheet
-        if row.symbol in definition.absent
-    ]
-    symbols = [row.symbol for row in definition.model.sheet]
-    unmodelled = [*_unmodelled(definition, symbols, given), *_without_effect(rows, of_sheet)]
-    warnings = doubt + placed([*unmodelled, *lacking])
-    return Reading(values, placed(wrong), warnings, _inputs(definition, given))
+    unmodelled = [*_unmodelled(definition, given), *_without_effect(rows, of_sheet)]
+    warnings = doubt + placed([*unmodelled, *_lacking(definition)])
+    times_speed = record.times_speed or given.get(SPEED_FLAG, 0.0) != 0.0
+    return Reading(values, placed(wrong), warnings, _inputs(definition, given), times_speed)
 
 
 def record_fields(definition: Definition, values: Mapping[str, float]) -> list[str]:
@@ -199,10 +197,17 @@ def _inputs(definition: Definition, given: Mapping[str, float]) -> tuple[str, ..
     return tuple(SIGNALS.get(int(code), SIGNALS[usual]) for code, usual in codes)
 
 
-def _unmodelled(
-    definition: Definition, symbols: Iterable[str], given: Mapping[str, float]
-) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, warning) for what the model, of these symbols, has in one way only."""
+def _lacking(definition: Definition) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for what the model has and the record has not."""
+    for row in definition.model.sheet:
+        if row.symbol in definition.absent:
+            text = f"not in the record; the typical value {show(row.typical)} is taken"
+            yield row.symbol, text
+
+
+def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, warning) for what the model has in one way only."""
+    symbols = [row.symbol for row in definition.model.sheet]
     for name, modelled in (*definition.record.icons, *definition.record.absent):
         value = given.get(name, modelled)
         if name in definition.codes and value in SIGNALS:

@@ -44,6 +44,7 @@ class UnitPart:
     values: Mapping[str, float]
     fields: tuple[Field, ...] = ()
     inputs: tuple[str, ...] = ()
+    times_speed: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,14 @@ def _parts(
         reading = read_values(definition, head.line, head.fields)
         faults += head.faults or reading.faults
         warnings += reading.warnings
-        parts[kind] = UnitPart(definition, head.line, reading.values, head.fields, reading.inputs)
+        parts[kind] = UnitPart(
+            definition,
+            head.line,
+            reading.values,
+            head.fields,
+            reading.inputs,
+            reading.times_speed,
+        )
     return parts
 
 

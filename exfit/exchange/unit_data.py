@@ -1,4 +1,4 @@
-"""The data of a new case from a unit of a PSS/E dynamics file."""
+"""The data of a new case from a unit of a planner's file."""
 
 from pathlib import Path
 

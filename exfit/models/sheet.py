@@ -124,10 +124,10 @@ class DynamicsRecord:
     only value that the model stands for, unless its sheet has the symbol; ``absent`` are symbols
     that the model does not have, with the only value that it stands for; ``held`` are those of the
     model that the record does not have, with the value that makes the model that of the record;
-    ``ignored`` are symbols that act only where a limiter does, which none is here: any value will
-    do; ``doubt`` says what is not settled about the order; ``spelled`` are symbols with their names
-    in the file, where these differ by more than capitals. ``times_speed`` says that efd is
-    multiplied by the speed there.
+    ``ignored`` are symbols that act only where a limiter does, which none is here, or otherwise not
+    in the model's own equations: any value will do; ``doubt`` says what is not settled about the
+    order; ``spelled`` are symbols with their names in the file, where these differ by more than
+    capitals; ``times_speed`` says that efd is multiplied by the speed there.
     """
 
     name: str

@@ -96,7 +96,7 @@ def _line(line: str, place: int, start: int) -> _LogicalLine:
             return _LogicalLine(place, tuple(fields), before, continued=False, unclosed=True)
         if kind == "end":
             return _LogicalLine(place, tuple(fields), before, continued=True, unclosed=False)
-        if match["comment"] is not None and before is not None:
+        if kind == "comment":
             break
         if kind == "colon":
             before = len(fields) if before is None else before

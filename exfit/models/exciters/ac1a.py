@@ -24,6 +24,7 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.sheet import (
+    AS_IN_PSSE,
     DEMAGNETISING,
     EXCITER_LAG,
     FEEDBACK,
@@ -63,6 +64,15 @@ RECORDS = (
     record(
         "ESAC1A",
         "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esac1a",
+        "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 VRMAX VRMIN SPDMLT",
+        ignored="SPDMLT",
+        doubt=AS_IN_PSSE,
     ),
 )
 

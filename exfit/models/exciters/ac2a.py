@@ -37,6 +37,7 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.sheet import (
+    AS_IN_PSSE,
     DEMAGNETISING,
     EXCITER_LAG,
     FEEDBACK,
@@ -79,6 +80,16 @@ RECORDS = (
     record(
         "ESAC2A",
         "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 E2 SE2",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esac2a",
+        "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE VFEMAX KH KF TF KC KD KE E1 SE1 "
+        "E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=AS_IN_PSSE,
     ),
 )
 

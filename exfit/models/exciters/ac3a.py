@@ -43,6 +43,7 @@ from exfit.models.sheet import (
     FREE,
     LAG_OF_KF,
     LOADING,
+    OF_A_LIST,
     REGULATOR_LAG,
     record,
     sheet,
@@ -79,6 +80,15 @@ RECORDS = (
     record(
         "ESAC3A",
         "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esac3a",
+        "TR TB TC KA TA VAMAX VAMIN TE VEMIN KR KF TF KN EFDN KC KD KE VFEMAX E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 

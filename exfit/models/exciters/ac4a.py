@@ -15,7 +15,7 @@ EXAC4 differs in its limits and is a separate model.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag
-from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, REGULATOR_LAG, record, sheet
+from exfit.models.sheet import AS_IN_PSSE, FREE, LAG_OF_TC, LEAD_OF_TB, REGULATOR_LAG, record, sheet
 
 ALIASES = ("ESAC4A",)
 
@@ -33,6 +33,14 @@ SHEET = sheet(
 )
 
 RECORDS = (record("ESAC4A", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),)
+
+PSLF_RECORDS = (
+    record(
+        "esac4a",
+        "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
+        doubt=AS_IN_PSSE,
+    ),
+)
 
 STATES = "VC VL VR"
 

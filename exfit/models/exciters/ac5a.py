@@ -21,7 +21,16 @@ and 0 here, 1 and 1 (which cancel) elsewhere.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import exciter, exciter_demand, lag, lead_lag, limited_lag, washout
-from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.sheet import (
+    EXCITER_LAG,
+    FEEDBACK,
+    FREE,
+    LAG_OF_KF,
+    OF_A_LIST,
+    REGULATOR_LAG,
+    record,
+    sheet,
+)
 
 ALIASES = ("ESAC5A",)
 
@@ -44,6 +53,15 @@ SHEET = sheet(
 )
 
 RECORDS = (record("ESAC5A", "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2"),)
+
+PSLF_RECORDS = (
+    record(
+        "esac5a",
+        "TR KA TA VRMAX VRMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
+    ),
+)
 
 STATES = "VC VR VE VL VF"
 

@@ -38,6 +38,7 @@ from exfit.models.sheet import (
     LAG_OF_TC,
     LEAD_OF_TB,
     LOADING,
+    OF_A_LIST,
     record,
     sheet,
 )
@@ -74,6 +75,16 @@ RECORDS = (
     record(
         "ESAC6A",
         "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 SE1 E2 SE2",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esac6a",
+        "TR KA TA TK TB TC VAMAX VAMIN VRMAX VRMIN TE VFELIM KH VHMAX TH TJ KC KD KE E1 "
+        "SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 

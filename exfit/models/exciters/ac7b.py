@@ -35,7 +35,16 @@ from exfit.models.blocks import (
     rectifier_supply,
     washout,
 )
-from exfit.models.sheet import DEMAGNETISING, EXCITER_LAG, FREE, LOADING, SearchRange, record, sheet
+from exfit.models.sheet import (
+    AS_IN_PSSE,
+    DEMAGNETISING,
+    EXCITER_LAG,
+    FREE,
+    LOADING,
+    SearchRange,
+    record,
+    sheet,
+)
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -72,6 +81,16 @@ RECORDS = (
         "AC7B",
         "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD KE TE "
         "VFEMAX VEMIN E1 SE1 E2 SE2",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esac7b",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KPA KIA VAMAX VAMIN KP KL KF1 KF2 KF3 TF KC KD "
+        "KE TE VFEMAX VEMIN E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=AS_IN_PSSE,
     ),
 )
 

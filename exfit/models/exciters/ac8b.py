@@ -25,7 +25,16 @@ from exfit.models.blocks import (
     rectifier,
     rectifier_supply,
 )
-from exfit.models.sheet import DEMAGNETISING, EXCITER_LAG, FREE, LOADING, SearchRange, record, sheet
+from exfit.models.sheet import (
+    DEMAGNETISING,
+    EXCITER_LAG,
+    FREE,
+    LOADING,
+    OF_A_LIST,
+    SearchRange,
+    record,
+    sheet,
+)
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -59,6 +68,25 @@ RECORDS = (
         doubt="the order of AC8B is likely, not confirmed",
     ),
     record("ESAC8B", "TR KPR KIR KDR TDR KA TA VRMAX VRMIN TE KE E1 SE1 E2 SE2"),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esac8b",
+        "TR KPR KIR KDR TDR VRMAX VRMIN KA TA TE VFEMAX VEMIN KE KC KD E1 SE1 E2 SE2 VTMULT SPDMLT",
+        absent={"VTMULT": 0.0},
+        ignored="SPDMLT",
+        held={"VPIDMAX": 999.0, "VPIDMIN": -999.0},
+        doubt=OF_A_LIST,
+    ),
+    record(
+        "exac8b",
+        "TR KPR KIR KDR TDR VIMAX TA VRMAX VRMIN KE TE KC KD E1 SE1 E2 SE2 LIMFLG",
+        absent={"VIMAX": 999.0, "LIMFLG": 0.0},
+        held={"KA": 1.0, "VPIDMAX": 999.0, "VPIDMIN": -999.0, "VFEMAX": 999.0, "VEMIN": 0.0},
+        spelled={"KPR": "kvp", "KIR": "kvi", "KDR": "kvd", "TDR": "tvd"},
+        doubt=OF_A_LIST,
+    ),
 )
 
 STATES = "VC VI VD VR VE"

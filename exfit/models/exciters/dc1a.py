@@ -28,7 +28,16 @@ from exfit.models.blocks import (
     limited_lag,
     washout,
 )
-from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.sheet import (
+    EXCITER_LAG,
+    FEEDBACK,
+    FREE,
+    LAG_OF_KF,
+    OF_A_LIST,
+    REGULATOR_LAG,
+    record,
+    sheet,
+)
 
 ALIASES = ("ESDC1A",)
 
@@ -55,6 +64,17 @@ RECORDS = (
         "ESDC1A",
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF Switch E1 SE1 E2 SE2",
         absent={"Switch": 0.0},
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esdc1a",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF SPDMLT E1 SE1 E2 SE2 UELIN EXCLIM",
+        ignored="SPDMLT UELIN",
+        absent={"EXCLIM": 1.0},
+        spelled={"TF": "tf1"},
+        doubt=OF_A_LIST,
     ),
 )
 

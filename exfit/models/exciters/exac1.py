@@ -30,6 +30,7 @@ from exfit.models.sheet import (
     FREE,
     LAG_OF_KF,
     LOADING,
+    OF_A_LIST,
     REGULATOR_LAG,
     record,
     sheet,
@@ -56,6 +57,15 @@ SHEET = sheet(
 )
 
 RECORDS = (record("EXAC1", "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2"),)
+
+PSLF_RECORDS = (
+    record(
+        "exac1",
+        "TR TB TC KA TA VRMAX VRMIN TE KF TF KC KD KE E1 SE1 E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
+    ),
+)
 
 STATES = "VC VL VR VE VF"
 

@@ -41,6 +41,7 @@ from exfit.models.sheet import (
     FREE,
     LAG_OF_KF,
     LOADING,
+    OF_A_LIST,
     REGULATOR_LAG,
     record,
     sheet,
@@ -76,6 +77,16 @@ RECORDS = (
     record(
         "EXAC2",
         "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE KL KH KF TF KC KD KE VLR E1 SE1 E2 SE2",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "exac2",
+        "TR TB TC KA TA VAMAX VAMIN KB VRMAX VRMIN TE KL KH KF TF KC KD KE VLR E1 SE1 "
+        "E2 SE2 SPDMLT",
+        ignored="SPDMLT",
+        doubt=OF_A_LIST,
     ),
 )
 

@@ -32,6 +32,13 @@ SHEET = sheet(
 
 RECORDS = (record("EXAC4", "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC"),)
 
+PSLF_RECORDS = (
+    record(
+        "exac4",
+        "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
+    ),
+)
+
 STATES = "VC VL VR"
 
 

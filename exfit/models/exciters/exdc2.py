@@ -22,7 +22,16 @@ Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import commutator_start, exciter, lag, lead_lag, limited_lag, washout
-from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.sheet import (
+    EXCITER_LAG,
+    FEEDBACK,
+    FREE,
+    LAG_OF_KF,
+    OF_A_LIST,
+    REGULATOR_LAG,
+    record,
+    sheet,
+)
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -48,6 +57,15 @@ RECORDS = (
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 Switch E1 SE1 E2 SE2",
         absent={"Switch": 0.0},
         times_speed=True,
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "exdc2",
+        "TR KA TA TB TC VRMAX VRMIN KE TE KF TF1 TF2 E1 SE1 E2 SE2",
+        absent={"TF2": 0.0},
+        doubt=OF_A_LIST,
     ),
 )
 

@@ -36,7 +36,7 @@ from exfit.models.blocks import (
     smaller,
     washout,
 )
-from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, SearchRange, record, sheet
+from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, OF_A_LIST, SearchRange, record, sheet
 
 ALIASES = ("ESST1A",)
 
@@ -70,6 +70,22 @@ RECORDS = (
         "ESST1A",
         "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
         icons={"UEL": 1, "VOS": 1},
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esst1a",
+        "UELIN PSSIN TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF TC1 TB1 VAMAX VAMIN ILR KLR",
+        absent={"PSSIN": 0.0},
+        ignored="UELIN",
+        doubt=OF_A_LIST,
+    ),
+    record(
+        "exst1",
+        "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC KF TF TC1 TB1 VAMAX VAMIN XE ILR KLR",
+        absent={"XE": 0.0},
+        doubt=OF_A_LIST,
     ),
 )
 

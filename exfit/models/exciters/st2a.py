@@ -25,7 +25,16 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import EXCITER_LAG, FEEDBACK, FREE, LAG_OF_KF, REGULATOR_LAG, record, sheet
+from exfit.models.sheet import (
+    AS_IN_PSSE,
+    EXCITER_LAG,
+    FEEDBACK,
+    FREE,
+    LAG_OF_KF,
+    REGULATOR_LAG,
+    record,
+    sheet,
+)
 
 ALIASES = ("ESST2A",)
 
@@ -46,6 +55,14 @@ SHEET = sheet(
 )
 
 RECORDS = (record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),)
+
+PSLF_RECORDS = (
+    record(
+        "esst2a",
+        "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX",
+        doubt=AS_IN_PSSE,
+    ),
+)
 
 STATES = "VC VR EFD VF"
 

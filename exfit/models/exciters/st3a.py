@@ -17,7 +17,7 @@ only. The standard has no OEL gate here.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller, source_voltage
-from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, record, sheet
+from exfit.models.sheet import AS_IN_PSSE, FREE, LAG_OF_TC, LEAD_OF_TB, record, sheet
 
 ALIASES = ("ESST3A",)
 
@@ -50,6 +50,15 @@ RECORDS = (
         "ESST3A",
         "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP "
         "TM VMMAX VMMIN",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esst3a",
+        "TR VIMAX VIMIN KM TC TB KA TA VRMAX VRMIN KG KP KI VBMAX KC XL VGMAX THETAP TM "
+        "VMMAX VMMIN",
+        doubt=AS_IN_PSSE,
     ),
 )
 

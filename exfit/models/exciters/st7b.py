@@ -29,7 +29,7 @@ test unlimited.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, smaller
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
 
 SHEET = sheet(
     ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -53,6 +53,15 @@ RECORDS = (
         "ST7B",
         "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA",
         icons={"OEL": 0, "UEL": 0},
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "esst7b",
+        "TR KPA KIA TIA TB TC TF TG KL KH VRMAX VRMIN VMAX VMIN UEL OEL TS",
+        absent={"UEL": 0.0, "OEL": 0.0, "TS": 0.0},
+        doubt=OF_A_LIST,
     ),
 )
 

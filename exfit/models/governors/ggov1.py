@@ -60,7 +60,7 @@ from exfit.models.blocks import (
     washout,
     where,
 )
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import OF_A_LIST, record, sheet
 
 SHEET = sheet(
     ("Rselect", 1.0, "1", (-2.0, 1.0), "signal of the droop: 1, 0, -1 or -2"),
@@ -105,6 +105,20 @@ RECORDS = (
         icons={"Rselect": 1, "Flag": 0},
         absent={"Teng": 0.0, "Trate": 0.0, "Rup": 99.0, "Rdown": -99.0},
         held={"Trate_Mbase": 1.0},
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "ggov1",
+        "R Rselect Tpelec MAXERR MINERR Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb "
+        "Wfnl Tb Tc Flag Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET "
+        "Aset Ka Ta db Tsa Tsb Rup Rdown",
+        icons={"Rselect": 1, "Flag": 0},
+        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
+        ignored="PMWSET",
+        held={"Trate_Mbase": 1.0},
+        doubt=OF_A_LIST,
     ),
 )
 

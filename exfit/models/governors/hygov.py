@@ -20,7 +20,7 @@ of later versions. Typical data are those of IEC 61970-302 (GovHydro1).
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, limited
-from exfit.models.sheet import record, sheet
+from exfit.models.sheet import AS_IN_PSSE, record, sheet
 
 SHEET = sheet(
     ("R", 0.04, "pu", (0.001, 10.0), "permanent droop"),
@@ -38,6 +38,15 @@ SHEET = sheet(
 )
 
 RECORDS = (record("HYGOV", "R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL"),)
+
+PSLF_RECORDS = (
+    record(
+        "hygov",
+        "R r Tr Tf Tg VELM GMAX GMIN TW At Dturb qNL",
+        spelled={"R": "rperm", "r": "rtemp"},
+        doubt=AS_IN_PSSE,
+    ),
+)
 
 STATES = "E C G Q"
 SHUT = 0.01  # pu of gate

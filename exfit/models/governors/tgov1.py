@@ -26,6 +26,13 @@ SHEET = sheet(
 
 RECORDS = (record("TGOV1", "R T1 VMAX VMIN T2 T3 Dt"),)
 
+PSLF_RECORDS = (
+    record(
+        "tgov1",
+        "R T1 VMAX VMIN T2 T3 Dt",
+    ),
+)
+
 STATES = "V1 V3"
 
 

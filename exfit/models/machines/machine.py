@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from exfit.engine.trace import Signal
-from exfit.models.sheet import DynamicsRecord, Row, Sheet
+from exfit.models.sheet import DynamicsRecord, Row, Sheet, record
 
 Faults = Iterable[tuple[str, str]]
 
@@ -119,3 +119,22 @@ def power_order(values: Mapping[str, float]) -> Faults:
     yield from saturation_order(values)
     if values["S10"] == 0.0 < values["S12"]:
         yield "S10", "0 lies on no exponential saturation curve; give both as 0, or neither"
+
+
+# how PSLF names them, and its armature resistance and compensation, which no machine here has
+PSLF_NAMES = {
+    **{"Tpd0": "tpdo", "Tppd0": "tppdo", "Tpq0": "tpqo", "Tppq0": "tppqo"},
+    **{"Xd": "ld", "Xq": "lq", "Xpd": "lpd", "Xpq": "lpq", "Xppd": "lppd", "Xl": "ll"},
+    **{"S10": "s1", "S12": "s12"},
+}
+
+
+def pslf_record(name: str, cons: str) -> DynamicsRecord:
+    """Return PSLF's record of a machine: what it has more is taken as none."""
+    return record(
+        name,
+        f"{cons} RA RCOMP XCOMP ACCEL",
+        absent={"RA": 0.0, "RCOMP": 0.0, "XCOMP": 0.0},
+        ignored="ACCEL",
+        spelled=PSLF_NAMES,
+    )

@@ -30,6 +30,7 @@ from exfit.models.machines.machine import (
     descending,
     not_rising,
     power_order,
+    pslf_record,
     saturation_order,
 )
 from exfit.models.sheet import record, sheet
@@ -141,6 +142,7 @@ def machine(
         quadrature=partial(quadrature, form),
         faults=partial(faults, order),
         records=(record(name, CONS),),
+        pslf_records=(pslf_record("genrou", CONS),) if name == "GENROU" else (),
         saturation=shape,
     )
 

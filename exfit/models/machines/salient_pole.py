@@ -32,6 +32,7 @@ from exfit.models.machines.machine import (
     d_axis_order,
     descending,
     power_order,
+    pslf_record,
     saturation_order,
 )
 from exfit.models.sheet import record, sheet
@@ -137,6 +138,7 @@ GENSAL = Machine(
     quadrature=unsaturated_quadrature,
     faults=gensal_faults,
     records=(record("GENSAL", CONS),),
+    pslf_records=(pslf_record("gensal", CONS),),
 )
 
 GENSAE = Machine(

@@ -54,6 +54,16 @@ RECORDS = (
     ),
 )
 
+PSLF_RECORDS = (
+    record(
+        "ieeest",
+        "ICS REMBUS A1 A2 A3 A4 A5 A6 T1 T2 T3 T4 T5 T6 KS LSMAX LSMIN VCU VCL TDELAY",
+        icons={"ICS": 1, "REMBUS": 0},
+        absent={"VCU": 0.0, "VCL": 0.0, "TDELAY": 0.0},
+        spelled={"ICS": "j", "REMBUS": "k"},
+    ),
+)
+
 STATES = "V1 DV1 V2 DV2 V3 V4 V5"
 
 

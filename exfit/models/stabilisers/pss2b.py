@@ -54,6 +54,12 @@ SHEET = sheet(
     ("VSTMIN", -0.1, "pu", (-9999.0, 9999.0), "floor of the output"),
 )
 
+PSS2A_HELD = {
+    **{"T10": 0.0, "T11": 0.0},
+    **{"VSI1MAX": NO_LIMIT, "VSI1MIN": -NO_LIMIT},
+    **{"VSI2MAX": NO_LIMIT, "VSI2MIN": -NO_LIMIT},
+}
+
 RECORDS = (
     record(
         "PSS2B",
@@ -65,11 +71,28 @@ RECORDS = (
         "PSS2A",
         "TW1 TW2 T6 TW3 TW4 T7 KS2 KS3 T8 T9 KS1 T1 T2 T3 T4 VSTMAX VSTMIN",
         icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
-        held={
-            **{"T10": 0.0, "T11": 0.0},
-            **{"VSI1MAX": NO_LIMIT, "VSI1MIN": -NO_LIMIT},
-            **{"VSI2MAX": NO_LIMIT, "VSI2MIN": -NO_LIMIT},
-        },
+        held=PSS2A_HELD,
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "pss2b",
+        "ICS1 REMBUS1 VSI1MAX VSI1MIN ICS2 REMBUS2 VSI2MAX VSI2MIN TW1 TW2 TW3 TW4 T6 "
+        "T7 KS2 KS3 KS4 T8 T9 N M KS1 T1 T2 T3 T4 T10 T11 VSTMAX VSTMIN A TA TB",
+        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+        absent={"KS4": 1.0, "A": 1.0, "TA": 0.0, "TB": 0.0},
+        spelled={"ICS1": "j1", "REMBUS1": "k1", "ICS2": "j2", "REMBUS2": "k2"},
+        doubt="its order is not confirmed by any public source",
+    ),
+    record(
+        "pss2a",
+        "ICS1 REMBUS1 ICS2 REMBUS2 TW1 TW2 TW3 TW4 T6 T7 KS2 KS3 KS4 T8 T9 N M KS1 T1 "
+        "T2 T3 T4 VSTMAX VSTMIN A TA TB",
+        icons={"ICS1": 1, "REMBUS1": 0, "ICS2": 3, "REMBUS2": 0, "M": 5, "N": 1},
+        absent={"KS4": 1.0, "A": 1.0, "TA": 0.0, "TB": 0.0},
+        held=PSS2A_HELD,
+        spelled={"ICS1": "j1", "REMBUS1": "k1", "ICS2": "j2", "REMBUS2": "k2"},
     ),
 )
 
