@@ -70,8 +70,11 @@ def symbols(prefix: str, rows: Sheet) -> list[str]:
 
 
 def seconds(prefix: str, rows: Sheet) -> list[str]:
-    """Return those of them that are times."""
-    return [prefix + row.symbol for row in rows if row.unit == "s"]
+    """Return those of them that are time constants.
+
+    A time that may be negative is a coefficient of a numerator, which has no motion of its own.
+    """
+    return [prefix + row.symbol for row in rows if row.is_time and row.low >= 0.0]
 
 
 def values_named(source: Signals, names: Iterable[str]) -> Names:

@@ -5,17 +5,21 @@ import re
 
 import numpy as np
 import pytest
+from on_load import QUADRATIC, values_on_load
 from oracle import float_run, leads_of, vector
 from scipy.integrate import solve_ivp
-from scipy.signal import tf2ss
+from scipy.signal import StateSpace, tf2ss
 
 from exfit.engine.kernel import Kernel, Span
 from exfit.engine.system import Rest, System
-from exfit.models import STABILISERS
+from exfit.models import MODELS, STABILISERS
 from exfit.models.blocks import SHORTEST
+from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, typical
-from exfit.plants import Names
+from exfit.plants import STABILISER, Names, Stabilised, infinite_bus
 from exfit.plants.parts import motion, values_named
+from exfit.simulation.inputs import Inputs
+from exfit.simulation.simulator import Simulator
 
 FREQUENCIES = np.geomspace(0.01, 10.0, 61)  # Hz: from inter-area to local modes and beyond
 SIGNALS = ("speed", "p", "vt")
@@ -463,6 +467,101 @@ def test_another_typing_and_method_reach_and_leave_the_limits_together(name):
     # the input is a line between its points: (4 rad/s 1 ms)^2 / 8 = 2e-6 of a signal of a few
     # limits, times what the leads make of it
     assert np.abs(vs - expected[: len(vs)]).max() < 3e-5 * high
+
+
+def values_of_pss4b(**limits):
+    """Return data of PSS4B in which every block takes part, with notches at 3 to 12 Hz."""
+    values = lively(STABILISERS["PSS4B"])
+    for letter in "LIH":
+        leads = {3: 0.05, 4: 0.03, 5: 0.02, 6: 0.04, 9: 0.03, 10: 0.06, 11: 0.05, 12: 0.02}
+        values |= {f"T{letter}{k}": T for k, T in leads.items()}
+    notches = {"LI1": (9.0, 20.0), "LI2": (30.0, 75.0), "H1": (12.0, 30.0), "H2": (20.0, 60.0)}
+    values |= {f"BW{name}": width for name, (width, _) in notches.items()}
+    values |= {f"W{name}": at for name, (_, at) in notches.items()}
+    return values | {"CLI": 2e-5} | limits
+
+
+def paths_of_pss4b(p):
+    """Return for each band its input's number and its way there, before its limit."""
+
+    def block(above, below):
+        return StateSpace(*tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
+
+    def notch(name):
+        BW, square = p[f"BW{name}"], p[f"W{name}"] ** 2
+        return block([1.0, 0.0, square], [1.0, BW, square])
+
+    def band(letter, transducer):
+        def branch(gain, coefficient, first):
+            T = [p[f"T{letter}{first + k}"] for k in range(6)]
+            chain = block([T[0], p[coefficient]], [T[1], 1.0]) * p[gain]
+            return block([T[4], 1.0], [T[5], 1.0]) * block([T[2], 1.0], [T[3], 1.0]) * chain
+
+        upper = branch(f"K{letter}1", f"K{letter}11", 1)
+        difference = upper - branch(f"K{letter}2", f"K{letter}17", 7)
+        return difference * transducer * p[f"K{letter}"]
+
+    low = block([p["CLI"], p["DLI"], 1.0], [p["ALI"], p["BLI"], 1.0])
+    low = notch("LI2") * notch("LI1") * low
+    # s^2 over what is integrated, 1 / (s M): one s remains
+    high = block([-1.0 / p["M"], 0.0], np.polymul([p["TH"], 1.0], [p["AH"], p["BH"], 1.0]))
+    high = notch("H2") * notch("H1") * high
+    return {"L": (0, band("L", low)), "I": (0, band("I", low)), "H": (1, band("H", high))}
+
+
+def by_another_method(path, signal, time):
+    """Return the output of a state space driven by a function of time, by DOP853."""
+    span, rest = (0.0, time[-1]), np.zeros(len(path.A))
+    driven = solve_ivp(
+        lambda t, x: path.A @ x + path.B[:, 0] * signal(t), span, rest, "DOP853", time,
+        rtol=1e-9, atol=1e-12,
+    )  # fmt: skip
+    return (path.C @ driven.y)[0] + path.D[0, 0] * signal(time)
+
+
+@pytest.mark.parametrize("limited", ["bands", "output"])
+def test_the_bands_of_another_typing_and_method_reach_their_limits_together(limited):
+    """Speed and power swing; each band, or what they make together, meets both of its limits."""
+    limits = {"VSTMAX": 99.0, "VSTMIN": -99.0} if limited == "bands" else {}
+    values, step = values_of_pss4b(**limits), 5e-4
+    time = step * np.arange(8001)
+
+    def speed(t):
+        return 0.02 * np.sin(4.0 * t) * np.exp(-0.3 * t)
+
+    def power(t):
+        return 0.4 * np.sin(9.0 * t) * np.exp(-0.3 * t)
+
+    total = np.zeros(len(time))
+    for letter, (source, path) in paths_of_pss4b(values).items():
+        band = by_another_method(path, (speed, power)[source], time)
+        low, high = values[f"V{letter}MIN"], values[f"V{letter}MAX"]
+        assert limited == "output" or (band.min() < low and band.max() > high), letter
+        total += np.clip(band, low, high)
+    expected = np.clip(total, values["VSTMIN"], values["VSTMAX"])
+    assert limited == "bands" or (total.min() < -0.15 and total.max() > 0.15)
+    system = as_system(STABILISERS["PSS4B"])
+    code = Kernel(system, system.outputs)
+    p = vector(system, values)[:, None]
+    u = np.column_stack([speed(time), power(time)])
+    (got,) = code.run(p, code.start(p), [Span(u, step, 1)])
+    # the inputs are lines between their points: (9 rad/s 0.5 ms)^2 / 8 = 2.5e-6 of them, times what
+    # the bands make of it, before their limits: 9e-6 of the output
+    assert np.abs(got[:, 0, 0] - expected).max() < 3e-5 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("name", "symbol"), [("PSS3B", "A5"), ("IEEEST", "A5"), ("PSS3B", "A7")])
+def test_a_coefficient_of_a_numerator_alone_asks_for_no_sub_steps(name, symbol):
+    """A lag does; what is above it has no motion of its own."""
+    model, machine = STABILISERS[name], MACHINES["GENROU"]
+    plant = infinite_bus(
+        MODELS["AC8B"], machine, QUADRATIC, ("vref",), "Q", Stabilised(model, model.inputs)
+    )
+    values = values_on_load(machine)
+    values |= {STABILISER + key: value for key, value in typical(model.sheet).items()}
+    simulator = Simulator(plant, Inputs(0.0, 1.0, ()), np.array([1.0]), 1e-3)
+    parts = simulator.substeps(values | {STABILISER + symbol: 2.5e-4})
+    assert parts == (4 if symbol == "A7" else 1)
 
 
 # --- sheets and records ---------------------------------------------------------------------------

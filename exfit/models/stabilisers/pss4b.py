@@ -24,10 +24,11 @@ BWH1 and WH1, BWH2 and WH2; W = 0 leaves it out. A lag of 0 bypasses its block,
 ALI = 0 and AH = 0 leave a lag.
 
 The first input is the speed, the second the electrical power. The standard of
-2005 prints PE; IEC 61970-302 corrects that to -PE, the sign of the swing
-equation, which is taken here. M is 2 H; programs that read M = 0 as the 2 H of
-the machine need its value here. Typical data are the standard's, as CIM has
-them, but for M.
+2005 prints PE; IEC 61970-302 says that it should read -PE, the sign of the
+swing equation, which is taken here. With typical data the power's transducer is
+-80 s² / ((s³ + 82 s² + 161 s + 80) 2 H s): the standard's but for the sign. M is 2 H;
+programs that read M = 0 as the 2 H of the machine need its value here. Typical
+data are the standard's, as CIM has them, but for M.
 """
 
 from exfit.engine.trace import Signal
@@ -130,7 +131,7 @@ RECORDS = (
         "KI1 KI11 TI1 TI2 TI3 TI4 TI5 TI6 KI2 KI17 TI7 TI8 TI9 TI10 TI11 TI12 KI VIMAX VIMIN "
         "KH1 KH11 TH1 TH2 TH3 TH4 TH5 TH6 KH2 KH17 TH7 TH8 TH9 TH10 TH11 TH12 KH VHMAX VHMIN "
         "VSTMAX VSTMIN",
-        doubt="its order is from one public source; the sign of its power is not confirmed",
+        doubt="its order is from one public source; the sign of its power is that of IEC 61970-302",
     ),
 )
 
