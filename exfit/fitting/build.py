@@ -124,16 +124,17 @@ def _driving(
 
     One whose scale is found is without any: the system multiplies it.
     """
-    if case.kind.finds_rest:
-        return event_inputs(test, record)
-    if not case.kind.plays_back:
+    event = event_inputs(test, record) if case.kind.finds_rest else {}
+    if event:
+        driving = [signal for signal in driving if signal in REFERENCES]
+    elif not case.kind.plays_back:
         driving = [signal for signal in driving if signal not in REFERENCES]
     return {
         signal: RecordedInput(
             record.time, deviation(test, record, signal) / _start_of_scale(file, signal)
         )
         for signal in driving
-    }
+    } | event
 
 
 def _start_of_scale(file: RecordFile, signal: str) -> float:

@@ -71,6 +71,8 @@ def with_steps_of_record(
     """
     given_record, file = case.given_records.get(recording.name), recording.record
     record = given_record or read_section(file, case.folder, case.kind.per_unit)
+    if case.kind.finds_rest:
+        return _event(case, recording, values, given)
     signal = _stepped(case, recording.test)
     inspection = None if given_record else _inspected(file, case.folder)
     if signal == "vref" and not any(given) and not case.kind.plays_back:
@@ -95,6 +97,18 @@ def with_steps_of_record(
         if _begins_there(setup, values, steps[0], sizes):
             return UnplannedTest(setup, (EARLIER_STEPS,))
     return UnplannedTest(setup_with(sizes, {}))
+
+
+def _event(case: Case, recording: Recording, values: Values, given: GivenSteps) -> UnplannedTest:
+    """Return the setup of a grid event: it has its own rest, and no steps.
+
+    Raises CaseError where steps are given.
+    """
+    if any(given):
+        text = f"step and at: not allowed with plant {case.kind.name}: the record drives it"
+        raise CaseError([f"{case.path}: {text}"])
+    test: Test = dict.fromkeys(("vt0", "begin", "steady_until"))
+    return UnplannedTest(_built(case, recording, values, {**test, "vref": (), "vs": ()}))
 
 
 def _stepped(case: Case, test: BumpTest) -> str | None:

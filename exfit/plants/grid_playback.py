@@ -21,7 +21,7 @@ from exfit.plants.parts import (
     symbols,
     values_named,
 )
-from exfit.plants.plant import Equipment, PlantKind, PowerAt, present
+from exfit.plants.plant import REFERENCES, Equipment, PlantKind, PowerAt, present
 from exfit.plants.playback import initial
 from exfit.plants.unit import (
     ROTOR,
@@ -162,7 +162,7 @@ def _build(equipment: Equipment) -> System:
         equipment.stabiliser,
         equipment.swing,
     )
-    inputs = tuple(name for name in ("vref", "vs") if name in equipment.inputs)
+    inputs = tuple(name for name in REFERENCES if name in equipment.inputs)
     given = equipment.given & {row.symbol for row in AT_START}
     return grid_playback(unit, (*inputs, "vt", "angle"), given, equipment.power_at)
 
@@ -171,9 +171,9 @@ GRID_PLAYBACK = PlantKind(
     name="grid-playback",
     title="on load, driven by the grid's recorded voltage and angle",
     needs=("exciter", "machine", "network"),
-    events=("vref", "vs"),
-    signals=("vt", *DRIVING_ANGLE, "efd", "ifd", "p", "q", "it", "speed"),
-    driving=("vt", *DRIVING_ANGLE),
+    events=REFERENCES,
+    signals=("vt", *DRIVING_ANGLE, *REFERENCES, "efd", "ifd", "p", "q", "it", "speed"),
+    driving=("vt", *DRIVING_ANGLE, *REFERENCES),
     required=("vt",),
     required_one_of=DRIVING_ANGLE,
     levels=LEVELS,

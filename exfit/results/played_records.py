@@ -80,7 +80,7 @@ def driving_signals(
         label, unit, drawn = label_of(signal), unit_of_signal(signal), samples
         if signal == "angle":
             signal, label, unit = FREQUENCY, FROM_ANGLE, HERTZ
-            drawn = np.gradient(samples, time) / (2.0 * pi)
+            drawn = np.gradient(np.unwrap(samples), time) / (2.0 * pi)
         signals[signal] = DrivingSignal(label, unit, drawn, excursion(time, begins, drawn))
     return signals
 

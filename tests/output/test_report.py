@@ -329,7 +329,9 @@ def test_a_playback_shows_what_was_played_in_and_no_features_of_a_step(pages):
     ]  # fmt: skip
     assert heads[2:6] == ["rms", "largest", "at (s)", "at rest"]
     assert "played-0" in page.ids
-    assert "recorded vt, ifd played in; at rest until 1 s with vt 1 pu, efd 1.121 pu" in page.text
+    assert (
+        "recorded vt and ifd played in; at rest until 1 s with vt 1 pu, efd 1.121 pu" in page.text
+    )
     assert "features" not in page.text
 
 

@@ -11,8 +11,8 @@ from exfit.util.text import show
 
 RESTING = ("vt", "p", "q", "efd", "ifd", "speed")  # in the order in which a rest is described
 SWING = {
-    "power": "swing equation with the power Pm: 2H dw/dt = (Pm - D dw) / (1 + dw) - Te",
-    "torque": "swing equation with the torque Pm: 2H dw/dt = Pm - D dw - Te",
+    "power": "swing equation: Pm is a power, its torque (Pm - D dw) / (1 + dw)",
+    "torque": "swing equation: Pm is a torque, less D dw",
 }
 
 
@@ -23,7 +23,7 @@ def played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Itera
     """
     if not setup.driving:
         return
-    yield f"recorded {', '.join(setup.driving)} played in"
+    yield f"recorded {' and '.join(setup.driving)} played in"
     if setup.test.steady is not None:
         levels = ", ".join(_levels(setup))
         yield f"at rest until {show(setup.test.steady)} s" + (f" with {levels}" if levels else "")
@@ -40,7 +40,7 @@ def _levels(setup: ExperimentSetup) -> Iterator[str]:
     for signal in RESTING:
         level = setup.experiment.own.get(initial(signal))
         if level is not None and signal in setup.record.signals:
-            yield f"{signal} {level:.5g} {unit_of_signal(signal)}"
+            yield f"{signal} {level:.4g} {unit_of_signal(signal)}"
 
 
 def _filters(recording: Recording) -> Iterator[str]:

@@ -18,7 +18,10 @@ from exfit.case.checks.record import (
     record_faults,
     weight_faults,
 )
-from exfit.case.checks.recorded_reference import recorded_reference_faults
+from exfit.case.checks.recorded_reference import (
+    recorded_reference_faults,
+    stabiliser_channel_faults,
+)
 from exfit.case.checks.sources import source_faults
 from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
@@ -113,6 +116,7 @@ def _recording_faults(
     if has_record:
         yield from record_faults(test, record)
         yield from channels_faults(record.at("channels"), kind)
+        yield from stabiliser_channel_faults(record.at("channels"), content.at("stabiliser"), kind)
         yield from level_faults(record.at("channels"), plant.at("network"), kind)
     elif kind.plays_back:
         yield record.fault(f"is missing: plant {kind.name} plays it back")

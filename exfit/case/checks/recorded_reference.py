@@ -35,6 +35,15 @@ def recorded_reference_faults(
             yield from channel_faults(signal, given, kind.per_unit)
 
 
+def stabiliser_channel_faults(
+    channels: ContentNode, stabiliser: ContentNode, kind: PlantKind
+) -> Iterator[Fault]:
+    """Yield the recorded output of a stabiliser beside the stabiliser itself."""
+    if kind.plays_back and "vs" in channels and stabiliser.content:
+        text = "not allowed with a stabiliser, whose output it is: leave one of them out"
+        yield channels.at("vs").fault(text)
+
+
 def _not_used(signal: str, given: ContentNode) -> str:
     """Return what to do about a channel that drives nothing."""
     if given.value is None:

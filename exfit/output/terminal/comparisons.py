@@ -89,8 +89,11 @@ def _error_table(comparisons: Sequence[Comparison]) -> Table:
     for signal in signals:
         label = "rmse" if len(signals) == 1 else f"rmse {signal}"
         table.add_row(label, "pu", *(_rmse(comparison, signal) for comparison in comparisons))
-    table.add_row("maximum error", "pu", *(f"{match.max_error:.3e}" for match in comparisons))
-    table.add_row("fit", "%", *(percentage(comparison.fit_percent) for comparison in comparisons))
+    of_events = f" {comparisons[0].judged_by}" if comparisons[0].is_event else ""
+    errors = (f"{match.max_error:.3e}" for match in comparisons)
+    table.add_row(f"maximum error{of_events}", "pu", *errors)
+    percentages = (percentage(comparison.fit_percent) for comparison in comparisons)
+    table.add_row(f"fit{of_events}", "%", *percentages)
     return table
 
 

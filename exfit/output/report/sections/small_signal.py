@@ -25,6 +25,16 @@ class BodeFigures:
     why: str
     charts: tuple[Chart, ...]
 
+    @property
+    def response(self) -> str:
+        """What the response of the view is called: of a record that is played in no closed loop."""
+        return "" if self.view is None else _name_of_response(self.view)
+
+
+def _name_of_response(view: SmallSignal) -> str:
+    source, output = view.path
+    return "closed loop" if output == "vt" else f"response from {source} to {output}"
+
 
 def small_signal(result: FitResult) -> tuple[BodeFigures, ...] | None:
     """Return the small-signal views of a fit; None where the result does not hold them."""
@@ -61,7 +71,9 @@ def _bodes(key: str, of_tests: SmallSignalView) -> Iterator[Chart]:
     width = "none" if view.bandwidth is None else f"{view.bandwidth:.3g} Hz"
     yield _bode(
         f"{key}-closed",
-        f"Closed loop from {source} to {output}, {names}",
+        f"Closed loop from {source} to {output}, {names}"
+        if output == "vt"
+        else f"Response from {source} to {output}, vt as recorded, {names}",
         f"Gain and phase from {source} to {output} over the frequency: peak {view.peak:.2f} dB, "
         f"bandwidth {width}.",
         view.closed,
