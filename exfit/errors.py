@@ -22,7 +22,7 @@ class CaseError(FileError):
 
 
 class DynamicsError(FileError):
-    """A PSS/E dynamics file that cannot be used."""
+    """A planner's dynamics file that cannot be used."""
 
 
 class RecordError(ExfitError):

@@ -19,7 +19,7 @@ MOST_BUSES = 999_999
 BUSES = click.IntRange(1, MOST_BUSES)
 
 
-@click.command("import", short_help="Make cases from a PSS/E dynamics file.")
+@click.command("import", short_help="Make cases from a planner's dynamics file.")
 @click.argument("dyr", type=GivenFile(Kind.DYNAMICS), metavar="UNIT")
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit.")
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
@@ -57,7 +57,9 @@ def import_(
     output: Path | None,
     force: bool,
 ) -> None:
-    """Make a case from the machine, exciter and stabiliser in UNIT, a PSS/E .dyr file.
+    """Make a case from the machine, exciter and stabiliser in UNIT.
+
+    UNIT is a dynamics file of PSS/E (.dyr) or of PSLF (.dyd).
 
     The case is a step of 5 % on open circuit that `exfit simulate` runs as it stands. Where UNIT
     holds several units, --bus and --id choose one, and --all makes a case of each. With --records
@@ -90,23 +92,23 @@ def _import_one(
         echo(f"written to {output}; next: exfit simulate {output}")
 
 
-@click.command(short_help="Write the result of a fit as PSS/E records.")
+@click.command(short_help="Write the result of a fit as records of a planner's file.")
 @click.argument("result", type=GivenFile(Kind.RESULT))
 @click.option(
     "--all", "every", is_flag=True, help="RESULT is the folder of a batch: all verified units."
 )
 @click.option(
     "--dyr",
+    "--planner",
     type=GivenFile(Kind.DYNAMICS),
     metavar="FILE",
     help="With --all: the planner's file to change (default: that of the cases).",
 )
 @click.option(
     "--format",
-    "_format",
-    type=click.Choice(["dyr"]),
-    default="dyr",
-    help="Kind of file: dyr, a PSS/E dynamics file (default).",
+    "form",
+    type=click.Choice(["dyr", "dyd"]),
+    help="Kind of file: dyr of PSS/E, dyd of PSLF (default: as FILE is named, else dyr).",
 )
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit (default: as found, else 1).")
 @click.option(
@@ -125,17 +127,17 @@ def export(
     result: Path,
     every: bool,
     dyr: Path | None,
-    _format: str,
+    form: str | None,
     bus: int | None,
     machine_id: str | None,
     model: str | None,
     output: Path | None,
     force: bool,
 ) -> None:
-    """Write the machine, exciter and stabiliser of RESULT as PSS/E records.
+    """Write the machine, exciter and stabiliser of RESULT as records of PSS/E or PSLF.
 
-    RESULT is the result.json of a fit, or the folder that holds it. What a PSS/E record cannot
-    hold, and what is uncertain, is reported.
+    RESULT is the result.json of a fit, or the folder that holds it. What a record cannot hold, and
+    what is uncertain, is reported.
 
     With --all RESULT is the folder of a batch, and the planner's file is written with the values of
     the units whose fits hold; every other byte of it stays as it is.
@@ -143,15 +145,18 @@ def export(
     if every:
         if bus is not None or machine_id is not None or model is not None:
             raise click.UsageError("--bus, --id and --model: not allowed with --all.")
+        if form is not None:
+            raise click.UsageError("--format: not allowed with --all, which keeps the file's own.")
         export_every_unit(result, dyr, output, force)
         return
     if dyr is not None:
         raise click.UsageError("--dyr: only with --all.")
-    _export_one(result, bus, machine_id, model, output, force)
+    _export_one(result, form, bus, machine_id, model, output, force)
 
 
 def _export_one(
     result: Path,
+    form: str | None,
     bus: int | None,
     machine_id: str | None,
     model: str | None,
@@ -160,6 +165,7 @@ def _export_one(
 ) -> None:
     """Write the records of one fit, at the bus that is given, or where they were found."""
     from exfit.exchange.export import export as exported
+    from exfit.exchange.formats import FORMATS, format_of
     from exfit.results.io import load_result, result_file
 
     if output is not None:
@@ -168,7 +174,8 @@ def _export_one(
     fit = load_result(source)
     own_bus, own_id = _place_as_found(fit, source)
     try:
-        records = exported(fit, bus or own_bus, machine_id or own_id, model)
+        files = format_of(output or "") if form is None else FORMATS[form]
+        records = exported(fit, bus or own_bus, machine_id or own_id, model, files=files)
     except ExfitError as fault:
         texts = (f"{source}: {text}" for text in str(fault).splitlines())
         raise FileError(texts) from None

@@ -18,6 +18,7 @@ RECORDS = (
     ".xls", ".ods",
 )  # fmt: skip
 CASES = (".yaml", ".yml")
+DYNAMICS_FILES = (".dyr", ".dyd")  # of PSS/E, of PSLF
 RESULT = "result.json"
 
 
@@ -28,7 +29,7 @@ class Kind(StrEnum):
     RECORD = "a recorder's file"
     RESULT = "the result of a fit"
     PARAMETERS = "the parameters of a fit"
-    DYNAMICS = "a PSS/E dynamics file"
+    DYNAMICS = "a planner's dynamics file"
 
 
 # what takes a file of a kind
@@ -96,7 +97,7 @@ def _kind_of(path: Path) -> Kind | None:
         return Kind.RESULT if (path / RESULT).is_file() else None
     if suffix in RECORDS:
         return Kind.RECORD
-    if suffix == ".dyr":
+    if suffix in DYNAMICS_FILES:
         return Kind.DYNAMICS
     if path.name == RESULT:
         return Kind.RESULT

@@ -135,6 +135,7 @@ def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force:
     original = dyr or _original(fits)
     if output.exists() and original.exists() and output.samefile(original):
         raise ExfitError(f"{output}: is the planner's own file: name another one with -o")
+    _refuse_other_format(output, original)
     fitted = fitted_file(read_file(original), str(original), fits)
     left = [*fitted.left, *others]
     if not fitted.changes:
@@ -142,6 +143,15 @@ def export_every_unit(fleet: Path, dyr: Path | None, output: Path | None, force:
     write(output, fitted.data)
     write(table, changes_table(fitted.changes))
     _report_export(output, table, fitted.changes, left)
+
+
+def _refuse_other_format(output: Path, original: Path) -> None:
+    """Raise ExfitError where the name of a file says another program than its content is of."""
+    from exfit.exchange.formats import format_of
+
+    suffix = format_of(original).suffix
+    if format_of(output).suffix != suffix:
+        raise ExfitError(f"{output}: {original} is a {suffix} file: name it so with -o")
 
 
 def _fits_of(fleet: "Fleet") -> "tuple[list[FittedUnit], list[LeftUnit]]":

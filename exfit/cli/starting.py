@@ -86,9 +86,10 @@ class UnitSources:
 )
 @click.option(
     "--dyr",
+    "--planner",
     type=GivenFile(Kind.DYNAMICS),
     metavar="FILE",
-    help="PSS/E file with the data of machine, exciter and stabiliser.",
+    help="Planner's file (.dyr or .dyd) with the data of machine, exciter and stabiliser.",
 )
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit in it.")
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")
@@ -217,7 +218,7 @@ def _refuse_unused(given: UnitSources) -> None:
 
 
 def _planner(dyr: Path, bus: int | None, machine_id: str | None, folder: Path) -> "UnitData":
-    """Return the data of a unit of a PSS/E file; what of it is left out is reported."""
+    """Return the data of a unit of a planner's file; what of it is left out is reported."""
     from exfit.case.starting.suggestion import relative
     from exfit.exchange.fields import located
     from exfit.exchange.import_case import import_unit

@@ -171,7 +171,10 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[UnitPart,
         (result.stabiliser_model, unit.stabiliser, "stabiliser."),
     )
     if "model" in result.inputs:
-        raise ExfitError(f"{result.model} is not a model of the catalogue: it has no PSS/E record")
+        program = unit.exciter.definition.program
+        raise ExfitError(
+            f"{result.model} is not a model of the catalogue: it has no {program} record"
+        )
     for model, part, prefix in models:
         if model is None:
             continue
@@ -272,7 +275,8 @@ def _refuse_nonquadratic(result: FitResult, part: UnitPart, changed: Iterable[st
     own = [name for name in changed if name in UNSATURATED]
     if own and part.definition.kind == "exciter" and result.saturation != "quadratic":
         raise ExfitError(
-            f"fitted with saturation: {result.saturation}; PSS/E takes E1 SE1 E2 SE2 as quadratic"
+            f"fitted with saturation: {result.saturation}; {part.definition.program} takes "
+            "E1 SE1 E2 SE2 as quadratic"
         )
 
 

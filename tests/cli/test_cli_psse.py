@@ -477,3 +477,53 @@ def test_a_machine_that_was_fitted_alone_is_written_alone(run, tmp_path):
     (tmp_path / "alone" / "result.json").write_text(json.dumps(told))
     code, _, err = run("export", tmp_path / "alone")
     assert (code, "ONE_AXIS has no PSS/E record" in err) == (1, True)
+
+
+# ---- PSLF
+
+
+def test_a_file_of_pslf_becomes_a_case_and_gives_a_new_one_its_data(run):
+    sample = ROOT / "sample_data" / "unit.dyd"
+    code, out, err = run("import", sample, "-o", "case.yaml")
+    assert (code, out) == (0, "written to case.yaml; next: exfit simulate case.yaml\n")
+    assert "unit.dyd:10: esac1a: its order is taken to be that of PSS/E" in err
+    assert run("check", "case.yaml")[0] == 0
+    psse = run("import", SAMPLE, "-o", "other.yaml")
+    assert psse[0] == 0
+    cases = load_case(Path("case.yaml")), load_case(Path("other.yaml"))
+    assert cases[0].values() == cases[1].values()
+    record = ROOT / "sample_data" / "ac1a_up.csv"
+    options = ["--record", record, "--step", "0.02", "-o", "new.yaml"]
+    assert run("new", "--planner", sample, *options)[0] == 0
+    assert "those of unit.dyd" in Path("new.yaml").read_text()
+    assert run("import", "--all", sample, "-o", "cases")[0] == 0
+    assert Path("cases/bus-101-1.yaml").exists()
+
+
+@pytest.mark.parametrize("options", [["-o", "out.dyd"], ["--format", "dyd", "-o", "out.txt"]])
+def test_a_fit_is_written_for_pslf(run, fitted, options):
+    code, _, err = run("export", fitted, "--bus", "101", *options)
+    assert code == 0
+    assert "esac1a: its order is taken to be that of PSS/E" in err
+    text = Path(options[-1]).read_text()
+    assert max(map(len, text.splitlines())) <= WIDTH
+    unit = read_unit(text, "out.dyd", 101, "1")
+    assert run("export", fitted, "--bus", "101", "-o", "out.dyr")[0] == 0
+    psse = read_unit(Path("out.dyr").read_text(), "out.dyr", 101, "1")
+    assert unit.exciter.values == psse.exciter.values
+    assert unit.machine.values == psse.machine.values
+
+
+def test_efd_times_the_speed_is_a_flag_of_pslf(run, fitted):
+    text = result_of(fitted)["case_text"]
+    named(fitted, case_text=f"efd_times_speed: true\n{text}")
+    code, out, err = run("export", fitted, "--format", "dyd")
+    assert code == 0
+    assert "does not multiply" not in err
+    assert read_unit(out, "out.dyd").exciter.times_speed
+
+
+def test_a_format_is_not_for_all_units(run, fitted):
+    code, _, err = run("export", "--all", fitted, "--format", "dyd", "-o", "out.dyd")
+    assert code == 2
+    assert "--format: not allowed with --all" in err

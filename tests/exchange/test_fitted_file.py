@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from dynamics import THREE, replaced
 from dyr_words import changed_words
+from loose_dyd import PSLF_UNIT
 from loose_records import loose, sound
 from records import TEST, TIME, case_of, one, synthetic
 
@@ -180,6 +181,17 @@ def test_only_fields_whose_values_changed_are_written_again(fit):
         ("ESAC1A", "KA", 766.0),
         ("GENROU", "Tpd0", 6.0),
     ]
+
+
+def test_a_file_of_pslf_keeps_every_other_byte(fit):
+    """Values in their order and values behind their names."""
+    (unit,) = read_units(PSLF_UNIT, "units.dyd").units
+    values = {**values_of(unit), "KA": 312.34567, "machine.S12": 0.5}
+    fits = [FittedUnit("case", verified(fit, unit, values))]
+    written = fitted_file(PSLF_UNIT.encode(), "units.dyd", fits)
+    expected = replaced('"ka" 150', '"ka" 312.346', replaced("0.12 0.4", "0.12 0.5", PSLF_UNIT))
+    assert written.data.decode() == expected
+    assert [change.parameter for change in written.changes] == ["KA", "S12"]
 
 
 def test_a_fit_that_does_not_hold_leaves_its_unit(fit):

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from loose_dyd import garbage, loose_dyd, sorted_curve
+from loose_dyd import PSLF_UNIT, garbage, loose_dyd, sorted_curve
 from loose_records import sound
 
 from exfit.errors import DynamicsError
@@ -15,18 +15,6 @@ from exfit.exchange.unit import read_unit
 from exfit.exchange.units import read_units
 
 DEFINITIONS = {definition.record.name: definition for definition in definitions(PSLF)}
-SOUND = """\
-# dynamics data of a test
-lodrep
-wlwscc 4 "LOAD" 22.0 "1 " : #0 0.0 1.0
-models
-genrou 1 "GEN: 1/#" 18.0 "1 " : #9 mva=120.0 6.0 0.035 0.5 0.077 3.25 0.0 /
-  1.8 1.7 0.3 0.55 0.25 0.2 /
-# of 1999
-  0.12 0.4 0.0 0.0 0.0
-exac4 1 "GEN1" 18.0 "1 " : #9 "tr" 0.02 "vimax" 999 "vimin" -999 "tc" 1 "tb" 10 "ka" 150 /
-  "Ta" 0.1 "vrmax" 5 "vrmin" -5 "kc" 0.0
-"""
 
 
 @pytest.fixture(params=DEFINITIONS)
@@ -92,7 +80,7 @@ def sound_of(name):
 
 
 def test_a_sample_is_read_and_its_case_names_what_it_rests_on():
-    unit = read_unit(SOUND, "unit.dyd", 1)
+    unit = read_unit(PSLF_UNIT, "unit.dyd", 1)
     assert (unit.machine.line, unit.exciter.line) == (5, 9)
     assert unit.machine.values["S12"] == 0.4
     assert unit.exciter.values["KA"] == 150.0
@@ -104,9 +92,13 @@ def test_a_sample_is_read_and_its_case_names_what_it_rests_on():
 
 def test_efd_is_multiplied_by_the_speed_where_the_record_says_so():
     values = sound_of("exac1")
-    text = SOUND[: SOUND.index("exac4")] + record_text(DEFINITIONS["exac1"], values, 1, "1") + "\n"
+    text = (
+        PSLF_UNIT[: PSLF_UNIT.index("exac4")]
+        + record_text(DEFINITIONS["exac1"], values, 1, "1")
+        + "\n"
+    )
     assert "efd_times_speed" not in case_text(read_unit(text, "a.dyd", 1), "a.dyd")
-    text = SOUND[: SOUND.index("exac4")]
+    text = PSLF_UNIT[: PSLF_UNIT.index("exac4")]
     text += record_text(DEFINITIONS["exac1"], values | {"SPDMLT": 1.0}, 1, "1") + "\n"
     assert "efd_times_speed: true" in case_text(read_unit(text, "a.dyd", 1), "a.dyd")
 
@@ -134,9 +126,9 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_names_its_line_the_value_and_the_limit(fault):
     old, new, words = FAULTS[fault]
-    assert SOUND.count(old) == 1
+    assert PSLF_UNIT.count(old) == 1
     with pytest.raises(DynamicsError) as raised:
-        read_unit(SOUND.replace(old, new), "a.dyd", 1)
+        read_unit(PSLF_UNIT.replace(old, new), "a.dyd", 1)
     assert words in str(raised.value)
 
 
@@ -144,7 +136,7 @@ def test_a_fault_names_its_line_the_value_and_the_limit(fault):
 def test_a_damaged_file_is_reported_with_its_line_or_is_sound(seed, tmp_path):
     random = np.random.default_rng(seed)
     path = tmp_path / "unit.dyd"
-    path.write_bytes(garbage(SOUND.encode(), random))
+    path.write_bytes(garbage(PSLF_UNIT.encode(), random))
     try:
         unit = import_unit(path, 1)
     except DynamicsError as error:
@@ -155,17 +147,16 @@ def test_a_damaged_file_is_reported_with_its_line_or_is_sound(seed, tmp_path):
 
 
 def test_a_fault_of_one_unit_leaves_the_others():
-    other = SOUND.replace(" 1 ", " 2 ").replace("150", "-150")
-    units = read_units(SOUND + other, "a.dyd")
+    other = PSLF_UNIT.replace(" 1 ", " 2 ").replace("150", "-150")
+    units = read_units(PSLF_UNIT + other, "a.dyd")
     assert [unit.bus for unit in units.units] == [1]
     assert {unit.bus: unit.modelled for unit in units.refused} == {4: False, 2: True}
 
 
 def test_the_end_of_a_record_may_be_marked_as_other_writers_do():
-    ended = SOUND.replace("0.0 0.0 0.0\n", "0.0 0.0 0.0 /\n").replace('"kc" 0.0', '"kc" 0.0 /')
-    assert (
-        read_unit(ended, "a.dyd", 1).machine.values == read_unit(SOUND, "a.dyd", 1).machine.values
-    )
+    ended = PSLF_UNIT.replace("0.0 0.0 0.0\n", "0.0 0.0 0.0 /\n").replace('"kc" 0.0', '"kc" 0.0 /')
+    usual, other = (read_unit(text, "a.dyd", 1).machine.values for text in (PSLF_UNIT, ended))
+    assert other == usual
 
 
 def test_the_suffix_says_the_program():

@@ -6,6 +6,19 @@ import numpy as np
 
 from exfit.exchange.records import SORTED
 
+PSLF_UNIT = """\
+# dynamics data of a test
+lodrep
+wlwscc 4 "LOAD" 22.0 "1 " : #0 0.0 1.0
+models
+genrou 1 "GEN: 1/#" 18.0 "1 " : #9 mva=120.0 6.0 0.035 0.5 0.077 3.25 0.0 /
+  1.8 1.7 0.3 0.55 0.25 0.2 /
+# of 1999
+  0.12 0.4 0.0 0.0 0.0
+exac4 1 "GEN1" 18.0 "1 " : #9 "tr" 0.02 "vimax" 999 "vimin" -999 "tc" 1 "tb" 10 "ka" 150 /
+  "Ta" 0.1 "vrmax" 5 "vrmin" -5 "kc" 0.0
+"""
+
 
 def styled(value, random):
     """Return a number in one of the ways in which programs write it, none of which rounds."""

@@ -30,7 +30,8 @@ class AsFoundSection(Section):
         default=None, description='Machine id of the unit there, such as "1".'
     )
     file: Text | None = Field(
-        default=None, description="The PSS/E file that it is from; path, relative to the case file."
+        default=None,
+        description="The planner's file that it is from; path, relative to the case file.",
     )
     model: Text | None = Field(
         default=None, description="Name of its exciter in the catalogue; default: that of the case."
