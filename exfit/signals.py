@@ -98,6 +98,9 @@ ROWS = (
         "frequency", "frequency", "Hz", quantity="frequency", turn=11,
         words=("frequency", "freq", "frequenz", "frequence", "frecuencia", "frequencia"),
     ),
+    SignalRow(
+        "pref", "load reference", turn=12, words=("pref", "load reference", "load setpoint"),
+    ),
     SignalRow("vc1", "measured voltage"),
     SignalRow("breaker", "breaker open", ""),
     SignalRow("E", "source voltage"),

@@ -152,6 +152,8 @@ def fit(
         network_model=models.get("network"),
         stabiliser=own_values.get("stabiliser", {}),
         stabiliser_model=models.get("stabiliser"),
+        governor=own_values.get("governor", {}),
+        governor_model=models.get("governor"),
         cost=best.cost,
         comparisons=comparisons,
         knowledge=analysis.uncertainty,

@@ -25,7 +25,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
-from exfit.plants import BREAKER, NETWORK, REFERENCES, SPEED
+from exfit.plants import BREAKER, GOVERNOR, NETWORK, REFERENCES, SPEED
 from exfit.results.comparisons import Comparison
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Response, Simulator
@@ -167,15 +167,17 @@ def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
         if names and part.kind != "network":
             listed = ", ".join(f"{symbol} {typical[part.prefix + symbol]:g}" for symbol in names)
             yield f"typical values taken for {part.name}: {listed}"
-    if case.parts.stabiliser is not None and not case.on_load:
-        yield f"{case.parts.stabiliser.name} does not act: the breaker is open"
+    for model in (case.parts.stabiliser, case.parts.governor):
+        if model is not None and not case.on_load:
+            yield f"{model.name} does not act: the breaker is open"
 
 
 def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str]:
     """Yield how long a simulated speed holds for which a breaker has opened under power."""
     opened = [step.at for step in inputs.steps if step.signal == BREAKER]
     power = parameters.get(f"{NETWORK}P", 0.0)
-    if not opened or power == 0.0 or SPEED in inputs.recorded:
+    governed = any(name.startswith(GOVERNOR) for name in parameters)
+    if not opened or power == 0.0 or SPEED in inputs.recorded or governed:
         return
     until = opened[0] + GOVERNOR_ACTS
     if inputs.end > until:

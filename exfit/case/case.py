@@ -16,6 +16,7 @@ from exfit.case.schema import (
     BumpTest,
     Estimate,
     FreeSection,
+    Governor,
     Limit,
     Parameters,
     Plant,
@@ -69,6 +70,7 @@ class Case:
     efd_times_speed: bool
     plant: Plant
     stabiliser: Stabiliser | None
+    governor: Governor | None
     test: BumpTest | None
     record: RecordFile | None
     records: tuple[Recording, ...]

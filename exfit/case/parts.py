@@ -1,4 +1,4 @@
-"""The parts of a case that have a data sheet: exciter, machine, network, stabiliser."""
+"""The parts of a case with a data sheet: exciter, machine, network, stabiliser, governor."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -11,13 +11,14 @@ from exfit.case.saturation import saturation_ties
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
 from exfit.case.yaml import Fault
 from exfit.errors import ModelError
-from exfit.models import STABILISERS, find
+from exfit.models import GOVERNORS, STABILISERS, Catalogue, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
 from exfit.models.speed_multiplier import times_speed
 from exfit.plants import (
     EVENTS,
+    GOVERNOR,
     KINDS,
     MACHINE,
     NETWORK,
@@ -79,6 +80,7 @@ class Parts:
     exciter: Model | None
     machine: Machine | None
     stabiliser: Model | None
+    governor: Model | None
     all: tuple[Part, ...]
 
 
@@ -91,7 +93,8 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
     kind = kind_of(plant)
     exciter = _exciter(data, folder, faults, model_sha256) if kind.has_exciter else None
     machine = _machine(plant, faults) if kind.has_machine else None
-    stabiliser = _stabiliser(data, faults)
+    stabiliser = _added(data, "stabiliser", STABILISERS, faults)
+    governor = _added(data, "governor", GOVERNORS, faults)
     parts = []
     if exciter is not None:
         exponential = str(data.get("saturation")).startswith("exponential")
@@ -101,9 +104,9 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
         parts.append(machine_part(machine, on_load=any(kind.on_load for kind in kinds)))
     if kind.on_load:
         parts.append(network_part(_mapping(plant.get("network")), kind))
-    if stabiliser is not None:
-        parts.append(stabiliser_part(stabiliser))
-    return Parts(exciter, machine, stabiliser, tuple(parts))
+    added = (("stabiliser", STABILISER, stabiliser), ("governor", GOVERNOR, governor))
+    parts += [added_part(kind, prefix, model) for kind, prefix, model in added if model is not None]
+    return Parts(exciter, machine, stabiliser, governor, tuple(parts))
 
 
 def kind_of(plant: Data) -> PlantKind:
@@ -113,11 +116,13 @@ def kind_of(plant: Data) -> PlantKind:
 
 def in_plant(parts: Parts, kind: PlantKind, given: Data) -> Parts:
     """Return the parts in a plant of another kind, of whose network some values are given."""
-    absent = ("network",) if kind.has_exciter else ("network", "exciter", "stabiliser")
+    absent = ("network",) if kind.has_exciter else ("network", "exciter", "stabiliser", "governor")
     others = tuple(part for part in parts.all if part.kind not in absent)
     network = (network_part(given, kind),) if kind.on_load else ()
     changed = replace(parts, all=(*others, *network))
-    return changed if kind.has_exciter else replace(changed, exciter=None, stabiliser=None)
+    if kind.has_exciter:
+        return changed
+    return replace(changed, exciter=None, stabiliser=None, governor=None)
 
 
 def plants_of_records(data: Data) -> dict[Place, Data]:
@@ -229,13 +234,13 @@ def machine_part(machine: Machine, on_load: bool) -> Part:
     return Part("machine", machine.name, MACHINE, machine.sheet, *places, check)
 
 
-def stabiliser_part(model: Model) -> Part:
-    """Return the part of a stabiliser."""
-    places = _places("stabiliser", "parameters")
+def added_part(kind: str, prefix: str, model: Model) -> Part:
+    """Return the part of a stabiliser or of a governor."""
+    places = _places(kind, "parameters")
     return Part(
-        "stabiliser",
+        kind,
         model.name,
-        STABILISER,
+        prefix,
         model.sheet,
         *places,
         lambda values: iter(contradictions(values)),
@@ -289,10 +294,10 @@ def _machine(plant: Data, faults: list[Fault]) -> Machine | None:
     return None if name is None else MACHINES[name]
 
 
-def _stabiliser(data: Data, faults: list[Fault]) -> Model | None:
-    section = _mapping(data.get("stabiliser"))
-    name = _catalogue_name(section, ("stabiliser", "model"), STABILISERS, "stabiliser", faults)
-    return None if name is None else STABILISERS[name]
+def _added(data: Data, kind: str, catalogue: Catalogue, faults: list[Fault]) -> Model | None:
+    """Return the stabiliser or governor that a case names; None where it has none."""
+    name = _catalogue_name(_mapping(data.get(kind)), (kind, "model"), catalogue, kind, faults)
+    return None if name is None else catalogue[name]
 
 
 def _catalogue_name(

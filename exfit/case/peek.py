@@ -15,6 +15,7 @@ SECTIONS: Mapping[str, tuple[tuple[str, ...], ...]] = {
     "machine.": (("plant", "free"), ("plant", "parameters")),
     "network.": (("plant", "network"),),
     "stabiliser.": (("stabiliser", "free"), ("stabiliser", "parameters")),
+    "governor.": (("governor", "free"), ("governor", "parameters")),
 }
 
 

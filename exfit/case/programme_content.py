@@ -19,6 +19,7 @@ FREE_SECTIONS = (
     (("parameters", "free"), ("parameters", "fixed")),
     (("plant", "free"), ("plant", "parameters")),
     (("stabiliser", "free"), ("stabiliser", "parameters")),
+    (("governor", "free"), ("governor", "parameters")),
 )
 
 

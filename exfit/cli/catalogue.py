@@ -1,6 +1,6 @@
 """The commands models and schema."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,12 +26,13 @@ if TYPE_CHECKING:
 )
 def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
-    from exfit.models import MODELS, STABILISERS
+    from exfit.models import GOVERNORS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
     from exfit.output import terminal
 
-    exciters, machines, stabilisers = MODELS.values(), MACHINES.values(), STABILISERS.values()
-    every: Iterable[Model | Machine] = chain(exciters, machines, stabilisers)
+    exciters, machines = MODELS.values(), MACHINES.values()
+    added = {"stabiliser": STABILISERS.values(), "governor": GOVERNORS.values()}
+    every: Iterable[Model | Machine] = chain(exciters, machines, *added.values())
     if folder is not None:
         from exfit.output import run_folder
         from exfit.output.catalogue_page import write_overview
@@ -40,17 +41,19 @@ def models(name: str | None, folder: Path | None) -> None:
         write_overview(folder, [_model(name)] if name else every)
         terminal.written(terminal.console(), folder)
     elif name is None:
-        terminal.catalogue(terminal.console(), exciters, machines, stabilisers)
+        terminal.catalogue(terminal.console(), exciters, machines, added)
     else:
         terminal.model(terminal.console(), _model(name))
 
 
 def _model(name: str) -> "Model | Machine":
     """Return a model of the catalogue by its name, else the exciter in a file."""
-    from exfit.models import STABILISERS, find
+    from exfit.models import GOVERNORS, STABILISERS, find
     from exfit.models.machines import MACHINES
 
-    return STABILISERS.get(name.upper()) or MACHINES.get(name.upper()) or find(name, Path())
+    shelves: tuple[Mapping[str, Model | Machine], ...] = (STABILISERS, GOVERNORS, MACHINES)
+    listed = (shelf[name.upper()] for shelf in shelves if name.upper() in shelf)
+    return next(listed, None) or find(name, Path())
 
 
 @click.command(short_help="Print the JSON Schema of a case file.")

@@ -10,10 +10,11 @@ import click
 
 
 def models(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
-    """Return the names of exciters, machines and stabilisers, in upper or lower case."""
-    from exfit.models import MACHINE_NAMES, MODELS, STABILISERS
+    """Return the names of all models of the catalogue, in upper or lower case."""
+    from exfit.models import GOVERNORS, MACHINE_NAMES, MODELS, STABILISERS
 
-    return _beginning((*MODELS, *MACHINE_NAMES, *STABILISERS), incomplete.upper())
+    names = (*MODELS, *MACHINE_NAMES, *STABILISERS, *GOVERNORS)
+    return _beginning(names, incomplete.upper())
 
 
 def exciters(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:

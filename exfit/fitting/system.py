@@ -54,6 +54,7 @@ def _system_of(case: Case, recording: Recording | None) -> System:
         stabiliser=stabilised(case),
         swing=getattr(case.plant, "swing", "power"),
         power_at=getattr(case.plant, "power_at", "recorded-voltage"),
+        governor=parts.governor,
     )
     if kind.plays_back and parts.exciter is not None:
         _refuse_missing_drivers(case, parts.exciter, equipment.saturation)
@@ -67,14 +68,14 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
     """
     changed = {"vref"}
     for test in case.tests:
-        changed |= {name for name in ("vs", "E", "angle") if getattr(test, name)}
+        changed |= {name for name in ("vs", "pref", "E", "angle") if getattr(test, name)}
         for switch in test.network:
             changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
     if case.kind.plays_back:
         records = _record_files(case).values()
         changed |= {"vs"} & {signal for file in records for signal in file.channels}
     changed |= _inputs_of_breaker(case, recording)
-    inputs = ("vref", "vs", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
+    inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)
 
 

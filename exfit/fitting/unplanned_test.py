@@ -25,6 +25,7 @@ from exfit.fitting.build import build_experiment
 from exfit.fitting.recorded.detected_steps import SIZE_WITHIN
 from exfit.fitting.recordings import clock_of, read_section
 from exfit.fitting.setup import ExperimentSetup
+from exfit.plants import REFERENCES
 from exfit.records.formats import open_table
 from exfit.records.inspection import Inspection, inspect
 from exfit.records.record import Record
@@ -119,12 +120,12 @@ def _stepped(case: Case, test: BumpTest) -> str | None:
     if test.E or test.angle or test.network or test.breaker:
         text = (
             "changes the network or opens the breaker: the steps of a record by hand are those of "
-            "vref or vs"
+            "vref, vs or pref"
         )
         raise CaseError([f"{case.path}: test: {text}; give the record under validate"])
     if not case.kind.events:
         return None
-    return "vs" if test.vs and not test.vref else "vref"
+    return next((signal for signal in REFERENCES if test.reference(signal)), "vref")
 
 
 def _built(case: Case, recording: Recording, values: Values, test: Test) -> ExperimentSetup:
@@ -277,7 +278,7 @@ def _earliest(record: Record, steps: Sequence[RecordedStep], k: int) -> float:
 def _start(record: Record, steps: Sequence[RecordedStep]) -> Test:
     """Return what of a test says where it starts: at rest, at the level of the record."""
     test: dict[str, Any] = dict.fromkeys(("vt0", "begin", "duration", "steady_until"))
-    test |= dict.fromkeys(("vref", "vs"), ())
+    test |= dict.fromkeys(REFERENCES, ())
     vt = record.signals.get("vt")
     first = steps[0]
     if vt is None or not first.from_start:

@@ -162,13 +162,13 @@ def _group(content: Mapping[str, Any]) -> str:
     """Return what cases have in common that share their machine code."""
     parameters = content.get("parameters")
     free = parameters.get("free") if isinstance(parameters, Mapping) else None
-    plant, stabiliser = (
+    plant, *added = (
         {key: value for key, value in section.items() if key in ("type", "machine", "model")}
         if isinstance(section, Mapping)
         else None
-        for section in (content.get("plant"), content.get("stabiliser"))
+        for section in map(content.get, ("plant", "stabiliser", "governor"))
     )
     keys = ("model", "saturation", "efd_times_speed")
-    models = [*map(content.get, keys), plant, stabiliser]
+    models = [*map(content.get, keys), plant, *added]
     names = sorted(map(str, free)) if isinstance(free, Mapping) else []
     return json.dumps([*models, names], default=str, sort_keys=True)

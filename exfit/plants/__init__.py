@@ -2,6 +2,7 @@
 
 from exfit.plants.alone import alone
 from exfit.plants.breaker import BREAKER, SPEED
+from exfit.plants.governing import rests_at
 from exfit.plants.grid_playback import RESTING, grid_playback
 from exfit.plants.infinite_bus import INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
@@ -10,6 +11,7 @@ from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
 from exfit.plants.parts import (
     DRIVING_SCALE,
+    GOVERNOR,
     MACHINE,
     MEASURED,
     NETWORK,
@@ -31,6 +33,7 @@ __all__ = [
     "DRIVING",
     "DRIVING_SCALE",
     "EVENTS",
+    "GOVERNOR",
     "HEARD",
     "INFINITE_BUS",
     "KINDS",
@@ -63,5 +66,6 @@ __all__ = [
     "machine_playback",
     "open_circuit",
     "playback",
+    "rests_at",
     "rests_with_output",
 ]

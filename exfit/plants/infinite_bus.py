@@ -48,6 +48,7 @@ FLOW: Sheet = sheet(
 REACTIVE: Sheet = sheet(("Q", 0.0, "pu", (-10.0, 10.0), "reactive power at the start"))
 SOURCE: Sheet = sheet(("E", 1.0, "pu", (0.01, 10.0), "voltage of the source"))
 
+OFTEN_STILL = ("E", "R", "X", "angle", "vs", "pref")  # inputs that are there where they change
 Given = Literal["Q", "E"]  # what sets the start beside vt0 and P
 
 
@@ -81,20 +82,22 @@ def infinite_bus(
     given: Given = "Q",
     stabiliser: Stabilised | None = None,
     swing: Swing = "power",
+    governor: Model | None = None,
 ) -> System:
-    """Return an exciter on a machine behind R + jX to a stiff source, at constant power Pm.
+    """Return an exciter on a machine behind R + jX to a stiff source.
 
-    2H dw/dt = (Pm - D dw) / (1 + dw) - Te, as in PSS/E; the other form of ``swing`` has a torque.
-    Parameters are the exciter's, those of machine, network and stabiliser under their prefixes
-    (``network.X``), and the initial voltage ``vt0``. The inputs are changes: of the reference
-    ``vref``, of ``vs`` beside the stabiliser, of ``vc1``, the voltage that the exciter measures,
-    of ``E`` and its ``angle`` (rad), of ``R`` and ``X``. With the input ``breaker`` a breaker opens
-    where that is 1: p, q and it are zero from then on, delta stays, and vt follows the speed, which
-    is the simulated one, or 1 and the input ``speed``. All per unit on the machine's base;
-    ``delta``, to the source as it is, in rad, ``speed`` 1 when rated.
+    Its power Pm is constant unless there is a governor. 2H dw/dt = (Pm - D dw) / (1 + dw) - Te, as
+    in PSS/E; the other form of ``swing`` has a torque. Parameters are the exciter's, those of
+    machine, network, stabiliser and governor under their prefixes (``network.X``), and the initial
+    voltage ``vt0``. The inputs are changes: of the references ``vref`` and ``pref``, of ``vs``
+    beside the stabiliser, of ``vc1``, the voltage that the exciter measures, of ``E`` and its
+    ``angle`` (rad), of ``R`` and ``X``. With the input ``breaker`` a breaker opens where that is 1:
+    p, q and it are zero from then on, delta stays, and vt follows the speed, which is the simulated
+    one, or 1 and the input ``speed``. All per unit on the machine's base; ``delta``, to the source
+    as it is, in rad, ``speed`` 1 when rated.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *ROTOR, *machine.states))
-    unit = UnitOnLoad(model, machine, saturation, stabiliser, swing)
+    unit = UnitOnLoad(model, machine, saturation, stabiliser, swing, governor)
     network = flow_sheet(given)
 
     def rest(p: Signals) -> Rest:
@@ -106,7 +109,7 @@ def infinite_bus(
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         of_machine, d = named_parameters(p, MACHINE, machine.sheet), Names()
         n = named_parameters(p, NETWORK, network)
-        changed = Names(**{name: u.get(name, 0.0) for name in ("E", "R", "X", "angle", "vs")})
+        changed = Names(**{name: u.get(name, 0.0) for name in OFTEN_STILL})
         fluxes = values_named(x, machine.states)
         at = machine.source(fluxes, of_machine)
         E, R, X = r["source"] + changed.E, n.R + changed.R, n.X + changed.X
@@ -119,7 +122,7 @@ def infinite_bus(
         v = Axes(factor * (at.voltage.d + at.xq * i.q), factor * (at.voltage.q - at.xd * i.d))
         terminals, it = Terminals(fluxes, v, i, dw), modulus(closed.d, closed.q)
         vref = r["vref"] + u["vref"]
-        controls = Controls(vref, changed.vs, u.get(MEASURED, 0.0))
+        controls = Controls(vref, changed.vs, u.get(MEASURED, 0.0), changed.pref)
         efd, ifd, vc1 = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         if breaker is not None:
@@ -155,6 +158,7 @@ def _build(equipment: Equipment) -> System:
         "E" if "E" in equipment.given else "Q",
         equipment.stabiliser,
         equipment.swing,
+        equipment.governor,
     )
 
 
@@ -162,7 +166,7 @@ INFINITE_BUS = PlantKind(
     name="infinite-bus",
     title="on load, behind R + jX to a stiff source",
     needs=("exciter", "machine", "network"),
-    events=("vref", "vs", "E", "angle", "network", BREAKER),
+    events=("vref", "vs", "pref", "E", "angle", "network", BREAKER),
     signals=compared(OUTPUTS),
     network=lambda given: flow_sheet("E" if "E" in given else "Q"),
     network_required=("f0", "X", "P"),

@@ -20,10 +20,11 @@ SATURATION: Mapping[str, SaturationForm] = {
     "exponential-se": exponential_se,
 }
 
-# how the names of parameters begin, and the states of a stabiliser
+# how the names of parameters begin, and the states of a stabiliser and a governor
 MACHINE = "machine."
 NETWORK = "network."
 STABILISER = "stabiliser."
+GOVERNOR = "governor."
 VT0 = "vt0"
 DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
 
@@ -90,6 +91,20 @@ def values_of(written: Names, names: Iterable[str]) -> dict[str, Signal]:
 def state_of(model: Model, x: Signals, r: Signals) -> Names:
     """Return an exciter's states, and the setpoints that it found at the start."""
     return Names(**vars(values_named(x, model.states)), **vars(values_named(r, model.setpoints)))
+
+
+def output_of(prefix: str, model: Model, u: Names, p: Signals, state: Signals, d: Names) -> Signal:
+    """Write the slopes of a stabiliser or governor into ``d`` and return its output.
+
+    ``state`` holds its states and setpoints, which have the ``prefix`` in the system as its
+    parameters have.
+    """
+    slopes = Names()
+    s = Names(**{name: state[prefix + name] for name in (*model.states, *model.setpoints)})
+    output = model.equations(s, u, named_parameters(p, prefix, model.sheet), slopes)
+    for name, slope in vars(slopes).items():
+        setattr(d, prefix + name, slope)
+    return output
 
 
 def refuse_taken(model: Model, taken: Iterable[str]) -> None:

@@ -12,7 +12,8 @@ from exfit.plants.parts import SaturationForm
 from exfit.signals import COMPARED
 
 Component = TypeVar("Component", Model, Machine)
-REFERENCES = ("vref", "vs")  # inputs that are given as steps, ramps, tables or records
+OF_EXCITER = ("vref", "vs")
+REFERENCES = (*OF_EXCITER, "pref")  # inputs that are given as steps, ramps, tables or records
 Requirement = Literal["exciter", "machine", "network"]
 Swing = Literal["power", "torque"]  # what Pm is in the equation of the speed
 PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
@@ -42,6 +43,7 @@ class Equipment(NamedTuple):
     stabiliser: Stabilised | None = None
     swing: Swing = "power"
     power_at: PowerAt = "recorded-voltage"
+    governor: Model | None = None
 
 
 def no_network(given: Collection[str]) -> Sheet:

@@ -18,7 +18,7 @@ from exfit.plants.parts import (
     state_of,
     symbols,
 )
-from exfit.plants.plant import REFERENCES, Equipment, PlantKind, present
+from exfit.plants.plant import OF_EXCITER, Equipment, PlantKind, present
 
 EFD0, VREF0 = "efd0", "vref0"
 DRIVING = ("vt", "ifd", "p", "q", "speed")  # what may drive an exciter
@@ -112,9 +112,9 @@ PLAYBACK = PlantKind(
     name="playback",
     title="the exciter alone, driven by recorded signals",
     needs=("exciter",),
-    events=REFERENCES,
-    signals=(*REFERENCES, *DRIVING, "efd"),
-    driving=(*REFERENCES, *DRIVING),
+    events=OF_EXCITER,
+    signals=(*OF_EXCITER, *DRIVING, "efd"),
+    driving=(*OF_EXCITER, *DRIVING),
     required=("vt", "efd"),
     required_if_used=("ifd", "speed"),
     levels=(*DRIVING, "efd"),

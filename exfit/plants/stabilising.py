@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from exfit.engine.system import Signals
 from exfit.engine.trace import Signal
-from exfit.plants.parts import STABILISER, Names, named_parameters
+from exfit.plants.parts import STABILISER, Names, named_parameters, output_of
 from exfit.plants.plant import Stabilised
 
 ROUNDING_AT_REST = 1e-9  # pu
@@ -35,10 +35,4 @@ def stabiliser_rest(stabiliser: Stabilised, heard: Names, p: Signals) -> dict[st
 
 def stabilising(stabiliser: Stabilised, heard: Names, p: Signals, x: Signals, d: Names) -> Signal:
     """Write the slopes of a stabiliser into ``d`` and return its signal vs."""
-    model, slopes = stabiliser.model, Names()
-    states = Names(**{name: x[STABILISER + name] for name in model.states})
-    values = named_parameters(p, STABILISER, model.sheet)
-    vs = model.equations(states, listening(stabiliser, heard), values, slopes)
-    for name, slope in vars(slopes).items():
-        setattr(d, STABILISER + name, slope)
-    return vs
+    return output_of(STABILISER, stabiliser.model, listening(stabiliser, heard), p, x, d)

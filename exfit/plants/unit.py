@@ -1,4 +1,4 @@
-"""A unit on load: an exciter and a stabiliser on a machine whose speed follows the power."""
+"""A unit on load: exciter, stabiliser and governor on a machine whose speed follows the power."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,8 +8,10 @@ from exfit.engine.trace import Signal
 from exfit.models.machines import Axes, Machine
 from exfit.models.phasors import modulus
 from exfit.models.sheet import Model
+from exfit.plants.governing import REFERENCE, governing, governor_rest
 from exfit.plants.loaded_machine import Flow, compensated, loaded_at_rest
 from exfit.plants.parts import (
+    GOVERNOR,
     MACHINE,
     STABILISER,
     Names,
@@ -38,37 +40,45 @@ class UnitOnLoad(NamedTuple):
     saturation: SaturationForm
     stabiliser: Stabilised | None = None
     swing: Swing = "power"
+    governor: Model | None = None
+
+    @property
+    def added(self) -> tuple[tuple[str, Model], ...]:
+        """The stabiliser and the governor, those that there are, by how their names begin."""
+        stabiliser = None if self.stabiliser is None else self.stabiliser.model
+        models = ((STABILISER, stabiliser), (GOVERNOR, self.governor))
+        return tuple((prefix, model) for prefix, model in models if model is not None)
 
     @property
     def states(self) -> tuple[str, ...]:
         """All states by their names in the system."""
-        own = () if self.stabiliser is None else self.stabiliser.model.states
-        waiting = (STABILISER + name for name in own)
-        return (*self.machine.states, *ROTOR, *self.exciter.states, *waiting)
+        added = (prefix + name for prefix, model in self.added for name in model.states)
+        return (*self.machine.states, *ROTOR, *self.exciter.states, *added)
 
     @property
     def setpoints(self) -> tuple[str, ...]:
         """What holds the unit at rest."""
-        return ("vref", *self.exciter.setpoints, "Pm")
+        held = ("vref", *self.exciter.setpoints)
+        if self.governor is None:
+            return (*held, "Pm")
+        return (*held, REFERENCE, *(GOVERNOR + name for name in self.governor.setpoints))
 
     def parameters(self, network: Sequence[str]) -> tuple[str, ...]:
         """Return all parameters, with those of the network in their place."""
-        stabiliser = () if self.stabiliser is None else self.stabiliser.model.sheet
         return (
             *symbols("", self.exciter.sheet),
             *symbols(MACHINE, self.machine.sheet),
             *network,
-            *symbols(STABILISER, stabiliser),
+            *(name for prefix, model in self.added for name in symbols(prefix, model.sheet)),
         )
 
     @property
     def time_constants(self) -> tuple[str, ...]:
         """The parameters that are times."""
-        stabiliser = () if self.stabiliser is None else self.stabiliser.model.sheet
         return (
             *seconds("", self.exciter.sheet),
             *seconds(MACHINE, self.machine.sheet),
-            *seconds(STABILISER, stabiliser),
+            *(name for prefix, model in self.added for name in seconds(prefix, model.sheet)),
         )
 
 
@@ -107,11 +117,15 @@ class Terminals(NamedTuple):
 
 
 class Controls(NamedTuple):
-    """What acts on a unit beside its terminals: reference, vs, and what is added to vc1."""
+    """What acts on a unit beside its terminals: reference, vs, and what is added to vc1.
+
+    ``pref`` is the change of the governor's reference.
+    """
 
     vref: Signal
     vs: Signal = 0.0
     measured: Signal = 0.0
+    pref: Signal = 0.0
 
 
 class UnitState(NamedTuple):
@@ -147,12 +161,21 @@ def unit_at_rest(
     if unit.stabiliser is not None:
         heard = Names(speed=0.0, p=power, vt=vt, pa=0.0, none=0.0)
         states |= stabiliser_rest(unit.stabiliser, heard, p)
-    return UnitRest({**states, **exciter.states}, {**exciter.setpoints, "Pm": power})
+    held: Signals = {"Pm": power}
+    if unit.governor is not None:
+        turbine = governor_rest(unit.governor, power, p)
+        states, held = {**states, **turbine.states}, turbine.setpoints
+    return UnitRest({**states, **exciter.states}, {**exciter.setpoints, **held})
 
 
-def mechanical_power(r: Signals) -> Signal:
-    """Return the mechanical power Pm: the one that held the unit at rest."""
-    return r["Pm"]
+def mechanical_power(
+    unit: UnitOnLoad, at: Terminals, pref: Signal, given: UnitState, d: Names
+) -> Signal:
+    """Return the power Pm of the turbine: its governor's, or the one that held the unit at rest."""
+    p, r, x = given
+    if unit.governor is None:
+        return r["Pm"]
+    return governing(unit.governor, Names(dw=at.dw, p=at.p, pref=pref), p, r, x, d)
 
 
 def acceleration(swing: Swing, Pm: Signal, power: Signal, dw: Signal, machine: Names) -> Signal:
@@ -174,7 +197,7 @@ def unit_motion(
     of_machine = named_parameters(p, MACHINE, unit.machine.sheet)
     ifd = unit.machine.field(at.fluxes, at.i, of_machine)
     power, reactive, vt = at.p, at.q, at.vt
-    Pm, vs = mechanical_power(r), controls.vs
+    Pm, vs = mechanical_power(unit, at, controls.pref, given, d), controls.vs
     if unit.stabiliser is not None:
         heard = Names(speed=at.dw, p=power, vt=vt, pa=Pm - power, none=0.0)
         vs = vs + stabilising(unit.stabiliser, heard, p, x, d)

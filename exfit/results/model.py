@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names
 ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
-PARTS = ("machine", "network", "stabiliser")  # their parameters are named machine.Tpd0
+PARTS = ("machine", "network", "stabiliser", "governor")  # their parameters are named machine.Tpd0
 
 
 @dataclass(frozen=True)
@@ -176,9 +176,9 @@ class FitResult:
     """A fit: what was found, how, and how well it matches.
 
     ``parameters`` holds the fitted ones under their names in the system: KA, machine.Tpd0.
-    ``fixed`` are the exciter's others, and helpers; ``machine``, ``network`` and ``stabiliser`` are
-    all values of these parts by symbol, the fitted ones among them; their models are None where
-    the case has no such part. Values that follow others by ``ties`` are among all of these.
+    ``fixed`` are the exciter's others, and helpers; ``machine``, ``network``, ``stabiliser`` and
+    ``governor`` are all values of these parts by symbol, the fitted ones among them; their models
+    are None where the case has no such part. Values that follow others by ``ties`` are among these.
     ``sources`` says where every value comes from: typical, nameplate ..., not stated;
     ``typical_values`` what those that are typical and not 0 would move, if they were 20 % off.
 
@@ -231,6 +231,8 @@ class FitResult:
     versions: Mapping[str, str]
     inputs: Mapping[str, str]
     verdict: Verdict | None = None
+    governor: Mapping[str, float] = field(default_factory=dict)
+    governor_model: str | None = None
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
@@ -285,7 +287,7 @@ class FitResult:
     def own_values(self) -> dict[str, float]:
         """The values of the unit that another case may take over: all of the exciter, fitted ones.
 
-        The others, of machine, network and stabiliser, are as the case has them.
+        The others, of machine, network, stabiliser and governor, are as the case has them.
         """
         own = {**self.parameters, **self.values_of("")}.keys() - self.of_records.keys()
         return {name: value for name, value in self.values.items() if name in own}

@@ -102,7 +102,11 @@ def fixed_values(case: Case, values: Mapping[str, float]) -> dict[str, float]:
 def parts_of(case: Case) -> Iterator[PartDescription]:
     """Yield the parts of a case with their data sheets and drawings."""
     parts = case.parts
-    models = {"exciter": parts.exciter, "stabiliser": parts.stabiliser}
+    models = {
+        "exciter": parts.exciter,
+        "stabiliser": parts.stabiliser,
+        "governor": parts.governor,
+    }
     for part in parts.all:
         model = parts.machine if part.kind == "machine" else models.get(part.kind)
         yield PartDescription(
@@ -197,7 +201,7 @@ def _source_angle(test: BumpTest) -> Iterator[str]:
 
 
 def _reference(signal: str, given: Reference, prefix: str, identified: Identified) -> Iterator[str]:
-    """Yield what the reference, or the stabiliser's signal, did."""
+    """Yield what a reference, or the stabiliser's signal, did."""
     if isinstance(given, ReferenceTable):
         (start, first), (end, last) = given.table[0], given.table[-1]
         rows = f"{len(given.table)} rows, {start:g} ... {end:g} s"

@@ -15,10 +15,11 @@ from exfit.case.peek import section_of, stabiliser_inputs
 from exfit.engine.system import System
 from exfit.errors import ExfitError, SimulationError
 from exfit.fitting.experiment import Channel, Experiment
-from exfit.models import MODELS, STABILISERS, find
+from exfit.models import GOVERNORS, MODELS, STABILISERS, find
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import Model, typical
 from exfit.plants import (
+    GOVERNOR,
     INFINITE_BUS,
     MACHINE,
     NETWORK,
@@ -154,10 +155,16 @@ def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
     network = network_of(result)
     if network:
         equipment = Equipment(
-            None, machine, form, given=frozenset(network), stabiliser=_stabiliser(result)
+            None,
+            machine,
+            form,
+            given=frozenset(network),
+            stabiliser=_stabiliser(result),
+            governor=GOVERNORS.get(result.governor_model or ""),
         )
         own = {NETWORK + symbol: value for symbol, value in network.items()}
         own |= {STABILISER + symbol: value for symbol, value in result.stabiliser.items()}
+        own |= {GOVERNOR + symbol: value for symbol, value in result.governor.items()}
         plants.append(StepPlant(INFINITE_BUS, equipment, {**values, **own}))
     return tuple(plants)
 

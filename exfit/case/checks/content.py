@@ -9,7 +9,12 @@ from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
 from exfit.case.checks.model import parameter_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
-from exfit.case.checks.plant import model_faults, plants_of_records_faults, stabiliser_faults
+from exfit.case.checks.plant import (
+    governor_faults,
+    model_faults,
+    plants_of_records_faults,
+    stabiliser_faults,
+)
 from exfit.case.checks.record import (
     channels_faults,
     level_faults,
@@ -49,6 +54,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from model_faults(content, kind)
     yield from parameter_faults(content, parts, ties)
     yield from stabiliser_faults(content, parts, kind)
+    yield from governor_faults(content, parts, kind)
     yield from source_faults(content, parts, kind)
     yield from plants_of_records_faults(content, kind)
     yield from _missing_test_faults(content, kind)

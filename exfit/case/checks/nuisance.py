@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from exfit.case.checks.bounds import bound_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.yaml import Fault
-from exfit.plants import BREAKER, PlantKind
+from exfit.plants import BREAKER, REFERENCES, PlantKind
 from exfit.util.text import show
 
 AUTOMATIC = ("at", "step")  # what a record shows of the first step of the reference
@@ -43,7 +43,7 @@ def _scale_of(value: ContentNode, kind: PlantKind) -> bool:
 def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:
     """Yield the places at which a number or {start, min, max} is allowed."""
     yield test.at("vt0")
-    for name in ("vref", "vs"):
+    for name in REFERENCES:
         for step in test.at(name).entries:
             yield step.at("at")
             yield step.at("step")

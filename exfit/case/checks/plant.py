@@ -1,4 +1,4 @@
-"""What contradicts itself between the plant of a case, its model and its stabiliser."""
+"""What contradicts itself between the plant of a case, its model, stabiliser and governor."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,8 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.parts import Parts, kind_of, network_part, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
-from exfit.plants import HEARD, PlantKind, Stabilised, rests_with_output
+from exfit.plants import HEARD, PlantKind, Stabilised, rests_at, rests_with_output
+from exfit.util.text import show
 
 
 def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
@@ -16,7 +17,8 @@ def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
         if "model" not in content:
             yield content.at("model").fault("is missing")
         return
-    for key in ("model", "saturation", "efd_times_speed", "parameters", "stabiliser"):
+    keys = ("model", "saturation", "efd_times_speed", "parameters", "stabiliser", "governor")
+    for key in keys:
         if key in content:
             text = f"not allowed with plant {kind.name}: it has no exciter"
             yield content.at(key).fault(text)
@@ -27,17 +29,61 @@ def stabiliser_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> It
     section = content.at("stabiliser")
     if not section.content:
         return
-    if kind.has_exciter and not kind.has_machine:
-        yield section.fault(f"not allowed with plant {kind.name}: nothing feeds it")
-    kinds = (kind, *map(kind_of, plants_of_records(content.content).values()))
-    on_load = any(kind.on_load for kind in kinds)
-    if kind.closed_loop and not on_load and section.at("free").content:
-        yield section.at("free").fault("on open circuit a stabiliser does not act")
+    yield from _idle_faults(section, content, kind, "stabiliser")
     if parts.stabiliser is not None:
         wrong = [*_number_of_inputs(section, parts.stabiliser)]
         yield from wrong
-        if on_load and not wrong:
+        if _on_load(content, kind) and not wrong:
             yield from _output_at_rest(section, parts.stabiliser)
+
+
+def governor_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
+    """Yield a governor that does not act, or does not hold the power at the start."""
+    section = content.at("governor")
+    tests = (content, *content.at("records").entries, *content.at("validate").entries)
+    if not section.content:
+        for test in tests:
+            if "pref" in test.at("test"):
+                yield test.at("test", "pref").fault("needs a governor: there is none")
+        return
+    yield from _idle_faults(section, content, kind, "governor")
+    if parts.governor is None:
+        return
+    values = _start_values(section, parts.governor)
+    plants = (content.at("plant"), *(test.at("plant") for test in tests[1:]))
+    for power in dict.fromkeys(plant.at("network", "P").number for plant in plants):
+        if power is None or values is None or rests_at(parts.governor, values, power):
+            continue
+        name = parts.governor.name
+        text = f"{name} does not rest at P = {show(power)} pu: one of its limits is in the way"
+        yield section.at("parameters").fault(text)
+
+
+def _idle_faults(
+    section: ContentNode, content: ContentNode, kind: PlantKind, name: str
+) -> Iterator[Fault]:
+    """Yield a stabiliser or governor in a plant where nothing feeds it, or that is not on load."""
+    if kind.has_exciter and not kind.has_machine:
+        yield section.fault(f"not allowed with plant {kind.name}: nothing feeds it")
+    if kind.closed_loop and not _on_load(content, kind) and section.at("free").content:
+        yield section.at("free").fault(f"on open circuit a {name} does not act")
+
+
+def _on_load(content: ContentNode, kind: PlantKind) -> bool:
+    """Return whether a unit is on load, in the plant of a case or of one of its records."""
+    kinds = (kind, *map(kind_of, plants_of_records(content.content).values()))
+    return any(kind.on_load for kind in kinds)
+
+
+def _start_values(section: ContentNode, model: Model) -> dict[str, float] | None:
+    """Return the values at which a fit starts; None where one lies outside its data sheet."""
+    given = {symbol: value.number for symbol, value in section.at("parameters").sections} | {
+        symbol: value.start for symbol, value in section.at("free").sections
+    }
+    values = typical(model.sheet)
+    values |= {symbol: value for symbol, value in given.items() if value is not None}
+    within = all(row.low <= values[row.symbol] <= row.high for row in model.sheet)
+    return values if within else None
 
 
 def _number_of_inputs(section: ContentNode, model: Model) -> Iterator[Fault]:
@@ -50,14 +96,11 @@ def _number_of_inputs(section: ContentNode, model: Model) -> Iterator[Fault]:
 
 def _output_at_rest(section: ContentNode, model: Model) -> Iterator[Fault]:
     """Yield a stabiliser that moves the voltage of a unit at rest: its washout is left out."""
-    given = {symbol: value.number for symbol, value in section.at("parameters").sections} | {
-        symbol: value.start for symbol, value in section.at("free").sections
-    }
-    values = typical(model.sheet)
-    values |= {symbol: value for symbol, value in given.items() if value is not None}
+    values = _start_values(section, model)
     inputs = tuple(entry.text or "" for entry in section.at("inputs").entries) or model.inputs
-    within = all(row.low <= values[row.symbol] <= row.high for row in model.sheet)
-    if within and {*inputs} <= {*HEARD} and rests_with_output(Stabilised(model, inputs), values):
+    if values is None or not {*inputs} <= {*HEARD}:
+        return
+    if rests_with_output(Stabilised(model, inputs), values):
         heard = ", ".join(inputs)
         text = f"{model.name} does not rest at 0 with inputs {heard}: its washout is left out"
         yield section.at("parameters").fault(text)

@@ -17,7 +17,7 @@ BEFORE_RECORD = (
     "there; or, if the unit had not settled, give begin before this step, and vt0 at that time"
 )
 AFTER_WINDOW = "leave this step out, or end the window after it"
-PREFIXES_OF_PARTS = ("machine", "network", "stabiliser")
+PREFIXES_OF_PARTS = ("machine", "network", "stabiliser", "governor")
 
 
 def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:

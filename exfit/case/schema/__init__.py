@@ -12,7 +12,14 @@ from exfit.case.schema.phasors import (
     StatusSection,
     VoltagePhasor,
 )
-from exfit.case.schema.plants import InfiniteBus, OpenCircuit, Plant, SaturationName, Stabiliser
+from exfit.case.schema.plants import (
+    Governor,
+    InfiniteBus,
+    OpenCircuit,
+    Plant,
+    SaturationName,
+    Stabiliser,
+)
 from exfit.case.schema.programme import RecordedBump, RecordedRejection, TestOfProgramme
 from exfit.case.schema.records import (
     SINGLE,
@@ -55,6 +62,7 @@ __all__ = [
     "Filter",
     "FindableStep",
     "FreeSection",
+    "Governor",
     "InfiniteBus",
     "Limit",
     "MedianSection",

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
-from exfit.case.schema.plants import Plant, SaturationName, Stabiliser
+from exfit.case.schema.plants import Governor, Plant, SaturationName, Stabiliser
 from exfit.case.schema.programme import TestOfProgramme
 from exfit.case.schema.records import RecordFile, Recording
 from exfit.case.schema.report import AsFoundSection, ReportRequest
@@ -43,6 +43,11 @@ class CaseDocument(Section):
     )
     stabiliser: Stabiliser | None = Field(
         default=None, description="A power system stabiliser; it acts on load only."
+    )
+    governor: Governor | None = Field(
+        default=None,
+        description="A turbine with its governor; infinite-bus only. Default: the power of the "
+        "turbine is constant.",
     )
     test: BumpTest | None = Field(
         default=None,

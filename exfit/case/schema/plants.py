@@ -171,16 +171,9 @@ Plant = (
 SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 
-class Stabiliser(Section):
-    """A power system stabiliser; it acts on load only."""
+class AddedModel(Section):
+    """A model that a unit on load has beside its exciter."""
 
-    model: Text = Field(description="Name of the stabiliser model.")
-    inputs: tuple[Heard, ...] | None = Field(
-        default=None,
-        min_length=1,
-        description="Input signals, one or two of speed, p, vt, pa (accelerating power) and none; "
-        "default: those of the model.",
-    )
     parameters: Frozen[Given] = Field(
         default_factory=nothing,
         description="Its data; a missing value is the typical one.",
@@ -233,3 +226,21 @@ class AloneOnLoad(PlantSection):
     def given(self) -> Mapping[str, float]:
         """The values of the load."""
         return self.network
+
+
+class Stabiliser(AddedModel):
+    """A power system stabiliser; it acts on load only."""
+
+    model: Text = Field(description="Name of the stabiliser model.")
+    inputs: tuple[Heard, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="Input signals, one or two of speed, p, vt, pa (accelerating power) and none; "
+        "default: those of the model.",
+    )
+
+
+class Governor(AddedModel):
+    """A turbine with its governor; it acts where the speed follows from the power."""
+
+    model: Text = Field(description="Name of the governor model.")

@@ -214,6 +214,11 @@ class BumpTest(Section):
         description="The signal at the stabiliser's input of the exciter, given like vref; "
         "in a playback the record's channel vs drives it without.",
     )
+    pref: Reference = Field(
+        default=(),
+        description="The reference of the governor, given like vref: a power, or with TGOV1, "
+        "HYGOV and GGOV1 a speed, the droop times a power.",
+    )
     E: tuple[StepSection, ...] = Field(
         default=(),
         min_length=1,
@@ -236,14 +241,14 @@ class BumpTest(Section):
     )
 
     def events(self, signal: str) -> tuple[FindableStep, ...]:
-        """Return the steps and ramps of vref or vs in order of time; none of a recorded one."""
+        """Return the steps and ramps of a reference in order of time; none of a recorded one."""
         given = self.reference(signal)
         if isinstance(given, ReferenceTable):
             return given.events
         return given if isinstance(given, tuple) else ()
 
     def reference(self, signal: str) -> Reference:
-        """Return how vref or vs is given."""
+        """Return how vref, vs or pref is given."""
         given: Reference = getattr(self, signal)
         return given
 

@@ -1,6 +1,6 @@
 """The models of the catalogue."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from rich.console import Console
 from rich.table import Table
@@ -15,9 +15,9 @@ def catalogue(
     console: Console,
     models: Iterable[Model],
     machines: Iterable[Machine],
-    stabilisers: Iterable[Model],
+    added: Mapping[str, Iterable[Model]],
 ) -> None:
-    """Show the names of all models."""
+    """Show the names of all models; those ``added`` to exciter and machine by what they are."""
     table = plain_table("exciter", "also", "")
     for exciter in models:
         table.add_row(exciter.name, ", ".join(exciter.aliases), exciter.title.partition(" (")[0])
@@ -27,11 +27,12 @@ def catalogue(
     for machine in machines:
         table.add_row(machine.name, machine.title)
     show_table(console, table)
-    console.print()
-    table = plain_table("stabiliser", "")
-    for stabiliser in stabilisers:
-        table.add_row(stabiliser.name, stabiliser.title.partition(" (")[0])
-    show_table(console, table)
+    for kind, of_kind in added.items():
+        console.print()
+        table = plain_table(kind, "")
+        for model in of_kind:
+            table.add_row(model.name, model.title.partition(" (")[0])
+        show_table(console, table)
 
 
 def model(console: Console, described: Model | Machine) -> None:
