@@ -8,7 +8,7 @@ from sources import ROOT, nodes
 
 from exfit.case.schema import RecordFile
 from exfit.cli.completion import noises
-from exfit.models import MODELS
+from exfit.models import GOVERNORS, MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import (
     BREAKER,
@@ -28,7 +28,7 @@ from exfit.signals import COMPARED, NOISE, RECORDED, ROWS, SIGNALS, label_of
 
 MACHINE, EXCITER, QUADRATIC = MACHINES["GENROU"], MODELS["AC8B"], SATURATION["quadratic"]
 SYSTEMS = {
-    "infinite-bus": system(MACHINE, inputs=ALL_INPUTS),
+    "infinite-bus": system(MACHINE, inputs=(*ALL_INPUTS, "pref"), governor=GOVERNORS["TGOV1"]),
     "grid-playback": grid_playback(UnitOnLoad(EXCITER, MACHINE, QUADRATIC)),
     "open-circuit": open_circuit(EXCITER, MACHINE, QUADRATIC, ("vref", "vs")),
     "machine-on-load": machine_on_load(MACHINE, (BREAKER, "efd", SPEED)),

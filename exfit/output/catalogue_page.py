@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from exfit.models import GOVERNORS
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, typical
 from exfit.output.drawings import block_diagram, diagram_and_remarks, document
@@ -86,7 +87,7 @@ def _files(model: Model | Machine, diagram: str) -> Iterator[tuple[str, str | by
 
     if diagram:
         yield f"{model.name}.svg", document(diagram)
-    if isinstance(model, Model) and not model.inputs:
+    if isinstance(model, Model) and not model.inputs and model.name not in GOVERNORS:
         figure = plots.overview(f"{model.name}: {model.title}", sample_response(model))
         yield f"{model.name}.png", plots.png(figure)
 

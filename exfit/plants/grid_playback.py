@@ -89,8 +89,8 @@ def grid_playback(
     """Return a unit behind R + jX to a recorded voltage.
 
     Its inputs are the changes of the recorded voltage ``vt`` and its ``angle`` (rad) from what they
-    are at the start, where the angle may grow evenly; and of ``vref`` and ``vs``. The parameters
-    are those of exciter, machine, network and stabiliser, and the levels at the start: ``vt0`` of
+    are at the start, where the angle may grow evenly; and of ``vref``, ``vs`` and ``pref``. The
+    parameters are those of the unit and the network, and the levels at the start: ``vt0`` of
     the recorded voltage, ``p0`` and ``q0`` unless the network has P or Q, ``speed0``. The powers,
     and the current, are those at the recorded voltage or at the ``terminals``. All per unit on the
     machine's base; ``delta``, to the recorded voltage, in rad.
@@ -122,7 +122,7 @@ def grid_playback(
         v = Axes(at.voltage.d + at.xq * i.q, at.voltage.q - at.xd * i.d)
         terminals = Terminals(fluxes, v, i, x["dw"])
         vref = r["vref"] + u["vref"]
-        controls = Controls(vref, u.get("vs", 0.0))
+        controls = Controls(vref, u.get("vs", 0.0), pref=u.get("pref", 0.0))
         efd, ifd, vc1 = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         measured = terminals
@@ -161,6 +161,7 @@ def _build(equipment: Equipment) -> System:
         equipment.saturation,
         equipment.stabiliser,
         equipment.swing,
+        equipment.governor,
     )
     inputs = tuple(name for name in REFERENCES if name in equipment.inputs)
     given = equipment.given & {row.symbol for row in AT_START}

@@ -10,12 +10,12 @@ from on_load import QUADRATIC, system, values_on_load
 from places import REFERENCE
 from scipy.interpolate import CubicSpline
 
-from exfit.engine.trace import sqrt, where
-from exfit.models import MODELS
+from exfit.engine.trace import larger, sqrt, where
+from exfit.models import GOVERNORS, MODELS
 from exfit.models.blocks import field_demand, pi_rest
 from exfit.models.exciters import ac8b
 from exfit.models.machines import MACHINES
-from exfit.plants import MACHINE, NETWORK, VT0, UnitOnLoad, grid_playback
+from exfit.plants import GOVERNOR, MACHINE, NETWORK, VT0, UnitOnLoad, grid_playback
 from exfit.simulation.inputs import Inputs, InputStep, RecordedInput
 from exfit.simulation.simulator import Simulator
 from exfit.simulation.splines import SplinedInput
@@ -33,6 +33,7 @@ OF_EXCITER = {
     "E1": 6.5, "SE1": 0.3, "E2": 9.0, "SE2": 3.0,
 }  # fmt: skip
 OF_TRANSFORMER = {"f0": 60.0, "R": 0.0, "X": 0.0, "Rc": 0.0, "Xc": 0.0}
+OF_GOVERNOR = {"R": 0.05, "VMAX": 1.2, "VMIN": 0.0, "T1": 0.4, "T2": 2.1, "T3": 7.0, "Dt": 0.0}
 STEP = 1e-3
 
 
@@ -69,7 +70,8 @@ def response(made, inputs, time, values, step=STEP):
 
 def rounded_rectifier(ve, load):
     """Return the voltage behind a rectifier, with the constants that the other program rounds."""
-    sloping = where(load < 0.75 * ve, sqrt(0.75 * ve * ve - load * load), 1.732 * (ve - load))
+    steepest = larger(1.732 * (ve - load), 0.0)
+    sloping = where(load < 0.75 * ve, sqrt(0.75 * ve * ve - load * load), steepest)
     return where(load <= 0.433 * ve, ve - 0.577 * load, sloping)
 
 
@@ -98,18 +100,22 @@ ROUNDED = replace(MODELS["AC8B"], equations=rounded_equations, rest=rounded_rest
     ],
     ids=["exact", "rounded"],
 )
-def test_an_event_is_that_of_another_simulator(exciter, most):
+@pytest.mark.parametrize("governor", [None, "TGOV1"])
+def test_an_event_is_that_of_another_simulator(exciter, most, governor):
     """It rounds the constants of the rectifier, and writes the swing equation with a torque.
 
     With these constants efd jumps where the arcs miss each other, which a sample just beside shows.
     """
-    columns = recorded("playback_ac8b")
-    time = columns["t"]
-    made = grid_playback(UnitOnLoad(exciter, GENROU, QUADRATIC, swing="torque"))
+    columns = recorded("playback_ac8b" if governor is None else "playback_ac8b_tgov1")
+    time, turbine = columns["t"], None if governor is None else GOVERNORS[governor]
+    unit = UnitOnLoad(exciter, GENROU, QUADRATIC, swing="torque", governor=turbine)
     inputs = played(time, columns["vt"], columns["angle"])
-    got = response(made, inputs, time, values_of(columns), 0.5 * STEP)
+    values = {GOVERNOR + symbol: value for symbol, value in OF_GOVERNOR.items()}
+    got = response(grid_playback(unit), inputs, time, values_of(columns) | values, 0.5 * STEP)
+    arcs = np.abs(OF_EXCITER["KC"] * got["ifd"] / got["VE"] - 0.433) > 1e-3
     for signal, limit in most.items():
-        assert np.abs(got[signal] - columns[signal]).max() < limit, signal
+        difference = np.abs(got[signal] - columns[signal])
+        assert difference[arcs if signal == "efd" else slice(None)].max() < limit, signal
 
 
 # --- what must hold -------------------------------------------------------------------------------

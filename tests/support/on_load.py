@@ -21,5 +21,6 @@ def values_on_load(machine, given="Q", exciter="AC8B", **changes):
     return values | {symbol.replace("_", ".", 1): value for symbol, value in changes.items()}
 
 
-def system(machine, given="Q", exciter="AC8B", inputs=ALL_INPUTS, swing="power"):
-    return infinite_bus(MODELS[exciter], machine, QUADRATIC, inputs, given, swing=swing)
+def system(machine, given="Q", exciter="AC8B", inputs=ALL_INPUTS, swing="power", governor=None):
+    kinds = {"swing": swing, "governor": governor}
+    return infinite_bus(MODELS[exciter], machine, QUADRATIC, inputs, given, **kinds)

@@ -46,8 +46,8 @@ class CaseDocument(Section):
     )
     governor: Governor | None = Field(
         default=None,
-        description="A turbine with its governor; infinite-bus only. Default: the power of the "
-        "turbine is constant.",
+        description="A turbine with its governor; it acts where the speed follows from the power. "
+        "Default: the power of the turbine is constant.",
     )
     test: BumpTest | None = Field(
         default=None,
