@@ -14,6 +14,7 @@ from exfit.models.sheet import Model
 from exfit.plants import (
     BREAKER,
     DRIVING,
+    REFERENCES,
     SATURATION,
     SPEED,
     Equipment,
@@ -73,7 +74,7 @@ def inputs_of(case: Case, recording: Recording | None = None) -> tuple[str, ...]
             changed |= {name for name in ("R", "X", "E") if getattr(switch, name) is not None}
     if case.kind.plays_back:
         records = _record_files(case).values()
-        changed |= {"vs"} & {signal for file in records for signal in file.channels}
+        changed |= {*REFERENCES} & {signal for file in records for signal in file.channels}
     changed |= _inputs_of_breaker(case, recording)
     inputs = ("vref", "vs", "pref", "E", "angle", "R", "X", BREAKER, "efd", SPEED)
     return tuple(name for name in inputs if name in changed)

@@ -43,8 +43,9 @@ def governor_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iter
     tests = (content, *content.at("records").entries, *content.at("validate").entries)
     if not section.content:
         for test in tests:
-            if "pref" in test.at("test"):
-                yield test.at("test", "pref").fault("needs a governor: there is none")
+            for place in (test.at("test", "pref"), test.at("record", "channels", "pref")):
+                if place.value is not None:
+                    yield place.fault("needs a governor: there is none")
         return
     yield from _idle_faults(section, content, kind, "governor")
     if parts.governor is None:
