@@ -8,15 +8,16 @@ import hypothesis
 import pytest
 from oracle import EXCITERS, SATURATED, SURROUNDED
 
-from exfit.models import MODELS, STABILISERS
+from exfit.models import GOVERNORS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 
-CATALOGUE = {*MODELS, *MACHINES, *STABILISERS}
+CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS}
 # a few of each family: without a plant; commutators; rotating rectifiers; static; compound;
-# names of PSS/E; a round rotor and salient poles; a stabiliser of one input, one of two
+# names of PSS/E; a round rotor and salient poles; a stabiliser of one input, one of two;
+# two governors
 FEW = (
     "FIRST_ORDER", "DC1A", "AC1A", "AC8B", "ST1A", "ST4B", "SEXS", "GENROU", "GENSAE", "STAB1",
-    "PSS2B",
+    "PSS2B", "TGOV1", "HYGOV",
 )  # fmt: skip
 
 hypothesis.settings.register_profile("few", max_examples=30, deadline=None, derandomize=True)

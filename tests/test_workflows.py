@@ -115,7 +115,7 @@ def test_the_check_system_gives_back_its_two_numbers(fits):
     assert found.values["a"] == pytest.approx(2.0, rel=1e-5)
 
 
-@pytest.mark.parametrize("jacobian", ["central", "forward", "backward"])
+@pytest.mark.parametrize("jacobian", few_of(["central", "forward", "backward"], 1))
 def test_differences_lead_to_the_same_minimum_as_the_exact_derivative(fits, tmp_path, jacobian):
     text = (ROOT / "configs" / "ac1a_good.yaml").read_text()
     changed = text.replace("estimate:\n", f"estimate:\n  jacobian: {jacobian}\n")

@@ -20,6 +20,7 @@ from cases import FILES_OF_A_FIT, FIRST_ORDER, TIME, TRUTH, with_local_search
 from commands import Ran
 from places import ROOT
 from rich.console import Console
+from tiers import few_of
 
 from exfit import cli, workflows
 from exfit.models import MODELS
@@ -795,7 +796,7 @@ def test_ctrl_c_while_drawing_ends_with_130_and_says_what_stands(run, monkeypatc
     assert json.loads((place / "result.json").read_text())["success"]
 
 
-@pytest.mark.parametrize("option", [None, "--json", "-q"])
+@pytest.mark.parametrize("option", few_of([None, "--json", "-q"], 1))
 def test_results_are_written_and_shown_before_a_figure_is_drawn(run, monkeypatch, capsys, option):
     shown = []
     draw = FigureFiles.draw

@@ -12,6 +12,7 @@ import yaml
 from cases import FIRST_ORDER, TIME, TRUTH, with_local_search
 from matplotlib.figure import Figure
 from rich.console import Console
+from tiers import few_of
 
 from exfit import workflows
 from exfit.errors import ExfitError
@@ -221,7 +222,7 @@ def test_ctrl_c_keeps_what_is_done_and_ends_with_3():
     assert not (folder / "c-lm").exists()
 
 
-@pytest.mark.parametrize("width", [40, 80, 200])
+@pytest.mark.parametrize("width", few_of([40, 80, 200], 1))
 def test_a_terminal_shows_the_fit_that_runs_and_no_line_is_too_wide(run, monkeypatch, width):
     stream = io.StringIO()
     screen = Console(file=stream, force_terminal=True, color_system=None, width=width)

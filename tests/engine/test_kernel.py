@@ -58,7 +58,7 @@ def size_of(got):
 AS_FLOATS = 1e-10
 
 
-@settings(deadline=None, max_examples=5, derandomize=True)
+@settings(deadline=None, max_examples=min(5, settings.default.max_examples // 10), derandomize=True)
 @given(seed=st.integers(0, 10**6), size=st.sampled_from([0.002, 0.05, 0.5]))
 def test_machine_code_gives_what_the_float_run_gives(model, seed, size):
     system, values = system_of(model), drawn_values(model, seed)
@@ -95,6 +95,7 @@ def test_sets_side_by_side_give_what_each_gives_alone_to_the_last_bit(model):
             np.testing.assert_array_equal(c, b)
 
 
+@pytest.mark.long
 def test_arrays_of_sets_give_what_each_set_gives(model):
     system = system_of(model)
     sets = [drawn_values(model, seed) for seed in range(5)]

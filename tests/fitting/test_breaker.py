@@ -16,6 +16,7 @@ from rejection_cases import (
 )
 from rejection_record import FILE, UNIT, rejection_record
 from rejection_record import OPENS as OPENS_IN_SAMPLE
+from tiers import few_of
 from typed_rejection import Load, recorded_rejection
 
 import exfit
@@ -27,6 +28,7 @@ from exfit.fitting.nuisances.parameters import names_of
 from exfit.records.record import Record
 
 
+@pytest.mark.long
 def test_a_reactive_rejection_determines_the_d_axis_and_says_what_it_does_not():
     """X'd and T'd0 to 2 %, X''d to 5 %; nothing of the q axis nor of the inertia acts."""
     free = D_AXIS | {"Xq": 0.9, "H": 1.2}
@@ -132,7 +134,7 @@ def with_exciter(case):
     return Case.from_dict(content, case.given_records[recording.name])
 
 
-@pytest.mark.parametrize("plant", [lambda case: case, with_exciter])
+@pytest.mark.parametrize("plant", few_of([lambda case: case, with_exciter], 1))
 def test_derivatives_to_all_that_a_rejection_finds_are_exact(plant):
     """Beside central differences of the response, to the instant among them."""
     case = plant(case_of(Load(0.3, -0.2), D_AXIS | Q_AXIS, end=2.0, opens={"start": "auto"}))
@@ -160,6 +162,7 @@ def test_a_record_without_a_jump_gives_no_instant():
         build_experiments(Case.from_dict(content, record))
 
 
+@pytest.mark.long
 def test_a_recorded_speed_drives_vt_and_a_simulated_one_is_compared():
     load = Load(0.4, -0.1)
     driven = case_of(load, {"Tpd0": 1.1}, driving=("speed",), end=3.0)

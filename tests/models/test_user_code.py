@@ -70,11 +70,14 @@ def test_a_file_that_is_known_by_its_hash_is_run_once(tmp_path):
 
 @pytest.mark.parametrize(
     "command",
-    [
-        ["validate", "case.yaml"],
-        ["validate", "case.yaml", "--parameters", "run-1/parameters.yaml"],
-        ["simulate", "case.yaml", "--parameters", "run-1/parameters.yaml"],
-    ],
+    few_of(
+        [
+            ["validate", "case.yaml"],
+            ["validate", "case.yaml", "--parameters", "run-1/parameters.yaml"],
+            ["simulate", "case.yaml", "--parameters", "run-1/parameters.yaml"],
+        ],
+        1,
+    ),
 )
 def test_a_model_that_changed_since_the_fit_is_refused_before_it_is_run(case, command, capsys):
     assert run("fit", case, "-o", "run-1", "--no-plots", "--quiet") == 0

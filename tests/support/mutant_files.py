@@ -299,6 +299,58 @@ def _text_record(rng: Random, changes: Changes) -> Files:
     return {"record" + rng.choice((".csv", ".txt")): _damaged(rng, data, changes, text=True)}
 
 
+FITTED = b"""model: FIRST_ORDER
+plant: {type: none}
+test: {vt0: 1.0, vref: [{at: 1.0, step: 0.05}]}
+record: {file: record.csv, time: t, channels: {vt: vt}}
+parameters: {free: {k: {start: 2.0, min: 0.1, max: 50.0}, a: {start: 2.0, min: 0.1, max: 50.0}}}
+estimate: {search: local, iterations: 10}
+validate:
+  - name: again
+    test: {vref: [{at: 1.0, step: 0.05}]}
+    record: {file: again.csv, time: t, channels: {vt: vt}}
+"""
+
+
+def _fitted_record(rng: Random, changes: Changes) -> Files:
+    """Return a case with a record whose samples are damaged, but numbers in a table still."""
+    table = _recorded()
+    time, columns = [*table.columns[0]], [[*column] for column in table.columns[1:]]
+    for _ in range(rng.randint(1, 3)):
+        column = rng.choice([time, *columns, *5 * [columns[0]]])
+        first = rng.randrange(len(column))
+        last = min(first + rng.choice((1, 1, 2, 20, len(column))), len(column))
+        what, change = rng.choice([*SAMPLE_CHANGES.items()])
+        column[first:last] = [
+            None if value is None else change(value, rng) for value in column[first:last]
+        ]
+        changes.append(f"samples {first} to {last}: {what}")
+    damaged = Table(table.names, [time, *columns], table.units)
+    both = [damaged, table] if rng.random() < 0.7 else [table, damaged]
+    return {"case.yaml": FITTED} | dict(
+        zip(("record.csv", "again.csv"), map(_csv, both), strict=True)
+    )
+
+
+def _csv(table: Table) -> bytes:
+    rows = [table.names, *_rows(table)]
+    return "\n".join(",".join(map(_cell, row)) for row in rows).encode()
+
+
+SAMPLE_CHANGES: Mapping[str, Callable[[float, Random], float | None]] = {
+    "missing": lambda value, rng: None,
+    "the same": lambda value, rng: 1.0,
+    "zero": lambda value, rng: 0.0,
+    "reversed": lambda value, rng: -value,
+    "huge": lambda value, rng: value * 10.0 ** rng.choice((3, 30, 150, 300)),
+    "tiny": lambda value, rng: value * 10.0 ** -rng.choice((3, 30, 150, 300)),
+    "another base": lambda value, rng: 15.75 * value,
+    "far off": lambda value, rng: value + 1e6,
+    "noise": lambda value, rng: value + rng.gauss(0.0, 0.1),
+    "coarse": lambda value, rng: round(value, 1),
+}
+
+
 def _damaged(rng: Random, data: bytes, changes: Changes, text: bool = False) -> bytes:
     """Return data, half the time with changed bytes."""
     if changes and rng.random() < 0.5:
@@ -626,6 +678,7 @@ KINDS: Mapping[str, Callable[[Random, Changes], Files]] = {
     "result": _result,
     "programme-result": _programme_result,
     "text": _text_record,
+    "samples": _fitted_record,
     "workbook": _workbook,
     "mat": _mat,
     "parquet": _parquet,

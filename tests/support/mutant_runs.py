@@ -79,6 +79,11 @@ def commands(mutant: Mutant, folder: Path) -> Iterator[tuple[str, ...]]:
         yield ("export", main, "-o", f"{OUT}/unit.dyr")
     elif mutant.kind == "programme-result":
         yield ("report", ".", "-o", f"{OUT}/report.html")
+    elif mutant.kind == "samples":
+        command = ("validate", "identify", "profile", "fit")[mutant.number % 4]
+        values = ("--parameters", "values.yaml") if command == "validate" else ()
+        (folder / "values.yaml").write_text("parameters: {k: 2.5, a: 2.5}\n")
+        yield (command, main, *values, "-o", OUT, plots)
     elif mutant.kind in RECORDS:
         yield ("inspect", main, "-o", OUT, plots)
         yield ("new", "--model", "AC1A", "--record", main, "-o", f"{OUT}/new.yaml")

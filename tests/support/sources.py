@@ -34,6 +34,8 @@ def trees():
     return ((name, tree_of(name)) for name in MODULES)
 
 
-def nodes():
-    """Yield the path and each node of each module."""
-    return ((path, node) for name, path in MODULES.items() for node in nodes_of(name))
+def nodes(wanted):
+    """Yield the path and each node of each module whose text is ``wanted``."""
+    for name, path in MODULES.items():
+        if wanted(path.read_text(encoding="utf-8")):
+            yield from ((path, node) for node in nodes_of(name))

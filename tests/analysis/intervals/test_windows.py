@@ -48,6 +48,7 @@ def test_a_constant_one_keeps_the_interval_of_the_fit(tmp_path):
     assert any("no more than noise spreads them" in note for note in result.notes)
 
 
+@pytest.mark.long
 def test_the_windows_are_in_the_file_of_the_result(moving, tmp_path):
     file = tmp_path / "result.json"
     file.write_text(result_text(moving), encoding="utf-8")

@@ -90,6 +90,7 @@ def test_an_error_far_above_the_noise_misses_the_record(tmp_path, at, step, drif
     assert (found.verdict == MISSES) == missed
 
 
+@pytest.mark.long
 def test_what_is_masked_does_not_count(tmp_path):
     shown = synthetic(tmp_path, TEST, TIME, seed=1)["vt"]
     shown[(TIME > 3.0) & (TIME < 3.5)] += 0.01
