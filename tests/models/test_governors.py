@@ -414,7 +414,7 @@ def typed_ggov1(x, w, pe, ref, p):
     pe0 = POWER / base
     error = ref + mw - w - p["R"] * measured  # Rselect = 1
     error = np.sign(error) * max(abs(error) - p["db"], 0.0)
-    error = min(p["MAXERR"], max(p["MINERR"], error))
+    error = min(p["maxerr"], max(p["minerr"], error))
     asked = p["Kpgov"] * error + stiff * (error - slow_error) + integral
     room = p["Ldref"] / p["Kturb"] + p["Wfnl"] - hot
     may = p["Kpload"] * room + load

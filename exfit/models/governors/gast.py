@@ -1,13 +1,14 @@
 """GAST: gas turbine governor (PSS/E).
 
-                              VMAX
-pref ─►(+)────►[least  ]─►[   1   ]─►[   1   ]─┬─►(+)─► Pm
-       -▲   ┌─►[of both]  [1 + sT1]  [1 + sT2] │  -▲
-      [1/R] │                 VMIN             │ [Dturb]
-        ▲  (+)◄─ AT                            │   ▲
-        dw  ▲                                  │   dw
-            └──[KT]◄──(+)◄──────[   1   ]◄─────┘
-                   AT ─►▲-      [1 + sT3]
+                                   VMAX
+pref ─────────►(+)─►[lower of]─►[   1   ]─►[   1   ]─┬─►(+)─► Pm
+             -▲     [the two ]  [1 + sT1]  [1 + sT2] │-▲
+dw ─►[  1/R  ]┘         ▲          VMIN              │ │
+                  AT ─►(+)◄─[KT]◄─(+)◄── AT          │ │
+                                   ▲-                │ │
+                                   └─[   1   ]◄──────┘ │
+                                     [1 + sT3]         │
+dw ─►[Dturb]───────────────────────────────────────────┘
 
 pref is a power. The limits are non-windup. A unit that starts above AT, the
 load that the ambient temperature allows, is not at rest. Typical data are those

@@ -1,40 +1,52 @@
 """GGOV1: general governor of a gas turbine, with load and acceleration limiter.
 
-                         MAXERR
-pref ─►(+)─►[dead band]─►[clip]─►[Kpgov + Kigov/s + sKdgov/(1+sTdgov)]─► fsrn
- dw ─►-▲        db       MINERR
-        ├─◄-[R]◄─ droop: pe (Rselect 1), valve (-1), fsr (-2) or none (0)
-        └─◄─[Kimw/s]◄─(+)◄─ pe at the start     within -1.1 R and 1.1 R
-                       ▲-
-     p ─►[     1     ]─┴► pe
-         [1 + sTpelec]
+                         maxerr
+pref + mw ─►(+)─►[dead]─►[clip]─►[    Kpgov + Kigov/s    ]─► fsrn
+          -▲   ▲-[band]  minerr  [+ sKdgov/(1 + sTdgov)]
+dw ────────┘   └──[R]◄── droop
 
-fsrn, fsrt, fsra ─►[least]─►[clip VMIN, VMAX]─► fsr
+                             VMAX
+fsrn, fsrt, fsra ─►[least]─►[clip]─► fsr
+                             VMIN
 
-fsr ─►(+)─►[  1  ]─►[clip]─►[1]─┬─► valve ─►[Flag 1: x (1 + dw)]─► wf
-       ▲-  [Tact ]  Rclose, [s] │
-        └────────── Ropen  ─────┘      VMAX, VMIN
+                   Ropen   VMAX
+fsr ─►(+)─►[ 1  ]─►[clip]─►[ 1 ]─┬─► valve
+       ▲-  [Tact]  Rclose  [ s ] │
+       │                   VMIN  │
+       └─────────────────────────┘
 
-wf ─►(+)─►[Kturb]─►[1 + sTc]─►(+)─►[Trate_Mbase]─► Pm
+wf ─►(+)─►[Kturb]─►[1 + sTc]─►(+)─► Pm
       ▲-           [1 + sTb]   ▲-
-     Wfnl                     Dm (1 + dw), where Dm > 0
+     Wfnl                  Dm (1 + dw)
 
-wf ─►[1 + sTsa]─►[    1    ]─►-(+)─►[Kpload + Kiload/s]─► fsrt, at most 1
-     [1 + sTsb]  [1 + sTfload]   ▲
-                       Ldref/Kturb + Wfnl
+Ldref/Kturb + Wfnl ───────────►(+)─►[Kpload + Kiload/s]─► fsrt
+                             -▲
+wf ─►[1 + sTsa]─►[     1     ]┘
+     [1 + sTsb]  [1 + sTfload]
 
-dw ─►[   s   ]─►-(+)─►[Ka]─►[1]─► fsra, which follows fsr where it is not least
-     [1 + sTa]    ▲         [s]
-                 Aset
+Aset ─────────────►(+)─►[Ka]─►[ 1 ]─► fsra
+                 -▲           [ s ]
+dw ─►[   s   ]────┘
+     [1 + sTa]
 
-The integrals of the PID and of the load limiter follow fsr while another signal
-is the least, as PowerWorld and InterPSS draw it. fsra is drawn there as fsr of
-one time step before and Ka times step times (Aset - acceleration): here the
-step is 10 ms. Ka = 0 leaves that limiter out (there it lets no valve open).
-Dm < 0 multiplies wf on its way to fsrt with (1 + dw)^Dm. pref is a speed, R
-times the droop at rest; where Rselect = 0, it is 0. A unit that starts above
-Ldref is not at rest. Trate_Mbase is the turbine's rating over the machine's
-base, 1 where PSS/E's Trate is 0.
+pe at the start ─►(+)─►[Kimw/s]─► mw
+                -▲
+p ─►[     1     ]┴─► pe
+    [1 + sTpelec]
+
+The droop is of pe (Rselect = 1), the valve (-1), fsr (-2) or none (0); db is
+the dead band of the error. wf is the valve, with Flag = 1 times the speed. mw
+stays within 1.1 R, fsrt at most at 1. The integrals of the PID and of the load
+limiter follow fsr while another signal is the least, as PowerWorld and InterPSS
+draw it.
+
+fsra follows fsr where another signal is the least. The programs take fsr of one
+time step before and Ka times step times (Aset - acceleration); here that step
+is 10 ms. Ka = 0 leaves the limiter out (there it lets no valve open). Dm < 0
+multiplies wf on its way to fsrt with (1 + dw)^Dm. pref is a speed, R times the
+droop at rest; where Rselect = 0, it is 0. A unit that starts above Ldref is not
+at rest. Trate_Mbase is the turbine's rating over the machine's base, 1 where
+PSS/E's Trate is 0.
 
 In doubt are Dm > 0 (sources take Dm (1 + dw), not Dm dw, from the power) and
 the input of Kimw/s (pe, or p without its lag). Not modelled: a dead time of a
@@ -67,8 +79,8 @@ SHEET = sheet(
     ("Flag", 0.0, "1", (0.0, 1.0), "1: fuel in proportion to the speed"),
     ("R", 0.04, "pu", (0.0, 10.0), "permanent droop"),
     ("Tpelec", 1.0, "s", (0.0, 100.0), "power transducer lag"),
-    ("MAXERR", 0.05, "pu", (0.0, 10.0), "ceiling of the speed error"),
-    ("MINERR", -0.05, "pu", (-10.0, 0.0), "floor of the speed error"),
+    ("maxerr", 0.05, "pu", (0.0, 10.0), "ceiling of the speed error"),
+    ("minerr", -0.05, "pu", (-10.0, 0.0), "floor of the speed error"),
     ("Kpgov", 10.0, "1", (0.001, 1000.0), "proportional gain of the governor"),
     ("Kigov", 2.0, "1/s", (0.0, 1000.0), "integral gain of the governor"),
     ("Kdgov", 0.0, "s", (0.0, 1000.0), "derivative gain of the governor"),
@@ -100,7 +112,7 @@ SHEET = sheet(
 RECORDS = (
     record(
         "GGOV1",
-        "R Tpelec MAXERR MINERR Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng "
+        "R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng "
         "Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw Aset Ka Ta Trate db Tsa Tsb Rup Rdown",
         icons={"Rselect": 1, "Flag": 0},
         absent={"Teng": 0.0, "Trate": 0.0, "Rup": 99.0, "Rdown": -99.0},
@@ -111,7 +123,7 @@ RECORDS = (
 PSLF_RECORDS = (
     record(
         "ggov1",
-        "R Rselect Tpelec MAXERR MINERR Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb "
+        "R Rselect Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb "
         "Wfnl Tb Tc Flag Teng Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw PMWSET "
         "Aset Ka Ta db Tsa Tsb Rup Rdown",
         icons={"Rselect": 1, "Flag": 0},
@@ -183,9 +195,9 @@ def fuel_demand(error: Signal, least: Signal, s: Signal, p: Signal) -> Demand:
     gain, held = p.Kpgov + steep, s.INTEG - steep * s.DERIV
     loop = where(p.Rselect < -1.5, p.R, 0.0)
     alone = dead_band(error - loop * held, p) / (1.0 + loop * gain)
-    free = held + gain * clip(alone, p.MINERR, p.MAXERR)
+    free = held + gain * clip(alone, p.minerr, p.maxerr)
     fsr = clip(smaller(free, least), p.VMIN, p.VMAX)
-    seen = clip(dead_band(error - loop * fsr, p), p.MINERR, p.MAXERR)
+    seen = clip(dead_band(error - loop * fsr, p), p.minerr, p.maxerr)
     return Demand(fsr, held + gain * seen, seen)
 
 

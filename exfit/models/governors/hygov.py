@@ -1,14 +1,13 @@
 """HYGOV: hydro turbine governor with a rigid penstock (PSS/E).
 
-                                 VELM
+                                  VELM
 pref ─►(+)─►[   1   ]─►[1 + sTr]─►[clip]─┬─► c ─►[   1   ]─► g
-       -▲-  [1 + sTf]  [ r sTr ]         │       [1 + sTg]
-        ├──────────────────────[R]◄──────┘
-dw ─────┘              GMAX, GMIN, -VELM
+     -▲   ▲-[1 + sTf]  [ r sTr ]  -VELM  │       [1 + sTg]
+dw ───┘   └──────────────[R]◄────────────┘
 
-g ─►[h = (q/g)^2]─►(1 - h)─►[  1  ]─► q ─►[At h (q - qNL)]─►(+)─► Pm
-                            [ sTW ]                         -▲
-dw ─►[Dturb g]───────────────────────────────────────────────┘
+g ─►[h = (q/g)²]─►[1 - h]─►[  1  ]─► q ─►[At h (q - qNL)]─►(+)─► Pm
+                           [ sTW ]                         -▲
+dw ─►[Dturb g]──────────────────────────────────────────────┘
 
 c is the desired gate: VELM limits its rate, GMAX and GMIN its position, both
 non-windup. g is the gate, q the flow, h the head. pref is a speed, R times the

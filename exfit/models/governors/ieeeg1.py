@@ -1,16 +1,17 @@
 """IEEEG1: steam turbine governor (IEEE 1973; PSS/E).
 
-                                            UO         PMAX
-dw ─►[K (1 + sT2)]─►(+)─►[  1  ]─►[clip]─►[ 1 ]─┬─► valve
-     [  1 + sT1  ]  -▲   [ T3  ]   UC     [ s ] │
-           pref ─►(+)┤-                    PMIN │
-                     └──────────────────────────┘
+                               UO    PMAX
+pref ──────────►(+)─►[ 1  ]─►[clip]─►[ 1 ]─┬─► valve
+              -▲   ▲-[ T3 ]    UC    [ s ] │
+dw ─►[K(1+sT2)]┘   │                 PMIN  │
+     [ 1+sT1  ]    └───────────────────────┘
 
 valve ─►[   1   ]─┬─►[   1   ]─┬─►[   1   ]─┬─►[   1   ]─┐
         [1 + sT4] │  [1 + sT5] │  [1 + sT6] │  [1 + sT7] │
+                  ▼            ▼            ▼            ▼
                  [K1]         [K3]         [K5]         [K7]
-                  └─────►(+)◄──┴─────►(+)◄──┴────►(+)◄───┘
-                                       └─► Pm
+                  │            ▼            ▼            ▼
+                  └──────────►(+)─────────►(+)─────────►(+)─► Pm
 
 pref is a power, that of the valve. UC is negative, the rate of closing. The
 limits of the valve are non-windup. The shares K2, K4, K6 and K8 are those of

@@ -1,13 +1,16 @@
 """IEESGO: steam turbine governor of one gain and three shares (PSS/E).
 
                                      PMAX
-dw ─►[  K1   ]─►[1 + sT2]─►-(+)─►[clip]─►[   1   ]─► v4
-     [1 + sT1]  [1 + sT3]    ▲    PMIN   [1 + sT4]
-                            pref
+pref ─────────────────────────►(+)─►[clip]─►[   1   ]─► v4
+                             -▲      PMIN   [1 + sT4]
+dw ─►[  K1   ]─►[1 + sT2]─────┘
+     [1 + sT1]  [1 + sT3]
 
-v4 ─┬─►[1 - K2]──────────────────────────►(+)─► Pm
-    └─►[  K2   ]─┬─►[1 - K3]──────────────►▲
-       [1 + sT5] └─►[  K3   ]──────────────►
+v4 ─┬─►[1 - K2]────────────────────►(+)─►(+)─► Pm
+    │                                ▲    ▲
+    └─►[  K2   ]─┬─►[1 - K3]─────────┘    │
+       [1 + sT5] │                        │
+                 └─►[  K3   ]─────────────┘
                     [1 + sT6]
 
 pref is a power. PMAX and PMIN clip what goes into the turbine: no state stops
