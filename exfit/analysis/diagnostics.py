@@ -10,6 +10,7 @@ from exfit.analysis.causes.rest import INVISIBLE, other_levels, unsteady_signals
 from exfit.analysis.causes.run_quality import (
     LARGEST_STEP_ERROR,
     step_error_notes,
+    switching_notes,
     unstable_rest_notes,
     voltage_notes,
 )
@@ -208,7 +209,8 @@ def simulation_notes(
 
 
 def rest_notes(setup: ExperimentSetup, comparison: Comparison) -> Iterator[str]:
-    """Yield where the steady part of a record contradicts the case."""
+    """Yield where the steady part of a record contradicts the case, and what is left out of it."""
+    yield from switching_notes(setup)
     test = setup.test
     if test.steady is not None and test.begin is None:
         causes = unsteady_signals(setup.record, test.steady, setup.channels)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from exfit import estimate
 from exfit.analysis.behaviour import behaviour_of
 from exfit.analysis.causes import Evidence, FittedRecord
+from exfit.analysis.causes.run_quality import switching_notes
 from exfit.analysis.diagnostics import (
     notes,
     outlier_notes,
@@ -221,6 +222,7 @@ def fit_notes(
     yield from notes(case, residuals, best, comparisons)
     for recording, setup in zip(case.recordings, setups, strict=True):
         yield from outlier_notes(setup.record.source.name, setup.channels)
+        yield from switching_notes(setup)
         yield from reference_notes(recording.test, setup)
         experiment = setup.experiment
         yield from speed_notes(

@@ -9,6 +9,7 @@ import numpy as np
 from exfit.analysis.causes.rest import unsteady_signals
 from exfit.analysis.causes.run_quality import (
     step_error_notes,
+    switching_notes,
     unstable_rest_notes,
     voltage_notes,
 )
@@ -74,6 +75,7 @@ def _run_notes(
     simulator = setup.experiment.with_inputs(values)
     at = setup.experiment.parameters(values)
     simulated = {signal: overlay.simulated for signal, overlay in comparison.overlays.items()}
+    yield from switching_notes(setup)
     yield from unstable_rest_notes(simulator, at)
     yield from step_error_notes(case, simulator, at, simulated)
     yield from voltage_notes(case, comparison.time, simulated.get("vt"))

@@ -10,7 +10,7 @@ from exfit.case.case import Case
 from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_value
 from exfit.engine.system import System
 from exfit.errors import CaseError
-from exfit.fitting.channels import channel_of, without_masked
+from exfit.fitting.channels import channel_of, with_filter, without_masked
 from exfit.fitting.experiment import Channel, Experiment, Nuisance
 from exfit.fitting.input_steps import input_steps
 from exfit.fitting.levels import deviation, levels_of
@@ -18,7 +18,15 @@ from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
 from exfit.fitting.nuisances.sine_parameters import with_sines
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recorded.detected_steps import with_detected_steps
-from exfit.fitting.recorded.event import event_inputs, with_rest
+from exfit.fitting.recorded.event import (
+    Switching,
+    announced,
+    event_inputs,
+    masked,
+    offset_step,
+    switchings_of,
+    with_rest,
+)
 from exfit.fitting.recorded.references import references_of, span_of
 from exfit.fitting.recordings import record_of
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
@@ -41,13 +49,17 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     view, file = case.seen_from(recording), recording.record
     system = system_of(view, recording)
     driving = _driving_channels(view.kind, file, system)
-    record = without_masked(record_of(case, recording), file, driving)
+    record = with_filter(record_of(case, recording), file.filter)
+    switchings = switchings_of(view, record)
+    record = without_masked(record, masked(file, record, switchings), driving)
     references = references_of(case, recording.test, span_of(recording.test, record), record, file)
     resolved = recording.model_copy(update={"test": references.test})
     test = with_detected_steps(case, resolved, record)
     test = with_rest(test, record) if view.kind.finds_rest else test
     network = {} if view is case else _network_values(view)
-    steps = tuple(input_steps(view, test, {**values, **network}))
+    begin, end = span_of(test, record)
+    offset = offset_step(test, begin, end)
+    steps = (*input_steps(view, test, {**values, **network}), *offset)
     nuisances, free = nuisance_parameters(
         prefix_of(recording),
         test,
@@ -59,8 +71,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     if any(nuisance.kind == "shift" for nuisance in nuisances):
         steps = tuple(step._replace(smooth=False) for step in steps)
     delay = start_value(file.delay) or 0.0
-    recorded = {**_driving(view, test, record, file, driving), **references.recorded}
-    begin, end = span_of(test, record)
+    recorded = {**_driving(view, test, record, file, driving, switchings), **references.recorded}
     inputs = Inputs(begin, end + _beyond(nuisances, free, delay), steps, recorded)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
     experiment = Experiment(
@@ -71,7 +82,16 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         recording.name,
     )
     played = tuple(driving) if view.kind.plays_back else ()
-    plain = ExperimentSetup(case.path, test, record, experiment, free, references.files, played)
+    plain = ExperimentSetup(
+        case.path,
+        test,
+        record,
+        experiment,
+        free,
+        references.files,
+        played,
+        switchings=announced(file, switchings),
+    )
     return _with_given_starts(case, with_sines(case, recording, plain, values))
 
 
@@ -118,13 +138,18 @@ def _beyond(nuisances: Sequence[Nuisance], free: Sequence[FreeParameter], delay:
 
 
 def _driving(
-    case: Case, test: BumpTest, record: Record, file: RecordFile, driving: Sequence[str]
+    case: Case,
+    test: BumpTest,
+    record: Record,
+    file: RecordFile,
+    driving: Sequence[str],
+    switchings: Sequence[Switching],
 ) -> dict[str, RecordedInput | SplinedInput]:
     """Return the signals of a record that drive the simulation, but for recorded references.
 
     One whose scale is found is without any: the system multiplies it.
     """
-    event = event_inputs(test, record) if case.kind.finds_rest else {}
+    event = event_inputs(test, record, switchings) if case.kind.finds_rest else {}
     if event:
         driving = [signal for signal in driving if signal in REFERENCES]
     elif not case.kind.plays_back:

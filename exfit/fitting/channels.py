@@ -1,6 +1,6 @@
 """The channels of a record as they are compared: masked, cleaned, filtered, weighted."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -41,13 +41,15 @@ class NoiseShape(NamedTuple):
     apart: int
 
 
-def without_masked(record: Record, file: RecordFile, driving: Sequence[str]) -> Record:
-    """Return a record with nan in place of what is masked; what drives stays as it is.
+def without_masked(
+    record: Record, mask: Iterable[tuple[float, float]], driving: Sequence[str]
+) -> Record:
+    """Return a record with nan in the intervals (s) of a mask; what drives stays as it is.
 
     Raises RecordError where a signal that drives has a gap.
     """
     masked = np.zeros(len(record.time), dtype=bool)
-    for first, last in file.mask:
+    for first, last in mask:
         masked |= (record.time >= first) & (record.time <= last)
     signals = dict(record.signals)
     for signal, samples in record.signals.items():
@@ -58,6 +60,25 @@ def without_masked(record: Record, file: RecordFile, driving: Sequence[str]) -> 
             raise RecordError(
                 f"{record.source}: {signal}: drives the simulation, but has a gap at {at:g} s"
             )
+    return replace(record, signals=signals)
+
+
+def with_filter(record: Record, filter: Filter | None) -> Record:
+    """Return a record whose signals have all passed a filter, gaps in them as they were.
+
+    Raises RecordError where it cannot be filtered.
+    """
+    if filter is None:
+        return record
+    signals = {}
+    for signal, samples in record.signals.items():
+        there = np.isfinite(samples)
+        try:
+            own = Filtering(record.time, there, _filter(filter))
+        except ValueError as fault:
+            raise RecordError(f"{record.source}: {signal}: filter: {fault}") from fault
+        signals[signal] = np.full(len(samples), np.nan)
+        signals[signal][there] = own.apply(samples)
     return replace(record, signals=signals)
 
 

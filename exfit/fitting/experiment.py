@@ -23,6 +23,7 @@ NuisanceKind = Literal[
     "at",
     "shift",
     "step",
+    "drift",
     "vt0",
     "delay",
     "scale",
@@ -37,6 +38,7 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
     "at": ("s", "instant of a step"),
     "shift": ("s", "instant of a step"),
     "step": ("pu", "size of a step"),
+    "drift": ("Hz", "offset of the frequency"),
     "vt0": ("pu", "voltage before the first step"),
     "delay": ("s", "delay of the recorder"),
     "scale": ("", "factor of a channel"),
@@ -58,13 +60,15 @@ class Nuisance:
 
     ``step`` is the index in the inputs of a step whose instant or size it is, ``signal`` the
     channel whose scale, offset or periodic disturbance it is. The instant of an only step is a
-    ``shift`` of the whole response: the simulation stays as it is.
+    ``shift`` of the whole response: the simulation stays as it is. ``factor`` is what a step is of
+    a value that makes it.
     """
 
     name: str
     kind: NuisanceKind
     step: int = 0
     signal: str = ""
+    factor: float = 1.0
 
     @property
     def unit(self) -> str:
@@ -175,7 +179,10 @@ class Experiment:
     @property
     def moves(self) -> bool:
         """Whether the fit moves what its simulations do not have side by side."""
-        return any(nuisance.kind in ("at", "shift", "step", "delay") for nuisance in self.nuisances)
+        return any(
+            nuisance.kind in ("at", "shift", "step", "drift", "delay")
+            for nuisance in self.nuisances
+        )
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -199,8 +206,9 @@ class Experiment:
         for nuisance in self.nuisances:
             if nuisance.kind == "at":
                 steps[nuisance.step] = steps[nuisance.step]._replace(at=values[nuisance.name])
-            elif nuisance.kind == "step":
-                steps[nuisance.step] = steps[nuisance.step]._replace(step=values[nuisance.name])
+            elif nuisance.kind in ("step", "drift"):
+                size = nuisance.factor * values[nuisance.name]
+                steps[nuisance.step] = steps[nuisance.step]._replace(step=size)
             elif nuisance.kind == "delay":
                 delay = values[nuisance.name]
         shifts = [
@@ -366,8 +374,8 @@ class Experiment:
             at, step = steps.get(nuisance.step, (0.0, 0.0))
             if nuisance.kind == "at":
                 steps[nuisance.step] = (at + d, step)
-            elif nuisance.kind == "step":
-                steps[nuisance.step] = (at, step + d)
+            elif nuisance.kind in ("step", "drift"):
+                steps[nuisance.step] = (at, step + nuisance.factor * d)
             elif nuisance.kind in ("delay", "shift"):
                 delay += d
             elif nuisance.kind in OF_SYSTEM:

@@ -12,6 +12,7 @@ from exfit.case.schema import BumpTest
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.recorded.event import Switching
 from exfit.records.record import Record
 from exfit.simulation.simulator import Response, Simulator
 
@@ -39,7 +40,7 @@ class ExperimentSetup:
     ``references`` the files of the test's signals beside the record, by signal;
     ``driving`` are the signals of the record that drive it in place of a plant;
     ``automatic_sines`` are the signals of which residuals may show a periodic disturbance, with
-    the range of its frequency, Hz.
+    the range of its frequency, Hz; ``switchings`` those about which it is not compared.
     """
 
     case: Path
@@ -50,6 +51,7 @@ class ExperimentSetup:
     references: Mapping[str, Record] = field(default_factory=dict)
     driving: tuple[str, ...] = ()
     automatic_sines: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    switchings: tuple[Switching, ...] = ()
 
     @property
     def name(self) -> str:

@@ -1,6 +1,6 @@
 """A recorded input that runs between its samples in splines, as smooth as what was recorded."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,23 +10,20 @@ from numpy.typing import NDArray
 from exfit.simulation.grid import GridSegment
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
-
-NO_JUMPS = np.zeros(0, np.intp)
 
 
 @dataclass(frozen=True, eq=False)
 class SplinedInput:
     """A recorded input: by how much its ``samples`` (M,) at ``time`` (s) deviate from the start.
 
-    Cubic splines run through them, from jump to jump: after each of the samples ``jumps`` it jumps
-    in a line to the next one. ``integrated`` it is the integral of that from the first sample on.
-    Beyond the first and last sample it stays.
+    Cubic splines run through them, from jump to jump: each of the ``jumps`` is the sample before it
+    and the one after it, between which it runs in lines. ``integrated`` it is the integral of that
+    from the first sample on. Beyond the first and last sample it stays.
     """
 
     time: Array
     samples: Array
-    jumps: Places = field(default_factory=lambda: NO_JUMPS)
+    jumps: tuple[tuple[int, int], ...] = ()
     integrated: bool = False
 
     def on(self, part: GridSegment) -> Array:
@@ -43,14 +40,13 @@ class SplinedInput:
         """The polynomials between the samples, as SciPy evaluates them."""
         from scipy.interpolate import CubicSpline, PPoly
 
-        first, parts = 0, []
-        for last in (*self.jumps.tolist(), len(self.time) - 1):
+        first, parts, end = 0, [], len(self.time) - 1
+        for last, after in (*self.jumps, (end, end)):
             if last > first:
                 own = slice(first, last + 1)
                 parts.append(CubicSpline(self.time[own], self.samples[own]).c)
-            if last < len(self.time) - 1:
-                parts.append(self._line(last))
-            first = last + 1
+            parts += [self._line(place) for place in range(last, after)]
+            first = after
         polynomials = PPoly(np.concatenate(parts, axis=1), self.time)
         return polynomials.antiderivative() if self.integrated else polynomials
 

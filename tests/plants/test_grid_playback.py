@@ -226,8 +226,7 @@ def test_a_spline_goes_from_jump_to_jump():
     time = np.arange(60) / 60.0
     smooth = np.sin(3.0 * time)
     jumping = smooth + 0.5 * (time > 0.5)
-    after = np.array([30])
-    spline = SplinedInput(time, jumping, after)
+    spline = SplinedInput(time, jumping, ((30, 31),))
     fine = np.linspace(0.0, time[-1], 591)
     exact = np.sin(3.0 * fine) + 0.5 * (fine >= time[31])
     outside = (fine <= time[30]) | (fine >= time[31])

@@ -6,6 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
+from exfit.fitting.recorded.event import MASKED
+from exfit.fitting.setup import ExperimentSetup
+from exfit.signals import unit_of_signal
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -14,6 +17,7 @@ Values = Mapping[str, float]
 LEAST_GROWTH = 1e-3  # 1/s: what grows slower doubles in more than ten minutes
 ROUNDING_OF_RATES = 1e-6  # of the fastest rate: by what rounding parts a double eigenvalue of zero
 HIGHEST_VOLTAGE = 2.0  # pu: beyond it protection has tripped, and no curve of saturation holds
+SWITCHINGS_LISTED = 5  # the first ones
 LARGEST_STEP_ERROR = 1e-4  # pu, or of the largest value of a signal that passes 1 pu
 
 
@@ -64,3 +68,20 @@ def step_error_notes(
                 f"halving the step of {case.simulation.step:g} s moves {signal} by "
                 f"{errors[signal]:.1e} pu: reduce simulation.step"
             )
+
+
+def switching_notes(setup: ExperimentSetup) -> Iterator[str]:
+    """Yield about which switchings in the grid a record is not compared."""
+    if not setup.switchings:
+        return
+    jumps = ", ".join(
+        f"{switching.signal} {switching.change:+.3g} {unit_of_signal(switching.signal)} at "
+        f"{switching.at:.4g} s"
+        for switching in setup.switchings[:SWITCHINGS_LISTED]
+    )
+    more = len(setup.switchings) - SWITCHINGS_LISTED
+    others = f" and {more} more" if more > 0 else ""
+    yield (
+        f"{setup.record.source.name}: not compared {MASKED:g} s before and after switchings in the "
+        f"grid: {jumps}{others}; record.switchings: compare keeps these samples"
+    )

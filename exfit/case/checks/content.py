@@ -17,6 +17,7 @@ from exfit.case.checks.plant import (
 )
 from exfit.case.checks.record import (
     channels_faults,
+    event_faults,
     level_faults,
     name_faults,
     noise_faults,
@@ -116,6 +117,7 @@ def _recording_faults(
     test, record = recording.at("test"), recording.at("record")
     has_record = "record" in recording
     yield from bump_test_faults(test, network, kind)
+    yield from event_faults(test, record, kind)
     yield from nuisance_faults(test, record, kind, has_record)
     yield from breaker_faults(test, record, kind)
     yield from recorded_reference_faults(test, record, kind, has_record)

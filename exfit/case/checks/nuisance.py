@@ -21,7 +21,7 @@ def nuisance_faults(
         if not value.is_section:
             continue
         yield from _value_faults(value)
-        if kind.plays_back and not _scale_of(value, kind):
+        if kind.plays_back and not (_scale_of(value, kind) or _offset_of(value, kind)):
             yield value.fault(f"not allowed with plant {kind.name}: the record drives it")
         elif value.at("start").text == "auto":
             yield from _automatic_faults(value.at("start"), record, has_record)
@@ -40,6 +40,11 @@ def _scale_of(value: ContentNode, kind: PlantKind) -> bool:
     return bool(kind.scaled) and key == "scale" and signal != LEVEL_OF
 
 
+def _offset_of(value: ContentNode, kind: PlantKind) -> bool:
+    """Return whether a value is the offset of the frequency that a record of an event drives."""
+    return kind.finds_rest and value.place[-1] == "frequency_offset"
+
+
 def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:
     """Yield the places at which a number or {start, min, max} is allowed."""
     yield test.at("vt0")
@@ -48,6 +53,7 @@ def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:
             yield step.at("at")
             yield step.at("step")
     yield test.at(BREAKER, "opens")
+    yield test.at("frequency_offset")
     yield record.at("delay")
     for _, channel in record.at("channels").sections:
         yield channel.at("scale")

@@ -20,6 +20,15 @@ AFTER_WINDOW = "leave this step out, or end the window after it"
 PREFIXES_OF_PARTS = ("machine", "network", "stabiliser", "governor")
 
 
+def event_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:
+    """Yield what only the record of a grid event may have, where the plant plays none."""
+    if kind.finds_rest:
+        return
+    for node in (record.at("switchings"), record.at("filter"), test.at("frequency_offset")):
+        if node.value is not None:
+            yield node.fault(f"not allowed with plant {kind.name}: no grid event drives it")
+
+
 def record_faults(test: ContentNode, record: ContentNode) -> Iterator[Fault]:
     """Yield what contradicts itself in a record, or between it and its test."""
     if "duration" in test:

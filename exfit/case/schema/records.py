@@ -163,6 +163,16 @@ class RecordFile(Section):
     mask: tuple[tuple[Number, Number], ...] = Field(
         default=(), description="Parts that are not compared: start and end of each, s."
     )
+    switchings: Literal["mask", "compare"] = Field(
+        default="mask",
+        description="Whether 0.2 s before and after each switching in the grid, a jump of vt or of "
+        "its angle, are left out (mask) or compared; grid-playback only.",
+    )
+    filter: Filter | None = Field(
+        default=None,
+        description="{lowpass: Hz} or {median: samples}, for all channels alike, those that drive "
+        "and those that are compared; its end effects are left out; grid-playback only.",
+    )
     gaps: Literal["refuse", "skip"] = Field(
         default="refuse", description="Whether samples without a value are refused or left out."
     )

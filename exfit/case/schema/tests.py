@@ -204,6 +204,11 @@ class BumpTest(Section):
         description="End of the steady state in the record, s; default: the first step, or the "
         "first move of a recorded reference.",
     )
+    frequency_offset: Findable | None = Field(
+        default=None,
+        description="Added to the frequency of the grid, less its mean at rest, Hz; or {start, "
+        "min, max} to fit it; grid-playback only. Default: none.",
+    )
     vref: Reference = Field(
         default=(),
         description="The reference: steps and ramps in order of time; a table; a file; or "

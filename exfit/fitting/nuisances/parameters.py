@@ -1,6 +1,7 @@
 """What a fit finds about a record beside the parameters of the unit: instants, sizes, levels."""
 
 from collections.abc import Collection, Iterator, Sequence
+from math import pi
 from typing import Literal
 
 from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
@@ -11,6 +12,8 @@ from exfit.plants import BREAKER, REFERENCES, VT0
 from exfit.signals import SIGNALS
 from exfit.simulation.inputs import InputStep
 
+OFFSET = "frequency_offset"
+TURN = 2.0 * pi
 OPENING = "breaker.opens"  # the name of the instant, as its place in a test
 
 
@@ -54,6 +57,8 @@ def names_of(recording: Recording) -> tuple[str, ...]:
     prefix = prefix_of(recording)
     if test.breaker is not None:
         steps.append(InputStep(0.0, 1.0, BREAKER))
+    if test.frequency_offset is not None:
+        steps.append(InputStep(0.0, 0.0, "angle"))
     nuisances = [*_of_steps(prefix, test, steps, shift=False), *_of_record(prefix, test, file)]
     level = (f"{prefix}{VT0}",) if finds_level(test, file) else ()
     return (*(nuisance.name for nuisance, _ in nuisances), *level, *_sine_names(prefix, file))
@@ -99,6 +104,10 @@ def _of_steps(
                 yield Nuisance(f"{which}.at", "shift" if shift else "at", place), step.at
             if isinstance(step.step, Unknown):
                 yield Nuisance(f"{which}.step", "step", place), step.step
+    if isinstance(test.frequency_offset, Unknown):
+        place = len(steps) - 1  # the last of all
+        factor = TURN * steps[place].ramp
+        yield Nuisance(f"{prefix}{OFFSET}", "drift", place, factor=factor), test.frequency_offset
     if test.breaker is not None and isinstance(test.breaker.opens, Unknown):
         # the only step of its test
         yield Nuisance(f"{prefix}{OPENING}", "shift"), test.breaker.opens

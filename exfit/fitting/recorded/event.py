@@ -1,23 +1,96 @@
 """What a record of a grid event gives a unit that it drives: the rest before it, the inputs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.schema import BumpTest
+from exfit.case.case import Case
+from exfit.case.schema import BumpTest, MedianSection, RecordFile, start_value
 from exfit.dsp.reference_moves import FEWEST_SAMPLES, rest_end
+from exfit.dsp.switchings import jumps_while_moving
 from exfit.errors import RecordError
 from exfit.fitting.levels import deviation, initial_level
 from exfit.plants import RESTING
 from exfit.records.record import Record
-from exfit.simulation.inputs import RecordedInput
+from exfit.simulation.inputs import InputStep, RecordedInput
 from exfit.simulation.splines import SplinedInput
+from exfit.util.sorting import median
 from exfit.util.text import show
 
 Array = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
+LEAST_JUMPS = {"vt": 0.005, "angle": 0.02}  # pu, rad: a smaller one of the grid does no harm
+MASKED = 0.2  # s, before and after a switching, in which a record is not compared
+
+
+class Switching(NamedTuple):
+    """A jump of a signal that drives a unit: from which sample to which, when (s), by how much."""
+
+    signal: str
+    jump: tuple[int, int]
+    at: float
+    change: float
+
+    @property
+    def masked(self) -> tuple[float, float]:
+        """The interval in which the record is not compared, s."""
+        return self.at - MASKED, self.at + MASKED
+
+
+def masked(
+    file: RecordFile, record: Record, switchings: tuple[Switching, ...]
+) -> tuple[tuple[float, float], ...]:
+    """Return the intervals (s) of a record that are not compared.
+
+    Among them is its end where all channels were filtered: there a filter lacks what follows, and
+    a unit that it drives by then moves otherwise.
+    """
+    about = (switching.masked for switching in announced(file, switchings))
+    return (*file.mask, *about, *_filtered_end(file, record))
+
+
+def announced(file: RecordFile, switchings: tuple[Switching, ...]) -> tuple[Switching, ...]:
+    """Return the switchings about which a record is not compared."""
+    return switchings if file.switchings == "mask" else ()
+
+
+def _filtered_end(file: RecordFile, record: Record) -> Iterator[tuple[float, float]]:
+    """Yield the end of a record over which its filter reaches, s."""
+    if file.filter is None:
+        return
+    end = float(record.time[-1])
+    if isinstance(file.filter, MedianSection):
+        reach = file.filter.median // 2 * float(median(np.diff(record.time)))
+    else:
+        reach = 1.0 / file.filter.lowpass
+    yield end - reach, end
+
+
+def offset_step(test: BumpTest, begin: float, end: float) -> tuple[InputStep, ...]:
+    """Return the change of the angle by what is added to the recorded frequency, if it is."""
+    offset = start_value(test.frequency_offset)
+    if offset is None:
+        return ()
+    return (InputStep(begin, offset * TURN * (end - begin), "angle", ramp=end - begin),)
+
+
+def switchings_of(case: Case, record: Record) -> tuple[Switching, ...]:
+    """Return the jumps of what drives a unit in the record of an event: switchings in the grid."""
+    result: list[Switching] = []
+    if not case.kind.finds_rest:
+        return ()
+    for signal, least in LEAST_JUMPS.items():
+        if signal not in record.signals:
+            continue
+        samples = record.signals[signal] if signal != "angle" else unwrapped(record)
+        for first, last in jumps_while_moving(record.time, samples, least):
+            at = 0.5 * float(record.time[first] + record.time[last])
+            change = float(samples[last] - samples[first])
+            result.append(Switching(signal, (first, last), at, change))
+    return tuple(result)
 
 
 def with_rest(test: BumpTest, record: Record) -> BumpTest:
@@ -28,12 +101,12 @@ def with_rest(test: BumpTest, record: Record) -> BumpTest:
     if test.steady_until is not None:
         _refuse_short_rest(test.steady_until, record)
         return test
-    ends: list[int] = []
-    for signal, samples in _showing_rest(record):
+    ends: list[float] = []
+    for signal, time, samples in _showing_rest(record):
         if np.ptp(samples) == 0.0:
             continue
         try:
-            ends.append(rest_end(samples))
+            ends.append(float(time[rest_end(samples)]))
         except ValueError as fault:
             if "never" not in str(fault):
                 text = f"{signal}: {fault}; give test.steady_until, or a record that begins earlier"
@@ -41,8 +114,7 @@ def with_rest(test: BumpTest, record: Record) -> BumpTest:
     if not ends:
         text = "no signal moves out of its noise: there is no event; test.steady_until says"
         raise RecordError(f"{record.source}: {text} until when the record is at rest")
-    first = min([float(record.time[min(ends)]), *test.instants])
-    return test.model_copy(update={"steady_until": first})
+    return test.model_copy(update={"steady_until": min([*ends, *test.instants])})
 
 
 def _refuse_short_rest(until: float, record: Record) -> None:
@@ -52,14 +124,15 @@ def _refuse_short_rest(until: float, record: Record) -> None:
         raise RecordError(f"{record.source}: {text}; the rest needs {FEWEST_SAMPLES}")
 
 
-def _showing_rest(record: Record) -> Iterator[tuple[str, Array]]:
-    """Yield the signals (M,) that rest before an event; of an angle, what it turns by."""
+def _showing_rest(record: Record) -> Iterator[tuple[str, Array, Array]]:
+    """Yield the signals that rest before an event, with their time; of an angle, its turning."""
     for signal in RESTING:
         if signal in record.signals:
             samples = record.signals[signal]
-            yield signal, samples[np.isfinite(samples)]
+            there = np.isfinite(samples)
+            yield signal, record.time[there], samples[there]
     if "angle" in record.signals:
-        yield "angle", np.diff(unwrapped(record)) / np.diff(record.time)
+        yield "angle", record.time[:-1], np.diff(unwrapped(record)) / np.diff(record.time)
 
 
 def unwrapped(record: Record) -> Array:
@@ -67,7 +140,13 @@ def unwrapped(record: Record) -> Array:
     return np.unwrap(record.signals["angle"])
 
 
-def angle_of_event(test: BumpTest, record: Record) -> SplinedInput:
+def _jumps(switchings: Sequence[Switching], signal: str) -> tuple[tuple[int, int], ...]:
+    return tuple(switching.jump for switching in switchings if switching.signal == signal)
+
+
+def angle_of_event(
+    test: BumpTest, record: Record, switchings: Sequence[Switching] = ()
+) -> SplinedInput:
     """Return how the angle of the recorded voltage deviates from its even course before the event.
 
     It is recorded, or the integral of the recorded frequency, less the mean of that at rest.
@@ -78,10 +157,14 @@ def angle_of_event(test: BumpTest, record: Record) -> SplinedInput:
         return SplinedInput(time, TURN * frequency, integrated=True)
     angle, resting = unwrapped(record), time < (test.steady or np.inf)
     slope, level = np.polyfit(time[resting] - time[0], angle[resting], 1)
-    return SplinedInput(time, angle - level - slope * (time - time[0]))
+    moved = angle - level - slope * (time - time[0])
+    return SplinedInput(time, moved, _jumps(switchings, "angle"))
 
 
-def event_inputs(test: BumpTest, record: Record) -> dict[str, RecordedInput | SplinedInput]:
+def event_inputs(
+    test: BumpTest, record: Record, switchings: Sequence[Switching] = ()
+) -> dict[str, RecordedInput | SplinedInput]:
     """Return the inputs that a record of an event drives: vt and its angle."""
-    voltage = SplinedInput(record.time, deviation(test, record, "vt"))
-    return {"vt": voltage, "angle": angle_of_event(test, record)}
+    moved = deviation(test, record, "vt")
+    voltage = SplinedInput(record.time, moved, _jumps(switchings, "vt"))
+    return {"vt": voltage, "angle": angle_of_event(test, record, switchings)}

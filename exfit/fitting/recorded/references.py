@@ -156,7 +156,7 @@ def with_recorded_steps(case: Case, recording: Recording) -> Recording:
     recorded = [signal for signal in REFERENCES if test.reference(signal) == "recorded"]
     if not recorded and not test.files:
         return recording
-    record = without_masked(record_of(case, recording), file, recorded)
+    record = without_masked(record_of(case, recording), file.mask, recorded)
     references = references_of(case, test, span_of(test, record), record, file)
     return recording.model_copy(update={"test": references.test})
 
