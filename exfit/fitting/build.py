@@ -11,9 +11,10 @@ from exfit.case.schema import BumpTest, RecordFile, Recording, Unknown, start_va
 from exfit.engine.system import System
 from exfit.errors import CaseError
 from exfit.fitting.channels import channel_of, with_filter, without_masked
-from exfit.fitting.experiment import Channel, Experiment, Nuisance
+from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.input_steps import input_steps
 from exfit.fitting.levels import deviation, levels_of
+from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
 from exfit.fitting.nuisances.sine_parameters import with_sines
 from exfit.fitting.parameters import FreeParameter

@@ -3,86 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exfit.dsp.filtering import Filtering
+from exfit.fitting.nuisances.kinds import OF_SYSTEM, Nuisance
 from exfit.fitting.nuisances.sine import Sine
-from exfit.plants import DRIVING_SCALE, VT0
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Values = Mapping[str, float]
-
-
-NuisanceKind = Literal[
-    "at",
-    "shift",
-    "step",
-    "drift",
-    "vt0",
-    "delay",
-    "scale",
-    "offset",
-    "driving",
-    "frequency",
-    "cosine",
-    "sine",
-]
-
-NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
-    "at": ("s", "instant of a step"),
-    "shift": ("s", "instant of a step"),
-    "step": ("pu", "size of a step"),
-    "drift": ("Hz", "offset of the frequency"),
-    "vt0": ("pu", "voltage before the first step"),
-    "delay": ("s", "delay of the recorder"),
-    "scale": ("", "factor of a channel"),
-    "offset": ("pu", "offset of a channel"),
-    "driving": ("", "factor of a channel that drives the machine"),
-    "frequency": ("Hz", "frequency of a periodic disturbance"),
-    "cosine": ("pu", "cosine of it, about the middle of the record"),
-    "sine": ("pu", "sine of it, about the middle of the record"),
-}  # unit and meaning of each kind
-
-
-# those that are a parameter of the system
-OF_SYSTEM: Mapping[NuisanceKind, str] = {"vt0": VT0, "driving": DRIVING_SCALE}
-
-
-@dataclass(frozen=True)
-class Nuisance:
-    """What a fit finds about a record, under ``name``: it is no parameter of the unit.
-
-    ``step`` is the index in the inputs of a step whose instant or size it is, ``signal`` the
-    channel whose scale, offset or periodic disturbance it is. The instant of an only step is a
-    ``shift`` of the whole response: the simulation stays as it is. ``factor`` is what a step is of
-    a value that makes it.
-    """
-
-    name: str
-    kind: NuisanceKind
-    step: int = 0
-    signal: str = ""
-    factor: float = 1.0
-
-    @property
-    def unit(self) -> str:
-        """Its unit."""
-        return NUISANCES[self.kind][0]
-
-    @property
-    def meaning(self) -> str:
-        """What it is, in words."""
-        return NUISANCES[self.kind][1]
-
-    def rescales(self, channel: "Channel") -> bool:
-        """Return whether it is the scale or the offset of a channel."""
-        return self.signal == channel.signal and self.kind in ("scale", "offset")
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +156,7 @@ class Experiment:
         of_record = {
             nuisance.kind: values[nuisance.name]
             for nuisance in self.nuisances
-            if nuisance.rescales(channel)
+            if nuisance.rescales(channel.signal)
         }
         if not of_record:
             return channel.measured
@@ -280,7 +213,7 @@ class Experiment:
 
     def _moved_channel(self, channel: Channel) -> bool:
         """Return whether the scale or offset of a channel is found."""
-        return any(nuisance.rescales(channel) for nuisance in self.nuisances)
+        return any(nuisance.rescales(channel.signal) for nuisance in self.nuisances)
 
     def tangents(self, values: Values, moves: Sequence[Values]) -> tuple[Array, Array]:
         """Return the weighted errors and their derivatives (errors, N).
@@ -386,7 +319,7 @@ class Experiment:
         self, channel: Channel, values: Values, moves: Sequence[Values]
     ) -> Array | None:
         """Return the derivatives of what was measured, if its scale or offset is found."""
-        nuisances = [nuisance for nuisance in self.nuisances if nuisance.rescales(channel)]
+        nuisances = [nuisance for nuisance in self.nuisances if nuisance.rescales(channel.signal)]
         if not nuisances:
             return None
         raw = (channel.measured - channel.offset) / channel.scale

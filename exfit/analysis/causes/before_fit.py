@@ -113,7 +113,7 @@ def _not_rescaled(setup: ExperimentSetup, overlays: Mapping[str, Overlay]) -> di
         channel.signal
         for channel in setup.channels
         for nuisance in setup.experiment.nuisances
-        if nuisance.rescales(channel)
+        if nuisance.rescales(channel.signal)
     }
     return {name: overlay for name, overlay in overlays.items() if name not in rescaled}
 

@@ -17,7 +17,8 @@ from exfit.analysis.causes.trials import (
     with_opened,
 )
 from exfit.dsp.filtering import Filtering
-from exfit.fitting.experiment import Channel, Experiment, Nuisance
+from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.fitting.residuals import Residuals
 from exfit.plants import VT0
 from exfit.results.comparisons import Overlay

@@ -14,7 +14,8 @@ from exfit.analysis.causes.trials import Opened, Trial, tried, with_experiment, 
 from exfit.dsp.filtering import Filtering, MovingAverage
 from exfit.dsp.noise import NEIGHBOURS, noise
 from exfit.dsp.step_detection import find_step
-from exfit.fitting.experiment import Channel, Nuisance
+from exfit.fitting.experiment import Channel
+from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.ripple import MAINS, Ripple
 from exfit.results.verdict import Cause

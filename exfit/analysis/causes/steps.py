@@ -19,7 +19,8 @@ from exfit.analysis.causes.trials import (
 )
 from exfit.dsp.step_detection import DetectedStep, find_step
 from exfit.errors import SimulationError
-from exfit.fitting.experiment import Experiment, Nuisance
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.results.verdict import Cause
 from exfit.simulation.inputs import InputStep
 from exfit.simulation.simulator import Simulator

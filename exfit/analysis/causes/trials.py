@@ -12,7 +12,8 @@ from exfit.analysis.causes.evidence import Evidence
 from exfit.analysis.causes.suspicion import Suspicion, suspected
 from exfit.errors import SimulationError
 from exfit.estimate.run import NotFinite
-from exfit.fitting.experiment import Experiment, Nuisance
+from exfit.fitting.experiment import Experiment
+from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.fitting.parameters import UNIT, FreeParameter
 from exfit.fitting.residuals import Residuals
 from exfit.results.verdict import Cause

@@ -16,7 +16,7 @@ from exfit.analysis.causes.trials import Opened, freed_within, with_freed, with_
 from exfit.analysis.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
 from exfit.analysis.typical_values import parameters_of
 from exfit.errors import SimulationError
-from exfit.fitting.experiment import Nuisance, NuisanceKind
+from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.uncertainty import slopes_of
 from exfit.inference.wording import digits, listed

@@ -5,7 +5,7 @@ from math import pi
 from typing import Literal
 
 from exfit.case.schema import SINGLE, BumpTest, RecordFile, Recording, Unknown
-from exfit.fitting.experiment import Nuisance
+from exfit.fitting.nuisances.kinds import Nuisance
 from exfit.fitting.nuisances.sine import COSINE, FREQUENCY, SINE
 from exfit.fitting.parameters import FreeParameter
 from exfit.plants import BREAKER, REFERENCES, VT0

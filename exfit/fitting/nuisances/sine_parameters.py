@@ -11,7 +11,8 @@ from exfit.case.case import Case
 from exfit.case.schema import Recording, SineSection, Unknown
 from exfit.dsp.lines import Line
 from exfit.errors import RecordError
-from exfit.fitting.experiment import Channel, Nuisance, NuisanceKind
+from exfit.fitting.experiment import Channel
+from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.fitting.nuisances.sine import FREQUENCY, Sine
 from exfit.fitting.parameters import FreeParameter
