@@ -7,13 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.analysis.causes.before_fit import case_warnings, record_warnings
+from exfit.analysis.causes.events_before_fit import event_warnings
 from exfit.analysis.causes.run_quality import unstable_rest_notes
 from exfit.analysis.diagnostics import search_range_notes, typical_notes
 from exfit.case.case import Case
+from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
+from exfit.fitting.setup import ExperimentSetup
 from exfit.models.blocks import SHORTEST
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Simulator
@@ -62,11 +65,9 @@ class Check:
 
 def check(case: Case) -> Check:
     """Check a case at its start values; raises ExfitError for input that cannot be used."""
+    of_events = tuple(event_warnings(case))
     if case.recordings:
-        setups = tuple(
-            setup.with_enough_substeps(setup.with_start_values(case.values()))
-            for setup in build_experiments(case)
-        )
+        setups = _ready(case, of_events)
         experiments = [setup.experiment for setup in setups]
     else:
         setups, experiments = (), [planned(case)]
@@ -96,8 +97,21 @@ def check(case: Case) -> Check:
             *search_range_notes(case),
             *dict.fromkeys(_rest_notes(experiments, values)),
         ),
-        warnings=(*case_warnings(case), *record_warnings(case, setups, case.values())),
+        warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
     )
+
+
+def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:
+    """Return the tests of a case at its values; a fault follows what is wrong with the records."""
+    try:
+        return tuple(
+            setup.with_enough_substeps(setup.with_start_values(case.values()))
+            for setup in build_experiments(case)
+        )
+    except ExfitError as fault:
+        if not warnings:
+            raise
+        raise ExfitError("\n".join([*warnings, str(fault)])) from fault
 
 
 def _rest_notes(experiments: Sequence[Experiment], values: Values) -> Iterator[str]:

@@ -95,9 +95,10 @@ def fit(
         fit_again_and_again(case, given, folder, strategy, search, output)
         return
     from exfit.analysis.causes.before_fit import case_warnings
+    from exfit.analysis.causes.events_before_fit import event_warnings
 
     loaded = given.load(case)
-    for warning in case_warnings(loaded):
+    for warning in (*case_warnings(loaded), *event_warnings(loaded)):
         echo(f"warning: {warning}", err=True)
     folder = output.folder_of(loaded, "fit")
     if output.shown:

@@ -120,6 +120,10 @@ class PhasorTable:
         """Return the columns that are computed; nan where a sample may be missing and is."""
         voltage = self._positive_sequence(self.phasors.voltage, may_lack)
         signals = {"vt": np.abs(voltage), "angle": np.angle(voltage)}
+        if len(self.phasors.voltage.angles) == 1:  # as recorded, also where the voltage is lost
+            (angle,), unit = self.phasors.voltage.angles, self.phasors.voltage.angle_unit
+            gappy = frozenset([angle]) if may_lack else NONE
+            signals["angle"] = in_radians(self.table.numbers([angle], gappy)[angle], unit)
         current = self.phasors.current
         if current is not None and any(name.removeprefix(PREFIX) in OF_POWER for name in names):
             amperes = self._positive_sequence(current, may_lack)

@@ -81,6 +81,8 @@ def record_warnings(case: Case, setups: Sequence[ExperimentSetup], values: Value
     """
     free_machine = any(name.startswith(MACHINE) for name in case.free())
     for recording, setup in zip(case.recordings, setups, strict=True):
+        if case.seen_from(recording).kind.finds_rest:
+            continue  # the record of an event has causes of its own
         place = f"{setup.name}: " if len(setups) > 1 else ""
         steady = setup.test.steady if setup.test.begin is None else None
         beside = [] if steady is None else _beside_response(setup, values, steady, free_machine)
