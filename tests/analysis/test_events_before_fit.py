@@ -2,8 +2,8 @@
 
 import pytest
 from event_files import BAD, GOOD, bad_file, good_file
-from unit_events import simulated
 from tiers import few_of
+from unit_events import simulated
 
 from exfit import workflows
 from exfit.analysis.causes.events_before_fit import event_warnings

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from unit_events import MACHINE, REST, case_of, content, simulated
 from pmu_records import F0, KV, MVA, Course, degrees, phasors_of, stamps, write_table
+from unit_events import MACHINE, REST, case_of, content, simulated
 
 TIME, V, A, FREQUENCY, P, Q, STATUS = (
     "Time (UTC)", "GEN.V1 Mag (kV)", "GEN.V1 Ang (deg)", "GEN.Freq (Hz)", "GEN.P (MW)",
