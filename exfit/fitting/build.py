@@ -1,6 +1,6 @@
 """The experiments of a case: its tests, ready to be simulated, with or without a record."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -82,7 +82,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         nuisances,
         recording.name,
     )
-    played = tuple(driving) if view.kind.plays_back else ()
+    played = _played(view.kind, driving)
     plain = ExperimentSetup(
         case.path,
         test,
@@ -100,6 +100,11 @@ def _driving_channels(kind: PlantKind, file: RecordFile, system: System) -> list
     """Return the channels of a record that drive its simulation, some in another form."""
     inputs = (*system.inputs, *kind.required_one_of)
     return [signal for signal in file.channels if signal in inputs]
+
+
+def _played(kind: PlantKind, driving: Collection[str]) -> tuple[str, ...]:
+    """Return the channels that drive a simulation in place of a plant, in the order of the kind."""
+    return tuple(signal for signal in kind.driving if signal in driving and kind.plays_back)
 
 
 def _with_given_starts(case: Case, setup: ExperimentSetup) -> ExperimentSetup:

@@ -13,7 +13,7 @@ from exfit.signals import label_of, unit_of_signal
 Array = NDArray[np.float64]
 
 FREQUENCY, HERTZ = "frequency", "Hz"
-FROM_ANGLE = "frequency less rated, from the angle (Hz)"
+FROM_ANGLE = "frequency less rated (Hz)"
 
 
 class Excursion(NamedTuple):

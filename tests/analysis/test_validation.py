@@ -46,9 +46,9 @@ STEPS = [
 
 
 def test_every_sample_record_is_among_them():
-    """But those of no step: a ramp has a test of its own, a rejection and points have theirs."""
+    """But those of no step: ramp, rejection, grid event and points have tests of their own."""
     records = {path.stem for path in (ROOT / "sample_data").glob("*.csv")}
-    others = {"ac1a_ramp", "rejection"}
+    others = {"ac1a_ramp", "rejection", "grid_event"}
     others |= {stem for stem in records if stem.startswith("programme_")}
     assert {record for record, _, _ in STEPS} == records - others
 

@@ -11,11 +11,13 @@ from exfit.fitting.experiment import Channel
 from exfit.records.record import Record
 from exfit.results.comparisons import Comparison
 from exfit.results.verdict import Cause
+from exfit.signals import unit_of_signal
 
 FAR_FROM_BASE = 0.05  # of another signal: its base or the machine's data are others
 FAR_FROM_RATED = 0.3  # pu: sqrt(3) too much or too little lies beyond
 LEAST_LEVEL = 0.1  # pu: below it a deviation is not relative to the level
 INVISIBLE = 1e-7  # pu: no recorder shows it
+TURNING = ("angle",)  # at rest, too, evenly
 
 
 def wrong_voltage(evidence: Evidence) -> Iterator[Suspicion]:
@@ -75,13 +77,15 @@ def unsteady_signals(
     }
     before = record.time < steady
     for signal, samples in record.signals.items():
+        if signal in TURNING:
+            continue
         at_rest = samples[before & np.isfinite(samples)]
         # averages over a window scatter little from each to the next: one of each window counts
         at_rest = at_rest[:: smooth.get(signal, 1)]
         drift = abs(drift_at_rest(at_rest))
         if drift > INVISIBLE:
             yield Cause(
-                f"{signal} moves by {drift:.2g} pu before {steady:g} s, where the record should be "
-                "at rest",
+                f"{signal} moves by {drift:.2g} {unit_of_signal(signal)} before {steady:g} s, "
+                "where the record should be at rest",
                 "the values that the fit starts from are uncertain",
             )

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from exfit.case.case import Case
-from exfit.case.schema import ChannelSection, MedianSection, PhasesSection, Recording
+from exfit.case.schema import Filter, MedianSection, Recording
 from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import initial
 from exfit.signals import unit_of_signal
@@ -29,9 +29,13 @@ def played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Itera
         yield f"at rest until {show(setup.test.steady)} s" + (f" with {levels}" if levels else "")
     if view.kind.has_machine and view.kind.has_exciter:
         yield SWING[getattr(view.plant, "swing", "power")]
-    left_out = ", ".join(f"{show(start)} ... {show(end)} s" for start, end in recording.record.mask)
+    masks = (*recording.record.mask, *(switching.masked for switching in setup.switchings))
+    left_out = ", ".join(f"{show(start)} ... {show(end)} s" for start, end in masks)
     if left_out:
         yield f"left out of the comparison: {left_out}"
+    everything = _filter(recording.record.filter)
+    if everything:
+        yield f"all channels {everything}"
     yield from _filters(recording)
 
 
@@ -46,13 +50,13 @@ def _levels(setup: ExperimentSetup) -> Iterator[str]:
 def _filters(recording: Recording) -> Iterator[str]:
     """Yield the filters of the channels."""
     for signal, channel in recording.record.channels.items():
-        text = _filter(channel)
+        text = _filter(channel.filter)
         if text:
             yield f"{signal} {text}"
 
 
-def _filter(channel: ChannelSection | PhasesSection) -> str:
-    given = channel.filter
+def _filter(given: Filter | None) -> str:
+    """Return a filter in words; "" for none."""
     if given is None:
         return ""
     if isinstance(given, MedianSection):

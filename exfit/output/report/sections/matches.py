@@ -82,7 +82,7 @@ def played(key: str, comparison: Comparison, bins: int = BINS) -> Chart | None:
     time, driving = comparison.time, comparison.played.driving
     panels = [
         Panel(
-            f"{signal.label}: recorded, played in",
+            f"{signal.label}, played in",
             (Series("", *envelope(time, signal.samples, bins), "other thin"),),
             HALF,
         )
