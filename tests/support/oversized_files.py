@@ -7,6 +7,8 @@ import zlib
 
 import numpy as np
 
+from exfit.records.formats.parquet_pages import PACKED, CompactReader
+
 MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 RELATIONS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
 PACKAGE = "http://schemas.openxmlformats.org/package/2006"
@@ -302,6 +304,32 @@ def parquet(rows, columns=("t",), groups=1):
 def parquet_of_zeros():
     """Return a file with a column of more than a hundred million zeros."""
     return parquet(VALUES, groups=128)
+
+
+def parquet_that_lies(unpacked=2**31 - 1, rows=1000):
+    """Return a file whose page declares to unpack to far more than the footer states."""
+    import pyarrow as pa
+    from pyarrow import parquet as files
+
+    stream = io.BytesIO()
+    table = pa.table({"t": np.arange(float(rows))})
+    files.write_table(table, stream, compression="none", use_dictionary=False)
+    data = stream.getvalue()
+    start = files.ParquetFile(stream).metadata.row_group(0).column(0).data_page_offset
+    reader = CompactReader(data[start:])
+    packed = reader.integers_of_struct()[PACKED]
+    sizes = b"".join(b"\x15" + varint(2 * size) for size in (0, unpacked, packed))
+    values = b"\x2c\x15" + varint(2 * rows) + b"\x15\x00\x15\x06\x15\x06\x00"
+    filled = reader.at - len(sizes) - len(values) - 3  # of the statistics' room
+    header = sizes + values + b"\xa8" + varint(filled) + bytes(filled) + b"\x00"
+    assert len(header) == reader.at
+    return data[:start] + header + data[start + reader.at :]
+
+
+def varint(value):
+    """Return a number of Thrift's compact protocol, seven bits in a byte."""
+    digits = [value >> shift & 0x7F for shift in range(0, max(value.bit_length(), 1), 7)]
+    return bytes([*(digit | 0x80 for digit in digits[:-1]), digits[-1]])
 
 
 def text_of_columns(count=2 * 10**6, rows=2):

@@ -1,7 +1,7 @@
 """Parquet files, by pyarrow; a column is read when it is requested."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from exfit.errors import RecordError
 from exfit.records.formats.columns import Columns, missing_package, sound
 from exfit.records.formats.heads import stated
 from exfit.records.formats.memory import memory_limit, readable
+from exfit.records.formats.parquet_pages import unpacked_bytes
 from exfit.records.formats.table import Table, column_error
 from exfit.records.units import unit_in
 from exfit.util.root import on_disk
@@ -42,6 +43,13 @@ def read_parquet(path: Path, memory: float | None = None) -> Table:
     def opened() -> "ParquetFile":
         return ParquetFile(on_disk(path), page_checksum_verification=True)
 
+    def unpacked(columns: Sequence[str]) -> int:
+        def read() -> int:
+            with opened() as file, on_disk(path).open("rb") as data:
+                return unpacked_bytes(data, file.metadata, columns)
+
+        return sound(path, PARQUET, read)
+
     schema, rows = sound(path, PARQUET, lambda: _outline(opened))
     if rows == 0:
         raise RecordError(f"{path}: no samples in it")
@@ -54,7 +62,7 @@ def read_parquet(path: Path, memory: float | None = None) -> Table:
         fetch=lambda at: _fetch(path, opened, schema.field(at)),
         where=lambda row: f"{path}: row {row + 1}",
         refuse_larger=lambda columns: limit.check_columns(
-            [rows] * len(columns), ARROW_BYTES * rows
+            [rows] * len(columns), max(ARROW_BYTES * rows, unpacked(columns))
         ),
         stamps=tuple(field.name for field in schema if _is_stamp(field.type)),
     )

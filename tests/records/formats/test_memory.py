@@ -24,6 +24,7 @@ TOO_LARGE = {
     "mat_of_text.mat": "its arrays: reading needs about 43.1 GB",
     "mat_of_empty_structs.mat": "its arrays",
     "parquet_of_zeros.parquet": "134217728 samples in 1 column",
+    "parquet_that_lies.parquet": "1000 samples in 1 column: reading needs about 2.3 GB",
     "text_of_columns.csv": "5999998 cells in its first lines",
     "text_of_one_line.csv": "4000001 cells in its first lines",
 }
