@@ -8,6 +8,7 @@ import click
 from exfit.cli.given_files import GivenFile, Kind
 from exfit.cli.options import file_option, force_option, refuse_existing, write_text
 from exfit.cli.planner import OfRecords, export_every_unit, import_every_unit
+from exfit.cli.play_in import export_play_in
 from exfit.cli.records import bases_option, sheet_option, steps_option, time_option, unit_option
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError, FileError
@@ -121,6 +122,12 @@ def _import_one(
 @click.option(
     "--model", metavar="NAME", help="Another record of the exciter's model, such as ESAC8B."
 )
+@click.option(
+    "--plb",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Of a fit of grid events: write what drove it as a play-in file of PSS/E instead.",
+)
 @file_option
 @force_option
 def export(
@@ -131,6 +138,7 @@ def export(
     bus: int | None,
     machine_id: str | None,
     model: str | None,
+    plb: Path | None,
     output: Path | None,
     force: bool,
 ) -> None:
@@ -142,6 +150,10 @@ def export(
     With --all RESULT is the folder of a batch, and the planner's file is written with the values of
     the units whose fits hold; every other byte of it stays as it is.
     """
+    if plb is not None:
+        _refuse_beside_plb(every, dyr, form, bus, machine_id, model, output)
+        export_play_in(result, plb, force)
+        return
     if every:
         if bus is not None or machine_id is not None or model is not None:
             raise click.UsageError("--bus, --id and --model: not allowed with --all.")
@@ -152,6 +164,12 @@ def export(
     if dyr is not None:
         raise click.UsageError("--dyr: only with --all.")
     _export_one(result, form, bus, machine_id, model, output, force)
+
+
+def _refuse_beside_plb(every: bool, *others: object) -> None:
+    """Raise UsageError where options of records are given beside a play-in file."""
+    if every or any(other is not None for other in others):
+        raise click.UsageError("--plb: only --force is allowed with it.")
 
 
 def _export_one(

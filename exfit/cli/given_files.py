@@ -15,7 +15,7 @@ from exfit.util.files import refuse_bytes
 
 RECORDS = (
     ".csv", ".tsv", ".txt", ".asc", ".dat", ".cfg", ".cff", ".mat", ".parquet", ".xlsx", ".xlsm",
-    ".xls", ".ods",
+    ".xls", ".ods", ".plb",
 )  # fmt: skip
 CASES = (".yaml", ".yml")
 DYNAMICS_FILES = (".dyr", ".dyd")  # of PSS/E, of PSLF

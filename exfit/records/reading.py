@@ -25,6 +25,7 @@ from exfit.records.phasors import Phasors, PhasorTable, smooth_angle
 from exfit.records.record import FEWEST_SAMPLES, Array, Record, read_only
 from exfit.records.status import Status, bad_rows, status_error
 from exfit.records.units import alike, needs_base, unit_of, usual
+from exfit.signals import unit_of_signal
 from exfit.util.magnitude import LARGEST, SMALLEST
 
 Rows = NDArray[np.intp]
@@ -264,7 +265,12 @@ def _check_units(
             if channel.unit is not None and not alike(unit, channel.unit):
                 what = f"in {unit} as the file says, not in {channel.unit}"
                 raise column_error(table.path, column, what)
-            if signal in per_unit and unit_of(unit) and needs_base(unit):
+            own = unit_of_signal(signal)
+            if signal in per_unit and needs_base(own):
+                if not alike(unit, own):
+                    what = f"in {unit} as the file says, not in {own}: give {signal} unit: {unit}"
+                    raise column_error(table.path, column, what)
+            elif signal in per_unit and unit_of(unit) and needs_base(unit):
                 scaling = f"give {signal} {_how_to_scale(unit)}"
                 what = f"in {unit} as the file says, and not per unit: {scaling}"
                 raise column_error(table.path, column, what)

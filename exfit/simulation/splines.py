@@ -35,6 +35,11 @@ class SplinedInput:
         values: Array = self._polynomials(times.clip(self.time[0], self.time[-1]))
         return values
 
+    def slope(self, times: Array) -> Array:
+        """Return how fast it changes at some instants (n,) between the first and last, per s."""
+        values: Array = self._polynomials.derivative()(times)
+        return values
+
     @cached_property
     def _polynomials(self) -> Any:
         """The polynomials between the samples, as SciPy evaluates them."""

@@ -48,9 +48,24 @@ CHANNELS = {
         "record.channels.angle.base: not allowed",
     ),
     "no voltage": ({"vt": None}, "record.channels.vt: is missing"),
-    "nothing to compare": ({"p": None, "q": None}, "there is nothing to compare"),
     "a weight": ({"vt": {"column": "vt", "weight": 2.0}}, "record.channels.vt.weight: has no eff"),
 }
+
+
+def test_a_fit_needs_something_to_compare():
+    content = event()
+    content["record"]["channels"] = {"vt": "vt", "angle": "angle"}
+    content["plant"]["network"] |= {"P": 0.8, "Q": 0.1}
+    content["parameters"] = {"free": {"K": {"start": 50.0, "min": 10.0, "max": 100.0}}}
+    with pytest.raises(CaseError, match="there is nothing to compare"):
+        Case.from_dict(content)
+
+
+def test_what_is_only_simulated_needs_nothing_to_compare():
+    content = event()
+    content["record"]["channels"] = {"vt": "vt", "angle": "angle"}
+    content["plant"]["network"] |= {"P": 0.8, "Q": 0.1}
+    assert Case.from_dict(content).kind.finds_rest
 
 
 @pytest.mark.parametrize(("change", "says"), CHANNELS.values(), ids=CHANNELS)

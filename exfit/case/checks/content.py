@@ -35,6 +35,7 @@ from exfit.case.yaml import LONGEST_WHOLE, Fault
 from exfit.plants import PlantKind
 from exfit.util.strategies import DEFAULT_SEARCH
 
+WITH_PARAMETERS = ("parameters", "plant", "stabiliser", "governor")
 LM_UPDATES = {
     "radius": "radius",
     "nu": "ratio",
@@ -123,7 +124,8 @@ def _recording_faults(
     yield from recorded_reference_faults(test, record, kind, has_record)
     if has_record:
         yield from record_faults(test, record)
-        yield from channels_faults(record.at("channels"), kind)
+        fits = any(content.at(section, "free").content for section in WITH_PARAMETERS)
+        yield from channels_faults(record.at("channels"), kind, fits or not kind.finds_rest)
         yield from stabiliser_channel_faults(record.at("channels"), content.at("stabiliser"), kind)
         yield from level_faults(record.at("channels"), plant.at("network"), kind)
     elif kind.plays_back:

@@ -80,8 +80,13 @@ def _window_faults(test: ContentNode, window: tuple[float, float] | None) -> Ite
             yield place.fault(f"{text}: {BEFORE_RECORD if at < start else AFTER_WINDOW}")
 
 
-def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
-    """Yield the faults of the channels of a record, one by one and together."""
+def channels_faults(
+    channels: ContentNode, kind: PlantKind, compares: bool = True
+) -> Iterator[Fault]:
+    """Yield the faults of the channels of a record, one by one and together.
+
+    ``compares``: a signal must be recorded that the simulation is compared with.
+    """
     for signal, channel in channels.sections:
         if signal not in (*kind.signals, *kind.recorded_inputs):
             signals = ", ".join((*kind.signals, *kind.recorded_inputs))
@@ -95,7 +100,7 @@ def channels_faults(channels: ContentNode, kind: PlantKind) -> Iterator[Fault]:
         if signal not in channels:
             yield channels.at(signal).fault(f"is missing: plant {kind.name} needs it")
     yield from _either_faults(channels, kind)
-    if not {*kind.compared} & {*channels.content, *kind.required}:
+    if compares and not {*kind.compared} & {*channels.content, *kind.required}:
         lacking = f"neither {' nor '.join(kind.compared)}"
         yield channels.fault(f"{lacking}: there is nothing to compare")
 

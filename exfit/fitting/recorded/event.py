@@ -21,6 +21,7 @@ from exfit.util.text import show
 
 Array = NDArray[np.float64]
 
+
 TURN = 2.0 * np.pi
 LEAST_JUMPS = {"vt": 0.005, "angle": 0.02}  # pu, rad: a smaller one of the grid does no harm
 MASKED = 0.2  # s, before and after a switching, in which a record is not compared

@@ -39,6 +39,10 @@ def open_table(path: Path, sheet: str | None = None, memory: float | None = None
         from exfit.records.formats.parquet import read_parquet
 
         return read_parquet(path, memory)
+    if suffix == ".plb":
+        from exfit.records.formats.play_in import read_play_in
+
+        return read_play_in(path, memory)
     from exfit.records.formats.text import read_text_table
 
     return read_text_table(path, memory)
