@@ -42,9 +42,7 @@ from exfit.analysis.solution import (
 from exfit.analysis.verdict import verdict_of
 from exfit.case import load
 from exfit.case.case import Case
-from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment, plain_simulator
-from exfit.fitting.recorded.play_in import PlayIn, play_in_of
 from exfit.fitting.recordings import read_section
 from exfit.fitting.search import checked_strategy, fitted, search_options
 from exfit.fitting.setup import with_enough_substeps
@@ -303,19 +301,6 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
     response = simulator.response(at)
     notes = simulation_notes(case, simulator, at, response)
     return SimulationResult(response, None, tuple(notes))
-
-
-def played_in(case: CaseOrPath) -> dict[str, PlayIn]:
-    """Return what the record of each grid event of a case plays into the unit, by its name.
-
-    Raises ExfitError for a case of another plant, and for input that cannot be used.
-    """
-    case = loaded(case)
-    if not case.kind.finds_rest:
-        raise CaseError([f"{case.path}: plant {case.kind.name} is not driven by a grid event"])
-    f0 = case.plant.given["f0"]
-    setups = (build_experiment(case, own, case.values()) for own in case.recordings)
-    return {setup.name: play_in_of(setup, f0) for setup in setups}
 
 
 def validate(

@@ -12,13 +12,14 @@ BUS, MACHINE_ID = 1, "1"  # of the generator that plays, which no case has
 def export_play_in(source: Path, output: Path, force: bool) -> None:
     """Write what the records of a fit of grid events played into the unit, a file for each."""
     from exfit.exchange.play_in import play_in_record, play_in_text
+    from exfit.fitting.recorded.play_in import played_in
     from exfit.results.io import load_result, result_file
     from exfit.util.files import write
-    from exfit.workflows import played_in
+    from exfit.workflows import load_case
 
     if output.suffix.lower() != ".plb":
         raise ExfitError(f"{output}: a play-in file is called NAME.plb")
-    records = played_in(load_result(result_file(source)).case)
+    records = played_in(load_case(load_result(result_file(source)).case))
     files = {
         name: output if len(records) == 1 else output.with_stem(f"{output.stem}-{name}")
         for name in records

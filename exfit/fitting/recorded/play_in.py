@@ -5,6 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.case.case import Case
+from exfit.errors import CaseError
+from exfit.fitting.build import build_experiment
 from exfit.fitting.setup import ExperimentSetup
 from exfit.simulation.splines import SplinedInput
 
@@ -23,6 +26,18 @@ class PlayIn(NamedTuple):
     vt: Array
     frequency: Array
     f0: float
+
+
+def played_in(case: Case) -> dict[str, PlayIn]:
+    """Return what the record of each grid event of a case plays into the unit, by its name.
+
+    Raises CaseError for a case of another plant, ExfitError for a record that cannot be used.
+    """
+    if not case.kind.finds_rest:
+        raise CaseError([f"{case.path}: plant {case.kind.name} is not driven by a grid event"])
+    f0 = case.plant.given["f0"]
+    setups = (build_experiment(case, own, case.values()) for own in case.recordings)
+    return {setup.name: play_in_of(setup, f0) for setup in setups}
 
 
 def play_in_of(setup: ExperimentSetup, f0: float) -> PlayIn:
