@@ -58,6 +58,12 @@ def errors_of_channels(evidence: Evidence) -> Iterator[ChannelErrors]:
             yield ChannelErrors(number, channel, rows, time[channel.kept])
 
 
+UNSTEADY = "check the recorder, and whether speed and voltage were steady; use a shorter window"
+MOVED_IN_EVENT = (
+    "the set power, the reference, or the tap of a transformer may have moved; use a shorter window"
+)
+
+
 def ripple(evidence: Evidence) -> Iterator[Suspicion]:
     """Yield the channels in whose errors a line of the spectrum stands out."""
     linear = linear_fit(evidence)
@@ -106,20 +112,24 @@ def drift(evidence: Evidence) -> Iterator[Suspicion]:
         columns = own.columns(len(linear.errors), np.column_stack([way, np.ones_like(way)]))
         explained = linear.with_columns(columns)
         change = float(explained.coefficients[0])
-        rate = 1.0 / float(median(np.diff(own.time)))
-        folds = any(
-            abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5
-            for mains in MAINS
-        )
-        folding = ", or ripple of the mains that its sampling folds," if folds else ""
+        of_event = evidence.case.kind.finds_rest  # its phasors hold no ripple of the mains
+        folding = "" if of_event else _folding(1.0 / float(median(np.diff(own.time))))
         cause = Cause(
             f"a drift{folding} of {own.channel.signal}{evidence.name_of(own.number)}: "
             f"{change:+.1e} pu from start to end",
-            "check the recorder, and whether speed and voltage were steady; use a shorter window",
+            MOVED_IN_EVENT if of_event else UNSTEADY,
         )
         errors = linear.errors[own.rows]
         prior = 0.0 if _shows_at_rest(evidence, own, errors, change) else LAST
         yield from suspected(evidence, explained.cost, 2, cause, prior)
+
+
+def _folding(rate: float) -> str:
+    """Return that a ripple may look like a drift where a rate (Hz) of samples folds it to one."""
+    folds = any(
+        abs(mains / rate - round(mains / rate)) < FOLDED and mains / rate > 0.5 for mains in MAINS
+    )
+    return ", or ripple of the mains that its sampling folds," if folds else ""
 
 
 def _shows_at_rest(evidence: Evidence, own: ChannelErrors, errors: Array, change: float) -> bool:

@@ -51,7 +51,8 @@ def design(console: Console, result: Design) -> None:
     """Show how well planned tests would determine each parameter: standard errors in percent."""
     listed = ", ".join(f"{signal}{NO_BREAK}{level:.2g}" for signal, level in result.noise.items())
     paragraph(console, f"expected standard errors, with noise (pu): {listed}")
-    paragraph(console, "of this test; of steps of 2, 5, 10 %; twice as long; with further signals")
+    others = "; of steps of 2, 5, 10 %; twice as long; with further signals"
+    paragraph(console, f"of this test{others if result.plans else ''}")
     console.print()
     heads = ["this test", *(plan.label for plan in result.plans)]
     table = plain_table("parameter", *heads, numbers=heads)

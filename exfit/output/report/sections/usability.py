@@ -9,6 +9,7 @@ from exfit.results.model import FitResult
 
 NOT_HELD = "not stated: the fit was interrupted, or an earlier version of exfit wrote the result"
 
+RESTING = 1e-9  # 1/s: a pole within it is at zero but for rounding
 CHECKS = ("Initialises without error", "No-disturbance run", "Positive damping")
 
 
@@ -75,6 +76,8 @@ def _least_damping(behaviour: Behaviour) -> Iterator[tuple[str, float, bool]]:
     for each in behaviour.small_signal:
         if each.view is not None and each.view.poles:
             poles = each.view.poles
+            if each.view.open is None:  # what integrates a recorded voltage stays where it is
+                poles = tuple(pole for pole in poles if abs(pole.value) > RESTING) or poles
             decays = all(pole.value.real < 0.0 for pole in poles)
             yield ", ".join(each.tests), min(pole.damping for pole in poles), decays
 
