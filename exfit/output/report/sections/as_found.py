@@ -61,15 +61,28 @@ def as_found(result: FitResult) -> AsFoundView | None:
         verified_model=result.model,
         parameters=tuple(row for row in rows if row.change != UNCHANGED),
         same=tuple(row.name for row in rows if row.change == UNCHANGED),
-        matches=tuple(
-            MatchBefore(now.name, now.judged_by, before.rmse, now.rmse) for before, now in pairs
-        ),
+        matches=tuple(match for before, now in pairs for match in _matches(before, now)),
         charts=tuple(
-            _chart(f"before-{k}", before, now)
+            chart
             for k, (before, now) in enumerate(pairs)
-            if before.overlays and now.overlays
+            for chart in _charts(f"before-{k}", before, now)
         ),
     )
+
+
+def _matches(before: Comparison, now: Comparison) -> Iterator[MatchBefore]:
+    """Yield how the signals of a record are matched that judge it."""
+    for signal in now.judging:
+        if signal in before.channels:
+            errors = before.channels[signal].rmse, now.channels[signal].rmse
+            yield MatchBefore(now.name, signal, *errors)
+
+
+def _charts(key: str, before: Comparison, now: Comparison) -> Iterator[Chart]:
+    """Yield the signals of a record that judge it, as far as they are kept."""
+    for signal in now.judging:
+        if signal in before.overlays and signal in now.overlays:
+            yield _chart(f"{key}-{signal}", signal, before, now)
 
 
 def _parameters(result: FitResult, unit: AsFound) -> Iterator[ChangedParameter]:
@@ -110,10 +123,10 @@ def _change(before: float | None, verified: float | None) -> str:
     return f"{verified - before:+.3g}{share}"
 
 
-def _chart(key: str, before: Comparison, now: Comparison) -> Chart:
-    """Return a record with the response of the model as found and of the verified one."""
-    signal = now.judged_by
+def _chart(key: str, signal: str, before: Comparison, now: Comparison) -> Chart:
+    """Return a signal of a record with the response of the model as found and of the verified."""
     old, new = before.overlays[signal], now.overlays[signal]
+    errors_of = tuple(match.channels[signal].rmse for match in (before, now))
     lines = (
         Series("measured", *envelope(now.time, new.measured, BINS), "measured", dots=True),
         Series("as found", *envelope(before.time, old.simulated, BINS), "start"),
@@ -127,7 +140,7 @@ def _chart(key: str, before: Comparison, now: Comparison) -> Chart:
         key=key,
         title=f"{now.name}: as found and verified, {label_of(signal)}",
         text=f"Measured {signal}, simulated with the model as found and with the verified one, the "
-        f"differences below: rmse {before.rmse:.3g} pu as found, {now.rmse:.3g} pu verified.",
+        f"differences below: rmse {errors_of[0]:.3g} pu as found, {errors_of[1]:.3g} pu verified.",
         x_title=TIME,
         panels=(
             Panel(label_of(signal), lines, TALL),

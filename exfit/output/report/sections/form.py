@@ -47,7 +47,8 @@ class FormRow(NamedTuple):
 class FormAnswers(NamedTuple):
     """What the rows of the form have from a fit or a programme, facts of the case aside.
 
-    ``machine`` are its values by symbol, ``source_of`` says where the value of a name is from.
+    ``machine`` are its values by symbol, ``source_of`` says where the value of a name is from,
+    ``excursions`` how far the frequency departed in grid events, if there were any.
     """
 
     responses: str
@@ -58,6 +59,7 @@ class FormAnswers(NamedTuple):
     before: str
     compensation: str
     usable: tuple[UsabilityCheck, ...]
+    excursions: str = ""
 
 
 def form(result: FitResult) -> tuple[FormRow, ...]:
@@ -71,6 +73,7 @@ def form(result: FitResult) -> tuple[FormRow, ...]:
         before=_before(result),
         compensation=_compensation(result),
         usable=usability(result),
+        excursions="; ".join(_excursions(result)),
     )
     return _rows(result.about, answers)
 
@@ -111,6 +114,7 @@ def _rows(about: Facts, answers: FormAnswers) -> tuple[FormRow, ...]:
         FormRow("R2.1.4", "Model in the planner's base", answers.before, "as-found"),
         FormRow("R2.1.5", "Compensation (droop, line drop)", answers.compensation),
         FormRow("R2.1.6", "Stabiliser", _stabiliser(about, answers.parts), "parameters"),
+        *_governor(answers),
         *(FormRow("R6", check.name, _usable(*check[1:]), "flat") for check in answers.usable),
         *(_fact(about, "", fact, "test") for fact in TESTS),
         *(
@@ -221,6 +225,32 @@ def _stabiliser(about: Facts, parts: tuple[PartDescription, ...]) -> str:
     if part is not None:
         return f"{part.name}, {part.title}" + (f"; {given}" if given else "")
     return given or f"{NOT_STATED} whether the unit has one; none in the model"
+
+
+def _excursions(result: FitResult) -> Iterator[str]:
+    """Yield how far voltage and frequency departed from rest in each grid event."""
+    for match in (*result.comparisons, *result.validation):
+        if match.played is None or not match.is_event:
+            continue
+        texts = (
+            f"{name} {signal.excursion.text(signal.unit)}"
+            for name, signal in match.played.driving.items()
+            if signal.excursion is not None
+        )
+        yield f"{match.name}: {', '.join(texts)}"
+
+
+def _governor(answers: FormAnswers) -> Iterator[FormRow]:
+    """Yield what is asked of a governor where a grid event was played in, or the unit has one."""
+    part = _part(answers.parts, "governor")
+    if not answers.excursions and part is None:
+        return
+    name = "none in the model: the mechanical power is constant"
+    if part is not None:
+        name = f"{part.name}, {part.title}"
+    yield FormRow("MOD-027-1 R2", "Turbine governor and load control", name, "parameters")
+    if answers.excursions:
+        yield FormRow("", "Recorded disturbances, from rest", answers.excursions, "fit")
 
 
 def _usable(passed: bool | None, text: str) -> str:
