@@ -58,7 +58,7 @@ def import_(
     output: Path | None,
     force: bool,
 ) -> None:
-    """Make a case from the machine, exciter and stabiliser in UNIT.
+    """Make a case from machine, exciter, stabiliser and governor in UNIT.
 
     UNIT is a dynamics file of PSS/E (.dyr) or of PSLF (.dyd).
 
@@ -142,7 +142,7 @@ def export(
     output: Path | None,
     force: bool,
 ) -> None:
-    """Write the machine, exciter and stabiliser of RESULT as records of PSS/E or PSLF.
+    """Write machine, exciter, stabiliser and governor of RESULT as records of PSS/E or PSLF.
 
     RESULT is the result.json of a fit, or the folder that holds it. What a record cannot hold, and
     what is uncertain, is reported.

@@ -89,7 +89,7 @@ class UnitSources:
     "--planner",
     type=GivenFile(Kind.DYNAMICS),
     metavar="FILE",
-    help="Planner's file (.dyr or .dyd) with the data of machine, exciter and stabiliser.",
+    help="Planner's file (.dyr or .dyd) with machine, exciter, stabiliser and governor.",
 )
 @click.option("--bus", type=BUSES, metavar="N", help="Bus of the unit in it.")
 @click.option("--id", "machine_id", metavar="ID", help="Machine id of the unit, such as 1.")

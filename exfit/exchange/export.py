@@ -74,7 +74,8 @@ def export(
     written = [
         *_machine(result, program, warnings),
         *_exciter(result, program, name),
-        *_stabiliser(result, program, warnings),
+        *_added(result, "stabiliser", program, warnings),
+        *_added(result, "governor", program, warnings),
     ]
     if not written:
         raise ExfitError(f"{result.model} has no {program} record")
@@ -175,19 +176,18 @@ def _machine(result: FitResult, program: str, warnings: list[str]) -> Iterator[W
     yield _written(result, candidates[0], "machine.")
 
 
-def _stabiliser(result: FitResult, program: str, warnings: list[str]) -> Iterator[Written]:
-    name = result.stabiliser_model
+def _added(result: FitResult, kind: str, program: str, warnings: list[str]) -> Iterator[Written]:
+    """Yield the record of the stabiliser or governor; add what is lost to the warnings."""
+    name = result.stabiliser_model if kind == "stabiliser" else result.governor_model
     if name is None:
         return
     candidates = [
-        entry
-        for entry in definitions(program)
-        if entry.kind == "stabiliser" and entry.model.name == name
+        entry for entry in definitions(program) if entry.kind == kind and entry.model.name == name
     ]
     if not candidates:
-        warnings.append(f"stabiliser {name} has no {program} record: it is left out")
+        warnings.append(f"{kind} {name} has no {program} record: it is left out")
         return
-    record = _written(result, candidates[0], "stabiliser.")
+    record = _written(result, candidates[0], f"{kind}.")
     own = getattr(record.definition.model, "inputs", ())
     inputs = stabiliser_inputs(result.case_text, result.case) or own
     codes = dict(zip(record.definition.codes, map(CODES.__getitem__, inputs), strict=False))

@@ -169,6 +169,7 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[UnitPart,
         (exciter, unit.exciter, ""),
         (result.machine_model, unit.machine, "machine."),
         (result.stabiliser_model, unit.stabiliser, "stabiliser."),
+        (result.governor_model, unit.governor, "governor."),
     )
     if "model" in result.inputs:
         program = unit.exciter.definition.program

@@ -67,6 +67,7 @@ class ImportedUnit:
     machine: str
     exciter: str
     stabiliser: str
+    governor: str
     status: str
     case: str
     records: str
@@ -173,14 +174,15 @@ def _row(unit: Unit, plan: ImportPlan, case: str, notes: Iterable[str]) -> Impor
     planned = plan.rows.get(key)
     files = plan.files.get(key, ()) if planned is None else tuple(planned.settings)
     written = RECORDED if files else WRITTEN
-    stabiliser = "" if unit.stabiliser is None else unit.stabiliser.definition.record.name
+    added = {part.definition.kind: part.definition.record.name for part in unit.added}
     return ImportedUnit(
         bus=unit.bus,
         id=unit.id,
         line=unit.machine.line,
         machine=unit.machine.definition.record.name,
         exciter=unit.exciter.definition.record.name,
-        stabiliser=stabiliser,
+        stabiliser=added.get("stabiliser", ""),
+        governor=added.get("governor", ""),
         status=written if case else REFUSED,
         case=case,
         records="; ".join(str(path) for path in files),
@@ -191,7 +193,7 @@ def _row(unit: Unit, plan: ImportPlan, case: str, notes: Iterable[str]) -> Impor
 def _refused_row(unit: RefusedUnit) -> ImportedUnit:
     status = REFUSED if unit.modelled else NO_MODEL
     notes = "; ".join(_in_words(unit.faults))
-    return ImportedUnit(unit.bus, unit.id, unit.line, "", "", "", status, "", "", notes)
+    return ImportedUnit(unit.bus, unit.id, unit.line, "", "", "", "", status, "", "", notes)
 
 
 def _in_words(faults: Iterable[DynamicsFault]) -> Iterator[str]:

@@ -49,11 +49,11 @@ def case_text(unit: Unit, file: str) -> str:
     ``file`` is the path of the dynamics file as the case names it.
     """
     lines = [*_heading(unit, file), *_exciter_name(unit.exciter), *_plant(unit.machine)]
-    if unit.stabiliser is not None:
-        name = unit.stabiliser.definition.model.name
-        lines += ["stabiliser:", commented(f"  model: {name}", _origin(unit.stabiliser))]
-        lines += inputs_lines(unit.stabiliser.definition.model, unit.stabiliser.inputs)
-        lines += ["  parameters:", *_values(unit.stabiliser, "    "), *_sources(unit.stabiliser)]
+    for part in unit.added:
+        model = part.definition.model
+        lines += [f"{part.definition.kind}:", commented(f"  model: {model.name}", _origin(part))]
+        lines += inputs_lines(model, part.inputs)
+        lines += ["  parameters:", *_values(part, "    "), *_sources(part)]
     lines += [*TEST.splitlines(), "parameters:"]
     lines += [commented("  fixed:", "what a fit shall find goes under free")]
     lines += [*_values(unit.exciter, "    "), *_sources(unit.exciter)]
@@ -65,8 +65,7 @@ def as_found(unit: Unit, file: str) -> Iterator[str]:
     """Yield what the file holds of the unit, for the report to compare with."""
     values = {
         _prefix(part) + row.symbol: part.values[row.symbol]
-        for part in (unit.exciter, unit.machine, unit.stabiliser)
-        if part is not None
+        for part in (unit.exciter, unit.machine, *unit.added)
         for row in part.definition.model.sheet
         if row.symbol in part.definition.names
     }

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from exfit.exchange.fields import DynamicsFault, Field, number, whole
-from exfit.models import MODELS, STABILISERS, sheet
+from exfit.models import GOVERNORS, MODELS, STABILISERS, sheet
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import DynamicsRecord, Model, Sheet, typical
@@ -22,7 +22,7 @@ UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of 
 class Definition:
     """A record of a program and the model that it gives the data of.
 
-    ``kind``: machine, exciter, stabiliser.
+    ``kind``: machine, exciter, stabiliser, governor.
     """
 
     kind: str
@@ -69,6 +69,7 @@ def definitions(program: str = PSSE) -> list[Definition]:
         ("machine", MACHINES),
         ("exciter", MODELS),
         ("stabiliser", STABILISERS),
+        ("governor", GOVERNORS),
     )
     return [
         Definition(kind, model, record, program)

@@ -1,4 +1,4 @@
-"""One unit of a dynamics file: its machine, its exciter, its stabiliser, and what is left out."""
+"""One unit of a dynamics file: machine, exciter, stabiliser, governor, and what is left out."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -56,7 +56,13 @@ class Unit:
     machine: UnitPart
     exciter: UnitPart
     stabiliser: UnitPart | None
+    governor: UnitPart | None
     warnings: tuple[DynamicsFault, ...]
+
+    @property
+    def added(self) -> tuple[UnitPart, ...]:
+        """Its stabiliser and its governor, those that it has."""
+        return tuple(part for part in (self.stabiliser, self.governor) if part is not None)
 
 
 def read_unit(text: str, file: str, bus: int | None = None, machine_id: str | None = None) -> Unit:
@@ -97,6 +103,7 @@ def unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
         parts["machine"],
         parts["exciter"],
         parts.get("stabiliser"),
+        parts.get("governor"),
         tuple(sorted(warnings, key=lambda warning: warning.line)),
     )
     return unit, []
@@ -132,6 +139,13 @@ def _parts(
             faults.append(DynamicsFault(head.line, f"{name}: a second {kind}; {other}"))
             continue
         reading = read_values(definition, head.line, head.fields)
+        if kind == "governor" and reading.faults and not head.faults:
+            # a unit whose governor cannot be simulated can be verified without it
+            warnings += [
+                fault._replace(text=f"governor {name} is left out: {fault.text}")
+                for fault in reading.faults
+            ]
+            continue
         faults += head.faults or reading.faults
         warnings += reading.warnings
         parts[kind] = UnitPart(

@@ -9,14 +9,15 @@ from exfit.util.sources import TYPICAL
 
 
 def unit_data(unit: Unit, file: str) -> UnitData:
-    """Return the machine, exciter and stabiliser of a unit of a file, whose path the case names.
+    """Return the models of a unit of a file, whose path the case names, with their values.
 
     The file does not say where its values come from; what it does not hold is typical.
     """
-    stabiliser = None if unit.stabiliser is None else _part(unit.stabiliser, file)
+    added = {part.definition.kind: _part(part, file) for part in unit.added}
     exciter = _part(unit.exciter, file)
     found = tuple(as_found(unit, file))
-    return UnitData(exciter.model.name, exciter, _part(unit.machine, file), stabiliser, found)
+    machine = _part(unit.machine, file)
+    return UnitData(exciter.model.name, exciter, machine, added, found)
 
 
 def _part(part: UnitPart, file: str) -> PartData:

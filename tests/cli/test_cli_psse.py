@@ -45,10 +45,10 @@ def listing(folder):
 def test_the_sample_becomes_a_case_that_runs_as_it_stands(run):
     code, out, err = run("import", SAMPLE, "-o", "case.yaml")
     assert (code, out) == (0, "written to case.yaml; next: exfit simulate case.yaml\n")
-    assert err == f"Warning: {SAMPLE}:9: governor IEEEG1 is left out\n"
+    assert err == ""
     text = Path("case.yaml").read_text()
     assert max(map(len, text.splitlines())) <= WIDTH
-    for words in ("unit.dyr", "bus 101", "line 3", "line 6", "IEEEG1"):
+    for words in ("unit.dyr", "bus 101", "line 3", "line 6", "IEEEG1 on line 9"):
         assert words in text
     assert run("simulate", "case.yaml", "--no-plots", "-q") == (0, "", "")
     assert run("check", "case.yaml")[0] == 0

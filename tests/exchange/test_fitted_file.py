@@ -26,7 +26,12 @@ DEFINITIONS = {
 }
 GENROU, ESAC1A = DEFINITIONS["GENROU"], DEFINITIONS["ESAC1A"]
 WRITTEN = 5e-6  # of a value: half of the sixth digit
-PREFIXES = {"exciter": "", "machine": "machine.", "stabiliser": "stabiliser."}
+PREFIXES = {
+    "exciter": "",
+    "machine": "machine.",
+    "stabiliser": "stabiliser.",
+    "governor": "governor.",
+}
 ENCODINGS = ("utf-8", "latin-1", "utf-8-sig", "utf-16", "utf-16-be")
 
 
@@ -50,8 +55,8 @@ def unit_of(data, bus, machine_id="1"):
 
 def parts_of(unit):
     """Return the records of a unit by the beginnings of the names of their parameters."""
-    parts = (unit.exciter, unit.machine, unit.stabiliser)
-    return {PREFIXES[part.definition.kind]: part for part in parts if part is not None}
+    parts = (unit.exciter, unit.machine, *unit.added)
+    return {PREFIXES[part.definition.kind]: part for part in parts}
 
 
 def values_of(unit):
@@ -82,6 +87,8 @@ def verified(fit, unit, values, sources=None, **others):
             "machine_model": model["machine."],
             "stabiliser": of_part.get("stabiliser.", {}),
             "stabiliser_model": model.get("stabiliser."),
+            "governor": of_part.get("governor.", {}),
+            "governor_model": model.get("governor."),
             "sources": dict.fromkeys(changed, FITTED) | (sources or {}),
             "as_found": AsFound("", model[""], found, bus=unit.bus, machine_id=unit.id),
             "saturation": "quadratic",
@@ -133,7 +140,7 @@ def odd_file(definition, random):
     for bus in (7, 101, 99_999):
         for own, values in partners(definition, random):
             text += loose(own, values, random, bus=bus, machine_id="G1")
-        text += f"{bus} 'IEEEG1' G1 0 0 0.050 3*1.0 / {bus} governor's\n"
+        text += f"{bus} 'IEEEG2' G1 0 0 0.050 3*1.0 / {bus} governor's\n"
         text += f"{bus}, 'USRMDL', '2', 'OWN' 1 2 3.5000, ,/\n"
     text += str(random.choice(["", "\x1a", "\n\n", "/ the end", "  \t"]))
     text = text.replace("\r\n", "\n").replace("\n", ends)

@@ -127,7 +127,7 @@ def each_case_holds_the_numbers_of_its_file(definition, seed):
     places = {"machine": ("plant", "parameters"), "exciter": ("parameters", "fixed")}
     for one, values in records:
         for data in (mine, theirs):
-            for key in places.get(one.kind, ("stabiliser", "parameters")):
+            for key in places.get(one.kind, (one.kind, "parameters")):
                 data = data[key]
             assert data == values
     if definition.kind != "stabiliser":
@@ -336,7 +336,7 @@ def test_what_other_units_and_devices_hold_is_no_fault():
 @pytest.mark.parametrize(
     ("record", "words"),
     [
-        ("1 IEEEG1 1 0 0 /", "governor IEEEG1 is left out"),
+        ("1 IEEEG2 1 0 0 /", "governor IEEEG2 is left out"),
         ("1 'MAXEX2' 1 0 0 /", "excitation limiter MAXEX2 is left out"),
         ("1 'XYZ' 1 0 0 /", "XYZ is left out: not a known model"),
         ("1 'USRMDL' 1 'MYGOV' 5 0 0 /", "USRMDL MYGOV is left out: not a known model"),
@@ -346,6 +346,19 @@ def test_what_is_left_out_is_reported_and_written_in_the_case(record, words):
     unit = read_unit(SOUND + record, "unit.dyr")
     assert unit.warnings == ((5, words),)
     assert f"# Line 5: {words}." in case_text(unit, "unit.dyr").splitlines()
+
+
+def test_a_governor_that_cannot_be_simulated_is_left_out_with_the_reason():
+    for text, reason in (
+        ("1 TGOV1 1 0.05 0.5 1 0 3 10 /", "TGOV1: 6 values after the id"),
+        ("1 TGOV1 1 0 0.5 1 0 3 10 0 /", "TGOV1: R: 0 lies outside 0.001 ... 10 pu"),
+        ("1 HYGOV 1 .05 .3 5 .05 .5 .2 0 1 1 1.2 .5 .1 /", "HYGOV: GMIN: 1 is not below GMAX = 0"),
+    ):
+        unit = read_unit(SOUND + text, "unit.dyr")
+        assert unit.governor is None
+        (warning,) = unit.warnings
+        assert warning.line == 5
+        assert warning.text.startswith(f"governor {text.split()[1]} is left out: {reason}")
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-8", "utf-16"])

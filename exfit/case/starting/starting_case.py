@@ -59,7 +59,7 @@ def starting_case(
         *_about(about or {}),
         f"model: {unit.name}",
         *_plant(unit, first),
-        *_stabiliser(unit.stabiliser),
+        *_added(unit),
         *recordings,
         *_parameters(unit.exciter),
         *weights_section(first),
@@ -116,7 +116,7 @@ def _events(
 
 def _advice(unit: UnitData) -> list[str]:
     """Return what to do with the values of a new case, as comments."""
-    parts = [unit.exciter, unit.machine, *filter(None, [unit.stabiliser])]
+    parts = [unit.exciter, unit.machine, *unit.added.values()]
     given = list(dict.fromkeys(part.origin for part in parts if part.origin))
     text = f"Values are {' and '.join(given)}. " if given else ""
     if any(TYPICAL in part.sources.values() for part in parts):
@@ -235,16 +235,16 @@ def _machine(machine: PartData, sources: Mapping[str, str]) -> Iterator[str]:
     yield from source_lines({**sources, **machine.sources}, "  ")
 
 
-def _stabiliser(part: PartData | None) -> Iterator[str]:
-    if part is None:
-        return
-    yield "stabiliser:"
-    yield commented(f"  model: {part.model.name}", in_comment(part.origin))
-    yield from inputs_lines(part.model, part.inputs)
-    yield "  parameters:"
-    for row in part.model.sheet:
-        yield parameter_line(row, yaml_number(part.values[row.symbol]), "    ")
-    yield from source_lines(part.sources, "  ")
+def _added(unit: UnitData) -> Iterator[str]:
+    """Yield the sections of stabiliser and governor."""
+    for section, part in unit.added.items():
+        yield f"{section}:"
+        yield commented(f"  model: {part.model.name}", in_comment(part.origin))
+        yield from inputs_lines(part.model, part.inputs)
+        yield "  parameters:"
+        for row in part.model.sheet:
+            yield parameter_line(row, yaml_number(part.values[row.symbol]), "    ")
+        yield from source_lines(part.sources, "  ")
 
 
 def _wrapped(text: str) -> list[str]:

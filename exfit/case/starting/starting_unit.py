@@ -1,7 +1,7 @@
 """The data of a new case: models with their values, typical or taken from elsewhere."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from exfit.case.load import load_case
@@ -36,15 +36,16 @@ class PartData:
 
 @dataclass(frozen=True)
 class UnitData:
-    """The exciter, behind the ``name`` that the case gives it, its machine and its stabiliser.
+    """The exciter, behind the ``name`` that the case gives it, its machine, and what is ``added``.
 
-    ``as_found``: lines of the case on what was in the planner's base.
+    That are the stabiliser and the governor, each under the key of its section; ``as_found`` are
+    lines of the case on what was in the planner's base.
     """
 
     name: str
     exciter: PartData
     machine: PartData
-    stabiliser: PartData | None = None
+    added: Mapping[str, PartData] = field(default_factory=dict)
     as_found: tuple[str, ...] = ()
 
 
