@@ -56,16 +56,11 @@ def wraps(angle: Array, unit: str) -> int:
 
 
 def unit_by_range(angle: Array) -> str | None:
-    """Return the unit in which angles (M,) without one are: deg or rad; None where it is open.
+    """Return the unit in which wrapped angles (M,) are: deg or rad, by the size of their jumps.
 
-    Beyond one turn in rad they are in deg; jumps by a turn show either.
+    None without jumps by a turn: an angle that is not wrapped may have any range in either.
     """
-    present = angle[np.isfinite(angle)]
-    if not present.size:
-        return None
     if wraps(angle, "deg"):
         return "deg"
-    largest = float(np.max(np.abs(present)))
-    if largest <= TURNS["rad"] and wraps(angle, "rad"):
-        return "rad"
-    return "deg" if 2.0 * TURNS["rad"] < largest <= TURNS["deg"] else None
+    largest = float(np.max(np.abs(angle), initial=0.0, where=np.isfinite(angle)))
+    return "rad" if largest <= TURNS["rad"] and wraps(angle, "rad") else None

@@ -13,6 +13,8 @@ from exfit.dsp.quality import mains_frequency, noise_of
 from exfit.dsp.reference_moves import rest_end
 from exfit.dsp.sampling import Sampling, increasing, sampling_of
 from exfit.errors import RecordError
+from exfit.records.angle_findings import angle_findings
+from exfit.records.angles import in_radians
 from exfit.records.channel_identity import identified
 from exfit.records.channel_inspection import (
     PLACES_LISTED,
@@ -87,11 +89,18 @@ class Inspection:
         return channel
 
     @property
+    def is_event(self) -> bool:
+        """Whether it seems to be a grid event: phasors, or an angle and p without a reference."""
+        signals = {channel.signal for channel in self.channels}
+        plain = {"vt", "angle", "p"} <= signals and REFERENCE not in signals
+        return self.pmu is not None or plain
+
+    @property
     def findings(self) -> tuple[str, ...]:
         """What must be known before the record is used, in sentences."""
-        if self.pmu is not None:
+        if self.is_event:
             lacking = (channel.missing_samples for channel in self.channels)
-            return (*_clock_findings(self), *filter(None, lacking))
+            return (*_clock_findings(self), *filter(None, lacking), *_angle_findings(self))
         of_channels = (finding for channel in self.channels for finding in channel.findings)
         opening = self.opening
         of_reference = [step for step in self.steps if not (opening and opening.causes(step.at))]
@@ -307,6 +316,17 @@ def _with_sizes_of(channel: InspectedChannel, steps: Sequence[RecordedStep]) -> 
         step = min(steps, key=lambda step: abs(step.at - change.at))
         changes.append(replace(change, size=step.sizes.get(channel.name, change.size)))
     return replace(channel, steps=tuple(changes))
+
+
+def _angle_findings(inspection: Inspection) -> Iterator[str]:
+    """Yield what speaks against the angle of a PMU: its turns, and the frequency beside it."""
+    pmu = inspection.pmu
+    if pmu is None or pmu.voltage.angle_unit is None:
+        return
+    (angle, *_), unit = pmu.voltage.angles, pmu.voltage.angle_unit
+    frequency = None if pmu.frequency is None else inspection.samples[pmu.frequency]
+    radians = in_radians(inspection.samples[angle], unit)
+    yield from angle_findings(inspection.time, angle, radians, frequency)
 
 
 def _clock_findings(inspection: Inspection) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """Cases of grid events from the files of phasor measurement units."""
 
+import numpy as np
 import pytest
 import yaml
 from pmu_records import KV, MVA, pmu_columns, smooth_course, write_table
@@ -23,7 +24,7 @@ def inspected(folder, **changes):
 
 
 def section(inspection, bases):
-    text = "\n".join(event_section(inspection, inspection.pmu, "event.csv", bases))
+    text = "\n".join(event_section(inspection, "event.csv", bases))
     return text, yaml.safe_load(text)["record"]
 
 
@@ -50,6 +51,36 @@ def test_without_a_fitting_rating_the_connection_is_asked_for(tmp_path, bases):
     places = {value.place for value in open_values(text)}
     assert "record.phasors.voltage.connection" in places
     assert ("record.phasors.kV" in places) == (not bases)
+
+
+def test_a_table_with_an_angle_and_no_reference_is_an_event_too(tmp_path):
+    course = smooth_course(slip=0.3)
+    columns = {
+        "t": course.time,
+        "vt": course.vt,
+        "angle": np.degrees(course.angle) % 360.0,
+        "p": course.p,
+        "q": course.q,
+    }
+    inspection = RecordSettings().inspect(write_table(tmp_path / "event.csv", columns))
+    _, content = section(inspection, {})
+    assert content["channels"]["angle"] == {"column": "angle", "unit": "deg"}
+    assert content["channels"]["p"] == "p"
+    del columns["angle"]
+    assert not RecordSettings().inspect(write_table(tmp_path / "other.csv", columns)).is_event
+
+
+@pytest.mark.parametrize(
+    ("factor", "word"), [(-1.0, "turns against"), (57.3, "times as fast"), (0.01, "times as fast")]
+)
+def test_an_angle_that_contradicts_the_frequency_beside_it_is_named(tmp_path, factor, word):
+    course = smooth_course()
+    turned = {
+        "UNIT1-PA1 (deg)": factor * np.degrees(0.3 * course.angle),
+        "UNIT1-FQ (Hz)": 60.0 + 0.3 * (course.frequency - 60.0),
+    }
+    assert any(word in finding for finding in inspected(tmp_path, **turned).findings)
+    assert not inspected(tmp_path).findings
 
 
 def test_a_case_of_an_event_has_no_test_and_plays_its_record_back(tmp_path):

@@ -40,8 +40,11 @@ def test_missing_samples_stay_missing_and_those_beside_them_are_counted_on():
     assert smooth[53:] == pytest.approx(ANGLE[53:], abs=1e-12)
 
 
-def test_the_range_shows_the_unit_where_it_can():
+def test_the_jumps_of_a_wrapped_angle_show_its_unit():
     assert unit_by_range(wrapped(np.degrees(ANGLE), 360.0)) == "deg"
     assert unit_by_range(wrapped(ANGLE, 2.0 * np.pi)) == "rad"
-    assert unit_by_range(np.linspace(20.0, 40.0, 30)) == "deg"
-    assert unit_by_range(np.linspace(0.2, 0.5, 30)) is None
+
+
+def test_the_range_of_an_angle_that_is_not_wrapped_shows_nothing():
+    assert unit_by_range(np.degrees(ANGLE)) is None
+    assert unit_by_range(ANGLE) is None

@@ -15,6 +15,7 @@ from exfit.analysis.causes.channels import (
     wrong_scale,
     wrong_start,
 )
+from exfit.analysis.causes.event_record import wrong_event
 from exfit.analysis.causes.evidence import Evidence, FittedRecord
 from exfit.analysis.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
 from exfit.analysis.causes.rest import unsteady_record, wrong_levels, wrong_voltage
@@ -35,6 +36,7 @@ __all__ = ["Evidence", "FittedRecord", "Recogniser", "Suspicion", "causes_of"]
 
 ALWAYS: tuple[Recogniser, ...] = (
     wrong_voltage,
+    wrong_event,
     unsteady_record,
     wrong_levels,
     typical_values,
@@ -48,6 +50,7 @@ FROM_RESIDUALS: tuple[Recogniser, ...] = (
 )
 BY_TRIAL: tuple[Recogniser, ...] = (
     wrong_voltage,
+    wrong_event,
     unsteady_record,
     typical_values,
     wrong_sign,

@@ -10,6 +10,8 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from exfit.analysis.causes.evidence import Evidence
+from exfit.analysis.causes.suspicion import CERTAIN, Suspicion
 from exfit.dsp.quality import noise_of, spikes
 from exfit.dsp.sampling import sampling_of
 from exfit.records.record import Record
@@ -47,6 +49,18 @@ LEAST_ALIKE = 0.5  # correlation of swings that are the same but for a delay
 SIGN_BEFORE_DELAY = 0.05  # of the correlation: with as little to choose it is the sign
 GAINED_BY_DELAY = 0.15  # of the correlation
 DRIVING = ("vt", "angle", "frequency")
+
+
+def wrong_event(evidence: Evidence) -> Iterator[Suspicion]:
+    """Yield what the records of grid events themselves show to be wrong."""
+    if not evidence.case.kind.finds_rest:
+        return
+    for record in evidence.records:
+        steady = record.steady_until
+        if steady is not None:
+            measured = record.setup.record
+            for cause in (*clock_causes(measured), *record_causes(measured, steady)):
+                yield Suspicion(cause, CERTAIN)
 
 
 def record_causes(record: Record, steady: float) -> tuple[Cause, ...]:

@@ -17,6 +17,7 @@ from exfit.case.starting.suggestion import (
     reading_lines,
 )
 from exfit.case.templates import commented, in_comment
+from exfit.records.angles import unit_by_range
 from exfit.records.inspection import Inspection
 from exfit.records.phasors import OF_POWER, PREFIX
 from exfit.records.pmu_recognition import InspectedPhasor, PmuContent
@@ -30,41 +31,43 @@ MEASURED = ("p", "q", "efd", "ifd", "speed")  # that a record may hold beside ph
 
 
 def event_section(
-    inspection: Inspection, pmu: PmuContent, file: str, bases: Mapping[str, Base] = NO_BASES
+    inspection: Inspection, file: str, bases: Mapping[str, Base] = NO_BASES
 ) -> list[str]:
     """Return the lines of a ``record:`` section of a grid event, which needs no ``test:``.
 
     ``bases`` has the rated voltage under vt and the rated power under p; what is not known is to be
     filled in.
     """
+    pmu = inspection.pmu
     return [
         "record:",
         f"  file: {plain_text(file)}",
         f"  time: {clock_text(inspection)}",
-        *_phasors(pmu, bases),
-        *_status(pmu),
+        *(() if pmu is None else _phasors(pmu, bases)),
+        *(() if pmu is None else _status(pmu)),
         "  channels:",
-        *_channels(inspection, pmu, bases),
+        *(_plain_driving(inspection, bases) if pmu is None else _driving(inspection, pmu)),
+        *_compared(inspection, bases),
         *gap_lines(inspection),
         *reading_lines(inspection),
     ]
 
 
-def event_plant(pmu: PmuContent) -> list[str]:
+def event_plant(inspection: Inspection) -> list[str]:
     """Return the first lines of a ``plant:`` section, on whose terminals an event is played."""
     return [
         "plant:",
         commented("  type: grid-playback", "the recorded voltage and angle drive the unit"),
         "  network:",
-        commented(f"    f0: {_rated_frequency(pmu)}", "Hz, rated frequency"),
+        commented(f"    f0: {_rated_frequency(inspection.pmu)}", "Hz, rated frequency"),
         commented("    R: 0.0", "pu, from the terminals to the recorded voltage"),
         commented("    X: 0.0", "pu, as of a step-up transformer; 0: recorded at the terminals"),
     ]
 
 
-def _rated_frequency(pmu: PmuContent) -> str:
+def _rated_frequency(pmu: PmuContent | None) -> str:
     """Return the rated frequency by the recorded one, to be filled in where it shows none."""
-    level = pmu.frequency_level
+    level = None if pmu is None else pmu.frequency_level
     near = (f0 for f0 in RATED_FREQUENCIES if level is not None and abs(level - f0) < NEAR_RATED)
     return next((f"{f0:g}" for f0 in near), FILL_IN)
 
@@ -141,22 +144,42 @@ def _status(pmu: PmuContent) -> Iterator[str]:
         yield f"  status: {{column: {plain_text(pmu.status)}}}"
 
 
-def _channels(inspection: Inspection, pmu: PmuContent, bases: Mapping[str, Base]) -> Iterator[str]:
-    """Yield the channels: what drives the unit, and what is compared."""
+def _driving(inspection: Inspection, pmu: PmuContent) -> Iterator[str]:
+    """Yield the channels that drive the unit, of phasors."""
     yield f"    vt: {PREFIX}vt"
     yield f"    angle: {PREFIX}angle"
     if pmu.frequency is not None:
         unit = _unit(inspection, pmu.frequency) or FILL_IN
         entry = f"{{column: {plain_text(pmu.frequency)}, unit: {unit}}}"
         yield commented(f"    # frequency: {entry}", "drives in place of the angle")
+
+
+def _plain_driving(inspection: Inspection, bases: Mapping[str, Base]) -> Iterator[str]:
+    """Yield the channels that drive the unit, of columns of their own."""
+    voltage, angle = (inspection.channel_of(signal) for signal in ("vt", "angle"))
+    if voltage is not None:
+        yield f"    vt: {channel_entry(voltage, bases.get('vt'))}"
+    if angle is not None:
+        shown = unit_by_range(inspection.samples[angle.name])
+        unit = angle.unit or shown or FILL_IN
+        why = "deg or rad" if unit == FILL_IN else "by its range" if angle.unit is None else ""
+        entry = f"    angle: {{column: {plain_text(angle.name)}, unit: {unit}}}"
+        yield commented(entry, why) if why else entry
+
+
+def _compared(inspection: Inspection, bases: Mapping[str, Base]) -> Iterator[str]:
+    """Yield the channels that are compared: meters of their own first, else those of phasors."""
+    has_current = inspection.pmu is not None and inspection.pmu.current is not None
     for signal in MEASURED:
         channel = inspection.channel_of(signal)
-        measured = channel is not None and (
-            signal not in OF_POWER or quantity_of(channel.unit) == SIGNALS[signal].quantity
+        known = channel is not None and (
+            signal not in OF_POWER
+            or inspection.pmu is None
+            or quantity_of(channel.unit) == SIGNALS[signal].quantity
         )
-        if channel is not None and measured:
+        if channel is not None and known:
             yield f"    {signal}: {channel_entry(channel, bases.get(signal))}"
-        elif signal in OF_POWER and pmu.current is not None:
+        elif signal in OF_POWER and has_current:
             yield f"    {signal}: {PREFIX}{signal}"
         elif signal in OF_POWER:
             yield f"    {signal}: {{column: {FILL_IN}, unit: {FILL_IN}, base: {FILL_IN}}}"

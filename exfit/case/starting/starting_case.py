@@ -86,7 +86,7 @@ def _recordings(
     tests: Sequence[StartingTest], names: Mapping[Path, str], exciter: str
 ) -> tuple[list[str], list[str]]:
     """Return the sections of what is fitted, and of what validates."""
-    if tests[0].inspection.pmu is not None:
+    if tests[0].inspection.is_event:
         return _events(tests, names)
     if len(tests) == 1:
         level = _voltage_before(exciter, tests[0])
@@ -101,9 +101,7 @@ def _events(
 ) -> tuple[list[str], list[str]]:
     """Return the sections of grid events: the first, or every other one, is fitted."""
     sections = [
-        event_section(test.inspection, test.inspection.pmu, names[test.inspection.path], test.bases)
-        for test in tests
-        if test.inspection.pmu is not None
+        event_section(test.inspection, names[test.inspection.path], test.bases) for test in tests
     ]
     if len(tests) == 1:
         return sections[0], []
@@ -207,8 +205,8 @@ def _channels_once(test: StartingTest, anchors: dict[str, str]) -> list[str]:
 
 def _plant(unit: UnitData, inspection: Inspection) -> Iterator[str]:
     machine = unit.machine
-    if inspection.pmu is not None:
-        yield from event_plant(inspection.pmu)
+    if inspection.is_event:
+        yield from event_plant(inspection)
         yield from _machine(machine, {"R": TYPICAL, "X": TYPICAL})
         return
     yield "plant:"

@@ -46,7 +46,7 @@ def starting_tests(
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
     for a record in which the breaker opens, and for one of several that shows no step.
     """
-    if any(inspection.pmu is not None for inspection in inspections):
+    if any(inspection.is_event for inspection in inspections):
         return _events(inspections, sizes, bases or {})
     _refuse_rejections(inspections)
     recorded = [(inspection, test) for inspection in inspections for test in tests_of(inspection)]
@@ -73,10 +73,10 @@ def _events(
     """
     _refuse_unused(sizes, [])
     for inspection in inspections:
-        if inspection.pmu is None:
+        if not inspection.is_event:
             raise ExfitError(
-                f"{inspection.path}: no phasors of a measurement unit, which the other records "
-                "have: give bump tests a case of their own"
+                f"{inspection.path}: no angle of a grid event, which the other records have: give "
+                "bump tests a case of their own"
             )
     single = len(inspections) == 1
     return tuple(

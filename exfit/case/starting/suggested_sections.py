@@ -7,8 +7,8 @@ from exfit.records.inspection import Inspection
 
 def suggested_sections(inspection: Inspection, file: str) -> list[str]:
     """Return the lines of the sections that an inspected file suggests."""
-    if inspection.pmu is not None:
-        return [*event_plant(inspection.pmu), *event_section(inspection, inspection.pmu, file)]
+    if inspection.is_event:
+        return [*event_plant(inspection), *event_section(inspection, file)]
     return [
         *record_section(inspection, file),
         *bump_section(inspection),

@@ -39,10 +39,12 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     for line in _signals([each for each in result.channels if each.name not in of_pmu]):
         paragraph(console, line)
     console.print()
-    if result.pmu is None:
-        _steps(console, result)
-    else:
+    if result.pmu is not None:
         paragraph(console, _of_pmu(result.pmu))
+    elif result.is_event:
+        paragraph(console, "a grid event: voltage, angle and power, and no reference")
+    else:
+        _steps(console, result)
     console.print()
     if result.findings:
         findings = result.findings
