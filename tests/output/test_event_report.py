@@ -1,5 +1,7 @@
 """The report of a unit that was verified from a grid event, as its reviewer reads it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -7,9 +9,11 @@ from grid_events import event_case, recorded
 from pages import Page
 
 from exfit.output.report import html
+from exfit.output.report.sections.usability import usability
 from exfit.output.terminal import comparisons
 from exfit.output.terminal.terminal import GuardedConsole
 from exfit.results.io import load_result, result_text
+from exfit.simulation.small_signal import Pole
 from exfit.workflows import fit
 
 # of all machine data, so that no typical value is looked into
@@ -99,3 +103,14 @@ def test_the_terminal_has_room_for_the_errors_of_events(result, capsys):
     assert [row.split()[:2] for row in rows if row] == [
         ["fit", "p"], ["fit", "q"], ["night", "p"], ["night", "q"]
     ]  # fmt: skip
+
+
+def test_what_integrates_a_recorded_voltage_is_no_mode_that_fails_to_decay(result):
+    """The integrator of a PID regulator: its loop is open while the record drives."""
+    (of_tests, *_) = result.behaviour.small_signal
+    for value, passed in ((0.0, True), (0.01, False)):
+        pole = Pole(complex(value), -float(value > 0.0), 0.0, ("VI",))
+        view = replace(of_tests.view, poles=(pole, *of_tests.view.poles))
+        behaviour = replace(result.behaviour, small_signal=(replace(of_tests, view=view),))
+        damping = usability(replace(result, behaviour=behaviour))[2]
+        assert damping.passed is passed

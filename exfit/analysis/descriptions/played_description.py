@@ -26,11 +26,11 @@ def played_in(view: Case, recording: Recording, setup: ExperimentSetup) -> Itera
     yield f"recorded {' and '.join(setup.driving)} played in"
     if setup.test.steady is not None:
         levels = ", ".join(_levels(setup))
-        yield f"at rest until {show(setup.test.steady)} s" + (f" with {levels}" if levels else "")
+        yield f"at rest until {setup.test.steady:.4g} s" + (f" with {levels}" if levels else "")
     if view.kind.has_machine and view.kind.has_exciter:
         yield SWING[getattr(view.plant, "swing", "power")]
     masks = (*recording.record.mask, *(switching.masked for switching in setup.switchings))
-    left_out = ", ".join(f"{show(start)} ... {show(end)} s" for start, end in masks)
+    left_out = ", ".join(f"{start:.4g} ... {end:.4g} s" for start, end in masks)
     if left_out:
         yield f"left out of the comparison: {left_out}"
     everything = _filter(recording.record.filter)

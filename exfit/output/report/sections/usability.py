@@ -76,7 +76,7 @@ def _least_damping(behaviour: Behaviour) -> Iterator[tuple[str, float, bool]]:
     for each in behaviour.small_signal:
         if each.view is not None and each.view.poles:
             poles = each.view.poles
-            if each.view.open is None:  # what integrates a recorded voltage stays where it is
+            if each.view.path[1] != "vt":  # what integrates a recorded voltage stays where it is
                 poles = tuple(pole for pole in poles if abs(pole.value) > RESTING) or poles
             decays = all(pole.value.real < 0.0 for pole in poles)
             yield ", ".join(each.tests), min(pole.damping for pole in poles), decays
