@@ -18,6 +18,7 @@ from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.models.blocks import SHORTEST
+from exfit.signals import OF_FLAT_RUN
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Simulator
 
@@ -31,8 +32,6 @@ SMALLEST_COLUMN = float(np.finfo(float).tiny)
 FLAT_SECONDS = 60.0
 FLAT_TIMES = np.linspace(0.0, FLAT_SECONDS, 601)
 FLAT_DRIFT = 1e-9  # pu
-
-UNCOMPARED = ("efd", "p", "q")  # of a grid event that is played in and not compared
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ def check(case: Case) -> Check:
     drift, error = 0.0, 0.0
     for experiment in experiments:
         simulator, at = experiment.with_inputs(values), experiment.parameters(values)
-        signals = experiment.signals or UNCOMPARED
+        signals = experiment.signals or OF_FLAT_RUN
         drift = max(drift, flat_drift(simulator, at, signals))
         error = max(error, simulator.step_error(at, signals))
     first = experiments[0].simulator

@@ -14,12 +14,13 @@ from exfit.errors import RecordError
 from exfit.records.angles import AngleError, in_radians, unwrapped
 from exfit.records.formats.table import NONE, Array, Table, column_error
 from exfit.records.units import alike, scale_between
+from exfit.signals import OF_CURRENT_PHASOR
 
 Complex = NDArray[np.complex128]
 
 PREFIX = "phasors."
 OF_VOLTAGE = ("vt", "angle")
-OF_POWER = ("p", "q", "it")
+OF_POWER = OF_CURRENT_PHASOR
 SIGNALS_OF_PHASORS = (*OF_VOLTAGE, *OF_POWER)
 TURN = np.exp(2j * np.pi / 3.0)  # by which phase a leads phase b
 
@@ -128,7 +129,8 @@ class PhasorTable:
         if current is not None and any(name.removeprefix(PREFIX) in OF_POWER for name in names):
             amperes = self._positive_sequence(current, may_lack)
             power = voltage * np.conj(amperes)
-            signals |= {"p": power.real, "q": power.imag, "it": np.abs(amperes)}
+            of_power = (power.real, power.imag, np.abs(amperes))
+            signals |= dict(zip(OF_POWER, of_power, strict=True))
         return {name: np.asarray(signals[name.removeprefix(PREFIX)]) for name in names}
 
     def _positive_sequence(self, phasor: Phasor, may_lack: bool) -> Complex:

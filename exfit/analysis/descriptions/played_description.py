@@ -6,10 +6,10 @@ from exfit.case.case import Case
 from exfit.case.schema import Filter, MedianSection, Recording
 from exfit.fitting.setup import ExperimentSetup
 from exfit.plants import initial
-from exfit.signals import unit_of_signal
+from exfit.signals import COMPARED_IN_EVENT, unit_of_signal
 from exfit.util.text import show
 
-RESTING = ("vt", "p", "q", "efd", "ifd", "speed")  # in the order in which a rest is described
+RESTING = ("vt", *COMPARED_IN_EVENT)  # in the order in which a rest is described
 SWING = {
     "power": "swing equation: Pm is a power, its torque (Pm - D dw) / (1 + dw)",
     "torque": "swing equation: Pm is a torque, less D dw",

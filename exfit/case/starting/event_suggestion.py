@@ -22,12 +22,11 @@ from exfit.records.inspection import Inspection
 from exfit.records.phasors import OF_POWER, PREFIX
 from exfit.records.pmu_recognition import InspectedPhasor, PmuContent
 from exfit.records.units import quantity_of, scale_between
-from exfit.signals import SIGNALS
+from exfit.signals import COMPARED_IN_EVENT, SIGNALS
 
 RATED_FREQUENCIES = (50.0, 60.0)  # Hz
 NEAR_RATED = 1.0  # Hz: a grid is closer to its rated frequency
 LIKE_RATED = (0.85, 1.15)  # of the rated voltage: where a unit rests on load
-MEASURED = ("p", "q", "efd", "ifd", "speed")  # that a record may hold beside phasors
 
 
 def event_section(
@@ -170,7 +169,7 @@ def _plain_driving(inspection: Inspection, bases: Mapping[str, Base]) -> Iterato
 def _compared(inspection: Inspection, bases: Mapping[str, Base]) -> Iterator[str]:
     """Yield the channels that are compared: meters of their own first, else those of phasors."""
     has_current = inspection.pmu is not None and inspection.pmu.current is not None
-    for signal in MEASURED:
+    for signal in COMPARED_IN_EVENT:
         channel = inspection.channel_of(signal)
         known = channel is not None and (
             signal not in OF_POWER
