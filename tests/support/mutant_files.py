@@ -649,6 +649,32 @@ def _dyr(rng: Random, changes: Changes) -> Files:
     return {"unit.dyr": data}
 
 
+PSLF_UNITS = b"""# two units
+models
+genrou 101 "G: 1/#" 18.0 "1 " : #9 mva=120.0 6.0 0.035 0.5 0.077 3.25 0.0 /
+  1.8 1.7 0.3 0.55 0.25 0.2 0.12 0.4
+exac8b 101 "G: 1/#" 18.0 "1 " : #9 0.0 84.0 5.0 10.0 0.1 999 0.0 35.0 -35.0 /
+# in between
+  1.0 1.3 0.1 0.4 6.5 0.3 9.0 3.0
+gensal 7 ! ! "G2" : "tpdo" 5.0 "tppdo" 0.05 "tppqo" 0.06 "h" 3.0 "d" 0.0 "ld" 1.1 /
+  "lq" 0.7 "lpd" 0.25 "lppd" 0.2 "ll" 0.15 "s1" 0.11 "s12" 0.4
+exac4 7 ! ! "G2" : 0.02 999 -999 1.0 10.0 100.0 0.1 5.0 -5.0 0.0
+"""
+
+
+def _dyd(rng: Random, changes: Changes) -> Files:
+    sources = [(ROOT / "sample_data" / "unit.dyd").read_bytes(), PSLF_UNITS]
+    data = mutated_bytes(rng, rng.choice(sources), rng.choice(sources), changes, text=True)
+    return {"unit.dyd": data}
+
+
+def _play_in(rng: Random, changes: Changes) -> Files:
+    times = [number / 60.0 for number in range(300)]
+    rows = (f"{t:.6f}, {1.0 - 0.02 * (t > 2.0):.6f}, {60.0 - 0.1 * (t > 2.0):.6f}" for t in times)
+    data = "\n".join(rows).encode()
+    return {"event.plb": mutated_bytes(rng, data, data, changes, text=True)}
+
+
 TESTS = b"""file,at,step,base,validates
 ../sample_data/ac1a_up.csv,1.0,0.05,,no
 ../sample_data/ac1a_down.csv,1.0,-0.05,,yes
@@ -684,6 +710,8 @@ KINDS: Mapping[str, Callable[[Random, Changes], Files]] = {
     "parquet": _parquet,
     "comtrade": _comtrade,
     "dyr": _dyr,
+    "dyd": _dyd,
+    "play-in": _play_in,
     "tests": _table_of_tests,
     "cases": _table_of_cases,
     "batch": _batch,

@@ -89,7 +89,11 @@ def commands(mutant: Mutant, folder: Path) -> Iterator[tuple[str, ...]]:
         yield ("new", "--model", "AC1A", "--record", main, "-o", f"{OUT}/new.yaml")
         (folder / "record.yaml").write_text(CASE_OF_RECORD % main)
         yield ("simulate", "record.yaml", "-o", OUT, "--no-plots")
-    elif mutant.kind == "dyr":
+    elif mutant.kind == "play-in":
+        yield ("inspect", main, "-o", OUT, plots)
+        (folder / "event.yaml").write_text(CASE_OF_EVENT)
+        yield ("simulate", "event.yaml", "-o", OUT, "--no-plots")
+    elif mutant.kind in ("dyr", "dyd"):
         yield ("import", main, "-o", f"{OUT}/unit.yaml")
         bus, machine = ("101", "1") if mutant.number % 2 else ("7", "G2")
         yield ("import", main, "--bus", bus, "--id", machine, "-o", f"{OUT}/unit_{bus}.yaml")
@@ -100,6 +104,13 @@ def commands(mutant: Mutant, folder: Path) -> Iterator[tuple[str, ...]]:
         yield (READ_FLEET, ".")
     elif mutant.kind == "tests":
         yield ("new", "--model", "AC1A", "--tests", main, "-o", f"{OUT}/new.yaml")
+
+
+CASE_OF_EVENT = """\
+model: SEXS
+plant: {type: grid-playback, machine: GENSAL, network: {f0: 60, P: 0.5, Q: 0.1}}
+record: {file: event.plb, time: t, channels: {vt: vt, frequency: frequency}}
+"""
 
 
 def prepared(workplace: Path) -> Path:
