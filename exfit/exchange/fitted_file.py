@@ -256,7 +256,8 @@ def _refuse_lost(
 ) -> None:
     """Raise ExfitError where the record has no field for a value that is fitted or not its own."""
     record = part.definition.record
-    fields, own = {*part.definition.names}, dict(record.held)
+    fields = {*part.definition.names}
+    own = {symbol: part.values[symbol] for symbol in dict(record.held)}
     for symbol in (row.symbol for row in part.definition.model.sheet):
         lost = f"{record.name} cannot hold {symbol} = {show(values[symbol])}"
         if symbol not in fields and prefix + symbol in result.parameters:

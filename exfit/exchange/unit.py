@@ -1,16 +1,17 @@
 """One unit of a dynamics file: machine, exciter, stabiliser, governor, and what is left out."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from exfit.errors import DynamicsError
 from exfit.exchange.fields import DynamicsFault, Field, located, refuse
 from exfit.exchange.file_format import Head
 from exfit.exchange.formats import format_of
 from exfit.exchange.records import Definition, definition_of, definitions, read_values
-from exfit.util.text import near
+from exfit.util.text import near, show
 
 NEEDED = ("machine", "exciter")
+BASE_SHARE = "Trate_Mbase"  # the base of a governor over the machine's, where its model has it
 MOST_LISTED = 20  # units in a message
 OTHERS: Mapping[str, str] = {
     name: kind
@@ -95,6 +96,8 @@ def unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     left_out = [head for head in heads if head.definition is None]
     warnings = [DynamicsFault(head.line, _left_out(head)) for head in left_out]
     parts = _parts(heads, faults, warnings)
+    if "governor" in parts:
+        parts["governor"] = _on_its_base(parts["governor"], heads, warnings)
     if faults or not parts.keys() >= {*NEEDED}:
         return None, faults
     unit = Unit(
@@ -107,6 +110,26 @@ def unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
         tuple(sorted(warnings, key=lambda warning: warning.line)),
     )
     return unit, []
+
+
+def _on_its_base(
+    governor: UnitPart, heads: Iterable[Head], warnings: list[DynamicsFault]
+) -> UnitPart:
+    """Return a governor with the share of its base in the machine's, or add that it is another."""
+    bases = {head.definition.kind: head.base for head in heads if head.definition is not None}
+    own, machine = bases.get("governor"), bases.get("machine")
+    if own is None or own == machine:
+        return governor
+    if machine is not None and machine > 0.0 and BASE_SHARE in governor.values:
+        share = own / machine
+        return replace(governor, values={**governor.values, BASE_SHARE: share})
+    theirs = "is not in the file" if machine is None else f"is {show(machine)} MVA"
+    name = governor.definition.record.name
+    text = (
+        f"{name}: its values are on {show(own)} MW and not converted; the machine's base {theirs}"
+    )
+    warnings.append(DynamicsFault(governor.line, text))
+    return governor
 
 
 def missing_kinds(heads: Iterable[Head]) -> list[str]:

@@ -23,4 +23,5 @@ def unit_data(unit: Unit, file: str) -> UnitData:
 def _part(part: UnitPart, file: str) -> PartData:
     absent = dict.fromkeys(part.definition.absent, TYPICAL)
     origin = f"those of {Path(file).name}"
-    return PartData(part.definition.model, part.values, absent, origin, part.inputs)
+    model, times_speed = part.definition.model, part.times_speed
+    return PartData(model, part.values, absent, origin, part.inputs, times_speed)

@@ -13,6 +13,7 @@ from exfit.exchange.pslf.files import PSLF_FILES, heads, record_text
 from exfit.exchange.records import PSLF, definition_of, definitions, read_values
 from exfit.exchange.unit import read_unit
 from exfit.exchange.units import read_units
+from exfit.models.sheet import typical
 
 DEFINITIONS = {definition.record.name: definition for definition in definitions(PSLF)}
 
@@ -88,6 +89,22 @@ def test_a_sample_is_read_and_its_case_names_what_it_rests_on():
     assert "model: EXAC4" in case
     assert "# exac4 on line 9" in case
     assert "Ka" not in case
+
+
+def governed(base, record):
+    """Return a unit with a governor on a base."""
+    values = dict(typical(DEFINITIONS[record].model.sheet))
+    text = record_text(DEFINITIONS[record], values, 1, "1").replace("#9", f"#9 mwcap={base}")
+    return read_unit(f"{PSLF_UNIT}{text}\n", "a.dyd", 1)
+
+
+def test_the_base_of_a_governor_is_its_share_of_the_machine_s_or_is_named():
+    assert not [text for _, text in governed(120.0, "tgov1").warnings if "not converted" in text]
+    (warning,) = [text for _, text in governed(90.0, "tgov1").warnings if "on 90 MW" in text]
+    assert warning.endswith("the machine's base is 120 MVA")
+    unit = governed(90.0, "ggov1")
+    assert unit.governor.values["Trate_Mbase"] == 0.75
+    assert not [text for _, text in unit.warnings if "not converted" in text]
 
 
 def test_efd_is_multiplied_by_the_speed_where_the_record_says_so():

@@ -58,6 +58,7 @@ def starting_case(
         *_heading(unit, tests),
         *_about(about or {}),
         f"model: {unit.name}",
+        *(["efd_times_speed: true"] if unit.exciter.times_speed else []),
         *_plant(unit, first),
         *_added(unit),
         *recordings,

@@ -19,7 +19,8 @@ class PartData:
     """A model with a value for each parameter, and the sources of these in the words of a case.
 
     A value without a source is not stated; ``origin`` says in a comment where the data are from;
-    ``inputs`` are the signals of a stabiliser, () for those of its model.
+    ``inputs`` are the signals of a stabiliser, () for those of its model; ``times_speed`` says that
+    the speed multiplies the efd of an exciter.
     """
 
     model: Model | Machine
@@ -27,6 +28,7 @@ class PartData:
     sources: Mapping[str, str]
     origin: str = ""
     inputs: tuple[str, ...] = ()
+    times_speed: bool = False
 
     @classmethod
     def typical(cls, model: Model | Machine) -> "PartData":
