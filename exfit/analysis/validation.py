@@ -41,20 +41,22 @@ def validate(
 ) -> list[Comparison]:
     """Return the comparisons with the fitted records, then with those that no fit saw.
 
-    A ``record`` by hand takes the place of all of these. Raises ExfitError where input cannot be
-    used, or where there is nothing to validate on.
+    A ``record`` by hand takes the place of all of these. Where nothing in the case is free no fit
+    saw any. Raises ExfitError where input cannot be used, or where there is nothing to validate on.
     """
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
+    saw = case.recordings if case.free() else ()
     fitted = [
         compare_with_record(setup.with_enough_substeps(values), setup.name, values)
-        for setup in (build_experiment(case, recording, values) for recording in case.recordings)
+        for setup in (build_experiment(case, recording, values) for recording in saw)
     ]
     if record is not None:
         return [*fitted, validation_by_hand(case, fitted, values, record, given)]
-    if not case.validations:
+    recordings = (*(() if saw else case.recordings), *case.validations)
+    if not recordings:
         raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
-    unseen = [build_experiment(case, recording, values) for recording in case.validations]
+    unseen = [build_experiment(case, recording, values) for recording in recordings]
     validated = (aligned(case, setup, values) for setup in unseen)
     return [*fitted, *(_validated(case, fitted, *pair) for pair in validated)]
 

@@ -1,6 +1,7 @@
 """The commands simulate and validate."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -18,6 +19,9 @@ from exfit.cli.options import (
     set_option,
 )
 from exfit.errors import CaseError
+
+if TYPE_CHECKING:
+    from exfit.case.case import Case
 
 
 @click.command()
@@ -95,27 +99,23 @@ def validate(
 ) -> None:
     """Compare fitted values with the records of CASE that were not fitted.
 
-    The values are those of the last fit of the case, or of --parameters. The steps of --record are
+    The values are those of the last fit of the case, or of --parameters; where nothing is free in
+    CASE, its own, and all of its records are validated. The steps of --record are
     found in it and shown; --step -0.05 and --at 1.0 replace what is found, each of several steps
     has its own. Writes validation.json, samples and overlays to runs/CASE-validate, or to DIR.
     Exit code 1: bad input, no step found, or no record to validate on; 3: a validation is not
     accepted.
     """
     from exfit import workflows
-    from exfit.fitting.overrides import fitted_model_hash, read_parameters
+    from exfit.fitting.overrides import read_parameters
     from exfit.output import run_folder
     from exfit.util.typed import plain
 
-    source = parameters or run_folder.last_fit(case)
-    loaded = load(case, "" if source is None else fitted_model_hash(source))
-    if source is None:
-        raise CaseError(
-            [f"{case}: no earlier fit of this case; run exfit fit, or give --parameters FILE"]
-        )
+    loaded, source = _with_source(case, parameters)
     folder = output.folder_of(loaded, "validate")
     if record is not None:
         run_folder.refuse_inputs("validate", [record], folder, [record.stem])
-    values = read_parameters(loaded, source)
+    values = {} if source is None else read_parameters(loaded, source)
     comparisons = workflows.validate(loaded, values, record, steps, instants)
     figures = run_folder.write_validation(comparisons, folder)
     if output.as_json:
@@ -124,10 +124,36 @@ def validate(
         from exfit.output import terminal
 
         console = terminal.console()
-        console.print(f"values of {parameters or 'the last fit'}", soft_wrap=True, markup=False)
+        console.print(_whose(parameters, source), soft_wrap=True, markup=False)
         terminal.validation(console, comparisons)
         console.print()
         terminal.written(console, folder)
     output.draw(figures)
     if not all(comparison.accepted for comparison in comparisons):
         raise SystemExit(NOT_CONVERGED)
+
+
+def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | None]:
+    """Return a case and the file with its values: its last fit's, None where nothing is free.
+
+    Raises CaseError where it was not fitted.
+    """
+    from exfit.fitting.overrides import fitted_model_hash
+    from exfit.output import run_folder
+
+    source = parameters or run_folder.last_fit(path)
+    case = load(path, "" if source is None else fitted_model_hash(source))
+    if not case.free():
+        return case, parameters
+    if source is None:
+        raise CaseError(
+            [f"{path}: no earlier fit of this case; run exfit fit, or give --parameters FILE"]
+        )
+    return case, source
+
+
+def _whose(parameters: Path | None, source: Path | None) -> str:
+    """Return whose values are validated."""
+    if source is None:
+        return "values of the case: nothing is free"
+    return f"values of {parameters or 'the last fit'}"

@@ -3,6 +3,7 @@
 import pytest
 from grid_events import SIGNALS, TRUTH, event_case, recorded
 
+from exfit import cli
 from exfit.case.load import load_case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments
@@ -92,3 +93,16 @@ def test_the_recorded_output_of_a_stabiliser_is_not_added_to_it(tmp_path):
     path = event_case(tmp_path, "pss", signals=(*SIGNALS, "vs"), stabiliser=stabiliser)
     with pytest.raises(CaseError, match=r"channels\.vs: not allowed with a stabiliser, whose"):
         load_case(path)
+
+
+def test_a_model_as_it_is_is_verified_without_a_fit(events, tmp_path, capsys):
+    """A planner's data, nothing of it free: each event is validated."""
+    path = event_case(events, "trip", "night", free=False)
+    trip, night = validate(path, {})
+    assert trip.validation
+    assert trip.accepted
+    assert night.accepted
+    with pytest.raises(SystemExit) as ended:
+        cli.main(args=["validate", str(path), "-o", str(tmp_path / "run")], prog_name="exfit")
+    assert not ended.value.code
+    assert "values of the case: nothing is free" in capsys.readouterr().out
