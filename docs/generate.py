@@ -44,6 +44,12 @@ plant: {{type: infinite-bus, machine: GENROU, network: {{f0: 60, X: 0.5, P: 0.8,
 {stabiliser}
 test: {{vt0: 1.0, duration: 10.0, vref: [{{at: 1.0, step: 0.02}}]}}
 """
+GOVERNOR_CASE = """\
+model: ST1A
+plant: {{type: infinite-bus, machine: GENROU, network: {{f0: 60, X: 0.3, P: 0.7, Q: 0.1}}}}
+{governor}
+test: {{vt0: 1.0, duration: 40.0, angle: [{{at: 1.0, step: 24.5, unit: rad, ramp: 39.0}}]}}
+"""
 
 
 # ---- keys of the case file
@@ -167,7 +173,7 @@ def _yaml(value: Any) -> str:
 
 def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
     """Write a page and a figure for each model; return the pages."""
-    from exfit.models import MODELS, STABILISERS
+    from exfit.models import GOVERNORS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
 
     pages = []
@@ -187,6 +193,18 @@ def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
         caption = (
             "The active power of a GENROU machine with ST1A on load, after a step of 2 % of the "
             "reference. All data are typical."
+        )
+        pages.append(_model_page(model, caption, folder))
+    for model in GOVERNORS.values():
+        with_it, without = (
+            GOVERNOR_CASE.format(governor=line)
+            for line in (f"governor: {{model: {model.name}}}", "")
+        )
+        responses = {"with governor": _response(with_it), "without": _response(without)}
+        _draw(responses, ("p",), folder / f"{model.name}.png")
+        caption = (
+            "The active power of a GENROU machine with ST1A on load, when the frequency of the grid "
+            "rises by 0.1 Hz of 60 Hz at 1 s. All data are typical."
         )
         pages.append(_model_page(model, caption, folder))
     for machine in MACHINES.values():
