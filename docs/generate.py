@@ -203,7 +203,7 @@ def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
         responses = {"with governor": _response(with_it), "without": _response(without)}
         _draw(responses, ("p",), folder / f"{model.name}.png")
         caption = (
-            "The active power of a GENROU machine with ST1A on load, when the frequency of the grid "
+            "The active power of a GENROU machine with ST1A on load, when the grid's frequency "
             "rises by 0.1 Hz of 60 Hz at 1 s. All data are typical."
         )
         pages.append(_model_page(model, caption, folder))
