@@ -60,7 +60,8 @@ def wrong_bus(field: Field) -> Iterator[str]:
     bus = field.text
     whole = not field.quoted and bus.isascii() and bus.isdigit()
     if not whole or not 0 < int(bus[:LONGEST_BUS]) < MOST_BUSES:
-        yield f"{show_value(bus)} is not the number of a bus"
+        advice = "; write the number in place of the name" if field.quoted else ""
+        yield f"{show_value(bus)} is not the number of a bus{advice}"
 
 
 def wrong_id(machine_id: str) -> Iterator[str]:

@@ -515,6 +515,12 @@ def test_a_fit_is_written_for_pslf(run, fitted, options):
 
 
 def test_efd_times_the_speed_is_a_flag_of_pslf(run, fitted):
+    sample = (ROOT / "sample_data" / "unit.dyd").read_text()
+    Path("flag.dyd").write_text(sample.replace("14.5 -14.5\nieeeg1", "14.5 -14.5 1\nieeeg1"))
+    record = ROOT / "sample_data" / "ac1a_up.csv"
+    given = ["--planner", "flag.dyd", "--record", record, "--step", "0.02"]
+    assert run("new", *given, "-o", "new.yaml")[0] == 0
+    assert yaml.safe_load(Path("new.yaml").read_text())["efd_times_speed"] is True
     text = result_of(fitted)["case_text"]
     named(fitted, case_text=f"efd_times_speed: true\n{text}")
     code, out, err = run("export", fitted, "--format", "dyd")

@@ -18,7 +18,7 @@ from exfit.errors import DynamicsError
 from exfit.exchange.fields import text_of
 from exfit.exchange.import_case import case_text, import_unit
 from exfit.exchange.psse.files import record_text
-from exfit.exchange.psse.free_format import read_records
+from exfit.exchange.psse.free_format import sound_records
 from exfit.exchange.records import (
     SIGNALS,
     Definition,
@@ -55,7 +55,8 @@ def definition(request):
 
 
 def read_back(definition, text):
-    ((line, fields),) = read_records(text, "unit.dyr")
+    ((line, fields),), faults = sound_records(text)
+    assert faults == []
     return read_values(definition, line, fields[3:])
 
 
@@ -271,6 +272,16 @@ def test_a_derivative_without_a_lag_is_warned_of():
     unit = read_unit(SOUND.splitlines()[0] + "\n" + record, "unit.dyr")
     assert unit.exciter.values["TD"] == 0.0
     assert "ESAC8B: KD: 10 has no effect, since TD is 0" in [text for _, text in unit.warnings]
+
+
+def test_names_and_ids_may_be_quoted_and_a_bus_needs_its_number():
+    text = SOUND.replace("GENROU 1", '"GENROU" "1 "').replace("ESAC1A 1", "'ESAC1A' '1 ' @")
+    text = f"@! of release 35, it's\n{text.replace(' @', '')}"
+    assert read_unit(text, "unit.dyr").machine.values == read_unit(SOUND, "unit.dyr").machine.values
+    with pytest.raises(
+        DynamicsError, match=r"'NORTH 21\.6' is not the number of a bus; write the n"
+    ):
+        read_unit(text.replace('1 "GENROU"', "'NORTH 21.6' 'GENROU'"), "unit.dyr")
 
 
 def test_no_saturation_may_be_written_as_four_zeros():

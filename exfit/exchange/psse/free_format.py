@@ -6,7 +6,7 @@ What follows the '/' on its line is comment, and so are lines that begin with //
 import re
 from typing import NamedTuple
 
-from exfit.exchange.fields import DynamicsFault, Field, Fields, lines_of, refuse
+from exfit.exchange.fields import DynamicsFault, Field, Fields, lines_of
 
 COMMENTS = ("//", "@!")
 FIELD = re.compile(
@@ -34,13 +34,6 @@ class _Line(NamedTuple):
     after_comma: bool
     ended: bool = False
     unclosed: bool = False
-
-
-def read_records(text: str, file: str) -> list[Fields]:
-    """Return the records of a text; raises DynamicsError where one has no end."""
-    records, faults = sound_records(text)
-    refuse(faults, file)
-    return records
 
 
 def sound_records(text: str) -> FileRecords:
