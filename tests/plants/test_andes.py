@@ -49,7 +49,7 @@ MACHINE_ON_LOAD = MACHINE_NAMES | {
     "Tq10": "Tpq0", "Tq20": "Tppq0", "xq": "Xq", "xq1": "Xpq", "D": "D",
 }  # fmt: skip
 EXCITERS = {"ESST1A": "ST1A", "ESST3A": "ST3A", "ESST4B": "ST4B"}
-TIMES_SPEED = ("EXDC2", "IEEEX1")  # the program multiplies efd there
+TIMES_SPEED = ("EXDC2",)  # the program multiplies efd there
 OF_GOVERNOR = {"Tw": "TW", "Dt": "Dturb"}  # names of HYGOV and GAST
 OF_EXCITER = {"KF1": "KF"}
 INPUTS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}
@@ -159,5 +159,5 @@ def played_back(name, every=1):
 @pytest.mark.parametrize("every", [1, 2])
 def test_an_event_played_back_is_that_of_another_simulator(name, every):
     differences, columns = played_back(name, every)
-    assert np.ptp(columns["p"]) > 0.05
+    assert np.ptp(columns["p"]) > 0.03
     assert_near(differences, columns)
