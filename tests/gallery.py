@@ -96,8 +96,8 @@ class Run:
         return Path("runs") / f"{name}-{command}"
 
 
-CASES = ("ac1a_typical", "ac8b_unit1", "field_record")
-FIT, UNIT, FIELD = (f"configs/{name}.yaml" for name in CASES)
+CASES = ("ac1a_typical", "ac8b_unit1", "field_record", "grid_event")
+FIT, UNIT, FIELD, EVENT = (f"configs/{name}.yaml" for name in CASES)
 RECORD = FILE.relative_to(ROOT).as_posix()
 RUNS = (  # in the order of the page
     Run(
@@ -134,6 +134,14 @@ RUNS = (  # in the order of the page
     Run(
         f"exfit fit {FIELD}",
         (Picture("field_overlay.png", "voltage and field current in one fit", "overlay.png"),),
+    ),
+    Run(
+        f"exfit fit {EVENT} --search local",
+        (
+            Picture(
+                "grid_event.png", "a grid event: what was played in, then P and Q", "overlay.png"
+            ),
+        ),
     ),
     Run(
         f"exfit simulate {FIT}",
