@@ -1,20 +1,21 @@
 """A planner's file with fitted values: what was fitted is in it, every other byte as it was."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import count
 
 import numpy as np
 import pytest
 from dynamics import THREE, replaced
 from dyr_words import changed_words
-from loose_dyd import PSLF_UNIT
+from loose_dyd import PSLF_UNIT, loose_dyd
 from loose_records import loose, sound
 from records import TEST, TIME, case_of, one, synthetic
 
 from exfit import workflows
 from exfit.exchange.fields import text_of
 from exfit.exchange.fitted_file import FittedUnit, fitted_file, number_text
-from exfit.exchange.records import contradictions, definition_of, definitions
+from exfit.exchange.records import PSLF, PSSE, contradictions, definition_of, definitions
 from exfit.exchange.units import read_units
 from exfit.results.other_values import AsFound
 from exfit.util.sources import FITTED, TYPICAL
@@ -25,6 +26,12 @@ DEFINITIONS = {
     if definition_of(definition.record.name) == definition
 }
 GENROU, ESAC1A = DEFINITIONS["GENROU"], DEFINITIONS["ESAC1A"]
+OF_PSLF = {definition.record.name: definition for definition in definitions(PSLF)}
+PARTNERS = {
+    PSSE: {"machine": GENROU, "exciter": ESAC1A},
+    PSLF: {"machine": OF_PSLF["genrou"], "exciter": OF_PSLF["exac4"]},
+}
+FILES = {PSSE: "units.dyr", PSLF: "units.dyd"}
 WRITTEN = 5e-6  # of a value: half of the sixth digit
 PREFIXES = {
     "exciter": "",
@@ -45,11 +52,10 @@ def fit(tmp_path_factory):
     return replace(result, parameters={}, ties={}, network={}, network_model=None)
 
 
-def unit_of(data, bus, machine_id="1"):
+def unit_of(data, bus, machine_id="1", program=PSSE):
     """Return a unit of a file."""
-    units = {
-        (unit.bus, unit.id.upper()): unit for unit in read_units(text_of(data, "f"), "f").units
-    }
+    units = read_units(text_of(data, "f"), FILES[program]).units
+    units = {(unit.bus, unit.id.upper()): unit for unit in units}
     return units[bus, machine_id.upper()]
 
 
@@ -97,10 +103,10 @@ def verified(fit, unit, values, sources=None, **others):
     )
 
 
-def exported(data, *fits):
+def exported(data, *fits, program=PSSE):
     """Return the file with the values of fits, which all must be in it."""
     names = (f"case-{number}" for number in count())
-    written = fitted_file(data, "units.dyr", [*map(FittedUnit, names, fits)])
+    written = fitted_file(data, FILES[program], [*map(FittedUnit, names, fits)])
     assert [left for left in written.left if left.verified] == []
     return written
 
@@ -127,7 +133,7 @@ def rounded(value):
 
 def partners(definition, random):
     """Return the records of a unit, one of them of a kind: (definition, values)."""
-    chosen = {"machine": GENROU, "exciter": ESAC1A, definition.kind: definition}
+    chosen = {**PARTNERS[definition.program], definition.kind: definition}
     records = [(own, sound(own, random)) for own in chosen.values()]
     random.shuffle(records)
     return records
@@ -149,32 +155,47 @@ def odd_file(definition, random):
     return mark + text.encode(encoding)
 
 
+def odd_file_of_pslf(definition, random):
+    """Return a file of three units between what exfit does not know, in an odd layout."""
+    text = '# Prüfstand: "as of" 1999\n\nlodrep\nmodels\n'
+    for bus in (7, 101, 99_999):
+        for own, values in partners(definition, random):
+            text += loose_dyd(own, values, random, bus, "G1")
+        text += f'ieeeg3 {bus} ! ! "G1" : mwcap=9 0.050 3.0 # {bus} governor\'s\n'
+        text += f"imetr {bus} ! ! ! 7 ! ! ! : #9 0.0\n"
+    return text.encode(str(random.choice(ENCODINGS[:4])))
+
+
+ODD_FILES = {PSSE: odd_file, PSLF: odd_file_of_pslf}
+
+
 def there_and_back(fit, definition, random):
-    data = odd_file(definition, random)
-    unit = unit_of(data, 101, "G1")
+    program = definition.program
+    read, write = partial(unit_of, program=program), partial(exported, program=program)
+    data = ODD_FILES[program](definition, random)
+    unit = read(data, 101, "G1")
     values = other_values(unit, random)
-    there = exported(data, verified(fit, unit, values))
-    now = unit_of(there.data, 101, "G1")
+    there = write(data, verified(fit, unit, values))
+    now = read(there.data, 101, "G1")
     assert values_of(now) == pytest.approx(values, rel=WRITTEN, abs=0.0)
     words = changed_words(text_of(data, "f"), text_of(there.data, "f"))
     assert sorted(words) == sorted((each.before, each.after) for each in there.changes)
     named = {(change.model, change.parameter) for change in there.changes}
     assert len(named) == len(there.changes)
     for bus in (7, 99_999):
-        assert values_of(unit_of(there.data, bus, "G1")) == values_of(unit_of(data, bus, "G1"))
-    back = exported(there.data, verified(fit, now, values_of(unit)))
-    assert values_of(unit_of(back.data, 101, "G1")) == pytest.approx(
-        values_of(unit), rel=WRITTEN, abs=0.0
-    )
+        assert values_of(read(there.data, bus, "G1")) == values_of(read(data, bus, "G1"))
+    back = write(there.data, verified(fit, now, values_of(unit)))
+    again = values_of(read(back.data, 101, "G1"))
+    assert again == pytest.approx(values_of(unit), rel=WRITTEN, abs=0.0)
     assert {(change.model, change.parameter) for change in back.changes} == named
-    assert exported(data, verified(fit, unit, values_of(unit))).data == data
+    assert write(data, verified(fit, unit, values_of(unit))).data == data
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", DEFINITIONS)
+@pytest.mark.parametrize("name", [*DEFINITIONS, *OF_PSLF])
 def test_values_go_into_every_kind_of_record_and_back_and_nothing_else_changes(fit, name):
     for seed in range(3):
-        there_and_back(fit, DEFINITIONS[name], np.random.default_rng(seed))
+        there_and_back(fit, (DEFINITIONS | OF_PSLF)[name], np.random.default_rng(seed))
 
 
 def test_only_fields_whose_values_changed_are_written_again(fit):
