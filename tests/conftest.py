@@ -93,8 +93,8 @@ def _is_left_out(item):
     if item.get_closest_marker("long"):
         return True
     given = item.callspec.params.values() if hasattr(item, "callspec") else ()
-    firsts = [value[0] if isinstance(value, tuple) and value else value for value in given]
-    names = [name for name in firsts if isinstance(name, str) and name in CATALOGUE]
+    parts = [part for value in given for part in (value if isinstance(value, tuple) else (value,))]
+    names = [name for name in parts if isinstance(name, str) and name in CATALOGUE]
     return any(name not in FEW for name in names)
 
 

@@ -153,6 +153,7 @@ def test_a_plant_without_a_network_has_no_other_tests():
     assert np.isfinite(errors(design.own.confidence)).all()
 
 
+@pytest.mark.long
 def test_the_noise_given_beats_that_of_the_case_and_that_of_the_record(changed):
     content = yaml.safe_load((CONFIGS / "ac1a_typical.yaml").read_text())["record"]
     recorded = identify(load_case(CONFIGS / "ac1a_typical.yaml"), {}).noise["vt"]
@@ -184,6 +185,7 @@ def test_the_own_test_is_as_telling_as_the_fit_to_its_record(changed):
     assert errors(told) == pytest.approx(errors(known), rel=0.1)
 
 
+@pytest.mark.long
 def test_records_of_different_noise_add_what_each_determines(tmp_path):
     """The inverses of the covariances add up: each record counts by its own noise."""
     levels = {"up": 1e-4, "down": 1e-3}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from cases import local_case
 from records import case_of, config, recording, several
+from tiers import few_of
 
 from exfit import workflows
 from exfit.analysis import iteration_responses, solution
@@ -142,7 +143,7 @@ def test_without_figures_the_table_is_written_on_the_record_s_clock(fitted, tmp_
     assert not (tmp_path / "run" / "iterations.png").exists()
 
 
-@pytest.mark.parametrize("count", [1, 2, 13, 40])
+@pytest.mark.parametrize("count", few_of([1, 2, 13, 40], 2))
 def test_a_line_is_drawn_for_every_response_and_the_bar_names_first_and_last(fitted, count):
     figure = plots.iterations(with_many(fitted, count))
     assert plots.png(figure)

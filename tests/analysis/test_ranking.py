@@ -88,6 +88,7 @@ def test_what_a_recorder_does_not_resolve_refutes_no_model(result):
     assert all(model.possible for model in ranked(fits))
 
 
+@pytest.mark.long
 def test_coloured_errors_count_as_the_few_that_they_are(result):
     """The true model, refuted by a rival that fits as much of the noise, by chance alone.
 

@@ -71,6 +71,7 @@ def test_a_key_in_brackets_is_a_key(case_file, key):
     assert f": {key}: unknown key" in refused(case_file(BASE + f"'{key}': 1\n"), load_case)
 
 
+@pytest.mark.long
 def test_the_same_holds_for_a_programme(case_file):
     tests = "".join(f"  - {{name: t{k}, kind: steady, key: 1}}\n" for k in range(2000))
     shared = BASE.partition("test:")[0]

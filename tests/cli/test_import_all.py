@@ -9,6 +9,7 @@ import yaml
 from dynamics import SOUND, THREE, replaced
 from places import ROOT
 from records import workbook_of
+from tiers import few_of
 
 from exfit.case.load import load_case
 from exfit.errors import CaseError
@@ -108,7 +109,7 @@ def test_a_case_with_records_is_the_one_that_new_makes(run):
     assert Path("cases", CASES[0]).read_text() == Path("cases", "new.yaml").read_text()
 
 
-@pytest.mark.parametrize("in_table", [True, False])
+@pytest.mark.parametrize("in_table", few_of([True, False], 1))
 def test_the_sheet_of_a_workbook_is_in_the_case(run, in_table):
     workbook_of(SAMPLES / "ac1a_up.csv", Path("records", "1_1.xlsx"), ("a", "b"))
     Path("records", "table.csv").write_text("bus,id,file,step,sheet\n1,1,1_1.xlsx,0.05,b\n")
@@ -186,6 +187,7 @@ def test_options_that_contradict_each_other_are_refused(run, options, says):
     assert says in " ".join(ran.err.split())
 
 
+@pytest.mark.long
 def test_two_hundred_units_take_no_longer_than_a_few_reads(run):
     """The file is read once: 200 units in the processor time of a few dozen single imports."""
     import time

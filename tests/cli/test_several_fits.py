@@ -81,6 +81,7 @@ def test_json_is_one_document_and_quiet_is_silent(run):
     assert run("fit", *cases, "--quiet", "--no-plots", "-o", "out")[:2] == (0, "")
 
 
+@pytest.mark.long
 def test_values_given_beside_the_cases_are_the_starts_of_all_fits(run):
     cases = [case_file("a.yaml"), case_file("b.yaml")]
     ran = run("fit", *cases, *BOTH, "--set", "k=3", "--json", "--no-plots")

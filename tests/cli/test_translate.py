@@ -48,6 +48,7 @@ def test_it_leaves_a_case_and_records_of_the_other_model(run, fitted):
     assert header[:2] == ["t", "vt AC1A +1 % open circuit"]
 
 
+@pytest.mark.long
 def test_a_poor_one_ends_with_3_and_says_why_first(run, fitted):
     code, out, _ = run("translate", fitted, "--model", "sexs", "--no-plots", "-o", "poor")
     assert code == 3

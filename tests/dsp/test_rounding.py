@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tiers import few_of
 
 from exfit.dsp.rounding import is_coarse, noise_before_rounding, rounding_waves
 
@@ -18,7 +19,7 @@ def rounded(rng, noise):
     return zero + STEP * np.round((samples - zero) / STEP)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.2, 0.35])
+@pytest.mark.parametrize("share", few_of([0.1, 0.2, 0.35], 1))
 def test_the_noise_is_found_behind_the_rounding_by_a_fit_that_took_some_of_it(share):
     rng, found = np.random.default_rng(1), []
     for _ in range(20):

@@ -117,6 +117,7 @@ def test_what_a_recorder_does_moves_the_step_little(reference, dirt):
         assert detected.size == pytest.approx(step, rel=0.01)
 
 
+@pytest.mark.long
 def test_the_error_holds_the_instant():
     records = [(reference, seed) for reference in REFERENCES for seed in range(8)]
     detected_steps = [find_step(*recorded(name, seed=seed, size=3e-4)) for name, seed in records]
@@ -257,7 +258,7 @@ def wandering(rng, count, interval, lag, deviation):
     return lfilter([1.0], [1.0, -decay], steps)
 
 
-@pytest.mark.parametrize("lag", [0.05, 0.2, 1.0])
+@pytest.mark.parametrize("lag", few_of([0.05, 0.2, 1.0], 1))
 def test_what_a_channel_does_at_rest_is_no_step(lag):
     time = np.arange(0.0, 20.0, 0.01)
     for seed in range(100, 106):

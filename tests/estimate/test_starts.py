@@ -197,7 +197,7 @@ def test_what_many_ask_for_is_asked_for_in_one_call():
     assert np.mean(sizes) > 4.0
 
 
-@pytest.mark.parametrize("kind", ["nan", "infinite", "fails"])
+@pytest.mark.parametrize("kind", few_of(["nan", "infinite", "fails"], 1))
 def test_starts_that_are_not_finite_are_dropped_and_counted(kind):
     def fun(x):
         if x[0] < 0.0:
@@ -258,7 +258,7 @@ def test_watch_receives_how_far_the_search_is():
     assert best[-1] == found.minima[0].cost
 
 
-@pytest.mark.parametrize("workers", [1, 3])
+@pytest.mark.parametrize("workers", few_of([1, 3], 1))
 def test_an_interruption_from_watch_keeps_what_is_done(workers):
     def watch(progress):
         if progress.done >= 5:

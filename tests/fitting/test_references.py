@@ -96,6 +96,7 @@ def test_a_jump_between_two_samples_is_a_step_whose_instant_is_found(noise):
     assert result.comparison.rmse < 1.1 * NOISE
 
 
+@pytest.mark.long
 def test_the_noise_of_a_recorded_reference_is_reported():
     """Its standard error, 1e-4 over the root of a hundred samples at rest, of a way of 1."""
     text = "vref was recorded with noise of"

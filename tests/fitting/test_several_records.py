@@ -19,6 +19,7 @@ from records import (
     write,
 )
 from tables import read_columns
+from tiers import few_of
 
 from exfit.analysis.model_check import check
 from exfit.errors import CaseError, RecordError
@@ -129,6 +130,7 @@ def test_noise_ten_times_as_large_makes_the_errors_so(tmp_path):
     assert errors(found[1]) == pytest.approx(tenfold, rel=1e-9)
 
 
+@pytest.mark.long
 def test_noise_may_be_given_for_a_validation_alone(tmp_path):
     content = three_free(config("ac1a_typical"))
     content["validate"][0]["record"]["channels"] = {"vt": {"column": "vt", "noise": 1e-4}}
@@ -342,6 +344,7 @@ def test_a_sharp_prior_holds_a_parameter_and_a_dull_one_does_nothing(tmp_path):
     assert dull.values == pytest.approx(free.values, rel=SAME)
 
 
+@pytest.mark.long
 def test_a_share_is_the_number_that_it_stands_for(tmp_path):
     shares = [with_prior("TF", 1.3, std) for std in ("20 %", "20%", "20.0 %", 0.2 * 1.3)]
     found = [fit(case_of(content, tmp_path)) for content in shares]
@@ -390,7 +393,7 @@ def away(found, clean):
     return result
 
 
-@pytest.mark.parametrize("loss", ["huber", "soft-l1"])
+@pytest.mark.parametrize("loss", few_of(["huber", "soft-l1"], 1))
 def test_a_robust_loss_bears_spikes(tmp_path, clean, loss):
     content = {**config("ac1a_typical"), "validate": []}
     content["record"]["file"] = spiked(tmp_path)
@@ -444,6 +447,7 @@ def test_a_gap_is_refused_or_skipped(tmp_path):
     assert unit(found) == pytest.approx(unit(whole), rel=5e-3)
 
 
+@pytest.mark.long
 def test_a_filter_of_both_signals_leaves_the_truth_in_place(tmp_path):
     synthetic(tmp_path, TEST, TIME, noise=2e-5)
     for chosen in ({"lowpass": 5.0}, {"median": 5}):
@@ -529,6 +533,7 @@ def test_a_fit_distinguishes_what_is_of_the_unit_from_what_is_of_the_records(tmp
     assert [one.name for one in found.comparisons] == ["up"]
 
 
+@pytest.mark.long
 def test_many_starts_end_at_one_minimum_with_nuisances_too(tmp_path):
     content = three_free(several(recording("up", step=found_in(0.045, 0.02, 0.08))))
     content["records"][0]["test"]["vt0"] = 1.0

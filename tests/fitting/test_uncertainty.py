@@ -120,6 +120,7 @@ def test_fixing_kd_makes_ka_and_te_known(ac1a, changed):
     assert errors == pytest.approx(told, rel=5e-3)
 
 
+@pytest.mark.long
 def test_at_another_value_of_kd_they_are_known_better_too(ac1a, changed):
     # the response is not linear as far as there: the errors are others, but small
     found = fit(changed("ac1a_typical", {"KD": 0.4039}, {})).knowledge.confidence.parameters

@@ -190,6 +190,7 @@ def test_an_address_without_a_scheduler_is_refused_in_a_line(monkeypatch, capfd)
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.long
 def test_another_program_at_the_address_is_no_scheduler(monkeypatch, capfd):
     monkeypatch.setattr(cluster, "CONNECTED_WITHIN", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as server:

@@ -5,6 +5,7 @@ import pytest
 from linearised import autoregressive
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
+from tiers import few_of
 
 from exfit.inference.autoregression import Autoregression, described
 from exfit.inference.noise import autocorrelations
@@ -18,7 +19,7 @@ def left_over(errors):
     return errors - SLOW @ np.linalg.lstsq(SLOW, errors, rcond=None)[0]
 
 
-@pytest.mark.parametrize("phi", [0.5, 0.9])
+@pytest.mark.parametrize("phi", few_of([0.5, 0.9], 1))
 def test_the_coefficient_is_found_though_the_fit_took_slow_errors(phi):
     rng = np.random.default_rng(1)
     found, plain, variances = [], [], []

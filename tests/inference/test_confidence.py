@@ -90,6 +90,7 @@ def test_the_interval_holds_the_truth_in_nineteen_of_twenty_records_with_white_n
     assert np.all((share > LIKELY[0]) & (share < LIKELY[1]))
 
 
+@pytest.mark.long
 def test_few_samples_ask_for_students_t():
     rng = np.random.default_rng(2)
     covered = []

@@ -147,6 +147,7 @@ def test_a_large_step_drives_efd_to_the_ceiling_and_to_the_floor_of_the_standard
     assert down == pytest.approx(floor(name, values), abs=1e-6)
 
 
+@pytest.mark.long
 def test_the_field_current_limiter_of_ac6a_holds_the_field_current_near_its_reference():
     """With VA at VAMAX, VFE = VAMAX - KH (VFE - VFELIM) holds at rest."""
     p = typical(MODELS["AC6A"].sheet) | {"VFELIM": 5.0}

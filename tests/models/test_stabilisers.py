@@ -9,6 +9,7 @@ from on_load import QUADRATIC, values_on_load
 from oracle import float_run, leads_of, vector
 from scipy.integrate import solve_ivp
 from scipy.signal import StateSpace, tf2ss
+from tiers import few_of
 
 from exfit.engine.kernel import Kernel, Span
 from exfit.engine.system import Rest, System
@@ -519,7 +520,7 @@ def by_another_method(path, signal, time):
     return (path.C @ driven.y)[0] + path.D[0, 0] * signal(time)
 
 
-@pytest.mark.parametrize("limited", ["bands", "output"])
+@pytest.mark.parametrize("limited", few_of(["bands", "output"], 1))
 def test_the_bands_of_another_typing_and_method_reach_their_limits_together(limited):
     """Speed and power swing; each band, or what they make together, meets both of its limits."""
     limits = {"VSTMAX": 99.0, "VSTMIN": -99.0} if limited == "bands" else {}

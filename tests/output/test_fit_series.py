@@ -38,6 +38,7 @@ def test_each_case_has_an_overlay_errors_and_costs_with_a_line_for_each_fit(seri
         assert widths == sorted(widths, reverse=True)  # what lies on top hides nothing
 
 
+@pytest.mark.long
 def test_more_cases_than_a_figure_has_room_for_are_named(series):
     runs = [
         replace(series.runs[0], case_name=f"case {k}", name=f"case {k}-dgn")

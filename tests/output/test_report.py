@@ -17,6 +17,7 @@ from places import ROOT
 from records import TEST, config, found_in, recording, several, synthetic, write
 from records import TIME as OF_UNIT
 from records import one as ac1a
+from tiers import few_of
 
 from exfit import cli, workflows
 from exfit.case.load import load_case
@@ -189,7 +190,7 @@ def test_every_fitted_parameter_is_reported_with_its_interval_or_the_reason_why_
         assert row[5] == f"{one['min']:.5g} … {one['max']:.5g}"
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", few_of(EVERY, 3))
 def test_every_parameter_that_was_not_fitted_is_reported_with_its_value_and_source(
     fits, pages, name
 ):
@@ -211,7 +212,7 @@ def test_every_parameter_that_was_not_fitted_is_reported_with_its_value_and_sour
             assert row[3] == (saved["sources"][prefix + symbol])
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", few_of(EVERY, 3))
 def test_every_signal_of_every_record_is_drawn_with_its_error(fits, pages, name):
     saved, page = saved_of(fits(name)), pages(name)
     matches = [*saved["records"], *saved["validation"]]
@@ -230,7 +231,7 @@ def test_every_signal_of_every_record_is_drawn_with_its_error(fits, pages, name)
     assert [one["key"] for one in data] == drawn
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", few_of(EVERY, 3))
 def test_a_page_is_whole_self_contained_and_small(pages, name):
     page = pages(name)
     assert len(page.ids) == len(set(page.ids))
@@ -246,7 +247,7 @@ def test_a_page_is_whole_self_contained_and_small(pages, name):
         assert page.text.count(head) >= 2  # among the contents, and above its section
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", few_of(EVERY, 3))
 def test_every_figure_and_table_has_its_number_and_every_section_is_among_the_contents(pages, name):
     page = pages(name)
     hidden = sum(tag == "figcaption" and "class" in attrs for tag, attrs in page.tags)

@@ -266,6 +266,7 @@ def test_a_steady_part_that_is_none_is_refused_or_reported(tmp_path):
     assert any(words in cause.cause for cause in late.verdict.causes)
 
 
+@pytest.mark.long
 def test_a_steady_part_behind_noise_is_not_complained_of(noisy, tmp_path):
     found = fit(case_of(MACHINE, tmp_path, noisy))
     assert not any("at rest" in cause.cause for cause in found.verdict.causes)

@@ -56,13 +56,16 @@ OF_RECORD = {
 
 @pytest.mark.parametrize(
     ("record", "test"),
-    [
-        ({}, TEST),
-        ({"mask": [[0.4, 0.7], [1.001, 1.004]]}, TEST),
-        ({"window": [0.2, 2.03], "delay": 0.0123}, TEST),
-        ({}, {**TEST, "begin": -0.5}),
-        ({}, OF_RECORD),
-    ],
+    few_of(
+        [
+            ({}, TEST),
+            ({"mask": [[0.4, 0.7], [1.001, 1.004]]}, TEST),
+            ({"window": [0.2, 2.03], "delay": 0.0123}, TEST),
+            ({}, {**TEST, "begin": -0.5}),
+            ({}, OF_RECORD),
+        ],
+        2,
+    ),
     ids=["whole", "mask", "ends with a step, late", "begins early", "of the record"],
 )
 def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, record, test):
@@ -77,6 +80,7 @@ def test_cost_and_gradient_and_curvature_are_those_of_all_samples(tmp_path, reco
             assert ours == pytest.approx(all_, rel=AGREE, abs=AGREE * np.max(np.abs(all_)))
 
 
+@pytest.mark.long
 def test_a_match_of_the_curves_is_that_of_all_samples(tmp_path):
     """Each channel by itself: the larger root mean square decides."""
     every = residuals(dense_case(tmp_path))

@@ -30,6 +30,7 @@ def test_by_way_of_the_linear_phase_every_start_reaches_the_lowest_minimum(name)
         assert any(cost == pytest.approx(lowest, rel=1e-3) for lowest in LOWEST[name])
 
 
+@pytest.mark.long
 def test_some_starts_go_the_direct_way():
     of_case, own = legs("ac1a_typical")
     (x,) = spread(own.bounds, 1)

@@ -20,6 +20,7 @@ from records import (
     write,
 )
 from tables import read_columns
+from tiers import few_of
 
 from exfit.fitting.build import build_experiments
 from exfit.fitting.forms.linear import linear_form
@@ -146,7 +147,7 @@ def test_up_and_down_find_their_instants_and_sizes(tmp_path):
         assert found.values[f"{name}.vref.step"] == pytest.approx(step, rel=2e-3)
 
 
-@pytest.mark.parametrize("delay", [0.0, found_in(0.0, -0.05, 0.05)])
+@pytest.mark.parametrize("delay", few_of([0.0, found_in(0.0, -0.05, 0.05)], 1))
 def test_what_is_shown_of_a_record_has_the_cost_that_the_fit_found(tmp_path, delay):
     """The instant, 40 ms off its start, moves the response once, also when it is read back."""
     synthetic(tmp_path, TEST, TIME)

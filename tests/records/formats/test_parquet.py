@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from oversized_files import parquet_that_lies
 from pyarrow.parquet import ParquetFile, write_table
 from tables import damage, everything, refused
+from tiers import few_of
 
 from exfit.errors import RecordError
 from exfit.records.formats.parquet import read_parquet
@@ -222,7 +223,7 @@ def test_the_missing_package_is_named_with_its_extra(parquet, monkeypatch):
     refused(lambda: read_parquet(path), "bump.parquet", 'pip install "exfit[parquet]"')
 
 
-@pytest.mark.parametrize("compression", ["none", "snappy"])
+@pytest.mark.parametrize("compression", few_of(["none", "snappy"], 1))
 @given(damage())
 @settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
