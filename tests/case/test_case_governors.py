@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from places import REFERENCE
 
 from exfit.analysis.diagnostics import speed_notes, typical_notes
 from exfit.case.load import load_case
@@ -83,6 +84,49 @@ def test_data_of_a_governor_are_found_within_their_intervals(found):
         # within three times the half of a 95 % interval: six standard errors
         low, high = parameter.interval
         assert abs(parameter.value - value) < 1.5 * (high - low), name
+
+
+EVENT = """\
+model: AC8B
+plant:
+  type: grid-playback
+  machine: GENROU
+  swing: torque
+  parameters: {Tpd0: 6.27, Tppd0: 0.059, Tpq0: 0.7, Tppq0: 0.096, D: 0, Xd: 2.014, Xq: 1.96,
+    Xpd: 0.331, Xpq: 0.466, Xppd: 0.2059, Xl: 0.129, S10: 0.14, S12: 0.56}
+  free: {H: {start: 4, min: 2, max: 9}}
+  network: {f0: 60}
+governor:
+  model: TGOV1
+  parameters: {VMAX: 1.2, VMIN: 0, T3: 7}
+  free: {R: {start: 0.08, min: 0.01, max: 0.2}, T1: {start: 0.7, min: 0.05, max: 3},
+    T2: {start: 1.5, min: 0.1, max: 5}}
+record:
+  file: record.csv
+  time: t
+  channels: {vt: vt, angle: {column: angle, unit: rad}, p: p, q: q}
+parameters: {fixed: {TR: 0, KPR: 80, KIR: 5, KDR: 10, TDR: 0.1, KA: 1, TA: 0.01, VPIDMAX: 999,
+  VPIDMIN: -999, VRMAX: 35, VRMIN: 0, TE: 1.2, VFEMAX: 999, VEMIN: 0, KC: 0.55, KD: 1.1, KE: 1,
+  E1: 6.5, SE1: 0.3, E2: 9, SE2: 3}}
+"""
+
+
+@pytest.mark.long
+def test_a_governor_is_found_from_a_grid_event_of_another_simulator(tmp_path):
+    columns = np.genfromtxt(REFERENCE / "playback_ac8b_tgov1.csv", delimiter=",", names=True)
+    rng = np.random.default_rng(1)
+    noisy = [columns[name] + 2e-4 * rng.standard_normal(columns.size) for name in ("p", "q")]
+    table = np.column_stack([columns["t"], columns["vt"], columns["angle"], *noisy])
+    path, header = tmp_path / "record.csv", "t,vt,angle,p,q"
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
+    (tmp_path / "case.yaml").write_text(EVENT)
+    result = fit(tmp_path / "case.yaml", search="local")
+    truth = {"machine.H": 4.471, "governor.R": 0.05, "governor.T1": 0.4, "governor.T2": 2.1}
+    for name, value in truth.items():
+        parameter = result.parameters[name]
+        low, high = parameter.interval
+        assert abs(parameter.value - value) < 1.5 * (high - low), name
+        assert high - low < 0.01 * value, name
 
 
 def test_a_result_keeps_the_governor_and_is_read_back(found, tmp_path):

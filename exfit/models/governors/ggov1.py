@@ -137,8 +137,6 @@ PSLF_RECORDS = (
 STATES = "PE MW DERIV INTEG VALVE TURB TEMP TEMPM LOAD ACC FSRA"
 SETPOINTS = "PE0"
 STEP = 0.01  # s, in which fsra follows fsr
-
-
 NEVER = 9999.0  # pu, of a limiter that is left out
 
 
