@@ -19,16 +19,15 @@ from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
 from exfit.fitting.nuisances.sine_parameters import with_sines
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recorded.detected_steps import with_detected_steps
-from exfit.fitting.recorded.event import (
+from exfit.fitting.recorded.event import event_inputs, offset_step, with_rest
+from exfit.fitting.recorded.references import references_of, span_of
+from exfit.fitting.recorded.switchings import (
     Switching,
     announced,
-    event_inputs,
     masked,
-    offset_step,
     switchings_of,
-    with_rest,
+    taken_apart,
 )
-from exfit.fitting.recorded.references import references_of, span_of
 from exfit.fitting.recordings import record_of
 from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.fitting.system import system_of
@@ -60,7 +59,10 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     network = {} if view is case else _network_values(view)
     begin, end = span_of(test, record)
     offset = offset_step(test, begin, end)
-    steps = (*input_steps(view, test, {**values, **network}), *offset)
+    given = input_steps(view, test, {**values, **network})
+    played = _driving(view, test, record, file, driving, switchings)
+    apart = taken_apart(played, file, switchings, prefix_of(recording), len(given))
+    steps = (*given, *apart.steps, *offset)
     nuisances, free = nuisance_parameters(
         prefix_of(recording),
         test,
@@ -72,25 +74,24 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     if any(nuisance.kind == "shift" for nuisance in nuisances):
         steps = tuple(step._replace(smooth=False) for step in steps)
     delay = start_value(file.delay) or 0.0
-    recorded = {**_driving(view, test, record, file, driving, switchings), **references.recorded}
+    recorded = {**apart.inputs, **references.recorded}
     inputs = Inputs(begin, end + _beyond(nuisances, free, delay), steps, recorded)
     simulator = Simulator(system, inputs, record.time, case.simulation.step)
     experiment = Experiment(
         simulator.with_inputs(steps, delay) if delay else simulator,
         _channels(case, file, record, [s for s in system.outputs if s not in driving]),
         {**network, **levels_of(case, test, record)},
-        nuisances,
+        (*nuisances, *apart.nuisances),
         recording.name,
     )
-    played = _played(view.kind, driving)
     plain = ExperimentSetup(
         case.path,
         test,
         record,
         experiment,
-        free,
+        (*free, *apart.free),
         references.files,
-        played,
+        _played(view.kind, driving),
         switchings=announced(file, switchings),
     )
     return _with_given_starts(case, with_sines(case, recording, plain, values))

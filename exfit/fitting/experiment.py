@@ -113,7 +113,7 @@ class Experiment:
     def moves(self) -> bool:
         """Whether the fit moves what its simulations do not have side by side."""
         return any(
-            nuisance.kind in ("at", "shift", "step", "drift", "delay")
+            nuisance.kind in ("at", "shift", "step", "drift", "switching", "delay")
             for nuisance in self.nuisances
         )
 
@@ -137,8 +137,9 @@ class Experiment:
         steps: list[InputStep] = list(self.simulator.inputs.steps)
         delay = self.simulator.delay
         for nuisance in self.nuisances:
-            if nuisance.kind == "at":
-                steps[nuisance.step] = steps[nuisance.step]._replace(at=values[nuisance.name])
+            if nuisance.kind in ("at", "switching"):
+                for place in range(nuisance.step, nuisance.step + nuisance.count):
+                    steps[place] = steps[place]._replace(at=values[nuisance.name])
             elif nuisance.kind in ("step", "drift"):
                 size = nuisance.factor * values[nuisance.name]
                 steps[nuisance.step] = steps[nuisance.step]._replace(step=size)
@@ -305,8 +306,10 @@ class Experiment:
             if d == 0.0:
                 continue
             at, step = steps.get(nuisance.step, (0.0, 0.0))
-            if nuisance.kind == "at":
-                steps[nuisance.step] = (at + d, step)
+            if nuisance.kind in ("at", "switching"):
+                for place in range(nuisance.step, nuisance.step + nuisance.count):
+                    moved, size = steps.get(place, (0.0, 0.0))
+                    steps[place] = (moved + d, size)
             elif nuisance.kind in ("step", "drift"):
                 steps[nuisance.step] = (at, step + nuisance.factor * d)
             elif nuisance.kind in ("delay", "shift"):

@@ -12,7 +12,7 @@ from exfit.case.schema import BumpTest
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.parameters import FreeParameter
-from exfit.fitting.recorded.event import Switching
+from exfit.fitting.recorded.switchings import Switching
 from exfit.records.record import Record
 from exfit.simulation.simulator import Response, Simulator
 

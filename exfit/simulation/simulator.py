@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from exfit.engine.kernel import DIRECTIONS, SIDE_BY_SIDE, Span, TangentKernel
 from exfit.engine.sampling import Course, Courses, Segment
 from exfit.engine.system import System
+from exfit.plants import REFERENCES
 from exfit.simulation.directions import Moves, moves_of
 from exfit.simulation.inputs import Direction, Inputs, InputStep, grid_segments
 from exfit.simulation.interpolation import GridPoints, Interpolation, joined
@@ -33,6 +34,7 @@ Values = Mapping[str, float]
 
 POINTS_ALONG = 100  # of a response, where its sub-steps are checked
 MOST_REPEATS = 3  # until the sub-steps are enough for the response that they give
+BESIDE_JUMP = 2.0  # steps: as far as the B-splines of a smooth jump reach on both grids
 SMALL_SHARE = 1e-3  # of the inputs: the response is linear, and far above the rounding of a run
 
 
@@ -196,9 +198,13 @@ class Simulator:
     def step_errors(self, values: Values, outputs: tuple[str, ...]) -> dict[str, float]:
         """Return by how much, at most and per unit, halving every step moves each output.
 
-        At the points of the grid: a record with many more samples shows no more.
+        At the points of the grid: a record with many more samples shows no more. Beside a smooth
+        jump of what is recorded the step itself is another there.
         """
         times = distinct(np.concatenate([segment.times for segment in self._grid]))
+        for change in self.inputs.steps:
+            if change.smooth and change.signal not in REFERENCES:
+                times = times[np.abs(times - change.at) > BESIDE_JUMP * self.step]
         coarse = Simulator(self.system, self.inputs, times, self.step, self.least)
         samples, parts = coarse.samples(values, outputs)
         finer = Simulator(self.system, self.inputs, times, self.step / 2.0, parts)

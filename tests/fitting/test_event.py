@@ -8,7 +8,7 @@ from exfit.case.case import Case
 from exfit.dsp.switchings import jumps_while_moving
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.recorded.event import MASKED
+from exfit.fitting.recorded.switchings import MASKED
 from exfit.records.record import Record
 
 TIME = np.arange(600) / 60.0
@@ -19,6 +19,10 @@ UNIT = {
     "model": "SEXS",
     "plant": {"type": "grid-playback", "machine": "GENROU", "network": {"f0": 60.0}},
 }
+CHANNELS = dict.fromkeys(("vt", "angle", "p", "q"), "x")
+VALUES = Case.from_dict(
+    {**UNIT, "record": {"file": "x", "time": "t", "channels": CHANNELS}}
+).values()
 
 
 def record(seed=0, noise=1e-4, **signals):
@@ -117,10 +121,40 @@ def test_a_record_is_not_compared_about_a_switching(width):
 
 def test_a_switching_is_compared_where_the_case_says_so():
     setup = setup_of(record(vt=jumping()), switchings="compare")
+    assert setup.free == ()
     assert setup.switchings == ()
     assert all(channel.kept.all() for channel in setup.channels)
     spline = setup.experiment.simulator.inputs.recorded["vt"]
     assert spline.jumps == ((240, 241),)
+
+
+def test_the_instant_of_a_switching_is_found_between_two_samples():
+    """Its derivative is that of differences; what is left of the voltage is as without a jump."""
+    turning = 0.4 + 0.2 * TIME + 0.1 * SWING + 0.08 * (TIME[240] < TIME)
+    setup = setup_of(record(noise=0.0, vt=jumping(), angle=turning))
+    (parameter,), recorded = setup.free, setup.experiment.simulator.inputs.recorded
+    assert parameter.name == "switching.at"
+    assert TIME[240] < parameter.low < parameter.start < parameter.high < TIME[241]
+    assert_allclose(recorded["vt"].samples, 0.02 * SWING, atol=2e-4)
+    assert_allclose(recorded["angle"].samples, 0.1 * SWING, atol=2e-3)
+    values = setup.with_start_values(VALUES)
+    _, slopes = setup.experiment.response_with_derivatives(values, [{"switching.at": 1.0}])
+    step = 1e-4
+    high, low = (
+        setup.experiment.samples(values | {"switching.at": parameter.start + d})[0]
+        for d in (step, -step)
+    )
+    kept = setup.channels[0].kept
+    differences = (high - low)[kept] / (2.0 * step)
+    assert_allclose(slopes[kept, :, 0], differences, rtol=0.0, atol=1e-3)
+    assert np.ptp(slopes[kept]) > 0.1
+
+
+def test_the_instant_of_a_small_switching_is_not_found():
+    small = 1.0 + 0.02 * SWING - 0.007 * (TIME[240] < TIME)
+    setup = setup_of(record(vt=small))
+    assert len(setup.switchings) == 1
+    assert setup.free == ()
 
 
 def test_no_swing_is_taken_for_a_switching():
@@ -159,21 +193,7 @@ def test_an_offset_of_the_frequency_turns_the_angle():
     setup = setup_of(record(noise=0.0), test={"frequency_offset": unknown})
     (parameter,) = setup.free
     assert parameter.name == "frequency_offset"
-    experiment, values = (
-        setup.experiment,
-        setup.with_start_values(
-            Case.from_dict(
-                UNIT
-                | {
-                    "record": {
-                        "file": "x",
-                        "time": "t",
-                        "channels": dict.fromkeys(("vt", "angle", "p", "q"), "x"),
-                    }
-                }
-            ).values()
-        ),
-    )
+    experiment, values = setup.experiment, setup.with_start_values(VALUES)
     _, slopes = experiment.response_with_derivatives(values, [{"frequency_offset": 1.0}])
     step = 1e-4
     high, low = (experiment.samples(values | {"frequency_offset": d})[0] for d in (step, -step))

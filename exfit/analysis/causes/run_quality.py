@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.fitting.recorded.event import MASKED
+from exfit.fitting.recorded.switchings import MASKED
 from exfit.fitting.setup import ExperimentSetup
 from exfit.signals import unit_of_signal
 from exfit.simulation.simulator import Simulator

@@ -34,6 +34,7 @@ RARE = 5.0  # log-likelihood of what is rare
 FARTHEST_DELAY = 2.0  # s
 CORRECT_STEP = "correct step, or let the fit find it: step: {start, min, max}"
 CORRECT_INSTANT = "correct at, or let the fit find it: at: {start: auto}; or give delay"
+SAME_CLOCK = "put all channels on one clock: the filters of phasors and powers delay differently"
 INSTANTS = 60  # at which a further step is looked for
 LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 
@@ -121,10 +122,13 @@ def wrong_instant(evidence: Evidence) -> Iterator[Suspicion]:
 
         def cause(trial: Trial, delay: float = delay, number: int = number) -> Cause:
             late = trial.values["cause.delay"] - delay
+            size = f"{1e3 * abs(late):.3g} ms {'later' if late > 0.0 else 'earlier'}"
+            if evidence.case.kind.finds_rest:
+                compared = f"what is compared{evidence.name_of(number)} is recorded {size}"
+                return Cause(f"the clocks: {compared} than what drives the unit", SAME_CLOCK)
             return Cause(
                 f"the instant of the step{evidence.name_of(number)}, or a delay of the recorder: "
-                f"the record is {1e3 * abs(late):.3g} ms {'later' if late > 0.0 else 'earlier'} "
-                "than the case",
+                f"the record is {size} than the case",
                 CORRECT_INSTANT,
             )
 

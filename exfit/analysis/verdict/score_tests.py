@@ -16,12 +16,14 @@ from exfit.analysis.causes.trials import Opened, freed_within, with_freed, with_
 from exfit.analysis.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
 from exfit.analysis.typical_values import parameters_of
 from exfit.errors import SimulationError
+from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
 from exfit.fitting.uncertainty import slopes_of
 from exfit.inference.wording import digits, listed
-from exfit.plants import VT0
+from exfit.plants import REFERENCES, VT0
 from exfit.results.verdict import REJECTED, Cause
+from exfit.simulation.inputs import InputStep
 
 Array = NDArray[np.float64]
 
@@ -204,17 +206,26 @@ def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
         nuisance = Nuisance(f"held{number}.{kind}{step}", kind, step)
         return Opened(nuisance, value, value - 1.0, value + 1.0)
 
-    for place, step in enumerate(experiment.simulator.inputs.steps):
+    steps = _steps_of_test(evidence, experiment)
+    for place, step in enumerate(steps):
         if step.step and ("step", place) not in found:
             words = f"the step of {step.step:+g} pu{of_record}"
             yield Held(words, CORRECT_STEP, step.step), opened("step", step.step, place)
-    if not kinds & {"at", "shift", "delay"} and experiment.simulator.inputs.steps:
+    if not kinds & {"at", "shift", "delay"} and steps:
         held = Held(f"the instant of the step{of_record}", CORRECT_INSTANT, unit="s")
         yield held, opened("delay", experiment.simulator.delay)
     if VT0 in experiment.own and "vt0" not in kinds:
         given = evidence.records[number].given_vt0
         voltage = Held(f"vt0 = {given:g}{of_record}", LEAVE_VT0_OUT, unit="pu") if given else Held()
         yield voltage, opened("vt0", experiment.own[VT0])
+
+
+def _steps_of_test(evidence: Evidence, experiment: Experiment) -> tuple[InputStep, ...]:
+    """Return the steps that a test makes; the others of an event are jumps of what is recorded."""
+    steps = experiment.simulator.inputs.steps
+    if not evidence.case.kind.finds_rest:
+        return steps
+    return tuple(step for step in steps if step.signal in REFERENCES)
 
 
 def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Array]]:

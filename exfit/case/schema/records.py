@@ -163,10 +163,11 @@ class RecordFile(Section):
     mask: tuple[tuple[Number, Number], ...] = Field(
         default=(), description="Parts that are not compared: start and end of each, s."
     )
-    switchings: Literal["mask", "compare"] = Field(
-        default="mask",
+    switchings: Literal["find", "mask", "compare"] = Field(
+        default="find",
         description="Whether 0.2 s before and after each switching in the grid, a jump of vt or of "
-        "its angle, are left out (mask) or compared; grid-playback only.",
+        "its angle, are left out (mask) or compared; find leaves them out and fits the instants of "
+        "larger ones, each between two samples; grid-playback only.",
     )
     filter: Filter | None = Field(
         default=None,

@@ -11,6 +11,7 @@ NuisanceKind = Literal[
     "shift",
     "step",
     "drift",
+    "switching",
     "vt0",
     "delay",
     "scale",
@@ -25,6 +26,7 @@ NUISANCES: Mapping[NuisanceKind, tuple[str, str]] = {
     "at": ("s", "instant of a step"),
     "shift": ("s", "instant of a step"),
     "step": ("pu", "size of a step"),
+    "switching": ("s", "instant of a switching in the grid"),
     "drift": ("Hz", "offset of the frequency"),
     "vt0": ("pu", "voltage before the first step"),
     "delay": ("s", "delay of the recorder"),
@@ -48,7 +50,7 @@ class Nuisance:
     ``step`` is the index in the inputs of a step whose instant or size it is, ``signal`` the
     channel whose scale, offset or periodic disturbance it is. The instant of an only step is a
     ``shift`` of the whole response: the simulation stays as it is. ``factor`` is what a step is of
-    a value that makes it.
+    a value that makes it; a ``switching`` is the instant of ``count`` steps from that one on.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Nuisance:
     step: int = 0
     signal: str = ""
     factor: float = 1.0
+    count: int = 1
 
     @property
     def unit(self) -> str:

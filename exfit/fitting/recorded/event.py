@@ -1,73 +1,25 @@
 """What a record of a grid event gives a unit that it drives: the rest before it, the inputs."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit.case.case import Case
-from exfit.case.schema import BumpTest, MedianSection, RecordFile, start_value
+from exfit.case.schema import BumpTest, start_value
 from exfit.dsp.reference_moves import FEWEST_SAMPLES, rest_end
-from exfit.dsp.switchings import jumps_while_moving
 from exfit.errors import RecordError
 from exfit.fitting.levels import deviation, initial_level
+from exfit.fitting.recorded.switchings import Switching
 from exfit.plants import RESTING
 from exfit.records.record import Record
 from exfit.simulation.inputs import InputStep, RecordedInput
 from exfit.simulation.splines import SplinedInput
-from exfit.util.sorting import median
 from exfit.util.text import show
 
 Array = NDArray[np.float64]
 
 
 TURN = 2.0 * np.pi
-LEAST_JUMPS = {"vt": 0.005, "angle": 0.02}  # pu, rad: a smaller one of the grid does no harm
-MASKED = 0.2  # s, before and after a switching, in which a record is not compared
-
-
-class Switching(NamedTuple):
-    """A jump of a signal that drives a unit: from which sample to which, when (s), by how much."""
-
-    signal: str
-    jump: tuple[int, int]
-    at: float
-    change: float
-
-    @property
-    def masked(self) -> tuple[float, float]:
-        """The interval in which the record is not compared, s."""
-        return self.at - MASKED, self.at + MASKED
-
-
-def masked(
-    file: RecordFile, record: Record, switchings: tuple[Switching, ...]
-) -> tuple[tuple[float, float], ...]:
-    """Return the intervals (s) of a record that are not compared.
-
-    Among them is its end where all channels were filtered: there a filter lacks what follows, and
-    a unit that it drives by then moves otherwise.
-    """
-    about = (switching.masked for switching in announced(file, switchings))
-    return (*file.mask, *about, *_filtered_end(file, record))
-
-
-def announced(file: RecordFile, switchings: tuple[Switching, ...]) -> tuple[Switching, ...]:
-    """Return the switchings about which a record is not compared."""
-    return switchings if file.switchings == "mask" else ()
-
-
-def _filtered_end(file: RecordFile, record: Record) -> Iterator[tuple[float, float]]:
-    """Yield the end of a record over which its filter reaches, s."""
-    if file.filter is None:
-        return
-    end = float(record.time[-1])
-    if isinstance(file.filter, MedianSection):
-        reach = file.filter.median // 2 * float(median(np.diff(record.time)))
-    else:
-        reach = 1.0 / file.filter.lowpass
-    yield end - reach, end
 
 
 def offset_step(test: BumpTest, begin: float, end: float) -> tuple[InputStep, ...]:
@@ -76,22 +28,6 @@ def offset_step(test: BumpTest, begin: float, end: float) -> tuple[InputStep, ..
     if offset is None:
         return ()
     return (InputStep(begin, offset * TURN * (end - begin), "angle", ramp=end - begin),)
-
-
-def switchings_of(case: Case, record: Record) -> tuple[Switching, ...]:
-    """Return the jumps of what drives a unit in the record of an event: switchings in the grid."""
-    result: list[Switching] = []
-    if not case.kind.finds_rest:
-        return ()
-    for signal, least in LEAST_JUMPS.items():
-        if signal not in record.signals:
-            continue
-        samples = record.signals[signal] if signal != "angle" else unwrapped(record)
-        for first, last in jumps_while_moving(record.time, samples, least):
-            at = 0.5 * float(record.time[first] + record.time[last])
-            change = float(samples[last] - samples[first])
-            result.append(Switching(signal, (first, last), at, change))
-    return tuple(result)
 
 
 def with_rest(test: BumpTest, record: Record) -> BumpTest:
@@ -133,12 +69,11 @@ def _showing_rest(record: Record) -> Iterator[tuple[str, Array, Array]]:
             there = np.isfinite(samples)
             yield signal, record.time[there], samples[there]
     if "angle" in record.signals:
-        yield "angle", record.time[:-1], np.diff(unwrapped(record)) / np.diff(record.time)
-
-
-def unwrapped(record: Record) -> Array:
-    """Return the angle (M,) of a record without jumps by whole turns, rad."""
-    return np.unwrap(record.signals["angle"])
+        yield (
+            "angle",
+            record.time[:-1],
+            np.diff(np.unwrap(record.signals["angle"])) / np.diff(record.time),
+        )
 
 
 def _jumps(switchings: Sequence[Switching], signal: str) -> tuple[tuple[int, int], ...]:
@@ -156,7 +91,7 @@ def angle_of_event(
     if "angle" not in record.signals:
         frequency = record.signals["frequency"] - initial_level(test, record, "frequency")
         return SplinedInput(time, TURN * frequency, integrated=True)
-    angle, resting = unwrapped(record), time < (test.steady or np.inf)
+    angle, resting = np.unwrap(record.signals["angle"]), time < (test.steady or np.inf)
     slope, level = np.polyfit(time[resting] - time[0], angle[resting], 1)
     moved = angle - level - slope * (time - time[0])
     return SplinedInput(time, moved, _jumps(switchings, "angle"))
