@@ -136,8 +136,7 @@ def taken_apart(
     if file.switchings != "find" or not switchings:
         return TakenApart(inputs)
     steps, nuisances, free = list[InputStep](), list[Nuisance](), list[FreeParameter]()
-    groups = [group for group in groups_of(switchings) if any(each.is_large for each in group)]
-    for number, group in enumerate(groups, 1):
+    for number, group in enumerate(_large(groups_of(switchings)), 1):
         before = min(each.jump[0] for each in group)
         after = max(each.jump[1] for each in group)
         time = smooth["vt"].time
@@ -149,10 +148,20 @@ def taken_apart(
             size = _size(own, before, after, at)
             smooth[each.signal] = _without(own, before, after, size)
             steps.append(InputStep(at, size, each.signal, smooth=True))
-        name = f"{prefix}switching{number if number > 1 else ''}.at"
+        name = f"{prefix}switching{_number(number)}.at"
         nuisances.append(Nuisance(name, "switching", place, count=len(group)))
         free.append(FreeParameter(name, at, low + margin, high - margin, logarithmic=False))
     return TakenApart({**inputs, **smooth}, tuple(steps), tuple(nuisances), tuple(free))
+
+
+def _large(groups: Sequence[Group]) -> list[Group]:
+    """Return the switchings whose instants matter."""
+    return [group for group in groups if any(each.is_large for each in group)]
+
+
+def _number(number: int) -> str:
+    """Return the number of a switching in its name, none of the first one."""
+    return str(number) if number > 1 else ""
 
 
 def _size(own: SplinedInput, before: int, after: int, at: float) -> float:
