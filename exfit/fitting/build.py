@@ -49,9 +49,9 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     view, file = case.seen_from(recording), recording.record
     system = system_of(view, recording)
     driving = _driving_channels(view.kind, file, system)
-    record = with_filter(record_of(case, recording), file.filter)
-    switchings = switchings_of(view, record)
-    record = without_masked(record, masked(file, record, switchings), driving)
+    whole = with_filter(record_of(case, recording), file.filter)
+    switchings = switchings_of(view, whole)
+    record = without_masked(whole, masked(file, whole, switchings), driving)
     references = references_of(case, recording.test, span_of(recording.test, record), record, file)
     resolved = recording.model_copy(update={"test": references.test})
     test = with_detected_steps(case, resolved, record)
@@ -93,6 +93,7 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
         references.files,
         _played(view.kind, driving),
         switchings=announced(file, switchings),
+        whole=whole,
     )
     return _with_given_starts(case, with_sines(case, recording, plain, values))
 

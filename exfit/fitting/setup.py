@@ -40,7 +40,8 @@ class ExperimentSetup:
     ``references`` the files of the test's signals beside the record, by signal;
     ``driving`` are the signals of the record that drive it in place of a plant;
     ``automatic_sines`` are the signals of which residuals may show a periodic disturbance, with
-    the range of its frequency, Hz; ``switchings`` those about which it is not compared.
+    the range of its frequency, Hz; ``switchings`` those about which it is not compared, ``whole``
+    the record with what its masks leave out.
     """
 
     case: Path
@@ -52,6 +53,7 @@ class ExperimentSetup:
     driving: tuple[str, ...] = ()
     automatic_sines: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     switchings: tuple[Switching, ...] = ()
+    whole: Record | None = None
 
     @property
     def name(self) -> str:

@@ -1,6 +1,6 @@
 """A simulated response beside its record."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,13 @@ from exfit.results.comparisons import (
     StepFeatures,
     match_of,
 )
-from exfit.results.played_records import PlayedRecord, driving_signals, played_errors
+from exfit.results.played_records import (
+    LeftOut,
+    PlayedRecord,
+    driving_signals,
+    left_out_of,
+    played_errors,
+)
 from exfit.simulation.inputs import Inputs, InputStep
 
 Array = NDArray[np.float64]
@@ -63,12 +69,14 @@ def compare_with_record(
         substeps=substeps,
         time=setup.record.time,
         overlays=overlays,
-        played=_played(setup, overlays) if setup.driving else None,
+        played=_played(setup, overlays, samples) if setup.driving else None,
     )
 
 
-def _played(setup: ExperimentSetup, overlays: Mapping[str, Overlay]) -> PlayedRecord:
-    """Return what drove a simulation, and how its signals depart from their record."""
+def _played(
+    setup: ExperimentSetup, overlays: Mapping[str, Overlay], samples: Array
+) -> PlayedRecord:
+    """Return what drove a simulation, and how its samples (M, channels) depart from a record."""
     time, steady = setup.record.time, setup.test.steady
     begins = float(time[0]) if steady is None else steady
     recorded = {signal: setup.record.signals[signal] for signal in setup.driving}
@@ -76,7 +84,18 @@ def _played(setup: ExperimentSetup, overlays: Mapping[str, Overlay]) -> PlayedRe
         signal: played_errors(time, begins, overlay.measured, overlay.simulated)
         for signal, overlay in overlays.items()
     }
-    return PlayedRecord(begins, driving_signals(time, begins, recorded), errors)
+    left_out = dict(_left_out(setup, samples))
+    return PlayedRecord(begins, driving_signals(time, begins, recorded), errors, left_out)
+
+
+def _left_out(setup: ExperimentSetup, samples: Array) -> Iterator[tuple[str, LeftOut]]:
+    """Yield the signals of which masks leave something out, with that."""
+    for k, channel in enumerate(setup.channels):
+        if setup.whole is not None:
+            whole = setup.whole.signals[channel.signal]
+            left_out = left_out_of(whole, setup.record.signals[channel.signal], samples[:, k])
+            if left_out is not None:
+                yield channel.signal, left_out
 
 
 def _reference(setup: ExperimentSetup, values: Values, vt0: float) -> Array | None:

@@ -80,6 +80,9 @@ def _of_played(played: PlayedRecord, match: Comparison) -> Iterator[str]:
     for signal, driving in played.driving.items():
         if driving.samples.shape != match.time.shape:
             yield f"played: {signal}: not one sample for each instant"
+    for signal, left_out in played.left_out.items():
+        if not left_out.measured.shape == left_out.simulated.shape == match.time.shape:
+            yield f"played: left_out: {signal}: not one sample for each instant"
     if not played.errors.keys() <= match.channels.keys():
         yield "played: its errors are not those of the channels"
 

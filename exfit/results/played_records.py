@@ -1,7 +1,7 @@
 """A record that was played into a unit: what drove it, and how its response departs from it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import nan, pi
 from typing import Annotated, NamedTuple
 
@@ -56,15 +56,39 @@ class DrivingSignal:
 
 
 @dataclass(frozen=True, eq=False)
+class LeftOut:
+    """What of a signal was recorded and simulated but is not compared (M,); nan elsewhere."""
+
+    measured: Array
+    simulated: Array
+
+
+@dataclass(frozen=True, eq=False)
 class PlayedRecord:
     """What of a record drove a simulation, and how what it gave departs from the rest of it.
 
-    ``begins`` is the end of its state of rest, s.
+    ``begins`` is the end of its state of rest, s; ``left_out`` has the signals of which masks leave
+    something out.
     """
 
     begins: float
     driving: Mapping[str, DrivingSignal]
     errors: Mapping[str, PlayedErrors]
+    left_out: Mapping[str, LeftOut] = field(default_factory=dict)
+
+
+def left_out_of(whole: Array, compared: Array, simulated: Array) -> LeftOut | None:
+    """Return what masks leave out of a recorded signal (M,), None for nothing.
+
+    A sample of what is compared comes with it on each side, so that lines meet.
+    """
+    masked = np.isfinite(whole) & ~np.isfinite(compared)
+    if not masked.any():
+        return None
+    wider = masked.copy()
+    wider[:-1] |= masked[1:]
+    wider[1:] |= masked[:-1]
+    return LeftOut(np.where(masked, whole, nan), np.where(wider, simulated, nan))
 
 
 def driving_signals(

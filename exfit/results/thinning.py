@@ -12,7 +12,7 @@ from exfit.results.comparisons import Comparison, IterationResponses, Overlay
 from exfit.results.description import Behaviour, SmallSignalView
 from exfit.results.model import FitResult
 from exfit.results.other_values import AsFound
-from exfit.results.played_records import PlayedRecord
+from exfit.results.played_records import LeftOut, PlayedRecord
 from exfit.results.tables import DIGITS, clock_digits
 from exfit.simulation.small_signal import Bode, SmallSignal
 from exfit.util.sorting import distinct
@@ -81,6 +81,7 @@ def _comparison(comparison: Comparison, iterations: int) -> Comparison:
     played = comparison.played
     if played is not None and signals:
         signals += [driving.samples for driving in played.driving.values()]
+        signals += [signal.measured for signal in played.left_out.values()]
     rows = _rows(signals, MOST_ROWS) if signals else np.arange(0)
     responses = comparison.iteration_responses
     return replace(
@@ -99,7 +100,11 @@ def _played(played: PlayedRecord, rows: NDArray[np.intp]) -> PlayedRecord:
         name: replace(signal, samples=rounded(signal.samples[rows]))
         for name, signal in played.driving.items()
     }
-    return replace(played, driving=driving)
+    left_out = {
+        name: LeftOut(rounded(signal.measured[rows]), rounded(signal.simulated[rows]))
+        for name, signal in played.left_out.items()
+    }
+    return replace(played, driving=driving, left_out=left_out)
 
 
 def _overlay(overlay: Overlay, rows: NDArray[np.intp]) -> Overlay:

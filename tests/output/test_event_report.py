@@ -72,6 +72,7 @@ def test_p_and_q_are_judged_and_shown_below_what_was_played_in(page):
         assert [row[0] for row in page.tables[title][1:]] == ["vt", "frequency", "p", "q"]
     assert {"played-0", "played-1"} <= set(page.ids)
     assert "in p, in q by the same rule" in page.text
+    assert page.text.count("simulated, not compared") == 1  # of the record with a mask
 
 
 def test_there_is_no_word_of_steps_or_of_a_closed_loop(page):
@@ -86,6 +87,7 @@ def test_what_was_played_in_is_kept_in_the_file_of_the_fit(result, tmp_path):
     for before, after in zip(result.comparisons, saved.comparisons, strict=True):
         assert after.played.begins == before.played.begins
         assert after.played.errors == before.played.errors
+        assert after.played.left_out.keys() == {"p", "q"}
         for name, signal in before.played.driving.items():
             np.testing.assert_allclose(
                 after.played.driving[name].samples, signal.samples, rtol=1e-8, atol=1e-12

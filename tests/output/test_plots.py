@@ -11,7 +11,7 @@ from exfit.analysis.steady.saturation import saturation_curve
 from exfit.output import plots
 from exfit.results.comparisons import Comparison, Overlay, StepFeatures, match_of
 from exfit.results.model import FitResult, FittedParameter, Iteration
-from exfit.results.played_records import PlayedRecord, driving_signals
+from exfit.results.played_records import LeftOut, PlayedRecord, driving_signals
 from exfit.simulation.simulator import Response
 from exfit.util.strategies import PHASES
 
@@ -50,12 +50,17 @@ def test_a_reference_that_was_recorded_is_drawn_beside_vt():
 def test_what_drove_a_simulation_is_drawn_above_what_came_of_it():
     """As a reviewer of a grid event looks at it: V and f, then P and Q with their differences."""
     driving = driving_signals(TIME, 0.9, {"vt": RISE, "angle": RISE, "vs": np.full(41, np.nan)})
-    played = PlayedRecord(0.9, driving, {})
+    half = np.where(TIME > 1.0, RISE, np.nan)
+    played = PlayedRecord(0.9, driving, {}, {"p": LeftOut(half, half)})
     figure = plots.overlay(replace(comparison(("p", "q")), played=played), "title")
     labels = [axes.get_ylabel().partition("\n")[0] for axes in figure.axes]
     assert labels[:3] == ["vt (pu)", "frequency (Hz)", "vs (pu)"]
     error = "simulated"
     assert labels[3:] == ["active power p (pu)", error, "reactive power q (pu)", error]
+    legends = [
+        [text.get_text() for text in axes.get_legend().get_texts()] for axes in figure.axes[3::2]
+    ]
+    assert legends == [["measured", "not compared", "simulated"], ["measured", "simulated"]]
     titles = [axes.get_title(loc="right") for axes in figure.axes]
     assert titles[0] == "recorded vt, played in; from rest by +0.05 pu at 1 s"
     assert titles[2] == "recorded vs, played in"

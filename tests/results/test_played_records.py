@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from exfit.results.played_records import driving_signals, excursion, played_errors
+from exfit.results.played_records import driving_signals, excursion, left_out_of, played_errors
 
 TIME = np.arange(0.0, 10.0, 0.02)
 BEGINS = 2.0
@@ -40,6 +40,20 @@ def test_what_is_left_out_of_the_comparison_is_no_peak():
     errors = played_errors(TIME, BEGINS, spiked, simulated)
     assert errors.largest == 0.0
     assert errors.simulated.value == pytest.approx(-0.1, rel=1e-9)
+
+
+def test_what_a_mask_leaves_out_is_kept_to_be_seen():
+    whole, simulated = 0.8 + SWING, 0.8 + 1.1 * SWING
+    compared = np.where((TIME > 2.0) & (TIME < 3.0), np.nan, whole)
+    left_out = left_out_of(whole, compared, simulated)
+    inside = np.isfinite(left_out.measured)
+    np.testing.assert_array_equal(inside, np.isnan(compared))
+    np.testing.assert_array_equal(left_out.measured[inside], whole[inside])
+    # the line of the simulation meets that of what is compared
+    assert np.count_nonzero(np.isfinite(left_out.simulated)) == np.count_nonzero(inside) + 2
+    assert left_out_of(whole, whole, simulated) is None
+    gap = np.where(TIME > 9.0, np.nan, whole)
+    assert left_out_of(gap, gap, simulated) is None
 
 
 def test_without_samples_there_is_no_departure():

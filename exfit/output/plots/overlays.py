@@ -17,11 +17,13 @@ from exfit.output.plots.style import (
     tidy,
 )
 from exfit.results.comparisons import REFERENCE, Comparison, Overlay
-from exfit.results.played_records import DrivingSignal
+from exfit.results.played_records import DrivingSignal, LeftOut
 from exfit.signals import label_of
 from exfit.util.text import percentage
 
 Array = NDArray[np.float64]
+
+FAINT = 0.4  # opacity of what is not compared
 
 
 def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
@@ -69,6 +71,8 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay, 
         axes.plot(
             *envelope(time, overlaid.start), "--", color=START, linewidth=1.2, label="start values"
         )
+    if comparison.played is not None and signal in comparison.played.left_out:
+        _left_out(axes, time, comparison.played.left_out[signal])
     label = label or ("fitted" if overlaid.start is not None else "simulated")
     axes.plot(*envelope(time, overlaid.simulated), "-", color=SIMULATED, linewidth=1.4, label=label)
     axes.set_ylabel(label_of(signal))
@@ -77,6 +81,20 @@ def _signal(axes: Axes, comparison: Comparison, signal: str, overlaid: Overlay, 
     text = f"rmse {match.rmse:.3g} pu, fit {percentage(match.fit_percent)} %"
     axes.set_title(text, fontsize=9, loc="right")
     tidy(axes)
+
+
+def _left_out(axes: Axes, time: Array, signal: LeftOut) -> None:
+    """Draw faintly what is not compared."""
+    axes.plot(time, signal.measured, ".", color=MEASURED, markersize=3, alpha=FAINT)
+    axes.plot(
+        time,
+        signal.simulated,
+        "-",
+        color=SIMULATED,
+        linewidth=1.0,
+        alpha=FAINT,
+        label="not compared",
+    )
 
 
 def _error(axes: Axes, comparison: Comparison, overlaid: Overlay) -> None:

@@ -12,6 +12,7 @@ from exfit.output.report.charts import Chart, Panel, Series
 from exfit.output.report.layout import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.results.comparisons import REFERENCE, Comparison
 from exfit.results.model import FitResult
+from exfit.results.played_records import LeftOut
 from exfit.results.tables import clock_digits
 from exfit.signals import label_of
 from exfit.util.text import show
@@ -91,7 +92,9 @@ def played(key: str, comparison: Comparison, bins: int = BINS) -> Chart | None:
     for name, samples in comparison.overlays.items():
         measured = Series("recorded", *envelope(time, samples.measured, bins), "measured", True)
         simulated = Series("simulated", *envelope(time, samples.simulated, bins), "simulated")
-        panels.append(Panel(label_of(name), (measured, simulated), HALF))
+        left_out = comparison.played.left_out.get(name)
+        gaps = () if left_out is None else _gaps(time, left_out)
+        panels.append(Panel(label_of(name), (measured, simulated, *gaps), HALF))
     signals = ", ".join(comparison.overlays)
     return Chart(
         key=key,
@@ -101,6 +104,14 @@ def played(key: str, comparison: Comparison, bins: int = BINS) -> Chart | None:
         x_title=TIME,
         panels=tuple(panels),
         x_range=(float(time[0]), float(time[-1])),
+    )
+
+
+def _gaps(time: Array, left_out: LeftOut) -> tuple[Series, ...]:
+    """Return what of a signal is not compared: few samples."""
+    return (
+        Series("", time, left_out.measured, "measured faint", dots=True),
+        Series("simulated, not compared", time, left_out.simulated, "simulated faint"),
     )
 
 
