@@ -10,13 +10,20 @@ from exfit.analysis.judgement import doubt_of
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.fitting.channel_weights import as_fitted, searched, weighted_alike
-from exfit.fitting.descents import Announce
+from exfit.fitting.descents import Announce, stopped
+from exfit.fitting.driving_noise.weighing import (
+    NOT_WEIGHED,
+    weighed_by_noise,
+    why_not_weighed,
+    with_minima_of,
+)
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
 from exfit.fitting.search import continued_from, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.util.strategies import WEIGHED_BY_NOISE
 
 Watch = Callable[[estimate.Progress], None]
 
@@ -52,7 +59,7 @@ def search_outcome(
     Where profiles lead to a lower minimum the search goes on from there.
     """
     options, counter = task.options, task.counter
-    problem, found = weighted_search(task, problem, announce, progress)
+    problem, found = weighed_search(task, problem, announce, progress)
     setups, unseen = as_fitted(task.setups, problem), task.unseen
     if options.weights == "balanced":
         unseen = weighted_alike(unseen, problem.residuals)
@@ -81,6 +88,32 @@ def with_lines(
     setups, notes = with_found_lines(task.setups, weighted.residuals, first.best.x)
     disturbed = problem_of(residuals_of(task.case, setups))
     return task._replace(setups=setups), disturbed, notes
+
+
+def weighed_search(
+    task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
+) -> tuple[FitProblem, SearchResult]:
+    """Return the problem weighed by the noise of the signals that drive its events, and its search.
+
+    It is that of `weighted_search` for tests that no event drives.
+    """
+    problem, found = weighted_search(task, problem, announce, progress)
+    ended = found.interrupted or found.best.stop is estimate.Stop.INTERRUPTED
+    if ended or not task.case.kind.finds_rest:
+        return problem, found
+    setups = as_fitted(task.setups, problem)
+    reason = why_not_weighed(problem.residuals, setups)
+    if reason is not None:
+        return problem, found._replace(notes=(*found.notes, f"{NOT_WEIGHED} {reason}"))
+    try:
+        weighed, theta, notes = weighed_by_noise(problem, setups, found.best.x)
+        found = with_minima_of(weighed, found)
+    except KeyboardInterrupt:
+        return problem, found._replace(best=stopped(found.best, estimate.Stop.INTERRUPTED))
+    found = continued_from(
+        theta, found, weighed, announce, task.counter, task.options, WEIGHED_BY_NOISE
+    )
+    return weighed, found._replace(notes=(*found.notes, *notes))
 
 
 def weighted_search(

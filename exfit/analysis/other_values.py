@@ -21,7 +21,7 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.model import Iteration
 from exfit.results.other_values import AsFound, PhaseEnd
-from exfit.util.strategies import FROM_FURTHER_STARTS
+from exfit.util.strategies import PHASES
 
 Values = Mapping[str, float]
 
@@ -39,7 +39,7 @@ def phase_ends(
     Where a descent before that one was given up, its phases are not among them, and an end without
     a finite response is left out.
     """
-    whole = [*takewhile(lambda line: line.phase != FROM_FURTHER_STARTS, history)]
+    whole = [*takewhile(lambda line: line.phase in PHASES, history)]
     starts = [k for k, line in enumerate(whole) if isnan(line.damping)]
     own = whole[starts[-1] :] if starts else whole
     start = residuals.values(residuals.start)

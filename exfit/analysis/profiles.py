@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.analysis.case_search import SearchTask, weighted_search, with_lines
+from exfit.analysis.case_search import SearchTask, weighed_search, with_lines
 from exfit.analysis.diagnostics import search_range_notes
 from exfit.analysis.intervals.profile_hull import (
     FoundMinimum,
@@ -188,7 +188,7 @@ def _found(
     unseen = tuple(build_experiment(case, recording, start) for recording in judged)
     task = SearchTask(case, setups, unseen, options.strategy, options, SimulationCounter())
     task, problem, _ = with_lines(task, problem, progress)
-    problem, found = weighted_search(task, problem, lambda _: None, progress)
+    problem, found = weighed_search(task, problem, lambda _: None, progress)
     if found.best.stop is estimate.Stop.INTERRUPTED or found.interrupted:
         raise KeyboardInterrupt
     return task.setups, problem, found

@@ -1,6 +1,6 @@
 """The noise of a record, estimated from the signal itself."""
 
-from math import sqrt
+from math import comb, sqrt
 from statistics import NormalDist
 
 import numpy as np
@@ -11,29 +11,32 @@ from exfit.util.sorting import distinct, median
 
 Array = NDArray[np.float64]
 
-NEIGHBOURS = 3  # samples of a second difference; their median is free of a lone spike
+NEIGHBOURS = 3  # samples whose median is free of a lone spike
 SECOND_DIFFERENCE = sqrt(6.0)  # spread of x[k-1] - 2 x[k] + x[k+1] over that of white x
 MEDIAN_DEVIATION = NormalDist().inv_cdf(0.75)  # median of |x|, over the spread of a normal x
 UNIFORM_SPREAD = 1.0 / sqrt(12.0)  # over the width: of what rounding leaves, over its step
 
 
-def noise(samples: Array) -> float:
+def noise(samples: Array, order: int = 2) -> float:
     """Return the standard deviation of the white noise on a slow signal (M,), in its unit.
 
     It is the median absolute deviation of the second differences, which neither the slow changes
     of the signal nor rare spikes affect, and no less than what rounding to the recorder's steps
-    leaves. Uneven sampling passes where the signal is slow against its longest step.
+    leaves. Uneven sampling passes where the signal is slow against its longest step. Differences
+    of a higher ``order`` bear a signal that moves faster, such as a swing at 60 samples a second,
+    for an estimate that is a little less certain.
 
-    Source: Rousseeuw and Croux 1993 (median absolute deviation).
+    Source: Rousseeuw and Croux 1993 (median absolute deviation). The variance of the differences of
+    white noise is binomial(2 order, order) times its own.
 
     Raises:
-        ValueError: fewer than three samples.
+        ValueError: no more samples than the order.
     """
-    if len(samples) < NEIGHBOURS:
+    if len(samples) <= order:
         raise ValueError(
-            f"{len(samples)} samples: the noise is estimated from at least {NEIGHBOURS}"
+            f"{len(samples)} samples: the noise is estimated from at least {order + 1}"
         )
-    scatter = spread(np.diff(samples, 2)) / SECOND_DIFFERENCE
+    scatter = spread(np.diff(samples, order)) / sqrt(comb(2 * order, order))
     return max(float(scatter), UNIFORM_SPREAD * _quantum(samples))
 
 

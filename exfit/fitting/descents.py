@@ -167,10 +167,18 @@ def minimum_near(residuals: Residuals, theta: Array) -> Array:
 
     Raises KeyboardInterrupt at an interruption.
     """
+    return descent_near(residuals, theta).x
+
+
+def descent_near(residuals: Residuals, theta: Array) -> Result:
+    """Return one descent from scaled parameters theta (N,), without announcements.
+
+    Raises KeyboardInterrupt at an interruption.
+    """
     descent = Descent(
         functions=OneByOne(residuals, residuals.exact), bounds=residuals.bounds, x_scale=UNIT
     )
     end = descent.run(theta)
     if end.stop is Stop.INTERRUPTED:
         raise KeyboardInterrupt
-    return end.x
+    return end

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from exfit.dsp.filtering import Filtering
 from exfit.fitting.nuisances.kinds import OF_SYSTEM, Nuisance
 from exfit.fitting.nuisances.sine import Sine
+from exfit.inference.whitening import Whitening
 from exfit.simulation.inputs import Direction, InputStep
 from exfit.simulation.simulator import Simulator
 
@@ -94,7 +95,8 @@ class Experiment:
     """A simulated test and the channels that it is compared with.
 
     ``own`` holds the parameters of the system that this test alone has: where its signals start,
-    its network. ``sines`` are periodic disturbances of what is simulated.
+    its network. ``sines`` are periodic disturbances of the response. ``whitening`` makes errors
+    white that hold noise of driving signals: weights of channels drop out.
     """
 
     simulator: Simulator
@@ -103,6 +105,7 @@ class Experiment:
     nuisances: tuple[Nuisance, ...] = ()
     name: str = ""
     sines: tuple[Sine, ...] = ()
+    whitening: Whitening | None = None
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -210,7 +213,8 @@ class Experiment:
             else:
                 theirs = channel.record
             blocks.append(channel.weight * ours - channel.weight * theirs)
-        return blocks[0] if len(blocks) == 1 else np.concatenate(blocks, axis=1)
+        errors = np.concatenate(blocks, axis=1) if len(blocks) > 1 else blocks[0]
+        return errors if self.whitening is None else self.whitening.errors(errors)
 
     def _moved_channel(self, channel: Channel) -> bool:
         """Return whether the scale or offset of a channel is found."""
@@ -256,7 +260,8 @@ class Experiment:
             )
             theirs = self._measured_slopes(channel, values, moves)
             blocks.append(channel.weight * (ours if theirs is None else ours - theirs))
-        return blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        slopes = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        return slopes if self.whitening is None else self.whitening.slopes(slopes)
 
     def response_with_derivatives(
         self, values: Values, moves: Sequence[Values]

@@ -170,14 +170,23 @@ def beyond(
 
 
 def continued(
-    searches: GlobalSearchMethods, found: SearchResult, point: Array, announce: Announce
+    searches: GlobalSearchMethods,
+    found: SearchResult,
+    point: Array,
+    announce: Announce,
+    phase: str = FROM_FURTHER_STARTS,
 ) -> SearchResult:
-    """Return a search that goes on from a point (N,) with a lower cost than its best."""
-    path, last = refined(searches, found.history, replace(found.best, x=point), announce)
+    """Return a search that goes on from a point (N,) with a lower cost than its best.
+
+    ``phase`` says in its history how that point was found.
+    """
+    path, last = refined(searches, found.history, replace(found.best, x=point), announce, phase)
     if found.minima is None:
         return found._replace(best=last, history=path)
-    alike = [local for local in found.minima.minima if is_same(last, local.result)]
-    others = [local for local in found.minima.minima if not is_same(last, local.result)]
+    alike, others = list[LocalMinimum](), list[LocalMinimum]()
+    for local in found.minima.minima:
+        same_minimum = is_same(last, local.result) or is_same(local.result, last)
+        (alike if same_minimum else others).append(local)
     lowest = LocalMinimum(last.x, last.cost, sum(local.starts for local in alike), last)
     minima = replace(found.minima, minima=(lowest, *others), best=last)
     return found._replace(best=last, history=path, minima=minima, place=0)
@@ -204,25 +213,27 @@ def refined(
     history: Sequence[SolverIteration],
     end: Result,
     announce: Announce,
+    phase: str = FROM_FURTHER_STARTS,
 ) -> tuple[tuple[SolverIteration, ...], Result]:
     """Return a last descent from an end that was found elsewhere, behind the path before."""
     path = [*history]
     last = path[-1]
 
     def join(line: SolverIteration) -> None:
-        path.append(after_search(last, line) if path[-1] is last else following(last, line))
+        first = path[-1] is last
+        path.append(after_search(last, line, phase) if first else following(last, line))
         announce(path[-1])
 
     result = searches.refined(end, join)
     return tuple(path), replace(result, nfev=last.nfev + result.nfev, njev=last.njev + result.njev)
 
 
-def after_search(last: SolverIteration, point: SolverIteration) -> SolverIteration:
+def after_search(
+    last: SolverIteration, point: SolverIteration, phase: str = FROM_FURTHER_STARTS
+) -> SolverIteration:
     """Return the line of a point that further starts led to, behind the last one of the case."""
     line = following(last, replace(point, number=0))
-    return replace(
-        line, phase=FROM_FURTHER_STARTS, step_norm=0.0, damping=nan, inner=0, capped=None
-    )
+    return replace(line, phase=phase, step_norm=0.0, damping=nan, inner=0, capped=None)
 
 
 def ways_of(further: FurtherDescents, descents: Descents) -> "tuple[Way, ...]":

@@ -90,13 +90,12 @@ class Residuals:
     def noise(self) -> float:
         """The standard deviation of a weighted error, by the noise of the records.
 
-        Where the channels are weighted by their residuals, it is that of these.
+        Where the channels are weighted by their residuals, it is that of these; or of white errors.
         """
-        deviations = [
-            channel.weight * (channel.residual_deviation or noise_of(channel))
-            for channel in self.channels
-        ]
-        return float(np.sqrt(np.mean(np.square(deviations))))
+        if white := [each.whitening for each in self.experiments if each.whitening is not None]:
+            return white[0].scale
+        sizes = [c.weight * (c.residual_deviation or noise_of(c)) for c in self.channels]
+        return float(np.sqrt(np.mean(np.square(sizes))))
 
     def match(self, residuals: Array, rmse: float) -> bool:
         """Return whether no channel of any record has a root mean square error above ``rmse``.

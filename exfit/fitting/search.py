@@ -32,7 +32,12 @@ from exfit.fitting.residuals import (
 )
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
-from exfit.util.strategies import DEFAULT_STRATEGY, SEARCHES, STRATEGIES
+from exfit.util.strategies import (
+    DEFAULT_STRATEGY,
+    FROM_FURTHER_STARTS,
+    SEARCHES,
+    STRATEGIES,
+)
 from exfit.util.text import near
 
 Array = NDArray[np.float64]
@@ -112,10 +117,11 @@ def continued_from(
     announce: Announce,
     counter: SimulationCounter,
     options: Estimate,
+    phase: str = FROM_FURTHER_STARTS,
 ) -> SearchResult:
     """Return a search that goes on from a point (N,) with a lower cost than its best."""
     searches = CaseSearches(problem, options, lambda _: None, counter)
-    return continued(searches, found, point, announce)
+    return continued(searches, found, point, announce, phase)
 
 
 @dataclass(frozen=True)

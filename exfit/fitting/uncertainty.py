@@ -249,11 +249,12 @@ def _channels(
     places = zip(slices(rows), slices(residuals.sizes), strict=True)
     for (experiment, channel), (own, samples) in zip(each, places, strict=True):
         label = f"{experiment.name} {channel.signal}" if several else channel.signal
-        noise = None if channel.noise is None else channel.noise * channel.weight
+        white = experiment.whitening is not None
+        noise = None if white or channel.noise is None else channel.noise * channel.weight
         block = ResidualBlock(label, own, noise, channel.weight, samples)
         as_many = own.stop - own.start == samples.stop - samples.start
         of_record = any(nuisance.signal == channel.signal for nuisance in experiment.nuisances)
-        if channel.plain and as_many and not of_record:
+        if channel.plain and as_many and not (of_record or white):
             block = replace(block, rounding=_rounding(channel, errors[samples], slopes[own]))
         yield block
 

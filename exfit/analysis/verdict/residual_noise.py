@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 # variance of the logarithm of a standard deviation, times the number of samples it is taken from
 OF_RMS = 0.5  # (Kendall & Stuart 1977, section 10.9)
 OF_SCATTER = 2.0  # by the median of second differences: simulated, for 100 to 5000 samples
+OF_FOURTH_DIFFERENCES = 2.8  # by theirs: simulated, for 720 samples
 OF_SPREAD = 1.36  # by the median deviation (Rousseeuw & Croux 1993)
 FEWEST_AT_REST = 20  # samples from which a record's scatter at rest is taken
 MOST_STEPS = 10  # whose patterns are tested
@@ -44,6 +45,14 @@ def sample_scatter(std: float, samples: int) -> Scatter:
     The residuals are as many ``samples``; so is their own share of the variance here.
     """
     return Scatter(std, (OF_RMS + OF_SCATTER) / samples)
+
+
+def white_scatter(std: float, samples: int) -> Scatter:
+    """Return the scatter of residuals that are weighed by the noise of what drives them.
+
+    It is as certain as the scatter of these signals, by the median of fourth differences.
+    """
+    return Scatter(std, (OF_RMS + OF_FOURTH_DIFFERENCES) / samples)
 
 
 def rest_scatter(at_rest: Array, samples: int) -> Scatter | None:

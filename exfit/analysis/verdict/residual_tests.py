@@ -16,6 +16,7 @@ from exfit.analysis.verdict.residual_noise import (
     rest_scatter,
     sample_scatter,
     step_pattern,
+    white_scatter,
     with_carried,
 )
 from exfit.fitting.channels import noise_shape
@@ -41,21 +42,49 @@ def residual_tests(evidence: Evidence) -> tuple[ResidualTests, ...]:
 
 def _tests(evidence: Evidence) -> Iterator[ResidualTests]:
     residuals, values = evidence.residuals, evidence.values
-    errors = [
-        channel.weight * _compared(record.comparison.overlays[channel.signal].error)
-        for record in evidence.records
-        for channel in record.setup.channels
-    ]
+    errors = [_errors(record) for record in evidence.records]
     influence, _ = residuals.influence(np.concatenate(errors))
     each = iter(np.split(influence, np.cumsum(residuals.sizes)[:-1]))
     noises = iter(evidence.uncertainty.confidence.noise if evidence.uncertainty else ())
     for record in evidence.records:
-        carried = carried_noise(record.setup, values)
         instants = _step_instants(record, values)
-        for k, channel in enumerate(record.setup.channels):
-            scatter = _scatter(record, channel, values, carried[k] if carried else None)
-            rmse = next(noises).estimated / channel.weight
-            yield _tests_of(record, channel, next(each) / channel.weight, rmse, scatter, instants)
+        for channel, (size, scatter) in zip(
+            record.setup.channels, _sizes(record, values), strict=True
+        ):
+            rmse = next(noises).estimated * size
+            yield _tests_of(record, channel, next(each) * size, rmse, scatter, instants)
+
+
+def _sizes(record: FittedRecord, values: Values) -> Iterator[tuple[float, list[Scatter]]]:
+    """Yield how much of a weighted error is one of each channel, pu, and the channel's scatter.
+
+    That of white errors is what they were before, whose size their noise foretells.
+    """
+    experiment, first = record.setup.experiment, 0
+    whitening = experiment.whitening
+    carried = carried_noise(record.setup, values) if whitening is None else []
+    for k, channel in enumerate(experiment.channels):
+        if whitening is None:
+            own = _scatter(record, channel, values, carried[k] if carried else None)
+            yield 1.0 / channel.weight, own
+        else:
+            before = whitening.deviations[first : first + channel.size] / channel.weight
+            std = float(np.sqrt(np.mean(before**2)))
+            yield std / whitening.scale, [white_scatter(std, channel.samples)]
+        first += channel.size
+
+
+def _errors(record: FittedRecord) -> Array:
+    """Return the weighted errors of all channels of a record, white where the fit makes them so."""
+    experiment = record.setup.experiment
+    errors = [
+        channel.weight * _compared(record.comparison.overlays[channel.signal].error)
+        for channel in experiment.channels
+    ]
+    together = np.concatenate(errors)
+    return (
+        together if experiment.whitening is None else experiment.whitening.errors(together[None])[0]
+    )
 
 
 def _scatter(

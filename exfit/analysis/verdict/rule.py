@@ -33,7 +33,9 @@ def verdict_of(evidence: Evidence) -> Verdict:
     """Return what a fit comes to, why, and the likeliest causes."""
     tests = residual_tests(evidence)
     words, reason = _judged(evidence, tests)
-    exact = words == GOOD and not any(test.carried > NEGLIGIBLE for test in tests)
+    carried = any(test.carried > NEGLIGIBLE for test in tests)
+    weighed = any(record.setup.experiment.whitening is not None for record in evidence.records)
+    exact = words == GOOD and not (carried or weighed)
     contradicted = contradictions(evidence) if exact else []
     if contradicted:
         words, reason = MATCHES, contradicted[0].reason

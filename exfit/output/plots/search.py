@@ -22,13 +22,14 @@ from exfit.output.plots.style import (
     tidy,
 )
 from exfit.results.model import FitResult, Minima
-from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES
+from exfit.util.strategies import FROM_FURTHER_STARTS, HISTORY_PHASES, PHASES, WEIGHED_BY_NOISE
 from exfit.util.text import rounded
 
 LONGEST = 30  # letters of a parameter
 COLOURS: Mapping[str, str] = {
     **dict(zip(PHASES, cycle((START, SIMULATED, GREEN)), strict=False)),
     FROM_FURTHER_STARTS: LIMIT,
+    WEIGHED_BY_NOISE: LIMIT,
 }
 
 WAYS = {

@@ -1,0 +1,1 @@
+"""Errors in variables: the noise of the recorded signals that drive a simulation."""

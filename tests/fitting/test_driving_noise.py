@@ -1,0 +1,103 @@
+"""Noise of the recorded signals that drive a unit: its share of the errors, its bias."""
+
+import re
+
+import numpy as np
+import pytest
+from grid_events import TRUTH, event_case, recorded
+
+from exfit.case.load import load_case
+from exfit.fitting.build import build_experiments
+from exfit.fitting.driving_noise import responses
+from exfit.fitting.driving_noise.responses import carried_noise, noise_of_inputs, with_added
+from exfit.workflows import fit
+
+NOISE = 2e-4
+STEP = 1e-5  # of a sample, for a difference quotient
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("noise")
+
+
+@pytest.fixture(scope="module")
+def event(folder):
+    return recorded(folder / "event.csv", noise=NOISE)
+
+
+@pytest.fixture(scope="module")
+def fitted(folder, event):
+    return fit(event_case(folder, "event"))
+
+
+def test_the_noise_of_what_drives_is_that_of_the_record(folder, event):
+    """The error of a standard deviation of 720 samples by a median is 6 %; four of it."""
+    (setup,) = build_experiments(load_case(event_case(folder, "event", free=False)))
+    assert noise_of_inputs(setup.experiment.simulator) == pytest.approx(
+        {"vt": NOISE, "angle": NOISE}, rel=0.25
+    )
+
+
+@pytest.mark.parametrize("signal", ["vt", "angle", "p", "q"])
+def test_a_sample_of_a_record_moves_the_errors_as_its_noise_is_said_to(folder, monkeypatch, signal):
+    """Of a sample at rest the levels follow; pulses beside it show its response to a few per cent.
+
+    Angles are interpolated by splines, which turn the response by the operating point.
+    """
+    columns = recorded(folder / "plain.csv")
+    case = load_case(event_case(folder, "plain", free=False))
+    (setup,) = build_experiments(case)
+    values = case.values()
+    monkeypatch.setattr(responses, "noise_of_inputs", lambda _: {"vt": 1.0, "angle": 1.0})
+    monkeypatch.setattr(responses, "noise_of_channel", lambda _: 1.0)
+    carried = carried_noise(setup, values).carried
+    samples, resting = len(columns["t"]), np.count_nonzero(columns["t"] < setup.test.steady)
+    first = {"vt": 0, "angle": samples, "p": 2 * samples, "q": 2 * samples + resting}[signal]
+    usual, _ = setup.experiment.errors(values)
+    driven = signal in ("vt", "angle")
+    for place in (0, 40, 100, 300) if driven else (0, 40):
+        moved = {**columns, signal: columns[signal] + STEP * (np.arange(samples) == place)}
+        path = folder / "moved.csv"
+        rows = np.transpose([*moved.values()])
+        np.savetxt(path, rows, delimiter=",", header=",".join(moved), comments="", fmt="%.15g")
+        until = {"test": {"steady_until": setup.test.steady}}
+        (other,) = build_experiments(load_case(event_case(folder, "moved", free=False, **until)))
+        change = (other.experiment.errors(values)[0] - usual) / STEP
+        off = np.linalg.norm(change - carried[:, first + place])
+        assert off < 0.04 * np.linalg.norm(change), place
+
+
+def test_the_intervals_hold_the_truth_and_the_output_says_why(fitted):
+    for name, true in TRUTH.items():
+        parameter = fitted.parameters[name]
+        low, high = parameter.interval
+        wider = 0.5 * (high - low)  # 3.9 standard errors on either side
+        assert low - wider < true < high + wider
+    notes = " ".join(fitted.notes)
+    assert re.search(r"the noise of what drives the simulation, vt 0\.0002\d? pu and angle", notes)
+    assert "the bias by that noise is taken out" in notes
+
+
+def test_weighed_errors_are_white_and_as_large_as_foretold(fitted):
+    """Twice the 6 % by which the noise of one signal is known."""
+    assert "noise" not in fitted.verdict.reason
+    for test in fitted.verdict.residuals:
+        assert test.are_noise
+        assert test.whiteness > 1e-3
+        assert test.times == pytest.approx(1.0, abs=0.12)
+
+
+def test_an_event_that_cannot_be_weighed_says_so(folder, event):
+    path = event_case(folder, "event", estimate={"search": "local", "loss": "huber"})
+    notes = " ".join(fit(path).notes)
+    assert "it cannot be weighed with a robust loss" in notes
+
+
+def test_added_samples_leave_the_simulator_as_it_is(folder, event):
+    (setup,) = build_experiments(load_case(event_case(folder, "event", free=False)))
+    simulator = setup.experiment.simulator
+    before = simulator.inputs.recorded["vt"].samples.copy()
+    more = with_added(simulator, {"vt": np.ones(len(before))})
+    assert np.array_equal(more.inputs.recorded["vt"].samples, before + 1.0)
+    assert np.array_equal(simulator.inputs.recorded["vt"].samples, before)
