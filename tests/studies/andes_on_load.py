@@ -25,7 +25,7 @@ VT0, P0, X, KV, MVA = 1.02, 0.8, 0.3, 20.0, 100.0
 DIP, AT, BACK, END = -0.25, 1.0, 1.2, 8.0  # pu of the source's voltage; s
 CALM = 2.5  # s: from then on steps and rows are longer
 ROWS = np.concatenate([np.arange(0.01, CALM, 0.02), np.arange(CALM, END, 0.05)])  # s
-FINEST, FINE, COARSE = 1e-4, 2.5e-4, 1e-3  # s, steps: fine from the dip to CALM
+FINEST, FINE, COARSE = 1e-4, 2.5e-4, 5e-4  # s, steps: fine from the dip to CALM
 JUMPED = 0.1  # s behind each jump the finest ones
 FIRST = 1e-6  # s; the rule averages over a step, so the first one after a jump is short
 SETTINGS = {
@@ -93,7 +93,7 @@ ESST3A = Part(
 )  # fmt: skip
 ESST4B = Part(
     "ESST4B",
-    {"TR": 0.02, "KPR": 10.75, "KIR": 10.75, "VRMAX": 9.0, "VRMIN": -9.0, "TA": 0.02, "KPM": 1.0,
+    {"TR": 0.02, "KPR": 3.0, "KIR": 3.0, "VRMAX": 9.0, "VRMIN": -9.0, "TA": 0.02, "KPM": 1.0,
      "KIM": 0.0, "VMMAX": 9.0, "VMMIN": -9.0, "KG": 0.0, "KP": 5.0, "KI": 0.3, "VBMAX": 11.63,
      "KC": 0.0, "XL": 0.124, "THETAP": 10.0},
 )  # fmt: skip
