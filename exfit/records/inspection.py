@@ -26,6 +26,7 @@ from exfit.records.channel_recognition import guess_signals, three_phases
 from exfit.records.clock import Clock, check_finite, check_steps, why_unusable
 from exfit.records.contradictions import contradictions
 from exfit.records.field_base import base_findings
+from exfit.records.formats import PLAY_IN
 from exfit.records.formats.memory import TooLargeError
 from exfit.records.formats.table import Table, column_error, listed, refuse_uneven
 from exfit.records.pmu_recognition import PmuContent, pmu_content
@@ -89,11 +90,16 @@ class Inspection:
         return channel
 
     @property
+    def plays_in(self) -> bool:
+        """Whether it is a play-in file: what drives a unit, and nothing to compare."""
+        return self.path.suffix.lower() == PLAY_IN
+
+    @property
     def is_event(self) -> bool:
         """Whether it seems to be a grid event: phasors, or an angle and p without a reference."""
         signals = {channel.signal for channel in self.channels}
         plain = {"vt", "angle", "p"} <= signals and REFERENCE not in signals
-        return self.pmu is not None or plain
+        return self.pmu is not None or plain or self.plays_in
 
     @property
     def findings(self) -> tuple[str, ...]:

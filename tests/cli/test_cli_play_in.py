@@ -45,6 +45,21 @@ def test_a_play_in_file_drives_what_its_record_drove(run, event):
         assert difference[-1] < 1e-5, signal
 
 
+def test_a_play_in_file_is_inspected_as_one_and_makes_no_new_case(run):
+    times = (number / 60.0 for number in range(300))
+    rows = (f"{t:.4f}, {1.0 - 0.02 * (t > 2.0):.4f}, {60.0 - 0.1 * (t > 2.0):.4f}" for t in times)
+    Path("event.plb").write_text("\n".join(rows))
+    code, out, _ = run("inspect", "event.plb", "--no-plots")
+    assert code == 0
+    assert "a play-in file: voltage and frequency" in out
+    assert "type: grid-playback" in out
+    assert "frequency: {column: frequency, unit: Hz}" in out
+    assert "vref" not in out
+    code, _, err = run("new", "--model", "SEXS", "--record", "event.plb", "-o", "case.yaml")
+    assert code == 1
+    assert "a play-in file has no P and Q to fit" in err
+
+
 def test_a_file_of_another_name_and_other_options_are_refused(run, event):
     _, case = event
     assert run("fit", case, "-o", "run", "--no-plots", "-q")[0] == 0

@@ -164,10 +164,16 @@ def _plain_driving(inspection: Inspection, bases: Mapping[str, Base]) -> Iterato
         why = "deg or rad" if unit == FILL_IN else "by its range" if angle.unit is None else ""
         entry = f"    angle: {{column: {plain_text(angle.name)}, unit: {unit}}}"
         yield commented(entry, why) if why else entry
+    frequency = inspection.channel_of("frequency")
+    if angle is None and frequency is not None:
+        unit = frequency.unit or FILL_IN
+        yield f"    frequency: {{column: {plain_text(frequency.name)}, unit: {unit}}}"
 
 
 def _compared(inspection: Inspection, bases: Mapping[str, Base]) -> Iterator[str]:
     """Yield the channels that are compared: meters of their own first, else those of phasors."""
+    if inspection.plays_in:
+        return
     has_current = inspection.pmu is not None and inspection.pmu.current is not None
     for signal in COMPARED_IN_EVENT:
         channel = inspection.channel_of(signal)

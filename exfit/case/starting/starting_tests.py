@@ -44,8 +44,10 @@ def starting_tests(
     they are amounts, or have the sign of the step. Of a single record without steps it is one test.
 
     Raises ExfitError for a size that is none, fits no test, or contradicts what the record shows,
-    for a record in which the breaker opens, and for one of several that shows no step.
+    for a record in which the breaker opens, for one of several that shows no step, and for a
+    play-in file.
     """
+    _refuse_play_in(inspections)
     if any(inspection.is_event for inspection in inspections):
         return _events(inspections, sizes, bases or {})
     _refuse_rejections(inspections)
@@ -62,6 +64,16 @@ def starting_tests(
         )
     ]
     return renamed(made, [test for _, test in recorded])
+
+
+def _refuse_play_in(inspections: Sequence[Inspection]) -> None:
+    """Raise ExfitError for a play-in file: it has nothing that a fit could be compared with."""
+    for inspection in inspections:
+        if inspection.plays_in:
+            raise ExfitError(
+                f"{inspection.path}: a play-in file has no P and Q to fit; exfit inspect shows the "
+                "sections of a case that exfit simulate takes"
+            )
 
 
 def _events(

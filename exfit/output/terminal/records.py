@@ -41,6 +41,8 @@ def inspection(console: Console, result: Inspection, record: Sequence[str]) -> N
     console.print()
     if result.pmu is not None:
         paragraph(console, _of_pmu(result.pmu))
+    elif result.plays_in:
+        paragraph(console, "a play-in file: voltage and frequency, which drive a grid-playback")
     elif result.is_event:
         paragraph(console, "a grid event: voltage, angle and power, and no reference")
     else:

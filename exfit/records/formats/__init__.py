@@ -6,10 +6,11 @@ from exfit.errors import RecordError
 from exfit.records.formats.table import Table
 from exfit.util.files import siblings
 
-__all__ = ["Table", "open_table"]
+__all__ = ["PLAY_IN", "Table", "open_table"]
 
 COMTRADE = (".cfg", ".cff")
 BESIDE_CFG = (".dat", ".hdr")  # text files too may be called so
+PLAY_IN = ".plb"
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 
@@ -39,7 +40,7 @@ def open_table(path: Path, sheet: str | None = None, memory: float | None = None
         from exfit.records.formats.parquet import read_parquet
 
         return read_parquet(path, memory)
-    if suffix == ".plb":
+    if suffix == PLAY_IN:
         from exfit.records.formats.play_in import read_play_in
 
         return read_play_in(path, memory)

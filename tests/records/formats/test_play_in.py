@@ -32,6 +32,21 @@ def test_what_is_written_is_read_to_its_digits(tmp_path, separator):
         assert columns[name] == pytest.approx(samples, rel=1e-8, abs=1e-8)
 
 
+def test_files_of_any_length_go_there_and_back(tmp_path):
+    """In nine digits, uneven times among them."""
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        count = int(random.integers(3, 40))
+        time = np.cumsum(random.uniform(1e-3, 0.1, count))
+        voltage, frequency = random.uniform(0.6, 1.9, count), random.uniform(45.0, 65.0, count)
+        text = play_in_text(zip(time.tolist(), voltage.tolist(), frequency.tolist(), strict=True))
+        columns = table_of(tmp_path, text).numbers(("t", "vt", "frequency"))
+        for name, samples in {"t": time, "vt": voltage, "frequency": frequency}.items():
+            assert columns[name] == pytest.approx(samples, rel=1e-8), (seed, name)
+        again = play_in_text(zip(*(columns[name].tolist() for name in columns), strict=True))
+        assert again == text, seed
+
+
 @pytest.mark.parametrize(
     ("voltage", "frequency", "units"),
     [(15.75, 1.0 / 60.0, {"frequency": "pu"}), (15750.0, 5.0 / 6.0, {"frequency": "Hz"})],
