@@ -45,7 +45,7 @@ def test_a_play_in_file_drives_what_its_record_drove(run, event):
         assert difference[-1] < 1e-5, signal
 
 
-def test_a_play_in_file_is_inspected_as_one_and_makes_no_new_case(run):
+def test_a_play_in_file_is_inspected_as_one_and_makes_no_new_case(run, empty_folder):
     times = (number / 60.0 for number in range(300))
     rows = (f"{t:.4f}, {1.0 - 0.02 * (t > 2.0):.4f}, {60.0 - 0.1 * (t > 2.0):.4f}" for t in times)
     Path("event.plb").write_text("\n".join(rows))
