@@ -13,6 +13,7 @@ from exfit.case.yaml import read_text, read_yaml
 from exfit.errors import CaseError
 from exfit.fitting.nuisances.parameters import names_of
 from exfit.fitting.recorded.references import with_recorded_steps
+from exfit.fitting.recorded.switchings import names_of_switchings
 from exfit.fitting.system import values_of
 from exfit.models.sheet import Parameter
 from exfit.util.magnitude import magnitude_fault
@@ -184,4 +185,8 @@ def _wrong_sources(given: Any) -> Iterator[str]:
 def _of_records(case: Case) -> list[str]:
     """Return the names of all that a fit of a case finds about its records."""
     recordings = [with_recorded_steps(case, recording) for recording in case.recordings]
-    return [name for recording in recordings for name in names_of(recording)]
+    return [
+        name
+        for recording in recordings
+        for name in (*names_of(recording), *names_of_switchings(case, recording))
+    ]

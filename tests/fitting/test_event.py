@@ -8,7 +8,7 @@ from exfit.case.case import Case
 from exfit.dsp.switchings import jumps_while_moving
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.recorded.switchings import MASKED
+from exfit.fitting.recorded.switchings import MASKED, names_of_switchings
 from exfit.records.record import Record
 
 TIME = np.arange(600) / 60.0
@@ -213,3 +213,14 @@ def test_only_an_event_has_its_keys(key):
     with pytest.raises(CaseError, match=f"record.{key}: not allowed with plant open-circuit") as no:
         Case.from_dict(content)
     assert "test.frequency_offset: not allowed" in str(no.value)
+
+
+def test_the_names_of_switchings_are_those_that_a_fit_finds():
+    """So that the parameters of a fit may be given to another run."""
+    signals = record(vt=jumping() + 0.04 * (TIME > 6.0))
+    content = {**UNIT, "record": {"channels": {k: k for k in signals.signals}}}
+    case = Case.from_dict(content, signals)
+    setup = build_experiment(*recorded(case))
+    names = [*names_of_switchings(case, case.recordings[0])]
+    assert names == ["switching.at", "switching2.at"]
+    assert names == [parameter.name for parameter in setup.free]

@@ -7,10 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
-from exfit.case.schema import MedianSection, RecordFile
+from exfit.case.schema import MedianSection, RecordFile, Recording
 from exfit.dsp.switchings import Jump, jumps_while_moving
+from exfit.fitting.channels import with_filter
 from exfit.fitting.nuisances.kinds import Nuisance
+from exfit.fitting.nuisances.parameters import prefix_of
 from exfit.fitting.parameters import FreeParameter
+from exfit.fitting.recordings import record_of
 from exfit.records.record import Record
 from exfit.simulation.inputs import InputStep, RecordedInput
 from exfit.simulation.splines import SplinedInput
@@ -148,7 +151,7 @@ def taken_apart(
             size = _size(own, before, after, at)
             smooth[each.signal] = _without(own, before, after, size)
             steps.append(InputStep(at, size, each.signal, smooth=True))
-        name = f"{prefix}switching{_number(number)}.at"
+        name = _name(prefix, number)
         nuisances.append(Nuisance(name, "switching", place, count=len(group)))
         free.append(FreeParameter(name, at, low + margin, high - margin, logarithmic=False))
     return TakenApart({**inputs, **smooth}, tuple(steps), tuple(nuisances), tuple(free))
@@ -157,6 +160,22 @@ def taken_apart(
 def _large(groups: Sequence[Group]) -> list[Group]:
     """Return the switchings whose instants matter."""
     return [group for group in groups if any(each.is_large for each in group)]
+
+
+def names_of_switchings(case: Case, recording: Recording) -> Iterator[str]:
+    """Yield the names of the instants that a fit finds in the record of an event.
+
+    Raises RecordError where that cannot be read.
+    """
+    file = recording.record
+    if case.kind.finds_rest and file.switchings == "find":
+        record = with_filter(record_of(case, recording), file.filter)
+        groups = _large(groups_of(switchings_of(case, record)))
+        yield from (_name(prefix_of(recording), k) for k in range(1, len(groups) + 1))
+
+
+def _name(prefix: str, number: int) -> str:
+    return f"{prefix}switching{_number(number)}.at"
 
 
 def _number(number: int) -> str:
