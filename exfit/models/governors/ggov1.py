@@ -48,10 +48,12 @@ droop at rest; where Rselect = 0, it is 0. A unit that starts above Ldref is not
 at rest. Trate_Mbase is the turbine's rating over the machine's base, 1 where
 PSS/E's Trate is 0.
 
-In doubt are Dm > 0 (sources take Dm (1 + dw), not Dm dw, from the power) and
-the input of Kimw/s (pe, or p without its lag). Not modelled: a dead time of a
-diesel engine (Teng) and limits of rate of the load limiter (Rup, Rdown).
-Typical data are those of the public libraries (OpenIPSL, InterPSS).
+The equations are those of InterPSS, which has compared them with PowerWorld. In
+doubt are Dm > 0 (sources take Dm (1 + dw), not Dm dw, from the power), the way
+of wf to fsrt where Dm is not negative (InterPSS multiplies it with the speed
+there) and the input of Kimw/s (pe, or p without its lag). Not modelled: a dead
+time of a diesel engine (Teng) and limits of rate of the load limiter (Rup,
+Rdown). Typical data are those of the public libraries (OpenIPSL, InterPSS).
 """
 
 from typing import NamedTuple
