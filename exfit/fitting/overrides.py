@@ -20,6 +20,9 @@ from exfit.util.magnitude import magnitude_fault
 from exfit.util.sources import SOURCES
 from exfit.util.text import near
 
+WHOLE_FIT = "result.json"
+OF_A_RESULT = "the result of a fit; give the parameters.yaml beside it"
+
 
 def changed_values(case: Case, given: Mapping[str, float], place: str) -> dict[str, float]:
     """Return changes of values by name: KA, machine.Tpd0, or what is found about a record.
@@ -104,10 +107,12 @@ def fitted_model_hash(path: Path) -> str:
 
 def _content(path: Path) -> tuple[dict[str, Any], list[str]]:
     """Return what a file of parameters contains, and the faults of its text."""
+    if path.is_dir() or path.name == WHOLE_FIT:  # a large one is more than YAML is read of
+        raise CaseError([f"{path}: {OF_A_RESULT}"])
     top, faults = read_yaml(read_text(path), path)
     content = top.value if isinstance(top.value, dict) else {}
     if "inputs" in content:
-        raise CaseError([f"{path}: the result of a fit; give the parameters.yaml beside it"])
+        raise CaseError([f"{path}: {OF_A_RESULT}"])
     texts = [fault.text for fault in faults]
     parameters = content.get("parameters")
     if not isinstance(parameters, dict) or not parameters:

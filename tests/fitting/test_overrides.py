@@ -6,7 +6,7 @@ from cases import FIRST_ORDER, TIME, TRUTH
 
 import exfit
 from exfit.errors import CaseError
-from exfit.fitting.overrides import with_given_values
+from exfit.fitting.overrides import read_parameters, with_given_values
 
 BACKGROUND = 1e-3 * np.random.default_rng(1).standard_normal(len(TIME))
 
@@ -105,3 +105,12 @@ def test_the_latest_value_counts_and_the_cases_own_is_remembered():
     twice = with_given_values(with_given_values(case(), {"k": 2.0}, "first"), {"k": 3.0}, "second")
     assert twice.values()["k"] == 3.0
     assert twice.given_values["k"] == (3.0, 1.0, "second")
+
+
+def test_the_result_of_a_fit_is_not_read_for_its_parameters(tmp_path):
+    """Of any size: a large one holds more values than YAML is read of."""
+    result = tmp_path / "result.json"
+    result.write_text('{"samples": [' + "1.0, " * 60_000 + "1.0]}")
+    for path in (result, tmp_path):
+        with pytest.raises(CaseError, match=r"the result of a fit; give the parameters\.yaml"):
+            read_parameters(case(), path)
