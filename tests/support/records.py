@@ -67,8 +67,9 @@ def case_of(content, folder):
 def write(path, **columns):
     """Write a record, gaps as empty cells."""
     rows = np.column_stack(list(columns.values()))
-    lines = [",".join("" if np.isnan(x) else f"{x:.10g}" for x in row) for row in rows]
-    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    line = ",".join(["%.10g"] * len(columns)) + "\n"
+    numbers = line * len(rows) % tuple(rows.ravel().tolist())
+    path.write_text(",".join(columns) + "\n" + numbers.replace("nan", ""))
     return path
 
 
