@@ -17,15 +17,18 @@ P0, Q0 = 0.8, 0.13  # pu, before the event
 REST = 2.0  # s
 
 
-def driving(rate=60, seconds=16.0, size=1.0):
-    """Return time, voltage and angle of a grid in which a line trips: a swing, and a slow fall."""
+def driving(rate=60, seconds=16.0, size=1.0, swings=0.8, damping=0.35, fall=1.0):
+    """Return time, voltage and angle of a grid in which a line trips: a swing, and a slow fall.
+
+    The swing has the frequency ``swings`` (Hz) and decays by ``damping`` (1/s).
+    """
     time = np.arange(0.0, seconds, 1.0 / rate)
     after = np.maximum(time - REST, 0.0)
     begun = 1.0 - np.exp(-((after / 0.06) ** 2))  # a filtered jump, as a PMU shows it
-    swing = np.exp(-0.35 * after) * np.sin(2.0 * np.pi * 0.8 * after)
+    swing = np.exp(-damping * after) * np.sin(2.0 * np.pi * swings * after)
     slow = 1.0 - np.exp(-after / 2.5)
     vt = 1.0 + size * (-0.015 * begun + 0.012 * swing + 0.008 * slow)
-    angle = 0.3 + size * (-0.05 * begun + 0.07 * swing - 0.25 * slow)
+    angle = 0.3 + size * (-0.05 * begun + 0.07 * swing - fall * 0.25 * slow)
     return time, vt, angle
 
 
@@ -51,11 +54,14 @@ def case_of(given, folder: Path, name="case.yaml"):
     return load_case(path)
 
 
-def simulated(folder, model="AC8B", parameters=None, machine=None, **course):
-    """Return the Course of the unit: its p and q are those of its own simulation."""
+def simulated(folder, model="AC8B", parameters=None, machine=None, start=(P0, Q0), **course):
+    """Return the Course of the unit: its p and q are those of its own simulation.
+
+    ``start`` are p and q before the event.
+    """
     time, vt, angle = driving(**course)
     path = folder / "driving.csv"
-    table = np.column_stack([time, vt, angle, np.full_like(vt, P0), np.full_like(vt, Q0)])
+    table = np.column_stack([time, vt, angle, *(np.full_like(vt, level) for level in start)])
     np.savetxt(path, table, delimiter=",", header="t,vt,angle,p,q", comments="")
     channels = {"vt": "vt", "angle": {"column": "angle", "unit": "rad"}, "p": "p", "q": "q"}
     record = {"file": str(path), "time": "t", "channels": channels}

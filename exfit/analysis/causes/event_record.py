@@ -37,6 +37,7 @@ BESIDE_JUMP = 5  # samples on both sides, in which the power follows
 LEAST_STIFFNESS = 0.5  # pu of power a rad of angle: machines have more than one
 JUMP_AFTER_HOLD = 4.0  # times the usual change between samples
 LOST_VOLTAGE, LONGEST_LOSS = 0.05, 3  # pu, samples
+BESIDE_SPIKE, BEND = 2, 3.0  # samples; times what most bends stay below
 SPIKE = 8.0  # times the noise
 LEAST_SWING = 1e-3  # pu, rms: with less in record or response nothing can be compared
 LEAST_OVER_NOISE = 4.0  # times the noise of the record: the same
@@ -45,7 +46,7 @@ LIKE_RESPONSE = (0.4, 2.5)  # times the swings of the response: what other data 
 AGAINST = -0.5  # correlation of swings that go against each other
 UNLIKE = 0.3  # correlation of swings that have little in common
 LATEST = 0.1  # s
-LEAST_ALIKE = 0.5  # correlation of swings that are the same but for a delay
+LEAST_ALIKE = 0.85  # correlation of swings that are the same but for a delay
 SIGN_BEFORE_DELAY = 0.05  # of the correlation: with as little to choose it is the sign
 GAINED_BY_DELAY = 0.15  # of the correlation
 DRIVING = ("vt", "angle", "frequency")
@@ -208,8 +209,12 @@ def _spiky(record: Record) -> Iterator[Cause]:
         present = np.isfinite(samples)
         t, y = record.time[present], samples[present]
         scatter = noise_of(y)
-        outlying = spikes(t, y, scatter, SPIKE) if scatter > 0.0 else ()
-        if len(outlying):
+        outlying = [
+            row
+            for row in (spikes(t, y, scatter, SPIKE) if scatter > 0.0 else ())
+            if not _others_bend(record, name, float(t[row]))
+        ]
+        if outlying:
             at = ", ".join(f"{t[row]:.4g}" for row in outlying[:3])
             remedy = (
                 "it drives the unit: give a median filter on the channel, or correct these samples"
@@ -218,6 +223,18 @@ def _spiky(record: Record) -> Iterator[Cause]:
             )
             count = "a single sample" if len(outlying) == 1 else f"{len(outlying)} single samples"
             yield Cause(f"{name} has {count} far off its course, at {at} s", remedy)
+
+
+def _others_bend(record: Record, name: str, at: float) -> bool:
+    """Return whether another signal bends beside an instant (s) as no noise does: a switching."""
+    row = int(np.searchsorted(record.time, at))
+    near = slice(max(row - BESIDE_SPIKE, 1), row + BESIDE_SPIKE + 1)
+    for other, samples in record.signals.items():
+        bends = np.abs(np.diff(samples, 2, prepend=samples[:1], append=samples[-1:]))
+        least = BEND * float(np.nanpercentile(bends, MOST_CHANGES))
+        if other != name and np.nanmax(bends[near], initial=0.0) > least:
+            return True
+    return False
 
 
 def _jumping_angle(record: Record) -> Iterator[Cause]:
