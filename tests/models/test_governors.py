@@ -547,4 +547,4 @@ def test_a_record_lists_every_parameter_once(governor):
         symbols = [row.symbol for row in governor.sheet]
         integers = [name for name, _ in record.icons if name in symbols]
         listed = [*record.cons, *integers, *dict(record.held)]
-        assert sorted(listed) == sorted([*symbols, *dict(record.absent)])
+        assert sorted(listed) == sorted([*symbols, *dict(record.absent), *record.ignored])

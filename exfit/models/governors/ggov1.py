@@ -117,8 +117,10 @@ RECORDS = (
         "R Tpelec maxerr minerr Kpgov Kigov Kdgov Tdgov VMAX VMIN Tact Kturb Wfnl Tb Tc Teng "
         "Tfload Kpload Kiload Ldref Dm Ropen Rclose Kimw Aset Ka Ta Trate db Tsa Tsb Rup Rdown",
         icons={"Rselect": 1, "Flag": 0},
-        absent={"Teng": 0.0, "Trate": 0.0, "Rup": 99.0, "Rdown": -99.0},
+        absent={"Teng": 0.0, "Rup": 99.0, "Rdown": -99.0},
+        ignored="Trate",
         held={"Trate_Mbase": 1.0},
+        doubt="Trate is taken as the base of the machine; Trate_Mbase says otherwise",
     ),
 )
 
