@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from grid_events import event_case, recorded
+from places import ROOT
 
 CORNERS = 0.02  # of what a signal moves: at the angle's corners, where its frequency jumps, 0.006
 
@@ -69,3 +70,14 @@ def test_a_file_of_another_name_and_other_options_are_refused(run, event):
     assert (code, "--plb: only --force is allowed with it" in err) == (2, True)
     Path("event.plb").write_text("")
     assert run("export", "run", "--plb", "event.plb")[0] == 1
+
+
+def test_a_fit_of_a_bump_test_was_driven_by_no_event(run, empty_folder):
+    case = yaml.safe_load((ROOT / "configs" / "ac1a_typical.yaml").read_text())
+    case["record"]["file"] = str(ROOT / "sample_data" / "ac1a_up.csv")
+    case |= {"validate": [], "estimate": {"search": "local", "iterations": 1}}
+    Path("bump.yaml").write_text(yaml.safe_dump(case))
+    run("fit", "bump.yaml", "-o", "bump", "--no-plots", "-q")
+    code, _, err = run("export", "bump", "--plb", "event.plb")
+    assert code == 1
+    assert "plant open-circuit is not driven by a grid event" in err
