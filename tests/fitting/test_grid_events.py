@@ -1,7 +1,9 @@
 """Several grid events of one unit: each has its own operating point, all share the parameters."""
 
 import pytest
+import yaml
 from grid_events import SIGNALS, TRUTH, event_case, recorded
+from places import CONFIGS, REFERENCE
 
 from exfit import cli
 from exfit.case.load import load_case
@@ -106,3 +108,28 @@ def test_a_model_as_it_is_is_verified_without_a_fit(events, tmp_path, capsys):
         cli.main(args=["validate", str(path), "-o", str(tmp_path / "run")], prog_name="exfit")
     assert not ended.value.code
     assert "values of the case: nothing is free" in capsys.readouterr().out
+
+
+@pytest.mark.long
+def test_governor_regulator_and_inertia_are_found_in_one_event_of_another_simulator(tmp_path):
+    """Without noise; the other one rounds the rectifier's constants, which costs 0.2 %."""
+    content = yaml.safe_load((CONFIGS / "grid_event.yaml").read_text())
+    content["governor"] = {
+        "model": "TGOV1",
+        "parameters": {"VMAX": 1.2, "VMIN": 0.0, "T2": 2.1, "Dt": 0.0},
+        "free": {
+            "R": {"start": 0.04, "min": 0.02, "max": 0.2},
+            "T1": {"start": 0.3, "min": 0.05, "max": 2.0},
+            "T3": {"start": 5.0, "min": 1.0, "max": 20.0},
+        },
+    }
+    channels = {signal: signal for signal in ("vt", "angle", "p", "q")}
+    file = str(REFERENCE / "playback_ac8b_tgov1.csv")
+    content["record"] = {"file": file, "time": "t", "channels": channels}
+    content["estimate"] = {"search": "local"}
+    path = tmp_path / "case.yaml"
+    path.write_text(yaml.safe_dump(content))
+    found = fit(path).parameters
+    truth = {"KPR": 80.0, "KIR": 5.0, "TE": 1.2, "machine.H": 4.471}
+    truth |= {"governor.R": 0.05, "governor.T1": 0.4, "governor.T3": 7.0}
+    assert {name: found[name].value for name in truth} == pytest.approx(truth, rel=3e-3)
