@@ -349,6 +349,7 @@ def test_the_figure_has_a_panel_and_a_panel_of_differences_for_each_signal(recor
     assert figure.axes[-1].get_xlabel() == "time (s)"
 
 
+@pytest.mark.long
 def test_of_many_responses_the_differences_from_the_reference_are_drawn():
     time = clock(0.01)
     sources = [write(f"{k}.csv", t=time, vt=rise(time) + 1e-3 * k) for k in range(6)]

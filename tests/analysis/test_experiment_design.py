@@ -115,6 +115,7 @@ def test_more_signals_and_more_time_are_never_worse(plain, name):
     assert (others["+ all"] < own).any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", EACH)
 def test_a_step_as_large_as_the_own_one_determines_the_same(plain, name):
     design = identify(plain(name, 0.05), {})

@@ -90,6 +90,7 @@ def test_ac1a_is_exac1_as_long_as_it_meets_no_limit():
     assert translation.lost == {"VAMAX": 14.5, "VAMIN": -14.5}
 
 
+@pytest.mark.long
 def test_what_cannot_be_translated_is_poor_and_says_why():
     """SEXS has neither an exciter with feedback nor a rectifier."""
     translation = translated("AC1A", "SEXS", **NO_LIMITS)

@@ -73,6 +73,7 @@ def test_what_cannot_be_made_is_a_row_with_its_reason_and_the_others_go_on():
     assert refused["bus-8-1"] == "table.csv:6: units.dyr: bus 8: no such unit can be imported"
 
 
+@pytest.mark.long
 def test_a_case_that_someone_has_edited_is_kept_and_its_row_says_so():
     rows_of()
     edited = Path("fleet", "cases", "bus-1-1.yaml")

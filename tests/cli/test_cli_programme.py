@@ -67,6 +67,7 @@ def test_json_is_one_document_and_quiet_is_silent(run, place):
     assert run("run", place, *OUT, "--quiet")[:2] == (0, "")
 
 
+@pytest.mark.long
 def test_only_the_figures_that_are_missing_are_drawn(run, place, folder):
     run("run", place, *OUT)
     result = load_summary(Path("out"))
@@ -119,6 +120,7 @@ def test_a_programme_is_checked_with_what_its_tests_at_rest_give(run, place):
     assert ran.out.count("derivatives agree") == 2
 
 
+@pytest.mark.long
 def test_the_report_says_how_the_programme_is_run_again(run, place):
     run("run", place, *OUT)
     report = Path("out/report.html").read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ import yaml
 from places import CONFIGS, SAMPLES
 from programme_files import BUS, programme_file
 from records import workbook_of, write
+from tiers import few_of
 
 from exfit.case.load import load_case
 from exfit.models import MODELS
@@ -72,13 +73,16 @@ def test_a_size_for_all_that_one_test_contradicts_is_refused_with_the_remedy(rec
 
 @pytest.mark.parametrize(
     ("size", "says"),
-    [
-        ("up=-0.05", "vt rises there"),
-        ("5", "no regulator is tested so"),
-        ("0", "0 is no step"),
-        ("sideways=0.05", "no test of that name; the record's tests: up-5%-at-30s"),
-        ("up=five", "not of the form 0.05 or up=0.05"),
-    ],
+    few_of(
+        [
+            ("up=-0.05", "vt rises there"),
+            ("5", "no regulator is tested so"),
+            ("0", "0 is no step"),
+            ("sideways=0.05", "no test of that name; the record's tests: up-5%-at-30s"),
+            ("up=five", "not of the form 0.05 or up=0.05"),
+        ],
+        2,
+    ),
 )
 def test_a_size_that_cannot_be_is_refused(record, run, size, says):
     ran = run("new", "--model", "AC1A", "--record", record, "--step", size)
@@ -169,15 +173,18 @@ def test_a_table_names_tests_of_several_files(record, new):
 
 @pytest.mark.parametrize(
     ("table", "says"),
-    [
-        ("at,step\n75,0.05\n", "tests.csv:2: at: no step within 5 s of 75 s"),
-        ("step\n0.05\n", "tests.csv:2: at: missing"),
-        ("at,size\n30,0.05\n", "tests.csv:1: column size"),
-        ("at,step\n30,five\n60,x\n", "tests.csv:3: step: 'x' is not a number"),
-        ("at,validates\n30,perhaps\n", "neither yes nor no"),
-        ("at,validates\n30,yes\n", "at least one must be fitted"),
-        ("at,step\n", "no row below"),
-    ],
+    few_of(
+        [
+            ("at,step\n75,0.05\n", "tests.csv:2: at: no step within 5 s of 75 s"),
+            ("step\n0.05\n", "tests.csv:2: at: missing"),
+            ("at,size\n30,0.05\n", "tests.csv:1: column size"),
+            ("at,step\n30,five\n60,x\n", "tests.csv:3: step: 'x' is not a number"),
+            ("at,validates\n30,perhaps\n", "neither yes nor no"),
+            ("at,validates\n30,yes\n", "at least one must be fitted"),
+            ("at,step\n", "no row below"),
+        ],
+        3,
+    ),
 )
 def test_a_table_that_cannot_be_used_is_refused_by_its_line(record, run, table, says):
     (record.parent / "tests.csv").write_text(table)

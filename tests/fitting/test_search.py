@@ -203,6 +203,7 @@ def test_a_step_of_levenberg_marquardt_is_capped_where_it_is_damped(tmp_path):
     assert {line.capped for line in first} == {True, False}
 
 
+@pytest.mark.long
 def test_armijos_constant_is_that_of_levenberg_marquardt_too(tmp_path):
     least = {}
     for armijo in (1e-4, 0.45):

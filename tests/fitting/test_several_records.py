@@ -110,6 +110,7 @@ def test_a_record_given_twice_halves_the_variance(tmp_path):
     assert errors(twice) == pytest.approx(halved, rel=2e-3)
 
 
+@pytest.mark.long
 def test_noise_is_one_over_the_weight(tmp_path):
     noise = {"vt": 1e-4, "efd": 5e-3}
     weighted = {name: {"column": name, "weight": 1e-4 / sigma} for name, sigma in noise.items()}

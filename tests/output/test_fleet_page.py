@@ -66,6 +66,7 @@ def test_a_case_leads_to_its_report_else_its_result_else_its_failure(tmp_path):
     ]  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_page_grows_by_less_than_two_kilobytes_a_case():
     small, large = (len(page_of(fleet(count)).encode()) for count in (100, 400))
     assert (large - small) / 300 < MOST_BYTES

@@ -1,5 +1,8 @@
 """Cases with records of the AC1A: the sample records, and others that the simulator makes."""
 
+from copy import deepcopy
+from functools import cache
+
 import numpy as np
 import yaml
 from cases import with_local_search
@@ -20,6 +23,11 @@ UNIT["KD"] = 0.2477
 
 def config(name):
     """Return a case of the collection, whose paths lead to the sample records."""
+    return deepcopy(_parsed(name))
+
+
+@cache
+def _parsed(name):
     text = (ROOT / "configs" / f"{name}.yaml").read_text()
     return yaml.safe_load(text.replace("../sample_data", SAMPLES.as_posix()))
 

@@ -183,6 +183,7 @@ def test_a_search_that_ended_nowhere_has_no_intervals():
         assert parameter.why == "has no interval: the search did not end at a minimum"
 
 
+@pytest.mark.long
 def test_a_parameter_tied_to_one_on_its_bound_is_named_with_it(unit2):
     _, _, linear, _ = unit2
     tied = replace(linear, tied_to_bounds={"KPR": ("KD",)})

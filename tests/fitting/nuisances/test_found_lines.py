@@ -130,6 +130,7 @@ def test_a_global_search_and_profiles_find_the_same(response):
     )
 
 
+@pytest.mark.long
 def test_a_record_that_was_not_fitted_has_a_sine_of_its_own_or_none(response):
     rng = np.random.default_rng(6)
     vt = {"column": "vt", "sine": AUTO}
