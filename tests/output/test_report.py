@@ -564,8 +564,8 @@ def test_ticks_are_round_equally_spaced_and_inside(low, span, most):
 
 
 def test_a_clock_that_began_long_ago_is_drawn_as_finely(tmp_path):
-    """Seconds since 1970 in the file of the recorder."""
-    ago = 1.6e9
+    """Seconds since a day of the recorder's own; those since 1970 count from the first sample."""
+    ago = 6e8
     rows = [f"{t + ago:.3f},{v:.9g}" for t, v in zip(TIME, noisy(TRUTH, 1), strict=True)]
     (tmp_path / "ago.csv").write_text("\n".join(["t,v", *rows]) + "\n")
     record = {"file": "../ago.csv", "time": "t", "channels": {"vt": "v"}}
