@@ -224,3 +224,13 @@ def test_the_names_of_switchings_are_those_that_a_fit_finds():
     names = [*names_of_switchings(case, case.recordings[0])]
     assert names == ["switching.at", "switching2.at"]
     assert names == [parameter.name for parameter in setup.free]
+
+
+def test_what_is_compared_may_come_later_than_what_drives():
+    """The rest is still found in the record; the delay is a number or found."""
+    found = setup_of(record(), delay={"start": 0.0, "min": -0.1, "max": 0.1})
+    assert found.test.steady_until < EVENT + 0.1
+    assert [parameter.name for parameter in found.free] == ["delay"]
+    at_once, late = setup_of(record(noise=0.0)), setup_of(record(noise=0.0), delay=0.05)
+    early, shifted = (setup.experiment.samples(VALUES)[0] for setup in (at_once, late))
+    assert_allclose(shifted[3:], early[:-3], rtol=0.0, atol=1e-6)  # 3 samples are 0.05 s

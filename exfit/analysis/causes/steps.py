@@ -34,7 +34,10 @@ RARE = 5.0  # log-likelihood of what is rare
 FARTHEST_DELAY = 2.0  # s
 CORRECT_STEP = "correct step, or let the fit find it: step: {start, min, max}"
 CORRECT_INSTANT = "correct at, or let the fit find it: at: {start: auto}; or give delay"
-SAME_CLOCK = "put all channels on one clock: the filters of phasors and powers delay differently"
+SAME_CLOCK = (
+    "put all channels on one clock, or let the fit find it: delay: {start, min, max}; phasors and "
+    "powers may be filtered differently"
+)
 INSTANTS = 60  # at which a further step is looked for
 LEAST_REST = 0.1  # of the record: so much of it must follow a further step
 

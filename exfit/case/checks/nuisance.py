@@ -21,7 +21,7 @@ def nuisance_faults(
         if not value.is_section:
             continue
         yield from _value_faults(value)
-        if kind.plays_back and not (_scale_of(value, kind) or _offset_of(value, kind)):
+        if kind.plays_back and not (_scale_of(value, kind) or _of_event(value, kind)):
             yield value.fault(f"not allowed with plant {kind.name}: the record drives it")
         elif value.at("start").text == "auto":
             yield from _automatic_faults(value.at("start"), record, has_record)
@@ -30,7 +30,7 @@ def nuisance_faults(
     for _, channel in record.at("channels").sections:
         yield from _frequency_faults(channel.at("sine", "frequency"))
     delay = record.at("delay")
-    if kind.plays_back and (delay.number or 0.0) != 0.0:
+    if kind.plays_back and not kind.finds_rest and (delay.number or 0.0) != 0.0:
         yield delay.fault(f"not allowed with plant {kind.name}")
 
 
@@ -40,9 +40,9 @@ def _scale_of(value: ContentNode, kind: PlantKind) -> bool:
     return bool(kind.scaled) and key == "scale" and signal != LEVEL_OF
 
 
-def _offset_of(value: ContentNode, kind: PlantKind) -> bool:
-    """Return whether a value is the offset of the frequency that a record of an event drives."""
-    return kind.finds_rest and value.place[-1] == "frequency_offset"
+def _of_event(value: ContentNode, kind: PlantKind) -> bool:
+    """Return whether a value is one of an event: the offset of its frequency, or a delay."""
+    return kind.finds_rest and value.place[-1] in ("frequency_offset", "delay")
 
 
 def _findable(test: ContentNode, record: ContentNode) -> Iterator[ContentNode]:

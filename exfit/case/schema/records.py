@@ -189,7 +189,8 @@ class RecordFile(Section):
     )
     delay: Findable = Field(
         default=0.0,
-        description="Delay of the recorder, s; or {start, min, max} to fit it.",
+        description="Delay of the recorder, s; or {start, min, max} to fit it. In a grid event "
+        "it is that of what is compared behind what drives the unit.",
     )
 
 

@@ -82,7 +82,9 @@ def _steady_until(test: BumpTest, file: RecordFile, record: Record) -> float | N
     unknown = [at for at in instants if isinstance(at, Unknown)]
     if test.steady_until is not None or not (unknown or delay < 0.0):
         return test.steady_until
-    earliest = min([*test.instants, *map(_lowest, unknown)]) if test.instants else inf
+    if not test.instants:
+        return test.steady_until
+    earliest = min([*test.instants, *map(_lowest, unknown)])
     return max(earliest + min(delay, 0.0), float(record.time[1]))
 
 
