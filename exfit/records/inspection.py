@@ -39,6 +39,7 @@ from exfit.records.steps import (
     with_sizes,
 )
 from exfit.records.units import unit_in, usual
+from exfit.signals import OF_EVENT
 from exfit.util.magnitude import LARGEST
 
 Array = NDArray[np.float64]
@@ -276,11 +277,12 @@ def _unit(table: Table, name: str) -> tuple[str | None, str]:
 def _recognised(
     samples: Mapping[str, Array], groups: Sequence[InspectedPhases], units: Mapping[str, str]
 ) -> tuple[list[str], set[str]]:
-    """Return the channels of the reference, and all that are a signal by their names."""
+    """Return the channels of the reference, and all that are a signal of a test by their names."""
     phases = {name for group in groups for name in group.columns}
     guesses = guess_signals([name for name in samples if name not in phases], units)
     references = [name for name, guess in guesses.items() if guess.signal == REFERENCE]
-    return references, {*guesses, *(group.name for group in groups)}
+    of_test = {name for name, guess in guesses.items() if guess.signal not in OF_EVENT}
+    return references, {*of_test, *(group.name for group in groups)}
 
 
 def _phase_groups(
