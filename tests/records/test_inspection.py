@@ -294,7 +294,9 @@ def test_the_unit_of_a_channel_and_the_origin_of_time_do_not_matter(scale, origi
 def test_a_long_record_shows_its_steps_as_well_as_a_short_one(count):
     clean = reference("reference_ac1a.csv")
     time = np.linspace(0.0, 300.0, count)
-    vt = np.interp(time - 100.0, clean["t"], clean["vt"]) + RNG.normal(0.0, 1e-4, count)
+    vt = np.interp(time - 100.0, clean["t"], clean["vt"]) + np.random.default_rng(count).normal(
+        0.0, 1e-4, count
+    )
     vt[count // 2] += 0.1
     inspection = inspect(Columns({"t": time, "vt": vt}))
     assert [step.at for step in inspection.steps] == pytest.approx([101.0, 111.0], abs=WITHIN)
