@@ -45,7 +45,8 @@ SMOOTHED_OVER = 2.0  # s: what is slower is the work of regulators and turbine
 LIKE_RESPONSE = (0.4, 2.5)  # times the swings of the response: what other data may explain
 AGAINST = -0.5  # correlation of swings that go against each other
 UNLIKE = 0.3  # correlation of swings that have little in common
-LATEST = 0.1  # s
+LATEST = 0.25  # s: near its resonance a unit with other data is as late
+AS_ALIKE = 0.05  # of the correlation: of delays that are as good the shortest one
 LEAST_ALIKE = 0.85  # correlation of swings that are the same but for a delay
 SIGN_BEFORE_DELAY = 0.05  # of the correlation: with as little to choose it is the sign
 GAINED_BY_DELAY = 0.15  # of the correlation
@@ -349,11 +350,18 @@ def _delay(time: Array, measured: Array, simulated: Array) -> tuple[float, float
     """Return by how much (s) a signal is later than another where they are most alike, and how."""
     step = float(np.median(np.diff(time)))
     most = min(round(1.0 / step), len(time) // 4)
-    best, place = -1.0, 0
+    correlations = []
     for lag in range(-most, most + 1):
         a = measured[max(lag, 0) : len(measured) + min(lag, 0)]
         b = simulated[max(-lag, 0) : len(simulated) - max(lag, 0)]
-        alike = _correlation(a, b)
-        if alike > best:
-            best, place = alike, lag
-    return place * step, best
+        correlations.append((lag, _correlation(a, b)))
+    best = max(alike for _, alike in correlations)
+    peaks = [
+        (lag, alike)
+        for (_, before), (lag, alike), (_, after) in zip(
+            correlations, correlations[1:], correlations[2:], strict=False
+        )
+        if before <= alike >= after and alike >= best - AS_ALIKE
+    ]
+    lag, alike = min(peaks, key=lambda peak: abs(peak[0]), default=(0, best))
+    return lag * step, alike

@@ -1,6 +1,6 @@
 """Name what is wrong with files of grid events before a fit, and accuse no sound one.
 
-Run it as ``python tests/studies/event_files.py [DRAWN]``. Thirty files with a fault and thirty
+Run it as ``python tests/studies/wrong_events.py [DRAWN]``. Thirty files with a fault and thirty
 sound ones are described in tests/support/event_files.py. DRAWN further sound events (100) have
 exciters, machines, operating points, swings, noise and rates that are drawn; the case has the
 typical exciter and the machine of the collection, which is up to 40 % off the drawn one. Each of
