@@ -158,6 +158,7 @@ def test_final_values_are_of_the_time_that_both_show():
     assert difference.finals == pytest.approx((1.0, 1.01))
 
 
+@pytest.mark.long
 def test_features_stand_beside_each_other_with_the_step_found():
     """From 10 to 90 % two equal lags take 3.3579 times one of them."""
     time = clock(0.002)

@@ -125,6 +125,7 @@ def test_a_step_as_large_as_the_own_one_determines_the_same(plain, name):
     assert errors(plans(other)["10 %"]) == pytest.approx(errors(larger.own.confidence), rel=EXACT)
 
 
+@pytest.mark.long
 def test_a_longer_test_determines_what_one_of_twice_the_duration_does(plain):
     planned = plans(identify(plain("ac1a"), VT))["longer"]
     own = identify(plain("ac1a", duration=20.0), VT).own.confidence
@@ -168,6 +169,7 @@ def test_the_noise_given_beats_that_of_the_case_and_that_of_the_record(changed):
     assert [one.std for one in given.own.confidence.noise] == pytest.approx([7e-4])
 
 
+@pytest.mark.long
 def test_the_own_test_is_as_telling_as_the_fit_to_its_record(changed):
     """At the values that the fit finds, with the noise that it finds."""
     content = yaml.safe_load((CONFIGS / "ac1a_typical.yaml").read_text())

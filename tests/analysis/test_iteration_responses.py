@@ -71,6 +71,7 @@ def test_every_record_has_its_own_responses(tmp_path):
     assert not (tmp_path / "run" / "iterations.csv").exists()
 
 
+@pytest.mark.long
 def test_what_is_found_about_a_record_moves_with_the_iterations(tmp_path):
     """The instant of the step is free: the simulations then have no common course."""
     content = config("ac1a_typical")

@@ -79,6 +79,7 @@ def test_a_profile_is_lowest_at_the_value_that_the_fit_finds(nearly_linear):
         assert (np.diff(above) > 0.0).all()
 
 
+@pytest.mark.long
 def test_kd_of_ac1a_is_open_down_to_its_bound(kd):
     (one,) = kd.profiles
     assert one.linear is None

@@ -105,6 +105,7 @@ def test_a_late_response_is_not_hidden_by_a_later_step():
     assert any("the response is too late" in note for note in match.notes)
 
 
+@pytest.mark.long
 def test_what_came_before_the_record_is_taken_from_the_case_where_it_leads_there():
     """AC8B settles for a minute: the step up, 9 s before, is still seen; but not in another."""
     known = by_hand("ac8b_unit1_down", "ac8b_unit1", alone=False)

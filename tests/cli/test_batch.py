@@ -105,6 +105,7 @@ def test_what_does_not_exist_is_refused(run):
     assert "nowhere: cannot be read" in done.err
 
 
+@pytest.mark.long
 def test_a_cluster_that_cannot_be_reached_is_a_line_and_the_table_is_there(run, monkeypatch):
     monkeypatch.setattr("exfit.fleet.cluster.CONNECTED_WITHIN", 0.2)
     done = run("batch", "cases", "--scheduler", "127.0.0.1:1", "-q")

@@ -47,6 +47,7 @@ def rows_of(table="table.csv", **options):
     return {row.name: row for row in fleet.cases}
 
 
+@pytest.mark.long
 def test_rows_of_a_unit_become_one_case_as_new_makes_it(run):
     rows = rows_of()
     case = load_case(Path("fleet", "cases", "bus-1-1.yaml"))

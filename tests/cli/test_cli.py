@@ -746,6 +746,7 @@ def test_a_comparison_never_goes_over_what_it_compares(run, workplace):
     assert run("compare", "response.csv", "down.csv", *columns, "--no-plots", "-o", ".").code == 0
 
 
+@pytest.mark.long
 def test_a_disk_that_is_full_leaves_the_former_files_and_shows_the_result(run, monkeypatch):
     case = case_file()
     assert run("fit", case, "--no-plots").code == 0
@@ -780,6 +781,7 @@ def test_a_figure_that_fails_is_a_warning(run, monkeypatch):
     assert (place.parent / "trajectories.png").is_file()
 
 
+@pytest.mark.long
 def test_ctrl_c_while_drawing_ends_with_130_and_says_what_stands(run, monkeypatch):
     def interrupted(result):
         raise KeyboardInterrupt

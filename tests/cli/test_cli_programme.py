@@ -77,6 +77,7 @@ def test_only_the_figures_that_are_missing_are_drawn(run, place, folder):
     assert {*planned} - {*left} == {"up.png"}
 
 
+@pytest.mark.long
 def test_the_report_can_be_made_again(run, place):
     run("run", place, *OUT)
     report = Path("out/report.html")
@@ -111,6 +112,7 @@ def test_the_other_commands_name_the_one_for_programmes(run, place):
     assert "exfit run runs it" in ran.err
 
 
+@pytest.mark.long
 def test_a_programme_is_checked_with_what_its_tests_at_rest_give(run, place):
     ran = run("check", place)
     assert ran.code == 0

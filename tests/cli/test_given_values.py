@@ -42,6 +42,7 @@ def test_a_fit_starts_from_a_file_and_from_the_command_line(run, workplace):
     }
 
 
+@pytest.mark.long
 def test_the_report_shows_the_values_beside_the_case_that_does_not_have_them(run, workplace):
     run("fit", "case.yaml", "--set", "k=6", "-o", "out", "--no-plots", "-q")
     page = html(load_result("out"), workplace / "out")

@@ -117,6 +117,7 @@ def test_nobody_may_be_listening_at_all(run, name):
     assert run(full, words(name), full) == (1, "")
 
 
+@pytest.mark.long
 def test_the_code_of_a_fit_that_did_not_converge_stays_where_its_output_is_lost(run):
     hurried = {
         **yaml.safe_load(CASE.read_text()),

@@ -151,6 +151,7 @@ def test_a_lag_is_missing_what_an_ideal_filter_takes_of_its_kink(rate, lag):
         assert worst == pytest.approx({200.0: 0.028, 1000.0: 0.0056}[rate], rel=0.02)
 
 
+@pytest.mark.long
 def test_white_noise_stays_nearly_white():
     """The figures that the docstring states; an ideal filter at 0.9 would leave 0.9 and 0.11."""
     time = clock(5000.0, 400.0)

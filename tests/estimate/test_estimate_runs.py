@@ -95,6 +95,7 @@ def test_rounding_carries_no_call_across_a_bound(method):
         assert low <= min(points) <= max(points) <= high
 
 
+@pytest.mark.long
 @for_every_run
 def test_the_result_belongs_to_the_best_trial(seed, method, jac):
     fun, exact, *_ = random_problem(seed)

@@ -158,6 +158,7 @@ def test_one_record_that_is_not_described_is_not_made_up_for_by_another(tmp_path
     assert not found.describes
 
 
+@pytest.mark.long
 def test_of_many_starts_the_first_is_that_of_the_case(tmp_path):
     content = several(recording("up"), free={"KA": found_in(310.0, 76.6, 7660.0)})
     content["records"][0]["test"]["vt0"] = 1.0

@@ -190,6 +190,7 @@ def test_every_run_is_counted(exciter):
     assert counter.substeps >= 1
 
 
+@pytest.mark.long
 def test_simulations_in_many_threads_are_all_counted():
     counter = SimulationCounter()
     with ThreadPoolExecutor(8) as pool:

@@ -99,6 +99,7 @@ def test_one_of_several_records_is_a_record_alone(tmp_path):
     assert errors(found) == errors(alone)
 
 
+@pytest.mark.long
 def test_a_record_given_twice_halves_the_variance(tmp_path):
     content = several(recording("up"), recording("up"))
     for entry, name in zip(content["records"], ("one", "two"), strict=True):
@@ -121,6 +122,7 @@ def test_noise_is_one_over_the_weight(tmp_path):
     assert by_noise.cost == pytest.approx(by_weight.cost, rel=1e-9)
 
 
+@pytest.mark.long
 def test_noise_ten_times_as_large_makes_the_errors_so(tmp_path):
     found = [
         fit(case_of(single(channels={"vt": {"column": "vt", "noise": noise}}), tmp_path))
@@ -413,6 +415,7 @@ def test_least_squares_do_not_bear_spikes_unless_they_are_left_out(tmp_path, cle
     assert max(away(fit(case_of(content, tmp_path)), clean).values()) < 1.0
 
 
+@pytest.mark.long
 def test_what_is_masked_can_be_anything(tmp_path):
     """Before the step too, where the level at the start is taken from."""
     record = read_columns(SAMPLES / "ac1a_up.csv", ["t", "vt"])

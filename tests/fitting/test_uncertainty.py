@@ -129,6 +129,7 @@ def test_at_another_value_of_kd_they_are_known_better_too(ac1a, changed):
         assert found[name].relative_error < before / 3.0
 
 
+@pytest.mark.long
 def test_the_gains_of_ac8b_make_one_exact_combination(ac8b):
     (one,) = ac8b.knowledge.identifiability.unseen
     assert one.exact

@@ -119,6 +119,7 @@ def test_parts_come_to_the_same_as_one_run(cases, parts):
     assert len(run(folder="parted", part=(1, parts))[0].of_run) == 4 // parts
 
 
+@pytest.mark.long
 def test_an_interruption_keeps_what_is_done_and_the_next_run_goes_on(cases):
     def interrupted(files, begin, end):
         def stop(case, outcome):
@@ -163,6 +164,7 @@ def test_a_case_that_changes_while_it_is_fitted_is_not_run(cases):
     assert run("cases/a.yaml")[1].of("done") == ["a.yaml"]
 
 
+@pytest.mark.long
 def test_a_case_that_another_run_has_done_meanwhile_is_not_begun(cases):
     run(folder="other")
 
@@ -177,6 +179,7 @@ def test_a_case_that_another_run_has_done_meanwhile_is_not_begun(cases):
     assert events.of("kept") == ["a.yaml"]
 
 
+@pytest.mark.long
 def test_a_table_is_written_again_if_something_was_added_meanwhile(cases):
     fleet, _ = run()
     row = fleet.cases[0]
@@ -194,6 +197,7 @@ def test_a_table_is_written_again_if_something_was_added_meanwhile(cases):
     assert len(written) == 2
 
 
+@pytest.mark.long
 def test_a_table_that_is_outrun_is_left_to_the_run_that_goes_on(cases):
     run()
     written = []

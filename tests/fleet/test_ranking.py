@@ -83,6 +83,7 @@ def test_a_model_that_cannot_be_simulated_keeps_no_other_from_its_fit(case, monk
     assert not ranking.complete
 
 
+@pytest.mark.long
 def test_an_interruption_keeps_the_models_that_are_done(case):
     def interrupt(fit, _):
         if fit.name == "AC1A":

@@ -239,6 +239,7 @@ def test_a_state_that_never_moves_is_named_but_not_drawn():
     assert "VC" in figure.get_supxlabel()
 
 
+@pytest.mark.long
 def test_a_signal_that_moves_by_rounding_errors_alone_looks_flat():
     wobble = 1.0 + 1e-15 * np.sin(40.0 * TIME)
     signals = {"vref": RISE, "vt": RISE, "VA": wobble}

@@ -393,6 +393,7 @@ def test_the_iterations_begin_with_the_start_and_end_with_the_fit_as_they_are_co
         np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8)
 
 
+@pytest.mark.long
 def test_a_switch_is_reported_though_it_sets_nothing_but_a_zero(pages):
     assert "network switched at 3 s: R 0 pu" in pages("on load").text
 

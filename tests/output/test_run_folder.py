@@ -261,6 +261,7 @@ def test_a_result_that_is_no_fit_s_takes_nothing_along(fitted, tmp_path, monkeyp
     assert json.loads((tmp_path / "run" / "result.json").read_text())["success"]
 
 
+@pytest.mark.long
 def test_a_validation_leaves_no_table_or_overlay_of_a_former_one(fitted, tmp_path):
     (match,) = fitted.validation
     run_folder.write_validation([match, replace(match, name="former")], tmp_path).draw()
@@ -309,6 +310,7 @@ def test_a_disk_that_fills_up_while_drawing_costs_figures_alone(twice, monkeypat
     assert value_in(folder) == 7.0
 
 
+@pytest.mark.long
 def test_an_interruption_while_drawing_leaves_the_numbers_and_nothing_half(twice, monkeypatch):
     result, folder = twice
 

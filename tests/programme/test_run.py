@@ -156,6 +156,7 @@ def test_facts_about_the_unit_are_no_reason_to_run_a_test_again(again):
     assert "Unit: 7" in result.fit.case_text
 
 
+@pytest.mark.long
 def test_a_test_whose_section_changes_is_run_again_and_the_others_only_for_its_values(again):
     content = programme_content()
     content["tests"][1]["free"]["Xd"]["max"] = 2.9  # far from the value: it stays the same

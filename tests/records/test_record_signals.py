@@ -207,6 +207,7 @@ def test_a_voltage_off_by_the_connection_is_noted(tmp_path, connection):
     assert noted == (connection == "phase-to-phase")
 
 
+@pytest.mark.long
 def test_noise_that_waveforms_smooth_is_neither_a_drift_nor_a_misfit(tmp_path):
     vt = synthetic(tmp_path, TEST, TIME, noise=0.0)["vt"]
     noise = 5e-3 * np.random.default_rng(3).standard_normal((len(TIME), 3))

@@ -67,6 +67,7 @@ def test_the_noise_of_the_study_has_the_covariance_it_counts_with(name):
     assert np.var(sums) == pytest.approx(float(covariance_of(name, channel, ones)[0, 0]), rel=0.3)
 
 
+@pytest.mark.long
 def test_the_truth_of_every_case_has_a_response_within_the_bounds():
     for name in HARD_CASES:
         problem = noisy(name, np.random.default_rng(0))[2]

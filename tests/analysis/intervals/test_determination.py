@@ -202,6 +202,7 @@ def test_a_closed_profile_of_a_parameter_tied_to_a_bound_is_printed(unit2):
     assert parameters["KC"].interval is None
 
 
+@pytest.mark.long
 def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
     def beside(case, problem, *rest):
         result = search(case, problem, *rest)
@@ -223,6 +224,7 @@ def test_profiles_that_lead_to_a_lower_minimum_lead_the_fit_there(monkeypatch):
     )
 
 
+@pytest.mark.long
 def test_an_interruption_of_the_profiles_keeps_the_intervals_that_are_whole(monkeypatch):
     monkeypatch.setenv("EXFIT_THREADS", "1")  # another thread might be done with its sides
 

@@ -29,6 +29,7 @@ def test_the_intervals_between_samples_about_an_instant_are_tried():
     assert len([*intervals_near(samples, 0.5)]) == 4
 
 
+@pytest.mark.long
 def test_beside_an_instant_between_the_wrong_samples_a_lower_minimum_is_found(record):
     _, _, problem = record
     truth = truth_of(NAME, problem)

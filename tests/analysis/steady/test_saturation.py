@@ -131,6 +131,7 @@ def test_what_is_extrapolated_is_not_good():
     assert "S(1.2) is extrapolated from 1.1" in verdict.reason
 
 
+@pytest.mark.long
 def test_points_that_lie_far_beside_their_curve_do_not_match_it():
     vt, ifd = noisy_loop()
     scattered = ifd * (1.0 + 0.1 * np.resize([1.0, -1.0], len(ifd)))  # five times the limit

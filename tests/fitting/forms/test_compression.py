@@ -126,6 +126,7 @@ def test_errors_and_intervals_are_those_of_all_samples(tmp_path, channels):
         assert len(channels) > 1 or ours_.p_value == theirs.p_value
 
 
+@pytest.mark.long
 def test_a_match_is_as_good_as_that_of_all_samples(tmp_path, monkeypatch):
     """What is known beforehand is one more residual of both."""
     asked = {}
