@@ -19,7 +19,7 @@ from exfit.fitting.nuisances.parameters import nuisance_parameters, prefix_of
 from exfit.fitting.nuisances.sine_parameters import with_sines
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.recorded.detected_steps import with_detected_steps
-from exfit.fitting.recorded.event import event_inputs, offset_step, with_rest
+from exfit.fitting.recorded.event import event_inputs, offset_step, with_even_clock, with_rest
 from exfit.fitting.recorded.references import references_of, span_of
 from exfit.fitting.recorded.switchings import (
     Switching,
@@ -49,7 +49,8 @@ def build_experiment(case: Case, recording: Recording, values: Values) -> Experi
     view, file = case.seen_from(recording), recording.record
     system = system_of(view, recording)
     driving = _driving_channels(view.kind, file, system)
-    whole = with_filter(record_of(case, recording), file.filter)
+    read = record_of(case, recording)
+    whole = with_filter(with_even_clock(read) if view.kind.finds_rest else read, file.filter)
     switchings = switchings_of(view, whole)
     record = without_masked(whole, masked(file, whole, switchings), driving)
     references = references_of(case, recording.test, span_of(recording.test, record), record, file)

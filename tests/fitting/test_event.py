@@ -8,6 +8,7 @@ from exfit.case.case import Case
 from exfit.dsp.switchings import jumps_while_moving
 from exfit.errors import CaseError, RecordError
 from exfit.fitting.build import build_experiment
+from exfit.fitting.recorded.event import with_even_clock
 from exfit.fitting.recorded.switchings import MASKED, names_of_switchings
 from exfit.records.record import Record
 
@@ -234,3 +235,12 @@ def test_what_is_compared_may_come_later_than_what_drives():
     at_once, late = setup_of(record(noise=0.0)), setup_of(record(noise=0.0), delay=0.05)
     early, shifted = (setup.experiment.samples(VALUES)[0] for setup in (at_once, late))
     assert_allclose(shifted[3:], early[:-3], rtol=0.0, atol=1e-6)  # 3 samples are 0.05 s
+
+
+def test_rounded_time_stamps_of_an_event_are_made_even():
+    """An angle that turns shows a clock that is read to 0.1 ms; one that is uneven stays so."""
+    rounded = Record.from_arrays(np.round(TIME, 4), {"vt": 1.0 + SWING})
+    assert_allclose(with_even_clock(rounded).time, TIME, atol=6e-5)
+    assert np.ptp(np.diff(with_even_clock(rounded).time)) < 1e-12
+    uneven = Record.from_arrays(TIME + 1e-3 * (np.arange(len(TIME)) == 7), {"vt": 1.0 + SWING})
+    assert np.array_equal(with_even_clock(uneven).time, uneven.time)

@@ -40,7 +40,7 @@ Rows = NDArray[np.intp]
 Values = Mapping[str, float]
 
 SEED = 0
-PAIRS = 16  # of realisations of noise, with either sign: what is of first order cancels
+PAIRS = 6  # of realisations of noise, with either sign: what is of first order cancels
 MOST_ERRORS = 5000  # of a record: the covariance of more takes too much memory and time
 MOST_PASSES = 5
 FAR = 0.1  # of a scaled parameter: the response to noise is not the same
