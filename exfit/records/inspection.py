@@ -32,6 +32,7 @@ from exfit.records.formats.table import Table, column_error, listed, refuse_unev
 from exfit.records.pmu_recognition import PmuContent, pmu_content
 from exfit.records.record import FEWEST_SAMPLES
 from exfit.records.rejection import BreakerOpening, breaker_opening, rejection_findings
+from exfit.records.status import Status, bad_rows
 from exfit.records.steps import (
     SAME_STEP,
     RecordedStep,
@@ -52,8 +53,8 @@ class Inspection:
     """What a file holds; ``unreadable`` says by column why it has no numbers.
 
     ``opening`` is that of the breaker in a load rejection, ``pmu`` what there is of a phasor
-    measurement unit; ``sheet`` and ``memory`` (GB) are what
-    the user gave for reading, None where nothing.
+    measurement unit, ``flagged`` what its flags say of bad rows; ``sheet`` and ``memory`` (GB) are
+    what the user gave for reading, None where nothing.
 
     ``time`` (M,) in s and ``samples``, each (M,), are those whose time increases.
     """
@@ -71,6 +72,7 @@ class Inspection:
     samples: Mapping[str, Array]
     opening: BreakerOpening | None = None
     pmu: PmuContent | None = None
+    flagged: str = ""
     sheet: str | None = None
     memory: float | None = None
 
@@ -107,7 +109,11 @@ class Inspection:
         """What must be known before the record is used, in sentences."""
         if self.is_event:
             lacking = (channel.missing_samples for channel in self.channels)
-            return (*_clock_findings(self), *filter(None, lacking), *_angle_findings(self))
+            return (
+                *_clock_findings(self),
+                *filter(None, (self.flagged, *lacking)),
+                *_angle_findings(self),
+            )
         of_channels = (finding for channel in self.channels for finding in channel.findings)
         opening = self.opening
         of_reference = [step for step in self.steps if not (opening and opening.causes(step.at))]
@@ -203,6 +209,7 @@ def inspect(
         samples,
         opening,
         pmu,
+        _flagged(table, pmu),
     )
 
 
@@ -326,6 +333,23 @@ def _with_sizes_of(channel: InspectedChannel, steps: Sequence[RecordedStep]) -> 
     return replace(channel, steps=tuple(changes))
 
 
+def _flagged(table: Table, pmu: PmuContent | None) -> str:
+    """Return what the flags of a PMU say of bad rows; "" where there are none."""
+    if pmu is None or pmu.status is None:
+        return ""
+    try:
+        bad = bad_rows(table, Status(pmu.status))
+    except RecordError as fault:
+        return str(fault)
+    if not bad:
+        return ""
+    first, count = bad[0], "1 row is" if len(bad) == 1 else f"{len(bad)} rows are"
+    return (
+        f"{pmu.status}: {count} not valid, the first at {table.place(first.row)}: {first.flag}, "
+        f"{first.why}"
+    )
+
+
 def _angle_findings(inspection: Inspection) -> Iterator[str]:
     """Yield what speaks against the angle of a PMU: its turns, and the frequency beside it."""
     pmu = inspection.pmu
@@ -351,8 +375,10 @@ def _clock_findings(inspection: Inspection) -> Iterator[str]:
         yield f"time repeats or goes back at {places}{rest}: left out here, refused by a fit"
     if sampling.step >= 1.0:
         yield f"samples are {sampling.step:g} s apart: is the time in s?"
+    flags = None if inspection.pmu is None else inspection.pmu.status
     for name, reason in inspection.unreadable.items():
-        yield f"{name}: no numbers: {reason}"
+        if name != flags:
+            yield f"{name}: no numbers: {reason}"
     for before, after in pairwise(inspection.steps):
         if after.at - before.at < SAME_STEP:
             yield (

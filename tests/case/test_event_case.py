@@ -83,6 +83,13 @@ def test_an_angle_that_contradicts_the_frequency_beside_it_is_named(tmp_path, fa
     assert not inspected(tmp_path).findings
 
 
+def test_rows_that_the_flags_call_bad_are_named_with_their_line(tmp_path):
+    flags = ["0"] * 700 + ["0x8000"] * 20
+    (finding,) = inspected(tmp_path, **{"UNIT1-SF": flags}).findings
+    assert "20 rows are not valid" in finding
+    assert "event.csv:702: 0x8000, data error" in finding
+
+
 def test_a_case_of_an_event_has_no_test_and_plays_its_record_back(tmp_path):
     tests = starting_tests([inspected(tmp_path)], (), RATED)
     text = starting_case(unit_with("AC8B", None, None, tmp_path), tests, tmp_path)
