@@ -21,6 +21,7 @@ from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.intervals.determination import Determination
 from exfit.analysis.intervals.value_errors import (
     allowing_for,
+    allowing_for_bias,
     errors_of_values,
     given_error_notes,
 )
@@ -112,8 +113,9 @@ def analysed(
         behaviour = behaviour_of(setups, values, validated)
         as_found = as_found_of(case, [*((setup, values) for setup in setups), *validated])
         if uncertainty is not None:
-            errors = errors_of_values(case, problem, best.x)
             at = problem, best.x, names_of_records(setups)
+            uncertainty = allowing_for_bias(uncertainty, *at)
+            errors = errors_of_values(case, problem, best.x)
             wider = allowing_for(errors, uncertainty, *at)
             typical = influence_of_typical_values(case, problem.compressed, best.x, wider)
             windows = spread_over_windows(case, setups, problem.residuals, values, uncertainty)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from exfit.analysis.intervals.determination import with_parameters, without_linear_intervals
 from exfit.analysis.intervals.value_shifts import shifts_by_values
 from exfit.case.case import Case
+from exfit.fitting.driving_noise.weighing import BIAS_KNOWN_TO, bias_of
 from exfit.fitting.parameters import FreeParameter
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.uncertainty import GivenError, UncertaintyAnalysis, linearisation
@@ -85,6 +86,27 @@ def allowing_for(
         widened[name] = widened_by(shift, own, parameter, float(x), float(size), [*given])
     together = replace(uncertainty, given_errors=given)
     return with_parameters(together, widened)
+
+
+def allowing_for_bias(
+    uncertainty: UncertaintyAnalysis, problem: FitProblem, theta: Array, of_record: tuple[str, ...]
+) -> UncertaintyAnalysis:
+    """Return the uncertainty with that of the bias by the noise of driving signals, at theta (N,).
+
+    That bias was taken out: it is as uncertain as the variance of the noise.
+    """
+    bias = bias_of(problem.residuals, theta)
+    if bias is None:
+        return uncertainty
+    sizes = linearisation(problem, theta, of_record).own_size
+    widened = {}
+    for parameter, x, size, moved in zip(problem.residuals.free, theta, sizes, bias, strict=True):
+        shift = BIAS_KNOWN_TO * abs(float(moved) * parameter.slope(float(x)))
+        own = uncertainty.confidence.parameters[parameter.name]
+        widened[parameter.name] = widened_by(
+            shift, own, parameter, float(x), float(size), ["the noise of what drives the unit"]
+        )
+    return with_parameters(uncertainty, widened)
 
 
 def given_error_notes(

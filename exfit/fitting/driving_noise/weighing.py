@@ -48,8 +48,7 @@ SMALL_BIAS = 0.1  # standard errors: a smaller change of it matters to no interv
 UNSEEN = 1e-9  # of the largest singular value: rounding
 REFUTED = 4.0  # times the least cost: such a minimum stays refuted whatever the weights
 NOT_SMALL = 0.5  # standard errors: the error of a larger bias matters
-# the variance of noise is known to so much, by the fourth differences of 720 samples
-KNOWN_TO = "; so large a bias is known to some 12 % of itself, which the intervals do not hold"
+BIAS_KNOWN_TO = 0.12  # of itself, as the variance of noise by fourth differences of 720 samples
 TURN = 2.0 * np.pi  # rad
 NOT_WEIGHED = (
     "the noise of the signals that drive the simulation biases the parameters, and the intervals "
@@ -140,6 +139,15 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
     return replace(residuals, experiments=experiments), relative
 
 
+def bias_of(residuals: Residuals, theta: Array) -> Array | None:
+    """Return the bias (N,) of scaled parameters that `without_bias` took out; None without one."""
+    shifts = [e.whitening.shift for e in residuals.experiments if e.whitening is not None]
+    if not shifts:
+        return None
+    jacobian = residuals.errors(theta)[1]
+    return np.asarray(np.linalg.lstsq(jacobian, -np.concatenate(shifts), rcond=UNSEEN)[0])
+
+
 def added_gradient(residuals: Residuals, theta: Array) -> Array:
     """Return what as much noise of the driving signals again adds to the gradient (N,), on average.
 
@@ -195,7 +203,9 @@ def noise_notes(residuals: Residuals, theta: Array, bias: Array) -> Iterator[str
     values = residuals.values(theta)
     worst = int(np.argmax(np.abs(bias)))
     share = f"{digits(abs(float(bias[worst])))} standard errors ({residuals.free[worst].name})"
-    large = KNOWN_TO if abs(bias[worst]) > NOT_SMALL else ""
+    large = (
+        "; the intervals allow for an error of 12 % of it" if abs(bias[worst]) > NOT_SMALL else ""
+    )
     for experiment in residuals.experiments:
         name = f" of {experiment.name}" if len(residuals.experiments) > 1 else ""
         levels = listed([*_levels(experiment.with_inputs(values))])
