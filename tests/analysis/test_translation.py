@@ -202,6 +202,12 @@ def test_a_fit_with_a_network_is_compared_on_load_too():
     assert translation.exact
 
 
+@pytest.mark.parametrize("network", [{"R": 0.0, "X": 0.1}, {**NETWORK, "X": 0.0}])
+def test_a_network_without_a_start_or_a_source_leaves_open_circuit(network):
+    plants = step_plants(fit_of(FIT, "AC1A", network=network))
+    assert [plant.label for plant in plants] == ["open circuit"]
+
+
 def test_the_file_holds_the_figures_and_no_samples():
     content = translated("IEEET1", "IEEEX1", steps=(0.02,)).to_dict()
     assert content["exact"] is True

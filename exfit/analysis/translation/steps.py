@@ -170,13 +170,21 @@ def step_plants(result: FitResult) -> tuple[StepPlant, ...]:
 
 
 def network_of(result: FitResult) -> dict[str, float]:
-    """Return the network of a fit, or of the first of its records that has one."""
-    if result.network:
-        return dict(result.network)
+    """Return the network of a fit, or of the first of its records that has one with a source.
+
+    That of a grid event has none: there the recorded voltage is played in.
+    """
+    networks: list[dict[str, float]] = [dict(result.network)]
     for test in result.tests:
-        if test.network:
-            return {symbol: parameter.value for symbol, parameter in test.network.items()}
-    return {}
+        own = {} if test.network is None else test.network
+        networks.append({symbol: parameter.value for symbol, parameter in own.items()})
+    return next(filter(_has_source, networks), {})
+
+
+def _has_source(network: Values) -> bool:
+    """Return whether a network says how a unit starts, and has something to the source."""
+    starts = "P" in network and not network.keys().isdisjoint({"Q", "E"})
+    return starts and (network["R"], network["X"]) != (0.0, 0.0)
 
 
 def _stabiliser(result: FitResult) -> Stabilised | None:

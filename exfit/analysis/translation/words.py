@@ -99,4 +99,4 @@ def _plant_notes(task: TranslationTask) -> Iterator[str]:
     if task.result.machine_model is None:
         yield f"the machine is typical, {DEFAULT_MACHINE}: the fit has none"
     if not any(plant.kind.on_load for plant in task.plants):
-        yield "compared on open circuit alone: the fit has no network"
+        yield "compared on open circuit alone: the fit has no network with a source"
