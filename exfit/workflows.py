@@ -1,10 +1,8 @@
 """What can be done with a case: the functions behind the commands and behind ``import exfit``."""
 
-import sys
 import time as clock
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exfit import __version__, estimate
+from exfit import estimate
 from exfit.analysis.case_search import SearchTask, search_outcome, with_lines
 from exfit.analysis.descriptions.case_description import (
     criteria_of,
@@ -22,6 +20,7 @@ from exfit.analysis.descriptions.case_description import (
     input_names,
     parts_of,
     tests_of,
+    text_of,
     values_by_part,
 )
 from exfit.analysis.diagnostics import rest_notes, simulation_notes
@@ -53,17 +52,16 @@ from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison
 from exfit.results.model import FitResult, Iteration
 from exfit.simulation.simulator import Response
-from exfit.util.root import on_disk
+from exfit.util.versions import versions
 
 if TYPE_CHECKING:
     from exfit.analysis.experiment_design import Design
     from exfit.analysis.model_check import Check
     from exfit.analysis.profiles import Profiles
+    from exfit.results.validation_result import ValidationResult
 
 Array = NDArray[np.float64]
 CaseOrPath = Case | str | PathLike[str]
-
-LIBRARIES = ("numpy", "llvmlite", "pydantic")
 
 
 def _ignore(_: object) -> None:
@@ -110,7 +108,7 @@ def fit(
     unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
     used = [*setups, *unseen]
     # before the search: whoever edits the case meanwhile changes nothing of this fit
-    hashes, case_text = input_hashes(case, used), _text_of(case)
+    hashes, case_text = input_hashes(case, used), text_of(case)
     task = SearchTask(case, setups, unseen, method, options, counter)
     task, problem, line_notes = with_lines(task, problem, search_progress)
     residuals = problem.residuals
@@ -194,11 +192,6 @@ def fit(
     )
 
 
-def _text_of(case: Case) -> str:
-    """Return the text of the file of a case; "" for a case that was made in Python."""
-    return on_disk(case.path).read_text(encoding="utf-8-sig") if case.from_file else ""
-
-
 def load_case(path: str | PathLike[str]) -> Case:
     """Return the case of a YAML file.
 
@@ -251,15 +244,6 @@ def loaded(case: CaseOrPath, values: ValuesOrResult | None = None) -> Case:
         return case
     sha256 = values.inputs.get("model", "") if isinstance(values, FitResult) else ""
     return load.load_case(Path(case), sha256)
-
-
-def versions() -> dict[str, str]:
-    """Return the versions that a result depends on."""
-    return {
-        "exfit": __version__,
-        "python": ".".join(map(str, sys.version_info[:3])),
-        **{name: import_module(name).__version__ for name in LIBRARIES},
-    }
 
 
 @dataclass(frozen=True)
@@ -331,15 +315,33 @@ def validate(
         >>> exfit.validate("case.yaml", result, "down.csv")[-1].accepted
     """
     from exfit.analysis import validation
-    from exfit.fitting.unplanned_test import GivenSteps
 
     case = loaded(case, values)
-    given = GivenSteps(_numbers(step), _numbers(at))
-    return validation.validate(case, values_of(case, changes_of(case, values)), record, given)
+    own = values_of(case, changes_of(case, values))
+    return validation.validate(case, own, record, step, at).comparisons
 
 
-def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
-    return tuple(given) if isinstance(given, Sequence) else (given,)
+def validation_result(
+    case: CaseOrPath,
+    values: ValuesOrResult,
+    record: Record | Path | str | None = None,
+    step: float | Sequence[float] = (),
+    at: float | Sequence[float] = (),
+    sources: Mapping[str, str] | None = None,
+) -> "ValidationResult":
+    """Compare a case with its records as `validate` does, with all that a report shows of it.
+
+    ``sources`` says where values come from that are given by name. Raises ExfitError as it does.
+    """
+    from exfit.analysis import validation
+    from exfit.analysis.descriptions.validation_description import validation_result
+
+    case = loaded(case, values)
+    own = values_of(case, changes_of(case, values))
+    if isinstance(values, FitResult):
+        sources = values.sources
+    compared = validation.validate(case, own, record, step, at)
+    return validation_result(compared, own, versions(), sources or {})
 
 
 def profile(

@@ -11,24 +11,20 @@ from exfit.simulation.limit_hits import limits_hit
 from exfit.simulation.small_signal import small_signal
 
 Values = Mapping[str, float]
+TestWithValues = tuple[ExperimentSetup, Values]
 
 
 def behaviour_of(
-    setups: Sequence[ExperimentSetup],
-    values: Values,
-    validations: Iterable[tuple[ExperimentSetup, Values]],
+    tests: Sequence[TestWithValues], others: Iterable[TestWithValues] = ()
 ) -> Behaviour:
-    """Return what the values do in the fitted tests, and which limits the validations met.
+    """Return what values do in tests, and which limits were met in these and in others.
 
-    The tests have sub-steps enough; each validation has its own values, with what was found about
-    its record.
+    The tests have sub-steps enough; each has its own values, with what was found about its record.
     """
-    experiments = [setup.experiment for setup in setups]
-    every = [*((setup, values) for setup in setups), *validations]
     return Behaviour(
-        flat_runs=tuple(_flat_run(experiment, values) for experiment in experiments),
-        small_signal=tuple(_small_signal(experiments, values)),
-        limits=tuple(_limits(setup, own) for setup, own in every),
+        flat_runs=tuple(_flat_run(setup.experiment, values) for setup, values in tests),
+        small_signal=tuple(_small_signal(tests)),
+        limits=tuple(_limits(setup, values) for setup, values in (*tests, *others)),
     )
 
 
@@ -41,15 +37,16 @@ def _flat_run(experiment: Experiment, values: Values) -> FlatRun:
     return FlatRun(experiment.name, drift, drift <= FLAT_DRIFT)
 
 
-def _small_signal(experiments: Sequence[Experiment], values: Values) -> Iterator[SmallSignalView]:
+def _small_signal(tests: Sequence[TestWithValues]) -> Iterator[SmallSignalView]:
     """Yield the small-signal view of each state of rest that the tests start from."""
-    alike: dict[object, list[Experiment]] = {}
-    for experiment in experiments:
+    alike: dict[object, list[tuple[Experiment, Values]]] = {}
+    for setup, values in tests:
+        experiment = setup.experiment
         parameters = experiment.parameters(values)
         key = (experiment.simulator.system, tuple(sorted(parameters.items())))
-        alike.setdefault(key, []).append(experiment)
+        alike.setdefault(key, []).append((experiment, values))
     for same in alike.values():
-        names, first = tuple(experiment.name for experiment in same), same[0]
+        names, (first, values) = tuple(experiment.name for experiment, _ in same), same[0]
         if "vref" not in first.simulator.system.inputs:
             why = "the recorded signals drive the machine: there is no loop"
             yield SmallSignalView(names, None, why)

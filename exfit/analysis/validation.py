@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from exfit.analysis.causes.run_quality import (
 )
 from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
-from exfit.case.schema import Recording
+from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
@@ -30,44 +31,93 @@ from exfit.util.file_names import folded
 Values = Mapping[str, float]
 
 EARLY_OR_LATE = {"min": "late", "max": "early"}  # a response, by the bound that its step is on
+LONE_RECORD = "record"  # its name, as in the case
 NOTHING_TO_VALIDATE_ON = (
     "missing: there is no record to validate on but the fitted ones; name one there, or give it by "
     "`exfit validate CASE --record FILE` (record in Python)"
 )
 
 
+class ComparedTest(NamedTuple):
+    """A test with sub-steps enough, its own values, and how its record compares."""
+
+    recording: Recording
+    setup: ExperimentSetup
+    values: Values
+    comparison: Comparison
+
+
+class Validation(NamedTuple):
+    """The tests that were compared, the fitted ones first, and a case that has just these."""
+
+    case: Case
+    tests: tuple[ComparedTest, ...]
+
+    @property
+    def comparisons(self) -> list[Comparison]:
+        """Their comparisons."""
+        return [test.comparison for test in self.tests]
+
+
 def validate(
-    case: Case, values: Values, record: Record | Path | str | None, given: GivenSteps
-) -> list[Comparison]:
+    case: Case,
+    values: Values,
+    record: Record | Path | str | None,
+    step: float | Sequence[float],
+    at: float | Sequence[float],
+) -> Validation:
     """Return the comparisons with the fitted records, then with those that no fit saw.
 
-    A ``record`` by hand takes the place of all of these. Where nothing in the case is free no fit
-    saw any. Raises ExfitError where input cannot be used, or where there is nothing to validate on.
+    A ``record`` by hand, whose steps may be given, takes the place of all of these. Where nothing
+    in the case is free no fit saw any. Raises ExfitError where input cannot be used, or where there
+    is nothing to validate on.
     """
+    given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
     saw = case.recordings if case.free() else ()
-    fitted = [
-        compare_with_record(setup.with_enough_substeps(values), setup.name, values)
-        for setup in (build_experiment(case, recording, values) for recording in saw)
-    ]
+    fitted = tuple(_fitted(case, recording, values) for recording in saw)
+    matches = [test.comparison for test in fitted]
     if record is not None:
-        return [*fitted, validation_by_hand(case, fitted, values, record, given)]
+        case, test = _validated_by_hand(case, matches, values, record, given)
+        own = (test.recording,)
+        case = replace(case, validations=own) if saw else _with_records(case, own)
+        return Validation(case, (*fitted, test))
     recordings = (*(() if saw else case.recordings), *case.validations)
     if not recordings:
         raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
-    unseen = [build_experiment(case, recording, values) for recording in recordings]
-    validated = (aligned(case, setup, values) for setup in unseen)
-    return [*fitted, *(_validated(case, fitted, *pair) for pair in validated)]
+    unseen = [(each, build_experiment(case, each, values)) for each in recordings]
+    validated = (_validated(case, matches, *pair, values) for pair in unseen)
+    return Validation(case, (*fitted, *validated))
+
+
+def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Sequence) else (given,)
+
+
+def _with_records(case: Case, recordings: tuple[Recording, ...]) -> Case:
+    return replace(case, record=None, records=recordings, validations=())
+
+
+def _fitted(case: Case, recording: Recording, values: Values) -> ComparedTest:
+    setup = build_experiment(case, recording, values).with_enough_substeps(values)
+    comparison = compare_with_record(setup, setup.name, values)
+    return ComparedTest(recording, setup, values, comparison)
 
 
 def _validated(
-    case: Case, fitted: Sequence[Comparison], setup: ExperimentSetup, values: Values
-) -> Comparison:
+    case: Case,
+    fitted: Sequence[Comparison],
+    recording: Recording,
+    setup: ExperimentSetup,
+    values: Values,
+) -> ComparedTest:
+    setup, values = aligned(case, setup, values)
+    if setup.name == SINGLE:  # fit is no name for what was not fitted
+        setup = replace(setup, experiment=replace(setup.experiment, name=LONE_RECORD))
     comparison = validation_of(case, fitted, setup, values)
-    return replace(
-        comparison, notes=(*comparison.notes, *_run_notes(case, setup, comparison, values))
-    )
+    notes = (*comparison.notes, *_run_notes(case, setup, comparison, values))
+    return ComparedTest(recording, setup, values, replace(comparison, notes=notes))
 
 
 def _run_notes(
@@ -83,16 +133,17 @@ def _run_notes(
     yield from voltage_notes(case, comparison.time, simulated.get("vt"))
 
 
-def validation_by_hand(
+def _validated_by_hand(
     case: Case,
     fitted: Sequence[Comparison],
     values: Values,
     record: Record | Path | str,
     given: GivenSteps,
-) -> Comparison:
+) -> tuple[Case, ComparedTest]:
     """Return how values do on a record that the case does not name, judged by ``fitted`` ones.
 
-    Its columns are those of the first record under validate, or else of the first fitted one.
+    The case has that record where it was given as samples. Its columns are those of the first
+    record under validate, or else of the first fitted one.
     Raises ExfitError where the record or the steps given cannot be used.
     """
     recordings = (*case.validations, *case.recordings)
@@ -105,7 +156,7 @@ def validation_by_hand(
     test = with_steps_of_record(case, recording, values, given)
     setup, own_values = aligned(case, test.setup, values)
     comparison = validation_of(case, fitted, setup, own_values)
-    return replace(
+    comparison = replace(
         comparison,
         steps=tuple(_steps(setup, own_values, given)),
         notes=(
@@ -113,6 +164,7 @@ def validation_by_hand(
             *_run_notes(case, setup, comparison, own_values),
         ),
     )
+    return case, ComparedTest(recording, setup, own_values, comparison)
 
 
 def _in_place_of(recording: Recording, record: Record | Path | str, taken: set[str]) -> Recording:

@@ -19,7 +19,7 @@ RECORDS = (
 )  # fmt: skip
 CASES = (".yaml", ".yml")
 DYNAMICS_FILES = (".dyr", ".dyd")  # of PSS/E, of PSLF
-RESULT = "result.json"
+RESULT, PARAMETERS = "result.json", "parameters.yaml"
 
 
 class Kind(StrEnum):
@@ -38,7 +38,10 @@ COMMANDS = {
     Kind.RECORD: (
         "exfit inspect {path} shows it, exfit new --model NAME --record {path} makes a case of it"
     ),
-    Kind.RESULT: "exfit report {path} and exfit export {path} take it",
+    Kind.RESULT: (
+        "exfit report {path} and exfit export {path} take it, "
+        "exfit validate CASE --parameters {path} its values"
+    ),
     Kind.PARAMETERS: "give it beside a case: exfit simulate CASE --parameters {path}",
     Kind.DYNAMICS: "exfit import {path} makes a case of it",
 }
@@ -66,7 +69,26 @@ class GivenFile(click.Path):
         advice = COMMANDS[kind].format(path=path)
         if kind is Kind.CASE and ctx is not None and Kind.RESULT in self.kinds:
             advice = _fit_first(path, f"exfit {ctx.info_name}")
+            if ctx.info_name == "report":
+                advice += f"; or, without a fit, exfit validate {path}"
         raise ExfitError(f"{path}: {kind}, not {self.kinds[0]}; {advice}")
+
+
+class ParameterFile(GivenFile):
+    """The path of a file of parameters: of the folder or the result of a fit the one in it."""
+
+    def __init__(self) -> None:
+        super().__init__(Kind.PARAMETERS, Kind.RESULT)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path of the parameters; raises ExfitError where a folder holds none."""
+        path = super().convert(value, param, ctx)
+        folder = path.parent if path.name == RESULT else path
+        if not folder.is_dir():
+            return path
+        if not (folder / PARAMETERS).is_file():
+            raise ExfitError(f"{path}: holds no {PARAMETERS} of a fit")
+        return folder / PARAMETERS
 
 
 def _fit_first(case: Path, command: str) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from exfit.cli import completion
-from exfit.cli.given_files import GivenFile, Kind
+from exfit.cli.given_files import GivenFile, Kind, ParameterFile
 from exfit.cli.streams import echo
 from exfit.errors import ExfitError
 from exfit.util.text import printable
@@ -29,9 +29,9 @@ cases_argument = click.argument(
 )
 parameters_option = click.option(
     "--parameters",
-    type=GivenFile(Kind.PARAMETERS, Kind.RESULT),
+    type=ParameterFile(),
     metavar="FILE",
-    help="Values from the parameters.yaml of a fit.",
+    help="Values from the parameters.yaml of a fit, or from the folder that holds it.",
 )
 set_option = click.option(
     "--set",

@@ -9,7 +9,7 @@ from exfit.cli.options import force_option
 from exfit.cli.streams import echo
 
 
-@click.command(short_help="Make a verification report of a fit.")
+@click.command(short_help="Make a verification report of a fit or a validation.")
 @click.argument("result", type=GivenFile(Kind.RESULT))
 @click.option(
     "-o",
@@ -29,8 +29,8 @@ from exfit.cli.streams import echo
 def report(result: Path, output: Path | None, pdf: bool, against: Path | None, force: bool) -> None:
     """Make a verification report of RESULT: one HTML file, to be read, printed and handed in.
 
-    RESULT is the result.json of a fit, or the folder that holds it: nothing else is read, and
-    nothing is run. A former report is replaced, another file only with --force. With --pdf it is
+    RESULT is the result.json of a fit, the validation.json of exfit validate, or the folder that
+    holds it: nothing else is read, and nothing is run. A former report is replaced, another file only with --force. With --pdf it is
     a PDF, which needs the package WeasyPrint: pip install 'exfit[pdf]'.
     """
     from exfit.output.report import write_report

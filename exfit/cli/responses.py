@@ -1,5 +1,7 @@
 """The commands simulate and validate."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -102,12 +104,13 @@ def validate(
     The values are those of the last fit of the case, or of --parameters; where nothing is free in
     CASE, its own, and all of its records are validated. The steps of --record are
     found in it and shown; --step -0.05 and --at 1.0 replace what is found, each of several steps
-    has its own. Writes validation.json, samples and overlays to runs/CASE-validate, or to DIR.
+    has its own. Writes validation.json, samples and overlays to runs/CASE-validate, or to DIR;
+    exfit report makes a report of that folder.
     Exit code 1: bad input, no step found, or no record to validate on; 3: a validation is not
     accepted.
     """
     from exfit import workflows
-    from exfit.fitting.overrides import read_parameters
+    from exfit.fitting.overrides import read_parameters, sources_in
     from exfit.output import run_folder
     from exfit.util.typed import plain
 
@@ -116,20 +119,29 @@ def validate(
     if record is not None:
         run_folder.refuse_inputs("validate", [record], folder, [record.stem])
     values = {} if source is None else read_parameters(loaded, source)
-    comparisons = workflows.validate(loaded, values, record, steps, instants)
-    figures = run_folder.write_validation(comparisons, folder)
+    sources = {} if source is None else sources_in(source)
+    result = workflows.validation_result(loaded, values, record, steps, instants, sources)
+    result = replace(
+        result,
+        origin=_whose(parameters, source),
+        options=tuple(_options(parameters, record, steps, instants)),
+        inputs={**result.inputs, **_hash_of(source)},
+        files={**result.files, "parameters": "" if source is None else source.name},
+    )
+    comparisons = result.matches
+    figures = run_folder.write_validation(result, folder)
     if output.as_json:
         print_json({"validation": [plain(comparison) for comparison in comparisons]})
     elif output.shown:
         from exfit.output import terminal
 
         console = terminal.console()
-        console.print(_whose(parameters, source), soft_wrap=True, markup=False)
+        console.print(result.origin, soft_wrap=True, markup=False)
         terminal.validation(console, comparisons)
         console.print()
         terminal.written(console, folder)
     output.draw(figures)
-    if not all(comparison.accepted for comparison in comparisons):
+    if not result.accepted:
         raise SystemExit(NOT_CONVERGED)
 
 
@@ -152,8 +164,28 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
     return case, source
 
 
+def _hash_of(parameters: Path | None) -> dict[str, str]:
+    """Return the hash of the file whose values are validated, by its label."""
+    from exfit.records.reading import file_hash
+
+    return {} if parameters is None else {"parameters": file_hash(parameters)}
+
+
+def _options(
+    parameters: Path | None, record: Path | None, steps: Sequence[float], instants: Sequence[float]
+) -> Iterator[str]:
+    """Yield the options with which a validation is made again."""
+    for option, path in (("--parameters", parameters), ("--record", record)):
+        if path is not None:
+            yield from (option, str(path))
+    for option, numbers in (("--step", steps), ("--at", instants)):
+        yield from (word for number in numbers for word in (option, f"{number!r}"))
+
+
 def _whose(parameters: Path | None, source: Path | None) -> str:
     """Return whose values are validated."""
+    from exfit.analysis.descriptions.validation_description import OF_CASE
+
     if source is None:
-        return "values of the case: nothing is free"
+        return OF_CASE
     return f"values of {parameters or 'the last fit'}"

@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from exfit.errors import ExfitError
 from exfit.output import run_figures
 from exfit.output.figure_files import FigureFiles
-from exfit.results.comparisons import Comparison
 from exfit.results.fit_files import (
     HISTORY,
     ITERATIONS,
@@ -23,7 +22,7 @@ from exfit.results.fit_files import (
     comparison_files,
     files_of_fit,
 )
-from exfit.results.io import WHOLE_FIT
+from exfit.results.io import VALIDATION, WHOLE_FIT, validation_text
 from exfit.results.model import FitResult
 from exfit.results.tables import (
     DIGITS,
@@ -39,7 +38,6 @@ from exfit.util.interrupts import deferred_interrupts
 from exfit.util.json_files import read_json
 from exfit.util.strategies import PHASES
 from exfit.util.text import to_json
-from exfit.util.typed import plain
 
 if TYPE_CHECKING:
     from exfit.analysis.comparison import Agreement
@@ -50,11 +48,12 @@ if TYPE_CHECKING:
     from exfit.models.sheet import Model
     from exfit.records.inspection import Inspection
     from exfit.results.translation import Translation
+    from exfit.results.validation_result import ValidationResult
     from exfit.workflows import SimulationResult
 
 Array = NDArray[np.float64]
 
-VALIDATION, PROFILES, DESIGN = "validation.json", "profile.json", "identify.json"
+PROFILES, DESIGN = "profile.json", "identify.json"
 INSPECTION, AGREEMENT = "inspect.json", "compare.json"
 SERIES, AT_RECORD = "fits.json", "compare-record.csv"
 TRANSLATION, RANKING = "translation.json", "rank.json"
@@ -194,17 +193,16 @@ def _named_after(records: Iterable[str]) -> set[str]:
     return {file for name in records if name for file in files_named_after(name)}
 
 
-def write_validation(comparisons: Sequence[Comparison], folder: Path) -> FigureFiles:
-    """Write a validation's numbers as JSON and its samples; return its overlays.
+def write_validation(result: "ValidationResult", folder: Path) -> FigureFiles:
+    """Write all of a validation as JSON, and its samples; return its overlays.
 
     As every function here: raises ExfitError where the folder cannot be written.
     """
     main = folder / VALIDATION
-    content = {"validation": [plain(match) for match in comparisons]}
     with deferred_interrupts():
-        numbers = {**dict(comparison_files(comparisons)), VALIDATION: to_json(content)}
+        numbers = {**dict(comparison_files(result.matches)), VALIDATION: validation_text(result)}
         write_together(folder, numbers, _of_records(main))
-    return FigureFiles.beside(main, partial(run_figures.of_comparisons, comparisons))
+    return FigureFiles.beside(main, partial(run_figures.of_comparisons, result.matches))
 
 
 def write_profiles(profiles: "Profiles", folder: Path) -> FigureFiles:

@@ -12,6 +12,7 @@ from exfit.results.model import FitResult
 from exfit.results.played_records import PlayedRecord
 from exfit.results.saturation import SaturationResult
 from exfit.results.v_curve import VCurve
+from exfit.results.validation_result import Reported, ValidationResult
 
 Array = NDArray[np.float64]
 
@@ -34,10 +35,20 @@ def contradictions(result: FitResult) -> Iterator[str]:
         yield from (f"behaviour: {text}" for text in _of_behaviour(result.behaviour))
 
 
-def _comparisons(result: FitResult) -> Iterator[tuple[str, Comparison]]:
+def validation_contradictions(result: ValidationResult) -> Iterator[str]:
+    """Yield what of a validation contradicts the rest of it, each with its place."""
+    if not result.matches:
+        yield "validation: empty"
+    for place, match in _comparisons(result):
+        yield from (f"{place}: {match.name}: {text}" for text in _of_comparison(match))
+    if result.behaviour is not None:
+        yield from (f"behaviour: {text}" for text in _of_behaviour(result.behaviour))
+
+
+def _comparisons(result: Reported) -> Iterator[tuple[str, Comparison]]:
     """Yield all comparisons with a record that a result holds, each with its place."""
     yield from (("records", match) for match in (*result.comparisons, *result.validation))
-    for end in result.phase_ends:
+    for end in result.phase_ends if isinstance(result, FitResult) else ():
         yield from ((f"phase_ends: {end.phase}", match) for match in end.comparisons)
     if result.as_found is not None:
         yield from (("as_found", match) for match in result.as_found.comparisons)

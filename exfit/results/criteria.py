@@ -8,7 +8,7 @@ import numpy as np
 
 from exfit.dsp.features import LABELS, TIMES, Features
 from exfit.results.comparisons import Comparison
-from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 from exfit.util.criteria import Criteria
 
 NAMES = {name: (label, unit) for label, name, unit in LABELS}
@@ -66,7 +66,7 @@ class CriteriaVerdict:
         return f"all {count} criteria are met"
 
 
-def judged_by_criteria(result: FitResult) -> CriteriaVerdict:
+def judged_by_criteria(result: Reported) -> CriteriaVerdict:
     """Return how the responses of a fit, and of its validations, meet the criteria."""
     every = [(match, True) for match in result.comparisons]
     every += [(match, False) for match in result.validation]

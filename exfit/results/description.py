@@ -7,7 +7,9 @@ from typing import Annotated, NamedTuple
 
 from exfit.simulation.limit_hits import LimitHit
 from exfit.simulation.small_signal import SmallSignal
-from exfit.util.sources import NOT_STATED
+from exfit.util.sources import NOT_STATED, TYPICAL
+
+PARTS = ("machine", "network", "stabiliser", "governor")  # their parameters are named machine.Tpd0
 
 
 class SheetRow(NamedTuple):
@@ -133,3 +135,23 @@ class Behaviour:
     flat_runs: tuple[FlatRun, ...]
     small_signal: tuple[SmallSignalView, ...]
     limits: tuple[HitLimits, ...]
+
+
+def values_of_part(values: Mapping[str, float], prefix: str) -> dict[str, float]:
+    """Return the values of one part by symbol; the exciter's prefix is empty."""
+    if not prefix:
+        others = tuple(f"{kind}." for kind in PARTS)
+        return {name: value for name, value in values.items() if not name.startswith(others)}
+    return {
+        name.removeprefix(prefix): value
+        for name, value in values.items()
+        if name.startswith(prefix)
+    }
+
+
+def source_in_words(name: str, sources: Mapping[str, str], ties: Mapping[str, str]) -> str:
+    """Return where the value of a parameter comes from, in words: fitted, typical, tied ..."""
+    word = sources.get(name, NOT_STATED)
+    if name not in ties:
+        return word
+    return f"tied {ties[name]}" + (f", {TYPICAL}" if word == TYPICAL else "")

@@ -6,22 +6,46 @@ from pathlib import Path
 from typing import Any
 
 from exfit.errors import ExfitError
-from exfit.results.consistency import contradictions
-from exfit.results.description import PartDescription
-from exfit.results.model import PARTS, FitResult
-from exfit.results.thinning import thinned
+from exfit.results.consistency import contradictions, validation_contradictions
+from exfit.results.description import PARTS, PartDescription
+from exfit.results.model import FitResult
+from exfit.results.thinning import thinned, thinned_validation
+from exfit.results.validation_result import ValidationResult
 from exfit.util.json_files import read_json
 from exfit.util.sources import FITTED, TYPICAL
 from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
-WHOLE_FIT, WHOLE_PROGRAMME = "result.json", "programme.json"
+WHOLE_FIT, WHOLE_PROGRAMME, VALIDATION = "result.json", "programme.json", "validation.json"
 VERSION = 8  # of the file; a file without a version is of the first
 
 
 def result_text(result: FitResult) -> str:
     """Return the text of result.json: all of a fit, long samples thinned to their extremes."""
     return to_json({"version": VERSION, **plain(thinned(result), whole=True)})
+
+
+def validation_text(result: ValidationResult) -> str:
+    """Return the text of validation.json: all of a validation, long samples thinned."""
+    return to_json({"version": VERSION, **plain(thinned_validation(result), whole=True)})
+
+
+def load_validation(source: Path) -> ValidationResult:
+    """Return a validation, given its validation.json.
+
+    Raises ExfitError where the file cannot be read, or does not hold all of a validation.
+    """
+    content = read_json(source)
+    if "version" not in content:
+        raise ExfitError(f"{source}: it lacks what a report shows; validate again")
+    _refuse_later(source, content["version"])
+    try:
+        result: ValidationResult = Reader(complete=False).read(ValidationResult, content)
+    except FormError as fault:
+        raise ExfitError(f"{source}: {fault}; validate again") from None
+    for text in validation_contradictions(result):
+        raise ExfitError(f"{source}: {text}; validate again")
+    return result
 
 
 def load_result(path: str | PathLike[str]) -> FitResult:
@@ -33,13 +57,7 @@ def load_result(path: str | PathLike[str]) -> FitResult:
     source = result_file(Path(path))
     content = _content(source)
     version = content.get("version", 1)
-    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
-        raise ExfitError(f"{source}: version: {show_value(version)} is not a version of results")
-    if version > VERSION:
-        raise ExfitError(
-            f"{source}: version {show_value(version)}: written by a later exfit; "
-            f"this one reads up to {VERSION}"
-        )
+    _refuse_later(source, version)
     whole = {**content, "parts": _parts_of(content)} if version == 1 else content
     if version < VERSION and "sources" not in whole:
         whole = {**whole, "sources": _sources_of(whole)}
@@ -50,6 +68,17 @@ def load_result(path: str | PathLike[str]) -> FitResult:
     for text in contradictions(result):
         raise ExfitError(f"{source}: {text}; fit again")
     return result
+
+
+def _refuse_later(source: Path, version: Any) -> None:
+    """Raise ExfitError for the version of a file that this exfit does not read."""
+    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+        raise ExfitError(f"{source}: version: {show_value(version)} is not a version of results")
+    if version > VERSION:
+        raise ExfitError(
+            f"{source}: version {show_value(version)}: written by a later exfit; "
+            f"this one reads up to {VERSION}"
+        )
 
 
 def result_file(path: Path) -> Path:

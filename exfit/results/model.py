@@ -15,13 +15,21 @@ from numpy.typing import NDArray
 from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
-from exfit.results.description import Behaviour, GivenInPlace, PartDescription, RecordedTest
+from exfit.results.description import (
+    PARTS,
+    Behaviour,
+    GivenInPlace,
+    PartDescription,
+    RecordedTest,
+    source_in_words,
+    values_of_part,
+)
 from exfit.results.other_values import AsFound, PhaseEnd
 from exfit.results.typical_values import TypicalValue
 from exfit.results.verdict import NO_MATCH, Verdict
 from exfit.results.windows import WindowSpread
 from exfit.util.criteria import Criteria
-from exfit.util.sources import NOT_STATED, TYPICAL
+from exfit.util.sources import TYPICAL
 from exfit.util.text import rounded
 from exfit.util.typed import IN_FILE, KEY, plain
 
@@ -32,7 +40,6 @@ Array = NDArray[np.float64]
 
 AT_TOLERANCE = (6, 7)  # status of a search that ended at a match or gradient that the case names
 ERRORS_IN_INTERVAL = 3.92  # standard errors in a 95 % interval
-PARTS = ("machine", "network", "stabiliser", "governor")  # their parameters are named machine.Tpd0
 
 
 @dataclass(frozen=True)
@@ -299,15 +306,7 @@ class FitResult:
 
     def values_of(self, prefix: str) -> dict[str, float]:
         """Return the values of one part by symbol; the exciter's prefix is empty."""
-        values = self.values
-        if not prefix:
-            others = tuple(f"{kind}." for kind in PARTS)
-            return {name: value for name, value in values.items() if not name.startswith(others)}
-        return {
-            name.removeprefix(prefix): value
-            for name, value in values.items()
-            if name.startswith(prefix)
-        }
+        return values_of_part(self.values, prefix)
 
     @property
     def typical(self) -> tuple[str, ...]:
@@ -318,10 +317,7 @@ class FitResult:
 
     def source_of(self, name: str) -> str:
         """Return where the value of a parameter comes from, in words: fitted, typical, tied ..."""
-        word = self.sources.get(name, NOT_STATED)
-        if name not in self.ties:
-            return word
-        return f"tied {self.ties[name]}" + (f", {TYPICAL}" if word == TYPICAL else "")
+        return source_in_words(name, self.sources, self.ties)
 
     @property
     def outcome(self) -> str:

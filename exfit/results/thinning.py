@@ -14,6 +14,7 @@ from exfit.results.model import FitResult
 from exfit.results.other_values import AsFound
 from exfit.results.played_records import LeftOut, PlayedRecord
 from exfit.results.tables import DIGITS, clock_digits
+from exfit.results.validation_result import ValidationResult
 from exfit.simulation.small_signal import Bode, SmallSignal
 from exfit.util.sorting import distinct
 
@@ -41,6 +42,16 @@ def thinned(result: FitResult) -> FitResult:
         ),
         as_found=None if result.as_found is None else _as_found(result.as_found, count),
         knowledge=None if result.knowledge is None else _knowledge(result.knowledge),
+        behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
+    )
+
+
+def thinned_validation(result: ValidationResult) -> ValidationResult:
+    """Return a validation with its samples as a file holds them."""
+    return replace(
+        result,
+        matches=tuple(_comparison(match, 0) for match in result.matches),
+        as_found=None if result.as_found is None else _as_found(result.as_found, 0),
         behaviour=None if result.behaviour is None else _behaviour(result.behaviour),
     )
 

@@ -98,7 +98,8 @@ def test_a_file_without_parameters_is_refused_before_the_model_is_run(case, comm
     """It says nothing of the hash of the model, so nothing could be compared."""
     assert run("fit", case, "-o", "run-1", "--no-plots", "--quiet") == 0
     (case.parent / "mine.py").write_text(SOURCE.read_text() + trap(case.parent))
-    file, fault = "run-1/result.json", "the result of a fit; give the parameters.yaml beside it"
+    (case.parent / "run-1" / "parameters.yaml").unlink()
+    file, fault = "run-1/result.json", "holds no parameters.yaml of a fit"
     if text is not None:
         (case.parent / "other.yaml").write_text(text)
         file, fault = "other.yaml", "parameters: missing"

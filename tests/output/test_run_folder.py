@@ -264,9 +264,11 @@ def test_a_result_that_is_no_fit_s_takes_nothing_along(fitted, tmp_path, monkeyp
 @pytest.mark.long
 def test_a_validation_leaves_no_table_or_overlay_of_a_former_one(fitted, tmp_path):
     (match,) = fitted.validation
-    run_folder.write_validation([match, replace(match, name="former")], tmp_path).draw()
+    result = replace(workflows.validation_result(CASE, fitted), matches=(match,))
+    former = replace(result, matches=(match, replace(match, name="former")))
+    run_folder.write_validation(former, tmp_path).draw()
     assert {"former.csv", "former.png"} <= names(tmp_path)
-    run_folder.write_validation([match], tmp_path)
+    run_folder.write_validation(result, tmp_path)
     assert names(tmp_path) == {"down-step.csv", "validation.json"}
 
 

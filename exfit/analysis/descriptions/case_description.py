@@ -33,6 +33,7 @@ from exfit.results.description import (
 )
 from exfit.results.model import FittedParameter
 from exfit.util.criteria import Criteria
+from exfit.util.root import on_disk
 from exfit.util.text import rounded
 
 Estimated = tuple[float, float | None]  # a value, and half of its 95 % interval
@@ -73,6 +74,11 @@ def _records(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[tuple[st
     for label, setup in zip(labelled_records(case), setups, strict=True):
         yield label, setup.record
         yield from ((f"{label}.{signal}", file) for signal, file in setup.references.items())
+
+
+def text_of(case: Case) -> str:
+    """Return the text of the file of a case; "" for a case that was made in Python."""
+    return on_disk(case.path).read_text(encoding="utf-8-sig") if case.from_file else ""
 
 
 def criteria_of(case: Case) -> Criteria:

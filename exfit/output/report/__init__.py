@@ -3,9 +3,15 @@
 from pathlib import Path
 
 from exfit.errors import ExfitError
-from exfit.output.report.page import Page, fit_page, html, is_page, page_html
+from exfit.output.report.page import Page, fit_page, html, is_page, page_html, validation_page
 from exfit.output.report.pdf import is_pdf, page_pdf
-from exfit.results.io import WHOLE_PROGRAMME, load_result, result_file
+from exfit.results.io import (
+    VALIDATION,
+    WHOLE_PROGRAMME,
+    load_result,
+    load_validation,
+    result_file,
+)
 from exfit.results.model import FitResult
 from exfit.util.files import write
 
@@ -21,13 +27,13 @@ def write_report(
     pdf: bool = False,
     against: Path | None = None,
 ) -> Path:
-    """Write the report of a fit or a programme, by default into its folder; return where.
+    """Write the report of a fit, validation or programme, by default to its folder; return where.
 
-    ``result`` is a result.json, a programme.json, or the folder that holds it; nothing is read but
-    results, and nothing is simulated. With ``pdf`` it is a PDF, else an HTML page. ``against`` is
-    the result of another fit, of an earlier revision or another unit, to be shown beside it. A
-    report that is there already is replaced, any other file only with ``force``. Raises ExfitError
-    for what cannot be used.
+    ``result`` is a programme.json, result.json or validation.json, or a folder, of which the first
+    of these is taken; nothing is read but results, and nothing is simulated. With ``pdf`` it is a
+    PDF, else an HTML page. ``against`` is the result of another fit, of an earlier revision or
+    another unit, to be shown beside it. A report that is there already is replaced, any other file
+    only with ``force``. Raises ExfitError for what cannot be used.
     """
     page = _page(result, None if against is None else load_result(against))
     place = output or page.folder / (PRINT if pdf else PAGE)
@@ -51,4 +57,10 @@ def _page(result: Path, other: FitResult | None) -> Page:
             raise ExfitError(f"{summary}: --against compares fits, and this is a programme")
         return programme_page(load_summary(summary.parent), summary.parent)
     source = result_file(result)
+    if result.is_dir() and not source.exists() and (result / VALIDATION).is_file():
+        source = result / VALIDATION
+    if source.name == VALIDATION:
+        if other is not None:
+            raise ExfitError(f"{source}: --against compares fits, and this is a validation")
+        return validation_page(load_validation(source), source.parent)
     return fit_page(load_result(source), source.parent, other)

@@ -15,12 +15,13 @@ from exfit import __version__
 from exfit.dsp.features import LABELS
 from exfit.errors import ExfitError
 from exfit.output.report.charts import drawing
-from exfit.output.report.sections import AGAINST, SECTIONS, ReportSection
+from exfit.output.report.sections import AGAINST, OF_VALIDATION, SECTIONS, ReportSection
 from exfit.output.report.sections.against import against
 from exfit.output.report.sections.matches import MatchView, OverlayChart, live_data
-from exfit.output.report.verdict import Headline, headline
+from exfit.output.report.verdict import Headline, headline, headline_of_validation
 from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
+from exfit.results.validation_result import ValidationResult
 from exfit.util.text import percentage, rounded
 
 if TYPE_CHECKING:
@@ -41,13 +42,15 @@ HEAD = 2000  # characters at the beginning of a page, among which it says what m
 class Page:
     """What a page shows: its title, what it comes to, its sections with their content.
 
-    ``folder`` is where the results lie, for the commands on the page.
+    ``folder`` is where the results lie, for the commands on the page; ``fitted`` is whether values
+    were fitted.
     """
 
     title: str
     headline: Headline
     sections: Sequence[tuple[ReportSection, Any]]
     folder: Path
+    fitted: bool = True
 
 
 def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str:
@@ -66,6 +69,14 @@ def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) ->
     return Page(f"{result.model}: {result.name}", headline(result), sections, folder)
 
 
+def validation_page(result: ValidationResult, folder: Path) -> Page:
+    """Return what the page of a validation shows: nothing of a search, which there was none."""
+    every = ((section, section.content(result)) for section in OF_VALIDATION)
+    sections = [(section, content) for section, content in every if content]
+    title = f"{result.model}: {result.name}"
+    return Page(title, headline_of_validation(result), sections, folder, fitted=False)
+
+
 def page_html(page: Page, interactive: bool = True) -> str:
     """Return a page as HTML; without scripts, for a print, where it is not ``interactive``."""
     style, script = (TEMPLATES / "report.css", TEMPLATES / "report.js")
@@ -80,6 +91,7 @@ def page_html(page: Page, interactive: bool = True) -> str:
             sections=page.sections,
             numbers={part.key: k for k, (part, _) in enumerate(page.sections, start=1)},
             folder=str(page.folder),
+            fitted=page.fitted,
             data=list(live_data(overlays)),
             css=CHART_STYLE.read_text(encoding="utf-8") + style.read_text(encoding="utf-8"),
             scripts=scripts,

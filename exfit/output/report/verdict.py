@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
+from exfit.results.validation_result import Reported, ValidationResult
 from exfit.results.verdict import GOOD, MATCHES
 
 
@@ -42,7 +43,29 @@ def headline(result: FitResult) -> Headline:
     )
 
 
-def _validated(result: FitResult) -> Iterator[str]:
+def headline_of_validation(result: ValidationResult) -> Headline:
+    """Return what the comparison of given values with records comes to.
+
+    It is neither good nor bad where nothing limits an error: the criteria then judge alone.
+    """
+    judged = judged_by_criteria(result)
+    reasons = [match.reason for match in result.validation if match.reason]
+    limited = all(match.limit is not None for match in result.validation)
+    word, good = ("Accepted", True) if limited else ("Compared", None)
+    if reasons:
+        word, good = "Not accepted", False
+    rmse = ", ".join(
+        f"{match.channels[signal].rmse:.2e} pu ({match.name}, {signal})"
+        for match in result.matches
+        for signal in match.judging
+    )
+    sentence = "; ".join([f"Simulated with {result.origin}", *reasons, *_validated(result)])
+    return Headline(
+        word, f"{sentence}; rmse {rmse}.", good, (), criteria=judged.sentence, passed=judged.passed
+    )
+
+
+def _validated(result: Reported) -> Iterator[str]:
     """Yield how the validations of a fit do that are accepted."""
     if not result.validation:
         yield "no record was kept for a validation"

@@ -4,17 +4,17 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from exfit.output.report.sections.against import against
-from exfit.output.report.sections.as_found import as_found
+from exfit.output.report.sections.as_found import as_found, as_found_of_validation
 from exfit.output.report.sections.criteria import criteria
 from exfit.output.report.sections.dynamics import dynamics
-from exfit.output.report.sections.findings import findings
-from exfit.output.report.sections.form import form
+from exfit.output.report.sections.findings import findings, findings_of_validation
+from exfit.output.report.sections.form import form, form_of_validation
 from exfit.output.report.sections.identifiability import identifiability
 from exfit.output.report.sections.limits import limits
 from exfit.output.report.sections.matches import fitted_matches, validation_matches
 from exfit.output.report.sections.model import model
 from exfit.output.report.sections.parameters import parameters
-from exfit.output.report.sections.reproduction import reproduction
+from exfit.output.report.sections.reproduction import reproduction, reproduction_of_validation
 from exfit.output.report.sections.search import search
 from exfit.output.report.sections.signatures import signatures
 from exfit.output.report.sections.small_signal import small_signal
@@ -54,4 +54,21 @@ SECTIONS = (
     ReportSection("reproduction", "Reproduction", reproduction, "reproduction"),
     ReportSection("signatures", "Revision and signatures", signatures, "signatures"),
 )  # fmt: skip
+# of values that were compared and not fitted; a section with nothing in it is left out
+OF_VALIDATION = (
+    ReportSection("form", FORM, form_of_validation, "form"),
+    ReportSection("criteria", "Criteria", criteria, "criteria"),
+    ReportSection("test", "Unit and test", unit_and_test, "unit_and_test"),
+    ReportSection("model", "Model", model, "model"),
+    ReportSection("parameters", "Parameters", parameters, "parameters"),
+    ReportSection("as-found", "As found and compared", as_found_of_validation, "as_found"),
+    ReportSection("findings", "Notes", findings_of_validation, "findings"),
+    ReportSection("fit", "Records that the values were fitted to", fitted_matches, "fit"),
+    ReportSection("validation", "Recorded and simulated", validation_matches, "fit"),
+    ReportSection("flat", "Usability", usability, "usability"),
+    ReportSection("small", "Small-signal view", small_signal, "small_signal"),
+    ReportSection("limits", "Limits that were hit", limits, "limits"),
+    ReportSection("reproduction", "Reproduction", reproduction_of_validation, "reproduction"),
+    ReportSection("signatures", "Revision and signatures", signatures, "signatures"),
+)
 AGAINST = ReportSection("against", "Beside another fit", against, "against")

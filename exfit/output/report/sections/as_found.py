@@ -7,8 +7,8 @@ from exfit.dsp.decimation import envelope
 from exfit.output.report.charts import Chart, Panel, Series
 from exfit.output.report.layout import BINS, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.results.comparisons import Comparison
-from exfit.results.model import FitResult
 from exfit.results.other_values import AsFound
+from exfit.results.validation_result import Reported, ValidationResult
 from exfit.signals import label_of
 
 UNCHANGED = "unchanged"
@@ -39,7 +39,10 @@ class MatchBefore:
 
 @dataclass(frozen=True)
 class AsFoundView:
-    """What was in the planner's base, or what the fit started from, and what has changed."""
+    """What was in the planner's base, or what the fit started from, and what has changed.
+
+    ``now`` is what the other model is called: verified, or compared where nothing was fitted.
+    """
 
     unit: AsFound
     verified_model: str
@@ -47,14 +50,16 @@ class AsFoundView:
     same: tuple[str, ...]
     matches: tuple[MatchBefore, ...]
     charts: tuple[Chart, ...]
+    now: str
 
 
-def as_found(result: FitResult) -> AsFoundView | None:
+def as_found(result: Reported) -> AsFoundView | None:
     """Return the model as found beside the verified one; None where the result does not hold it."""
     unit = result.as_found
     if unit is None:
         return None
     rows = tuple(_parameters(result, unit))
+    word = "compared" if isinstance(result, ValidationResult) else "verified"
     pairs = [*zip(unit.comparisons, (*result.comparisons, *result.validation), strict=False)]
     return AsFoundView(
         unit=unit,
@@ -65,9 +70,16 @@ def as_found(result: FitResult) -> AsFoundView | None:
         charts=tuple(
             chart
             for k, (before, now) in enumerate(pairs)
-            for chart in _charts(f"before-{k}", before, now)
+            for chart in _charts(f"before-{k}", before, now, word)
         ),
+        now=word,
     )
+
+
+def as_found_of_validation(result: ValidationResult) -> AsFoundView | None:
+    """Return the model as found beside the one compared; None where they are the same."""
+    view = as_found(result)
+    return view if view is not None and view.parameters else None
 
 
 def _matches(before: Comparison, now: Comparison) -> Iterator[MatchBefore]:
@@ -78,14 +90,14 @@ def _matches(before: Comparison, now: Comparison) -> Iterator[MatchBefore]:
             yield MatchBefore(now.name, signal, *errors)
 
 
-def _charts(key: str, before: Comparison, now: Comparison) -> Iterator[Chart]:
+def _charts(key: str, before: Comparison, now: Comparison, word: str) -> Iterator[Chart]:
     """Yield the signals of a record that judge it, as far as they are kept."""
     for signal in now.judging:
         if signal in before.overlays and signal in now.overlays:
-            yield _chart(f"{key}-{signal}", signal, before, now)
+            yield _chart(f"{key}-{signal}", signal, before, now, word)
 
 
-def _parameters(result: FitResult, unit: AsFound) -> Iterator[ChangedParameter]:
+def _parameters(result: Reported, unit: AsFound) -> Iterator[ChangedParameter]:
     """Yield the parameters of both models, those of records aside."""
     values, rows = result.values, _units(result)
     own = [name for name in values if name not in result.of_records and name in rows]
@@ -103,7 +115,7 @@ def _parameters(result: FitResult, unit: AsFound) -> Iterator[ChangedParameter]:
         )
 
 
-def _units(result: FitResult) -> dict[str, str]:
+def _units(result: Reported) -> dict[str, str]:
     return {
         part.prefix + symbol: row.unit
         for part in result.parts
@@ -123,14 +135,14 @@ def _change(before: float | None, verified: float | None) -> str:
     return f"{verified - before:+.3g}{share}"
 
 
-def _chart(key: str, signal: str, before: Comparison, now: Comparison) -> Chart:
+def _chart(key: str, signal: str, before: Comparison, now: Comparison, word: str) -> Chart:
     """Return a signal of a record with the response of the model as found and of the verified."""
     old, new = before.overlays[signal], now.overlays[signal]
     errors_of = tuple(match.channels[signal].rmse for match in (before, now))
     lines = (
         Series("measured", *envelope(now.time, new.measured, BINS), "measured", dots=True),
         Series("as found", *envelope(before.time, old.simulated, BINS), "start"),
-        Series("verified", *envelope(now.time, new.simulated, BINS), "simulated"),
+        Series(word, *envelope(now.time, new.simulated, BINS), "simulated"),
     )
     errors = (
         Series("", *envelope(before.time, MILLI * old.error, BINS), "start thin"),
@@ -138,9 +150,9 @@ def _chart(key: str, signal: str, before: Comparison, now: Comparison) -> Chart:
     )
     return Chart(
         key=key,
-        title=f"{now.name}: as found and verified, {label_of(signal)}",
-        text=f"Measured {signal}, simulated with the model as found and with the verified one, the "
-        f"differences below: rmse {errors_of[0]:.3g} pu as found, {errors_of[1]:.3g} pu verified.",
+        title=f"{now.name}: as found and {word}, {label_of(signal)}",
+        text=f"Measured {signal}, simulated with the model as found and with that {word}, the "
+        f"differences below: rmse {errors_of[0]:.3g} pu as found, {errors_of[1]:.3g} pu {word}.",
         x_title=TIME,
         panels=(
             Panel(label_of(signal), lines, TALL),

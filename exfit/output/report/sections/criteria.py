@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from exfit.results.criteria import CriteriaVerdict, judged_by_criteria
-from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 from exfit.util.criteria import ORIGIN, Criteria
 
 
@@ -15,7 +15,7 @@ class CriteriaView:
     origin: str
 
 
-def criteria(result: FitResult) -> CriteriaView:
+def criteria(result: Reported) -> CriteriaView:
     """Return the criteria of a fit with their results."""
     origin = ORIGIN
     if result.criteria != Criteria():

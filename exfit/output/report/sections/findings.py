@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from exfit.results.model import FitResult
+from exfit.results.validation_result import ValidationResult
 
 
 @dataclass(frozen=True)
@@ -11,6 +12,11 @@ class Findings:
 
     unresolved: tuple[str, ...]
     notes: tuple[str, ...]
+
+
+def findings_of_validation(result: ValidationResult) -> Findings:
+    """Return the notes on the records of a validation."""
+    return Findings((), result.notes)
 
 
 def findings(result: FitResult) -> Findings:

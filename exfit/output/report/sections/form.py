@@ -10,7 +10,7 @@ from exfit.results import facts
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.description import PartDescription
 from exfit.results.facts import AskedFact, Facts, answer, stated
-from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported, ValidationResult
 from exfit.util.sources import NOT_STATED, by_source
 from exfit.util.text import rounded, show
 
@@ -62,7 +62,7 @@ class FormAnswers(NamedTuple):
     excursions: str = ""
 
 
-def form(result: FitResult) -> tuple[FormRow, ...]:
+def form(result: Reported) -> tuple[FormRow, ...]:
     """Return the rows of the form for a fit (cf. NERC MOD-026-1 R2.1 and R6)."""
     answers = FormAnswers(
         responses=_responses(result),
@@ -76,6 +76,14 @@ def form(result: FitResult) -> tuple[FormRow, ...]:
         excursions="; ".join(_excursions(result)),
     )
     return _rows(result.about, answers)
+
+
+def form_of_validation(result: ValidationResult) -> tuple[FormRow, ...]:
+    """Return the rows of the form for given values beside records."""
+    return tuple(
+        row._replace(section="validation" if row.section == "fit" else row.section)
+        for row in form(result)
+    )
 
 
 def form_without_bumps(result: ProgrammeResult) -> tuple[FormRow, ...]:
@@ -140,10 +148,11 @@ def rated(about: Facts) -> str:
     return stated(about, facts.RATED) or ", ".join(each) or NOT_STATED
 
 
-def _responses(result: FitResult) -> str:
+def _responses(result: Reported) -> str:
     names = ", ".join(match.name for match in result.comparisons)
     unseen = ", ".join(match.name for match in result.validation)
-    text = f"fitted: {names}; " + (f"validated on: {unseen}" if unseen else "no validation")
+    text = f"validated on: {unseen}" if unseen else "no validation"
+    text = f"fitted: {names}; {text}" if names else f"nothing fitted; {text}"
     every = (*result.comparisons, *result.validation)
     events = ", ".join(match.name for match in every if match.is_event)
     if events:
@@ -191,24 +200,26 @@ def _source(word: str) -> str:
     return f"source {NOT_STATED}" if word == NOT_STATED else word
 
 
-def _excitation(result: FitResult) -> str:
+def _excitation(result: Reported) -> str:
     part = _part(result.parts, "exciter")
     if part is None:
-        return f"{NOT_STATED}: the machine alone was fitted"
+        return f"{NOT_STATED}: the case has the machine alone"
     names = [name for name in result.values if "." not in name and name not in result.of_records]
     words = by_source(names, {name: result.source_of(name) for name in names})
     counts = ", ".join(f"{len(group)} {_source(word)}" for word, group in words.items())
     return f"{part.name}, {part.title}; {len(names)} values: {counts}"
 
 
-def _before(result: FitResult) -> str:
+def _before(result: Reported) -> str:
     unit = result.as_found
+    if isinstance(result, ValidationResult):
+        return NOT_STATED if unit is None else f"{unit.model}, {unit.source}"
     if unit is None or not unit.is_stated:
         return f"{NOT_STATED}; the start values of the fit are shown"
     return f"{unit.model}, {unit.source}"
 
 
-def _compensation(result: FitResult) -> str:
+def _compensation(result: Reported) -> str:
     """Return the load compensation, as stated and as the network of a test has it."""
     given = stated(result.about, facts.COMPENSATION)
     values = {name: result.network.get(name, 0.0) for name in ("Rc", "Xc")}
@@ -227,7 +238,7 @@ def _stabiliser(about: Facts, parts: tuple[PartDescription, ...]) -> str:
     return given or f"{NOT_STATED} whether the unit has one; none in the model"
 
 
-def _excursions(result: FitResult) -> Iterator[str]:
+def _excursions(result: Reported) -> Iterator[str]:
     """Yield how far voltage and frequency departed from rest in each grid event."""
     for match in (*result.comparisons, *result.validation):
         if match.played is None or not match.is_event:

@@ -11,9 +11,9 @@ from exfit.dsp.decimation import envelope, kept_rows
 from exfit.output.report.charts import Chart, Panel, Series
 from exfit.output.report.layout import BINS, HALF, LEVEL, LOW, MILLI, TALL, TIME
 from exfit.results.comparisons import REFERENCE, Comparison
-from exfit.results.model import FitResult
 from exfit.results.played_records import LeftOut
 from exfit.results.tables import clock_digits
+from exfit.results.validation_result import Reported
 from exfit.signals import label_of
 from exfit.util.text import show
 
@@ -47,17 +47,17 @@ class MatchView:
     played: Chart | None = None
 
 
-def fitted_matches(result: FitResult) -> tuple[MatchView, ...]:
+def fitted_matches(result: Reported) -> tuple[MatchView, ...]:
     """Return the records that were fitted, beside their simulations."""
     return _matches(result)[: len(result.comparisons)]
 
 
-def validation_matches(result: FitResult) -> tuple[MatchView, ...]:
+def validation_matches(result: Reported) -> tuple[MatchView, ...]:
     """Return the records that were not fitted, beside their simulations."""
     return _matches(result)[len(result.comparisons) :]
 
 
-def _matches(result: FitResult) -> tuple[MatchView, ...]:
+def _matches(result: Reported) -> tuple[MatchView, ...]:
     comparisons = (*result.comparisons, *result.validation)
     count = sum(len(comparison.overlays) for comparison in comparisons)
     bins = max(FEWEST_BINS, min(BINS, MOST_POINTS // (PER_BIN * max(count, 1))))

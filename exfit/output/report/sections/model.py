@@ -6,7 +6,7 @@ from math import exp, log
 
 from exfit.output.drawings import block_diagram, diagram_and_remarks
 from exfit.results.description import PartDescription
-from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 
 # formula of a curve, and what of a point lies on the exponential
 EXPONENTIAL: Mapping[str, tuple[str, Callable[[float, float], float]]] = {
@@ -32,7 +32,7 @@ class PartView:
     remarks: tuple[str, ...]
 
 
-def model(result: FitResult) -> ModelView:
+def model(result: Reported) -> ModelView:
     """Return the models that were fitted; a network is none."""
     parts = (part for part in result.parts if part.kind != "network")
     return ModelView(tuple(map(_view, parts)), saturation(result))
@@ -43,7 +43,7 @@ def _view(part: PartDescription) -> PartView:
     return PartView(part, block_diagram(part.drawing, part.name, part.title), tuple(remarks))
 
 
-def saturation(result: FitResult) -> str:
+def saturation(result: Reported) -> str:
     """Return the saturation curve of the exciter in words: its points, its form, its constants."""
     values = result.values_of("")
     if not {"E1", "SE1", "E2", "SE2"} <= values.keys():

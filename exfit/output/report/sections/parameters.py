@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 from exfit.case.saturation import MEANINGS
 from exfit.results.description import PartDescription, SheetRow
-from exfit.results.model import FitResult, FittedParameter
+from exfit.results.model import FittedParameter
 from exfit.results.typical_values import DEVIATION, by_weight, moved_parameters
+from exfit.results.validation_result import Reported
 
 NO_ROW = SheetRow()  # of a result that holds no data sheet
 
@@ -55,7 +56,7 @@ class ParametersView:
     deviation: float = 100.0 * DEVIATION
 
 
-def parameters(result: FitResult) -> ParametersView:
+def parameters(result: Reported) -> ParametersView:
     """Return all parameters of a fit."""
     groups = (*_of_parts(result), *_helpers(result), *_networks_of_records(result))
     weighty = by_weight(result.typical_values)
@@ -76,7 +77,7 @@ def parameters(result: FitResult) -> ParametersView:
     )
 
 
-def _of_parts(result: FitResult) -> Iterator[FixedGroup]:
+def _of_parts(result: Reported) -> Iterator[FixedGroup]:
     for part in result.parts:
         values = result.values_of(part.prefix)
         rows = (
@@ -87,14 +88,14 @@ def _of_parts(result: FitResult) -> Iterator[FixedGroup]:
         yield FixedGroup(part.heading, tuple(rows))
 
 
-def _sheet(result: FitResult, part: PartDescription) -> Mapping[str, SheetRow]:
+def _sheet(result: Reported, part: PartDescription) -> Mapping[str, SheetRow]:
     """Return the data sheet of a part: where the result holds none, its symbols alone."""
     if part.sheet is not None:
         return part.sheet
     return dict.fromkeys(result.values_of(part.prefix), NO_ROW)
 
 
-def _helpers(result: FitResult) -> Iterator[FixedGroup]:
+def _helpers(result: Reported) -> Iterator[FixedGroup]:
     """Yield what is listed among the exciter's parameters and is none of them."""
     own = {symbol for part in result.parts if not part.prefix for symbol in _sheet(result, part)}
     rows = (
@@ -105,7 +106,7 @@ def _helpers(result: FitResult) -> Iterator[FixedGroup]:
     yield FixedGroup("Helpers", tuple(rows))
 
 
-def _networks_of_records(result: FitResult) -> Iterator[FixedGroup]:
+def _networks_of_records(result: Reported) -> Iterator[FixedGroup]:
     for test in result.tests:
         rows = (
             FixedParameter(symbol, row.unit, row.meaning, row.value, row.source)
@@ -116,7 +117,7 @@ def _networks_of_records(result: FitResult) -> Iterator[FixedGroup]:
 
 
 def _fixed(
-    result: FitResult, prefix: str, symbol: str, value: float, row: SheetRow
+    result: Reported, prefix: str, symbol: str, value: float, row: SheetRow
 ) -> FixedParameter:
     source = result.source_of(prefix + symbol)
     return FixedParameter(symbol, row.unit, row.meaning, value, source)

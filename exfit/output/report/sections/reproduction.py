@@ -7,6 +7,7 @@ from exfit import __version__
 from exfit.programme.kept import KEY
 from exfit.results.description import GivenInPlace
 from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported, ValidationResult
 
 
 @dataclass(frozen=True)
@@ -26,20 +27,39 @@ class Reproduction:
 
 def reproduction(result: FitResult) -> Reproduction:
     """Return how the report of a fit is made again; the folder of the result is not in it."""
-    versions = dict(result.versions)
-    if versions.get("exfit") != __version__:
-        versions["exfit that made this report"] = __version__
     of_programme = KEY in result.inputs
     return Reproduction(
         fit=("exfit", "run" if of_programme else "fit", str(result.case)),
         options=() if of_programme else tuple(_options(result)),
-        versions=versions,
-        inputs={
-            label: (result.files.get(label, "–"), sha256) for label, sha256 in result.inputs.items()
-        },
+        versions=_versions(result.versions),
+        inputs=_inputs(result),
         case=result.case_text,
         given=result.given_values,
     )
+
+
+def reproduction_of_validation(result: ValidationResult) -> Reproduction:
+    """Return how the report of a validation is made again."""
+    return Reproduction(
+        fit=("exfit", "validate", str(result.case)),
+        options=result.options,
+        versions=_versions(result.versions),
+        inputs=_inputs(result),
+        case=result.case_text,
+        given={},
+    )
+
+
+def _versions(versions: Mapping[str, str]) -> dict[str, str]:
+    if versions.get("exfit") == __version__:
+        return dict(versions)
+    return {**versions, "exfit that made this report": __version__}
+
+
+def _inputs(result: Reported) -> dict[str, tuple[str, str]]:
+    return {
+        label: (result.files.get(label, "–"), sha256) for label, sha256 in result.inputs.items()
+    }
 
 
 def _options(result: FitResult) -> Iterator[str]:

@@ -15,7 +15,7 @@ from exfit.results.facts import (
     answer,
     stated,
 )
-from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 
 
 class Signature(NamedTuple):
@@ -35,7 +35,7 @@ class Signatures(NamedTuple):
     rows: tuple[Signature, ...]
 
 
-def signatures(result: FitResult | ProgrammeResult) -> Signatures:
+def signatures(result: Reported | ProgrammeResult) -> Signatures:
     """Return the block of revision and signatures."""
     about = result.about
     return Signatures(

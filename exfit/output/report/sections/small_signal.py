@@ -8,7 +8,7 @@ import numpy as np
 from exfit.output.report.charts import Chart, Panel, Rule, Series
 from exfit.output.report.layout import HALF, LEVEL
 from exfit.results.description import SmallSignalView
-from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 from exfit.simulation.small_signal import Bode, Margins, SmallSignal
 
 Rules = tuple[Rule, ...]
@@ -36,7 +36,7 @@ def _name_of_response(view: SmallSignal) -> str:
     return "closed loop" if output == "vt" else f"response from {source} to {output}"
 
 
-def small_signal(result: FitResult) -> tuple[BodeFigures, ...] | None:
+def small_signal(result: Reported) -> tuple[BodeFigures, ...] | None:
     """Return the small-signal views of a fit; None where the result does not hold them."""
     if result.behaviour is None:
         return None

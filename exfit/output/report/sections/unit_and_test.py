@@ -6,6 +6,7 @@ from exfit.programme.result import ProgrammeResult
 from exfit.results.description import RecordedTest
 from exfit.results.facts import Facts
 from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 from exfit.util.text import show
 
 
@@ -21,7 +22,7 @@ class UnitAndTest:
     )
 
 
-def unit_and_test(result: FitResult) -> UnitAndTest:
+def unit_and_test(result: Reported) -> UnitAndTest:
     """Return which unit was tested, and how."""
     return UnitAndTest(_facts(result.about), result.tests)
 

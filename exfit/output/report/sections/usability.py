@@ -5,7 +5,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from exfit.results.description import Behaviour
-from exfit.results.model import FitResult
+from exfit.results.validation_result import Reported
 
 NOT_HELD = "not stated: the fit was interrupted, or an earlier version of exfit wrote the result"
 
@@ -21,7 +21,7 @@ class UsabilityCheck(NamedTuple):
     result: str
 
 
-def usability(result: FitResult) -> tuple[UsabilityCheck, ...]:
+def usability(result: Reported) -> tuple[UsabilityCheck, ...]:
     """Return the checks of usability (cf. NERC MOD-026-1 R6), each with its result."""
     behaviour = result.behaviour
     if behaviour is None:

@@ -1,0 +1,81 @@
+"""A validation in words and tables, as its report shows it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from exfit.analysis.behaviour import behaviour_of
+from exfit.analysis.descriptions.case_description import (
+    criteria_of,
+    identified_values,
+    input_hashes,
+    input_names,
+    parts_of,
+    tests_of,
+    text_of,
+)
+from exfit.analysis.other_values import as_found_of
+from exfit.analysis.validation import Validation
+from exfit.case.case import Case
+from exfit.results.description import RecordedTest
+from exfit.results.validation_result import ValidationResult
+from exfit.util.sources import NOT_STATED
+
+Values = Mapping[str, float]
+
+OF_CASE, GIVEN = "values of the case, in which nothing is free", "given values"
+
+
+def validation_result(
+    validation: Validation,
+    values: Values,
+    versions: Mapping[str, str],
+    sources: Mapping[str, str] = MappingProxyType({}),
+) -> ValidationResult:
+    """Return a validation with all that a report shows of it.
+
+    ``values`` are all of them, ``sources`` where those come from that were given beside the case.
+    """
+    case, tests = validation.case, validation.tests
+    setups = [test.setup for test in tests]
+    own = [(test.setup, test.values) for test in tests]
+    return ValidationResult(
+        case=case.path,
+        about=case.about,
+        model=case.subject,
+        saturation=case.saturation,
+        origin=GIVEN if case.free() else OF_CASE,
+        values={name: values[name] for name in case.values()},
+        sources=_sources(case, values, sources),
+        ties={name: tie.text for name, tie in case.ties.by_name.items()},
+        matches=tuple(validation.comparisons),
+        versions=versions,
+        inputs=input_hashes(case, setups),
+        parts=tuple(parts_of(case)),
+        tests=tuple(_tests(validation)),
+        behaviour=behaviour_of(own),
+        files=input_names(case, setups),
+        case_text=text_of(case),
+        as_found=None if case.as_found is None else as_found_of(case, own),
+        criteria=criteria_of(case),
+    )
+
+
+def _sources(case: Case, values: Values, sources: Mapping[str, str]) -> dict[str, str]:
+    """Return where every value comes from: what differs from the case is by who gave it."""
+    of_case, free = case.values(), case.free()
+    changed = [name for name in of_case if name not in free and values[name] != of_case[name]]
+    given = {name: word for name, word in sources.items() if name in of_case}
+    others = [name for name in changed if name not in case.ties.by_name]
+    return {**case.sources(fitted=free), **dict.fromkeys(others, NOT_STATED), **given}
+
+
+def _tests(validation: Validation) -> Iterator[RecordedTest]:
+    """Yield the tests with their records; of a record by hand the steps that it shows."""
+    matches = validation.comparisons
+    setups = [test.setup for test in validation.tests]
+    described = tests_of(validation.case, setups, identified_values({}, matches))
+    for match, test in zip(matches, described, strict=True):
+        done = "; ".join(step.text for step in match.steps) or test.done
+        role = "validation" if match.validation else "fitted"
+        yield replace(test, name=match.name, role=role, done=done)

@@ -1,0 +1,121 @@
+"""A validation as data: values that were compared with records, whoever they are from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from exfit.results.comparisons import Comparison
+from exfit.results.description import (
+    Behaviour,
+    GivenInPlace,
+    PartDescription,
+    RecordedTest,
+    source_in_words,
+    values_of_part,
+)
+from exfit.results.model import FitResult, FittedParameter
+from exfit.results.other_values import AsFound
+from exfit.results.typical_values import TypicalValue
+from exfit.util.criteria import Criteria
+from exfit.util.typed import IN_FILE, KEY
+
+
+@dataclass(frozen=True, eq=False)
+class ValidationResult:
+    """A unit with given values beside its records: nothing is searched for here.
+
+    ``matches`` are the comparisons with the records that the values were fitted to, if there are
+    any, then with those that no fit saw. ``origin`` says in words whose values they are, ``values``
+    are all of them, named as in the system; ``options`` are those of the command. The rest is as in
+    `FitResult`. It describes validation.json, too.
+    """
+
+    case: Path
+    about: Mapping[str, float | str]
+    model: str
+    saturation: str
+    origin: str
+    values: Mapping[str, float]
+    sources: Mapping[str, str]
+    ties: Mapping[str, str]
+    matches: tuple[Comparison, ...] = field(metadata={KEY: "validation"})
+    versions: Mapping[str, str]
+    inputs: Mapping[str, str]
+    options: tuple[str, ...] = ()
+    parts: tuple[PartDescription, ...] = field(default=(), metadata=IN_FILE)
+    tests: tuple[RecordedTest, ...] = field(default=(), metadata=IN_FILE)
+    behaviour: Behaviour | None = field(default=None, metadata=IN_FILE)
+    files: Mapping[str, str] = field(default_factory=dict, metadata=IN_FILE)
+    case_text: str = field(default="", metadata=IN_FILE)
+    as_found: AsFound | None = field(default=None, metadata=IN_FILE)
+    criteria: Criteria = field(default_factory=Criteria, metadata=IN_FILE)
+
+    @property
+    def name(self) -> str:
+        """The name of the case."""
+        return self.case.stem
+
+    @property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        """Those with the records that the values were fitted to."""
+        return tuple(match for match in self.matches if not match.validation)
+
+    @property
+    def validation(self) -> tuple[Comparison, ...]:
+        """Those with the records that no fit saw, each with its verdict."""
+        return tuple(match for match in self.matches if match.validation)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether every validation is within the limit of the case."""
+        return all(match.accepted for match in self.validation)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What must be known of the records, each with its name: steps found in them, and more."""
+        return tuple(
+            f"{match.name}: {text}"
+            for match in self.matches
+            for text in (*(step.text for step in match.steps), *match.notes)
+        )
+
+    @property
+    def parameters(self) -> Mapping[str, FittedParameter]:
+        """The parameters that were fitted here: none."""
+        return {}
+
+    @property
+    def typical_values(self) -> Mapping[str, TypicalValue]:
+        """What typical values would move: no parameter was found that they could."""
+        return {}
+
+    @property
+    def given_values(self) -> Mapping[str, GivenInPlace]:
+        """The values in place of those of the case: ``origin`` and ``options`` say whose."""
+        return {}
+
+    @property
+    def of_records(self) -> dict[str, float]:
+        """What was found about the records: instants and sizes of steps, levels, delays."""
+        return {name: value for match in self.matches for name, value in match.of_record.items()}
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """The values of the exciter, and of helpers of ties."""
+        return self.values_of("")
+
+    @property
+    def network(self) -> dict[str, float]:
+        """The values of the network by symbol."""
+        return self.values_of("network.")
+
+    def values_of(self, prefix: str) -> dict[str, float]:
+        """Return the values of one part by symbol; the exciter's prefix is empty."""
+        return values_of_part(self.values, prefix)
+
+    def source_of(self, name: str) -> str:
+        """Return where the value of a parameter comes from, in words: maker, typical, tied ..."""
+        return source_in_words(name, self.sources, self.ties)
+
+
+Reported = FitResult | ValidationResult  # what a report can be made of
