@@ -30,8 +30,9 @@ def report(result: Path, output: Path | None, pdf: bool, against: Path | None, f
     """Make a verification report of RESULT: one HTML file, to be read, printed and handed in.
 
     RESULT is the result.json of a fit, the validation.json of exfit validate, or the folder that
-    holds it: nothing else is read, and nothing is run. A former report is replaced, another file only with --force. With --pdf it is
-    a PDF, which needs the package WeasyPrint: pip install 'exfit[pdf]'.
+    holds it: nothing else is read, and nothing is run. A former report is replaced, another file
+    only with --force. With --pdf it is a PDF, which needs the package WeasyPrint:
+    pip install 'exfit[pdf]'.
     """
     from exfit.output.report import write_report
 

@@ -55,6 +55,8 @@ def load_result(path: str | PathLike[str]) -> FitResult:
     be read, or is no result of a fit: with the place in it, and what is wrong there.
     """
     source = result_file(Path(path))
+    if not source.exists() and source.with_name(VALIDATION).is_file():
+        raise ExfitError(f"{path}: holds a validation, no result of a fit")
     content = _content(source)
     version = content.get("version", 1)
     _refuse_later(source, version)
