@@ -106,6 +106,10 @@ class Simulator:
             result._sampling = Interpolation(self._grid, self.times, delay)
         return result
 
+    def of_system(self, system: System) -> "Simulator":
+        """Return the simulator of the same test of another system, which has the same inputs."""
+        return Simulator(system, self.inputs, self.times, self.step, self.least, self.delay)
+
     def on_grid(self, points: int | None = None) -> "Simulator":
         """Return the simulator that gives all points of its grid, or so many, whatever the delay.
 

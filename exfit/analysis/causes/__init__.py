@@ -16,6 +16,7 @@ from exfit.analysis.causes.channels import (
     wrong_start,
 )
 from exfit.analysis.causes.event_record import wrong_event
+from exfit.analysis.causes.event_unit import other_unit_in_event
 from exfit.analysis.causes.evidence import Evidence, FittedRecord
 from exfit.analysis.causes.recorder import averaging, drift, other_clock, ripple, spiky_channel
 from exfit.analysis.causes.rest import unsteady_record, wrong_levels, wrong_voltage
@@ -53,6 +54,7 @@ BY_TRIAL: tuple[Recogniser, ...] = (
     wrong_event,
     unsteady_record,
     typical_values,
+    other_unit_in_event,
     wrong_sign,
     wrong_size,
     wrong_instant,

@@ -76,7 +76,12 @@ class Evidence:
 
     @cached_property
     def noise_cost(self) -> float:
-        """The cost that the noise of the records alone would have, as they scatter."""
+        """The cost that the noise of the records alone would have, as they scatter.
+
+        Errors that are weighed by the noise of what drives them are as large as that foretells.
+        """
+        if any(each.whitening is not None for each in self.residuals.experiments):
+            return 0.5 * self.residuals.count * self.residuals.noise**2
         squares = (
             channel.samples * (channel.weight * noise_of(channel)) ** 2
             for channel in self.residuals.channels
