@@ -1,8 +1,9 @@
 """What a fit comes to: its verdict, in a word and a sentence, and the causes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from exfit.results.comparisons import Comparison
 from exfit.results.criteria import judged_by_criteria
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
@@ -29,9 +30,7 @@ class Headline:
 def headline(result: FitResult) -> Headline:
     """Return what a fit comes to."""
     outcome, judged = outcome_of(result), judged_by_criteria(result)
-    rmse = ", ".join(
-        f"{match.rmse:.2e} pu ({match.name})" for match in (*result.comparisons, *result.validation)
-    )
+    rmse = ", ".join(_rmse((*result.comparisons, *result.validation)))
     sentence = "; ".join([*filter(None, [explanation_of(result)]), *_validated(result)])
     return Headline(
         word=f"{outcome[:1].upper()}{outcome[1:]}",
@@ -54,15 +53,19 @@ def headline_of_validation(result: ValidationResult) -> Headline:
     word, good = ("Accepted", True) if limited else ("Compared", None)
     if reasons:
         word, good = "Not accepted", False
-    rmse = ", ".join(
-        f"{match.channels[signal].rmse:.2e} pu ({match.name}, {signal})"
-        for match in result.matches
-        for signal in match.judging
-    )
+    rmse = ", ".join(_rmse(result.matches))
     sentence = "; ".join([f"Simulated with {result.origin}", *reasons, *_validated(result)])
     return Headline(
         word, f"{sentence}; rmse {rmse}.", good, (), criteria=judged.sentence, passed=judged.passed
     )
+
+
+def _rmse(matches: Iterable[Comparison]) -> Iterator[str]:
+    """Yield the rms of the errors that records are judged by: of an event those of P and Q."""
+    for match in matches:
+        for signal in match.judging:
+            of = f"{match.name}, {signal}" if len(match.judging) > 1 else match.name
+            yield f"{match.channels[signal].rmse:.2e} pu ({of})"
 
 
 def _validated(result: Reported) -> Iterator[str]:
