@@ -3,12 +3,15 @@
     python tests/studies/playback_noise.py 500
     python tests/studies/playback_noise.py 100 --times 5
     python tests/studies/playback_noise.py 100 --free machine.Xppd machine.Tpd0
+    python tests/studies/playback_noise.py 100 --driving 0 --same
     python tests/studies/playback_noise.py 100 --plain
 
 The event is that of `tests/reference/playback_ac8b.csv`, which another simulator made: noise of
-2e-4 pu is added to p and q, 1e-4 pu to vt, 2e-4 rad to its angle, or ``--times`` as much. KPR, KIR,
-TE and H are fitted, and what else is to be ``--free``; ``--plain`` is without weights by the noise
-of what drives. ``--search global`` is the default of the command; it finds the same minimum.
+2e-4 pu is added to p and q, 1e-4 pu to vt, 2e-4 rad to its angle, or ``--times`` as much; to vt
+and the angle also ``--driving`` times as much. ``--same`` takes p and q of the simulator of the
+fit. KPR, KIR, TE and H are fitted, and what else is to be ``--free``; ``--plain`` is without
+weights by the noise of what drives. ``--search global`` is the default of the command; it finds the
+same minimum.
 """
 
 import json
@@ -25,6 +28,8 @@ import yaml
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
+from exfit.case.load import load_case  # noqa: E402
+from exfit.fitting.build import build_experiments  # noqa: E402
 from exfit.workflows import fit  # noqa: E402
 
 NOISE = {"vt": 1e-4, "angle": 2e-4, "p": 2e-4, "q": 2e-4}  # pu, rad
@@ -81,22 +86,34 @@ def content(free, search="local", record="event.csv"):
     }  # fmt: skip
 
 
-def write_record(path, times, seed):
+def event_of(same=False):
+    """Return the columns of the event; p and q of the ``same`` simulator as that of the fit."""
+    event = np.genfromtxt(REFERENCE, delimiter=",", names=True)
+    if same:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "case.yaml"
+            path.write_text(yaml.safe_dump(content((), record=str(REFERENCE))))
+            case = load_case(path)
+            (setup,) = build_experiments(case)
+        signals = setup.experiment.samples(case.values())[0]
+        for place, name in enumerate(setup.experiment.signals):
+            event[name] = signals[:, place]
+    return event
+
+
+def write_record(path, event, times, driving, seed):
     """Write the record of the event with so many times the noise."""
-    event, generator = (
-        np.genfromtxt(REFERENCE, delimiter=",", names=True),
-        np.random.default_rng(seed),
-    )
-    columns = {"t": event["t"]}
+    generator, columns = np.random.default_rng(seed), {"t": event["t"]}
     for signal, deviation in NOISE.items():
-        added = times * deviation * generator.standard_normal(len(event))
-        columns[signal] = event[signal] + added
+        size = times * deviation * (driving if signal in ("vt", "angle") else 1.0)
+        columns[signal] = event[signal] + size * generator.standard_normal(len(event))
     rows = np.transpose([*columns.values()])
     np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.10g")
 
 
-def fits(count, free, times=1.0, search="local", plain=False, first=0):
+def fits(count, free, times=1.0, driving=1.0, same=False, search="local", plain=False, first=0):
     """Yield the fit of each record."""
+    event = event_of(same)
     with tempfile.TemporaryDirectory() as folder:
         case = Path(folder) / "case.yaml"
         case.write_text(yaml.safe_dump(content(free, search)))
@@ -104,7 +121,7 @@ def fits(count, free, times=1.0, search="local", plain=False, first=0):
             "exfit.analysis.case_search.why_not_weighed", return_value="in this study"
         )
         for seed in range(first, first + count):
-            write_record(case.with_name("event.csv"), times, seed)
+            write_record(case.with_name("event.csv"), event, times, driving, seed)
             if plain:
                 with reason:
                     yield fit(case)
@@ -138,12 +155,19 @@ def main():
     parser = ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("count", type=int, nargs="?", default=20)
     parser.add_argument("--times", type=float, default=1.0)
+    parser.add_argument("--driving", type=float, default=1.0)
+    parser.add_argument("--same", action="store_true")
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--free", nargs="*", default=[])
     parser.add_argument("--search", default="local")
     parser.add_argument("--plain", action="store_true")
     given = parser.parse_args()
     free, results, began = (*FREE, *given.free), [], process_time()
-    for result in fits(given.count, free, given.times, given.search, given.plain):
+    all_fits = fits(
+        given.count, free, given.times, given.driving, given.same, given.search, given.plain,
+        given.first,
+    )  # fmt: skip
+    for result in all_fits:
         results.append(result)
         if len(results) in (10, 50) or len(results) % 100 == 0 or len(results) == given.count:
             seconds = (process_time() - began) / len(results)

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LEAST_CHANGE = 0.02  # of vt's scale: no base is wrong by less
+LEAST_ERROR_OF_BASE = 1e-3  # of another channel: less is no base, and no instrument's error
 LARGEST_FACTOR = 3.0  # of a scale, about what the levels at rest say
 FARTHEST_VOLTAGE = 0.2  # pu: how far vt0 may be from the case's
 FEWEST_CLIPPED = 5  # samples at one extreme value: white noise has one, rounded noise a few
@@ -70,7 +71,7 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
                 f"{place} is inverted{starts}",
                 "check the polarity; scale: -1 turns it",
             )
-        if signal == "vt" and abs(scale - 1.0) < LEAST_CHANGE:
+        if not is_wrong_base(signal, scale):
             return None
         if len(opened) > 1 and not nearer_to_rated(levels, trial):
             return None
@@ -87,6 +88,11 @@ def _other_scale(evidence: Evidence, number: int, channel: Channel) -> Iterator[
 
     residuals = with_opened(evidence.residuals, number, opened)
     yield from tried(evidence, residuals, len(opened), cause, prior)
+
+
+def is_wrong_base(signal: str, factor: float) -> bool:
+    """Return whether a base may be wrong by a factor: it is none that is hardly more than 1."""
+    return abs(factor - 1.0) >= (LEAST_CHANGE if signal == "vt" else LEAST_ERROR_OF_BASE)
 
 
 def factor_between(levels: tuple[float, float]) -> float:

@@ -68,15 +68,13 @@ def carried_noise(setup: ExperimentSetup, values: Values) -> CarriedNoise:
     for channel in experiment.channels:
         deviation = noise_of_channel(channel)
         variance = np.full(channel.size, (channel.weight * deviation) ** 2)
-        if channel.signal in by_rest:  # its samples at rest are in all errors, by their mean
+        if channel.signal in by_rest:  # its mean at rest is in all errors
             rest, moved = by_rest[channel.signal]
-            kept = np.flatnonzero(channel.kept)
-            resting, places = np.isin(kept, rest), np.searchsorted(rest, kept)
-            own_columns = deviation * moved
-            rows = first + np.flatnonzero(resting)
-            own_columns[rows, places[resting]] -= channel.weight * deviation
-            columns.append(own_columns)
-            variance[resting] = 0.0
+            by_level = deviation * moved
+            # at rest the mean of the errors is zero: with a variance of zero, rounding of the
+            # record and of the simulation would have all the weight; no parameter moves it
+            by_level[first + np.flatnonzero(np.isin(np.flatnonzero(channel.kept), rest))] = 0.0
+            columns.append(by_level)
         own.append(variance)
         first += channel.size
     return CarriedNoise(np.concatenate(own), np.hstack(columns))

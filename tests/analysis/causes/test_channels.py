@@ -1,8 +1,8 @@
-"""A record that was clipped, and one that was not."""
+"""A record that was clipped, and one that was not; factors that a base may be wrong by."""
 
 import numpy as np
 
-from exfit.analysis.causes.channels import clipped_samples
+from exfit.analysis.causes.channels import clipped_samples, is_wrong_base
 
 TIME = np.linspace(0.0, 10.0, 1001)
 RNG = np.random.default_rng(5)
@@ -25,3 +25,11 @@ def test_noise_is_not_clipped_nor_is_what_is_rounded_coarsely():
 def test_samples_that_are_left_out_do_not_count():
     cut = np.minimum(NOISY, 0.9)
     assert clipped_samples(cut, cut < 0.9) is None
+
+
+def test_a_factor_that_rounds_to_one_is_no_wrong_base():
+    for signal in ("vt", "p", "efd"):
+        for factor in (1.0, 1.00004, 0.9996):
+            assert not is_wrong_base(signal, factor)
+        for factor in (0.5, 1.05, 1.732):
+            assert is_wrong_base(signal, factor)
