@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from exfit.results.model import FitResult
     from exfit.workflows import (
         check,
+        design_test,
         fit,
         identify,
         load_case,
@@ -61,6 +62,7 @@ __all__ = [
     "batch",
     "cases_of_table",
     "check",
+    "design_test",
     "fit",
     "fit_all",
     "identify",
@@ -84,6 +86,7 @@ _MODULES = {
     "batch": "exfit.fleet.batch",
     "cases_of_table": "exfit.exchange.table_cases",
     "check": "exfit.workflows",
+    "design_test": "exfit.workflows",
     "fit": "exfit.workflows",
     "fit_all": "exfit.fleet.fits",
     "identify": "exfit.workflows",

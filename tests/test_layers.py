@@ -62,7 +62,7 @@ SLOW_TO_IMPORT = {
 }  # fmt: skip
 NOT_OF_A_FIT = {
     "exfit.analysis.profiles", "exfit.analysis.comparison", "exfit.analysis.translation",
-    "exfit.analysis.experiment_design", "exfit.exchange.records",
+    "exfit.analysis.planning.experiment_design", "exfit.exchange.records",
     "exfit.fleet.fits", "exfit.output.plots", "exfit.output.terminal", "exfit.records.inspection",
 }  # fmt: skip
 

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from exfit.analysis.comparison import Agreement
-    from exfit.analysis.experiment_design import Design
+    from exfit.analysis.planning.designed_test import DesignedTest
+    from exfit.analysis.planning.experiment_design import Design
     from exfit.analysis.profiles import Profiles
     from exfit.fitting.uncertainty import UncertaintyAnalysis
     from exfit.fleet.fits import FitSeries
@@ -161,6 +162,14 @@ def of_profiles(profiles: "Profiles") -> PlannedFigures:
 def of_design(design: "Design") -> PlannedFigures:
     """Return the figures of a planned test."""
     return of_uncertainty(design.own, design.name)
+
+
+def of_designed_test(design: "DesignedTest") -> PlannedFigures:
+    """Return the figure of a designed test."""
+    from exfit.output import plots
+
+    shows = "the reference, vt and efd of the designed test, with limits"
+    return {"designed_test.png": PlannedFigure(shows, partial(plots.designed_test, design))}
 
 
 def of_inspection(inspection: "Inspection") -> PlannedFigures:

@@ -41,7 +41,8 @@ from exfit.util.text import to_json
 
 if TYPE_CHECKING:
     from exfit.analysis.comparison import Agreement
-    from exfit.analysis.experiment_design import Design
+    from exfit.analysis.planning.designed_test import DesignedTest
+    from exfit.analysis.planning.experiment_design import Design
     from exfit.analysis.profiles import Profiles
     from exfit.fleet.fits import FitSeries
     from exfit.fleet.ranking import Ranking
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PROFILES, DESIGN = "profile.json", "identify.json"
+DESIGNED_TEST = "designed_test.json"
 INSPECTION, AGREEMENT = "inspect.json", "compare.json"
 SERIES, AT_RECORD = "fits.json", "compare-record.csv"
 TRANSLATION, RANKING = "translation.json", "rank.json"
@@ -62,6 +64,7 @@ MAIN_FILES = (
     VALIDATION,
     PROFILES,
     DESIGN,
+    DESIGNED_TEST,
     INSPECTION,
     RESPONSE,
     AGREEMENT,
@@ -84,7 +87,14 @@ NUMBERS = {
     "simulate": (RESPONSE,),
     "validate": (VALIDATION,),
     "profile": ("profile.csv", PROFILES),
-    "identify": (DESIGN, SENSITIVITIES),
+    "identify": (
+        DESIGN,
+        SENSITIVITIES,
+        DESIGNED_TEST,
+        "test_sheet.txt",
+        "test_sheet.csv",
+        "test_section.yaml",
+    ),
     "compare": ("compare.csv", AT_RECORD, AGREEMENT),
     "fits": ("fits.csv", SERIES),
     "rank": ("rank.csv", RANKING),
@@ -229,6 +239,21 @@ def write_design(design: "Design", folder: Path) -> FigureFiles:
     }
     write_together(folder, numbers, ["sensitivity.png", "correlation.png"])
     return FigureFiles.beside(folder / DESIGN, partial(run_figures.of_design, design))
+
+
+def write_designed_test(design: "DesignedTest", folder: Path) -> FigureFiles:
+    """Write a designed test as JSON, its sheet and its section of a case; return its figure."""
+    from exfit.output.test_sheet import case_section, sheet_table, sheet_text
+
+    numbers = {
+        "test_sheet.txt": sheet_text(design),
+        "test_sheet.csv": sheet_table(design),
+        "test_section.yaml": case_section(design),
+        DESIGNED_TEST: to_json(design.as_json()),
+    }
+    write_together(folder, numbers, ["designed_test.png"])
+    drawings = partial(run_figures.of_designed_test, design)
+    return FigureFiles.beside(folder / DESIGNED_TEST, drawings)
 
 
 def write_inspection(inspection: "Inspection", folder: Path) -> FigureFiles:

@@ -1,6 +1,7 @@
 """Figures of results: functions that return one, and touch nothing else."""
 
 from exfit.output.plots.agreement import agreement
+from exfit.output.plots.designed_test import designed_test
 from exfit.output.plots.fit_series import fit_series
 from exfit.output.plots.iterations import iterations
 from exfit.output.plots.overlays import overlay
@@ -18,6 +19,7 @@ __all__ = [
     "agreement",
     "convergence",
     "correlation",
+    "designed_test",
     "drawn",
     "encoded",
     "fit_series",

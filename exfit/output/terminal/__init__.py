@@ -5,6 +5,7 @@ from exfit.output.terminal.batch import BatchProgress, batch
 from exfit.output.terminal.catalogue import catalogue, model
 from exfit.output.terminal.checks import check
 from exfit.output.terminal.comparisons import comparisons, validation
+from exfit.output.terminal.designed_test import designed_test
 from exfit.output.terminal.fit_series import SeriesProgress, fit_series
 from exfit.output.terminal.fits import fit
 from exfit.output.terminal.programme import ProgrammeProgress, checked_step, programme
@@ -38,6 +39,7 @@ __all__ = [
     "comparisons",
     "console",
     "design",
+    "designed_test",
     "figure",
     "figures_of_fit",
     "fit",

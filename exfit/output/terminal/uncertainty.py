@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from exfit.analysis.experiment_design import Design
+from exfit.analysis.planning.experiment_design import Design
 from exfit.analysis.profiles import Profiles
 from exfit.inference import ParameterEffect
 from exfit.output.terminal.terminal import (

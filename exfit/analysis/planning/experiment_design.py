@@ -89,8 +89,8 @@ def identify(case: Case, noise: Mapping[str, float]) -> Design:
     if not free:
         raise CaseError([f"{case.path}: parameters.free: empty: there is nothing to identify"])
     own = [setup.experiment for setup in setups] or [planned(case)]
-    _refuse_noise(noise)
-    levels = [_noise_levels(experiment, noise) for experiment in own]
+    refuse_noise(noise)
+    levels = [noise_levels(experiment, noise) for experiment in own]
     records = tuple(parameter.name for setup in setups for parameter in setup.free)
     uncertainty_after = partial(
         _uncertainty_after, case=case, free=free, levels=levels, records=records
@@ -136,7 +136,7 @@ def _uncertainty_after(
     return uncertainty_of(problem, residuals.start, linear)
 
 
-def _refuse_noise(noise: Mapping[str, float]) -> None:
+def refuse_noise(noise: Mapping[str, float]) -> None:
     """Raise CaseError for a signal that does not exist, or a level that is none."""
     unknown = [name for name in noise if name not in NOISE]
     if unknown:
@@ -168,7 +168,7 @@ def _with_steps(
     ]
 
 
-def _noise_levels(experiment: Experiment, given: Mapping[str, float]) -> dict[str, float]:
+def noise_levels(experiment: Experiment, given: Mapping[str, float]) -> dict[str, float]:
     """Return the noise of each signal in a test."""
     levels = dict(NOISE)
     for channel in experiment.channels:

@@ -8,7 +8,7 @@ import yaml
 from places import CONFIGS
 from records import UNIT, case_of, found_in, recording, several
 
-from exfit.analysis.experiment_design import identify
+from exfit.analysis.planning.experiment_design import identify
 from exfit.case.load import load_case
 from exfit.errors import CaseError
 from exfit.signals import NOISE
