@@ -125,6 +125,14 @@ RUNS = (  # in the order of the page
         (Picture("identify.svg", "which parameters a planned test identifies"),),
     ),
     Run(
+        f"exfit identify {FIT} --design --limit vt=0.05 --limit efd=4 --channels vt,efd",
+        (
+            Picture(
+                "designed_test.png", "the test within limits that shows most", "designed_test.png"
+            ),
+        ),
+    ),
+    Run(
         f"exfit inspect {RECORD}",
         (
             Picture("inspect.svg", "contents of a recorder's file, and the sections of a case"),

@@ -24,6 +24,7 @@ def sheet_lines(design: DesignedTest) -> Iterator[str]:
     yield f"start       at rest, vt = {design.vt0:.4g} pu, all limiters out of reach"
     yield f"record      {', '.join(best.channels)} and the reference, to {best.duration:g} s,"
     yield f"            {design.rate:.6g} samples a second, in one file, with the instants of steps"
+    yield f"allowed     reference within {design.limits.of_vref:g} pu of its start"
     for signal, (low, high) in design.extremes.items():
         yield f"{'planned' if signal == 'vt' else '':<12}{_extreme(design, signal, low, high)}"
     for number, (signal, (low, high)) in enumerate(design.other_values.extremes.items()):

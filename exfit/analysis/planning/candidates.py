@@ -170,9 +170,8 @@ class Bench:
         covariance = self.covariance(moves, signals, duration)
         if covariance is None:
             return {}
-        return {
-            self.problem.free[k].name: float(np.sqrt(covariance[k, k])) for k in self.chosen
-        }  # fmt: skip
+        errors = np.sqrt(np.diag(covariance))
+        return {self.problem.free[k].name: float(errors[k]) for k in self.chosen}
 
     def stage(self, label: str, moves: Moves, signals: tuple[str, ...], duration: float) -> Stage:
         """Return a test that is allowed with what it would show."""

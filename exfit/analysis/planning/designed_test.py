@@ -21,6 +21,7 @@ from exfit.case.case import Case
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Channel, Experiment
+from exfit.fitting.nuisances.kinds import OF_SYSTEM
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import with_enough_substeps
@@ -76,6 +77,15 @@ class DesignedTest:
         """The standard errors, in shares of those of the best single step."""
         return {name: self.best.errors[name] / self.single.errors[name] for name in self.of}
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What must be known before the test is made."""
+        if self.limits.allow(self.other_values.extremes, self.vt0):
+            return ()
+        spread = f"{100.0 * self.other_values.spread:g} %"
+        text = f"with a parameter {spread} off the test would exceed a limit"
+        return (f"{text}: where the values are that uncertain, give a narrower one",)
+
     def as_json(self) -> dict[str, Any]:
         """Return the figures."""
         return {
@@ -87,6 +97,7 @@ class DesignedTest:
             "best": self.best.as_json(),
             "single_step": self.single.as_json(),
             "ratios": self.ratios,
+            "notes": list(self.notes),
             "extremes": plain(self.extremes),
             "other_values": plain(self.other_values),
             "stages": [stage.as_json() for stage in self.stages],
@@ -219,9 +230,7 @@ def _at_other_values(bench: Bench, best: Stage, moves: Moves, single: Moves) -> 
         for signal, (low, high) in extremes_of(run).items():
             before = extremes.get(signal, (low, high))
             extremes[signal] = min(low, before[0]), max(high, before[1])
-        errors = [
-            other.errors(steps, best.channels, best.duration) for steps in (moves, single)
-        ]  # fmt: skip
+        errors = [other.errors(steps, best.channels, best.duration) for steps in (moves, single)]
         for name in bench.names:
             ours, theirs = (of_test.get(name, inf) for of_test in errors)
             ratio = ours / theirs if ours < inf and theirs < inf else None
@@ -272,13 +281,17 @@ def _bench(
         for signal in possible
         if signal in (channels or possible)
     )
-    values = case.values()
     starts = {parameter.name: parameter.start for parameter in free}
-    fixed = {name: value for name, value in values.items() if name not in starts}
-    simulator = with_enough_substeps(own.simulator, own.parameters({**values, **{
-        parameter.name: parameter.start for setup in setups for parameter in setup.free
-    }}), case.path)  # fmt: skip
-    base = Experiment(simulator, own.channels, own.own)
+    fixed = {name: value for name, value in case.values().items() if name not in starts}
+    of_records = {row.name: row.start for setup in setups for row in setup.free}
+    values = own.parameters({**fixed, **starts, **of_records})
+    simulator = with_enough_substeps(own.simulator, values, case.path)
+    levels_found = {
+        OF_SYSTEM[nuisance.kind]: of_records[nuisance.name]
+        for nuisance in own.nuisances
+        if nuisance.kind in OF_SYSTEM
+    }
+    base = Experiment(simulator, own.channels, {**own.own, **levels_found})
     chosen = tuple(k for k, name in enumerate(names) if name in (of or names))
     problem = Residuals([base], free, fixed, case.ties)
     return Bench(base, problem, candidates, chosen, criterion, limits)

@@ -8,6 +8,7 @@ from exfit.analysis.planning.candidates import REST, Bench, Move, Moves
 DWELLS = (0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)  # s between steps
 SHARES = tuple(k / 5.0 for k in range(-5, 6))  # of the limit of the reference
 REFINEMENTS = (0.1, 0.05, 0.025)  # of that limit, about the best of these
+FIRST_DWELLS = (0.2, 1.0, 3.0)  # s, of a further step
 MOST_SWEEPS = 6
 LEAST_GAIN_OF_SWEEP = 1e-3  # of the criterion
 
@@ -23,22 +24,41 @@ def best_single_step(bench: Bench, signals: Sequence[str], duration: float) -> M
 
 
 def best_moves(bench: Bench, fewer: Moves, signals: Sequence[str], duration: float) -> Moves:
-    """Return the best moves with one more than those given: a coordinate exchange."""
-    starts = [start for start in _starts(fewer, duration)
-              if bench.cost(start, signals, duration) < inf]  # fmt: skip
-    ends = [_exchanged(bench, start, signals, duration) for start in starts]
-    return min(ends, key=lambda moves: bench.cost(moves, signals, duration), default=fewer)
+    """Return the best moves with one more than those given, or these where no more are allowed.
+
+    A coordinate exchange from the best start of each family.
+    """
+
+    def cost(moves: Moves) -> float:
+        return bench.cost(moves, signals, duration)
+
+    families = _later(fewer), _earlier(fewer), _pulses(len(fewer) + 1, duration)
+    starts = [min(family, key=cost) for family in families]
+    ends = [_exchanged(bench, start, signals, duration) for start in starts if cost(start) < inf]
+    return min(ends, key=cost, default=fewer)
 
 
-def _starts(fewer: Moves, duration: float) -> Iterator[Moves]:
-    """Yield moves to begin the exchange from: one more behind those given, and pulses."""
-    for dwell in (0.5, 2.0):
-        for share in (0.0, -fewer[-1].share):
+def _later(fewer: Moves) -> Iterator[Moves]:
+    """Yield moves with one more behind those given."""
+    for dwell in FIRST_DWELLS:
+        for share in _levels(fewer[-1].share):
             yield (*fewer, Move(dwell, share))
-    count = len(fewer) + 1
+
+
+def _earlier(fewer: Moves) -> Iterator[Moves]:
+    """Yield moves with one more before those given."""
+    first, *others = fewer
+    for dwell in FIRST_DWELLS:
+        for share in _levels(first.share):
+            yield (Move(0.0, share), Move(dwell, first.share), *others)
+
+
+def _pulses(count: int, duration: float) -> Iterator[Moves]:
+    """Yield moves up and down in turn."""
     even = (duration - REST) / count
     for dwell in (max((d for d in DWELLS if d <= even), default=DWELLS[0]), DWELLS[1]):
-        yield tuple(Move(dwell if k else 0.0, 0.8 * (-1) ** k) for k in range(count))
+        for size in SHARES:
+            yield tuple(Move(dwell if k else 0.0, size * (-1) ** k) for k in range(count))
 
 
 def _exchanged(bench: Bench, moves: Moves, signals: Sequence[str], duration: float) -> Moves:
@@ -59,10 +79,16 @@ def _exchanged(bench: Bench, moves: Moves, signals: Sequence[str], duration: flo
 
 def _other_moves(move: Move, first: bool) -> Iterator[Move]:
     """Yield moves with another level or, but for the first, another instant."""
-    near_by = [move.share + sign * part for part in REFINEMENTS for sign in (1.0, -1.0)]
-    for share in (*SHARES, *near_by):
-        if abs(share) <= 1.0:
-            yield move._replace(share=round(share, 6))
+    for share in _levels(move.share):
+        yield move._replace(share=share)
     if not first:
         for dwell in DWELLS:
             yield move._replace(dwell=dwell)
+
+
+def _levels(share: float) -> Iterator[float]:
+    """Yield the levels of the ladder, and finer ones about a level."""
+    near_by = (share + sign * part for part in REFINEMENTS for sign in (1.0, -1.0))
+    for level in (*SHARES, *near_by):
+        if abs(level) <= 1.0:
+            yield round(level, 6)

@@ -58,12 +58,17 @@ class Limits:
 
     def keep(self, run: Run) -> bool:
         """Return whether a simulated test is within the limits at every point of its grid."""
-        vt, efd = run.outputs["vt"], run.outputs["efd"]
-        if not (np.isfinite(vt).all() and np.isfinite(efd).all()):
-            return False
-        deviation = float(np.max(np.abs(vt - vt[0])))
-        within_efd = self.efd_min - ROUNDING <= efd.min() and efd.max() <= self.efd + ROUNDING
-        return deviation <= self.vt + ROUNDING and bool(within_efd)
+        extremes = extremes_of(run)
+        return bool(np.isfinite([*extremes.values()]).all()) and self.allow(
+            extremes, float(run.outputs["vt"][0])
+        )
+
+    def allow(self, extremes: Extremes, vt0: float) -> bool:
+        """Return whether signals that stay between extremes, from a voltage, are within limits."""
+        (vt_low, vt_high), (efd_low, efd_high) = extremes["vt"], extremes["efd"]
+        deviation = max(vt_high - vt0, vt0 - vt_low)
+        within_efd = self.efd_min - ROUNDING <= efd_low and efd_high <= self.efd + ROUNDING
+        return deviation <= self.vt + ROUNDING and within_efd
 
 
 def extremes_of(run: Run) -> Extremes:

@@ -56,5 +56,6 @@ def designed_test(console: Console, design: DesignedTest) -> None:
             f"channels ({channels}); '{spread:g} % off': the largest share with each parameter "
             f"{spread:g} % smaller or larger",
             LOCAL,
+            *design.notes,
         ),
     )
