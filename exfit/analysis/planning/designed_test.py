@@ -24,7 +24,7 @@ from exfit.fitting.experiment import Channel, Experiment
 from exfit.fitting.nuisances.kinds import OF_SYSTEM
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
-from exfit.fitting.setup import with_enough_substeps
+from exfit.fitting.setup import ExperimentSetup, with_enough_substeps
 from exfit.simulation.simulator import Run
 from exfit.util.text import near
 from exfit.util.typed import plain
@@ -260,41 +260,52 @@ def _bench(
     noise: Mapping[str, float],
 ) -> Bench:
     """Return what all candidates share; raises CaseError for what the case does not have."""
-    if not case.kind.closed_loop:
-        text = "no test can be designed: the plant has no reference whose steps are simulated"
-        raise CaseError([f"{case.path}: plant {case.kind.name}: {text}"])
+    _refuse(case, of, channels, criterion)
     free = free_parameters(case)
-    names = [parameter.name for parameter in free]
-    possible = case.kind.compared
-    faults = [*_unknown("of", of, names), *_unknown("channels", channels, possible)]
-    if not free:
-        faults.append(f"{case.path}: parameters.free: empty: there is nothing to identify")
-    if criterion not in CRITERIA:
-        faults.append(f"criterion: {criterion}: must be one of {', '.join(CRITERIA)}")
-    if faults:
-        raise CaseError(faults)
     setups = build_experiments(case) if case.recordings else ()
     own = setups[0].experiment if setups else planned(case)
     levels = noise_levels(own, noise)
     candidates = tuple(
         Channel(signal, np.zeros(0), weight=1.0 / levels[signal])
-        for signal in possible
-        if signal in (channels or possible)
+        for signal in case.kind.compared
+        if signal in (channels or case.kind.compared)
     )
     starts = {parameter.name: parameter.start for parameter in free}
     fixed = {name: value for name, value in case.values().items() if name not in starts}
+    base = _rested(case, own, {**fixed, **starts}, setups)
+    chosen = tuple(k for k, parameter in enumerate(free) if parameter.name in (of or starts))
+    problem = Residuals([base], free, fixed, case.ties)
+    return Bench(base, problem, candidates, chosen, criterion, limits)
+
+
+def _rested(
+    case: Case, own: Experiment, values: Mapping[str, float], setups: Sequence[ExperimentSetup]
+) -> Experiment:
+    """Return the test of a case with the levels that a fit would find, at their starts."""
     of_records = {row.name: row.start for setup in setups for row in setup.free}
-    values = own.parameters({**fixed, **starts, **of_records})
-    simulator = with_enough_substeps(own.simulator, values, case.path)
-    levels_found = {
+    levels = {
         OF_SYSTEM[nuisance.kind]: of_records[nuisance.name]
         for nuisance in own.nuisances
         if nuisance.kind in OF_SYSTEM
     }
-    base = Experiment(simulator, own.channels, {**own.own, **levels_found})
-    chosen = tuple(k for k, name in enumerate(names) if name in (of or names))
-    problem = Residuals([base], free, fixed, case.ties)
-    return Bench(base, problem, candidates, chosen, criterion, limits)
+    parameters = own.parameters({**values, **of_records})
+    simulator = with_enough_substeps(own.simulator, parameters, case.path)
+    return Experiment(simulator, own.channels, {**own.own, **levels})
+
+
+def _refuse(case: Case, of: Sequence[str], channels: Sequence[str], criterion: str) -> None:
+    """Raise CaseError for a plant without a reference, and for names that do not exist."""
+    if not case.kind.closed_loop:
+        text = "no test can be designed: the plant has no reference whose steps are simulated"
+        raise CaseError([f"{case.path}: plant {case.kind.name}: {text}"])
+    names = [*case.free()]
+    faults = [*_unknown("of", of, names), *_unknown("channels", channels, case.kind.compared)]
+    if not names:
+        faults.append(f"{case.path}: parameters.free: empty: there is nothing to identify")
+    if criterion not in CRITERIA:
+        faults.append(f"criterion: {criterion}: must be one of {', '.join(CRITERIA)}")
+    if faults:
+        raise CaseError(faults)
 
 
 def _unknown(key: str, given: Sequence[str], names: Sequence[str]) -> Iterator[str]:
