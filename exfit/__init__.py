@@ -21,6 +21,7 @@ from exfit.errors import (
 from exfit.util.lazy import names_of
 
 if TYPE_CHECKING:
+    from exfit.analysis.planning.design import design_test
     from exfit.analysis.steady.saturation import saturation_curve
     from exfit.analysis.translation.translate import translate
     from exfit.case.case import Case
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from exfit.results.model import FitResult
     from exfit.workflows import (
         check,
-        design_test,
         fit,
         identify,
         load_case,
@@ -86,7 +86,7 @@ _MODULES = {
     "batch": "exfit.fleet.batch",
     "cases_of_table": "exfit.exchange.table_cases",
     "check": "exfit.workflows",
-    "design_test": "exfit.workflows",
+    "design_test": "exfit.analysis.planning.design",
     "fit": "exfit.workflows",
     "fit_all": "exfit.fleet.fits",
     "identify": "exfit.workflows",

@@ -56,7 +56,6 @@ from exfit.util.versions import versions
 
 if TYPE_CHECKING:
     from exfit.analysis.model_check import Check
-    from exfit.analysis.planning.designed_test import DesignedTest
     from exfit.analysis.planning.experiment_design import Design
     from exfit.analysis.profiles import Profiles
     from exfit.results.validation_result import ValidationResult
@@ -386,45 +385,6 @@ def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Des
     from exfit.analysis.planning import experiment_design
 
     return experiment_design.identify(loaded(case), noise or {})
-
-
-def design_test(
-    case: CaseOrPath,
-    of: Sequence[str] = (),
-    *,
-    limits: Mapping[str, float] | None = None,
-    duration: float | None = None,
-    channels: Sequence[str] = (),
-    criterion: str = "A",
-    noise: Mapping[str, float] | None = None,
-) -> "DesignedTest":
-    """Return the steps of the reference that make parameters of a case best known.
-
-    Args:
-        case: a case, or the path of its file; it needs no record.
-        of: the parameters to be known best, all free ones by default; the others stay free.
-        limits: how far vt and vref may deviate from their start (default 0.05), the largest efd
-            and the least, efd_min; per unit.
-        duration: of the test, s; by default that of the case.
-        channels: what can be recorded, of which up to three are chosen; by default all signals.
-        criterion: what is made least: "A" the mean square of the relative standard errors, "D" the
-            volume of their confidence ellipsoid.
-        noise: as in `identify`.
-
-    The errors are those of linear theory at the values of the case. Raises ExfitError for input
-    that cannot be used.
-
-    Example:
-        >>> exfit.design_test("case.yaml", ["KA"], limits={"vt": 0.05, "efd": 4}).best.steps
-    """
-    from exfit.analysis.planning import designed_test
-    from exfit.analysis.planning.limits import Limits
-
-    names = [of] if isinstance(of, str) else of
-    bounds = Limits.of(limits or {})
-    return designed_test.design_test(
-        loaded(case), names, bounds, duration, channels, criterion, noise
-    )
 
 
 def check(case: CaseOrPath) -> "Check":

@@ -166,10 +166,10 @@ def _design(
     criterion: str | None,
 ) -> None:
     """Show the best test within limits."""
-    from exfit import workflows
+    from exfit.analysis.planning.design import design_test
     from exfit.output import run_folder
 
-    design = workflows.design_test(
+    design = design_test(
         loaded,
         _names(of),
         limits=assignments(limits, "--limit"),

@@ -23,14 +23,14 @@ LAST_DWELL = 1.0  # s that the last level is recorded at least
 SMALLEST_SIZE = 0.1  # of the interval between bounds: what counts as 100 % of a value near zero
 
 
-class Move(NamedTuple):
+class ReferenceMove(NamedTuple):
     """A move of the reference to a level: a ``share`` of its limit, ``dwell`` s after the last."""
 
     dwell: float
     share: float
 
 
-Moves = tuple[Move, ...]
+Moves = tuple[ReferenceMove, ...]
 
 
 @dataclass(frozen=True)

@@ -104,14 +104,14 @@ class DesignedTest:
         }
 
 
-def design_test(
+def designed_test(
     case: Case,
-    of: Sequence[str] = (),
-    limits: Limits | None = None,
-    duration: float | None = None,
-    channels: Sequence[str] = (),
-    criterion: str = "A",
-    noise: Mapping[str, float] | None = None,
+    of: Sequence[str],
+    limits: Limits,
+    duration: float | None,
+    channels: Sequence[str],
+    criterion: str,
+    noise: Mapping[str, float],
 ) -> DesignedTest:
     """Return the steps of the reference that make the parameters ``of`` a case best known.
 
@@ -120,9 +120,8 @@ def design_test(
     test is as long as that of the case. Raises ExfitError for input that cannot be used, and where
     no single step within the limits determines the parameters.
     """
-    limits = limits or Limits()
-    refuse_noise(noise or {})
-    bench = _bench(case, of, limits, channels, criterion, noise or {})
+    refuse_noise(noise)
+    bench = _bench(case, of, limits, channels, criterion, noise)
     times = bench.base.simulator.times
     duration = float(times[-1] - times[0]) if duration is None else duration
     if not REST + LAST_DWELL < duration < inf:

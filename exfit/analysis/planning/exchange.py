@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import inf
 
-from exfit.analysis.planning.candidates import REST, Bench, Move, Moves
+from exfit.analysis.planning.candidates import REST, Bench, Moves, ReferenceMove
 
 DWELLS = (0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 20.0)  # s between steps
 SHARES = tuple(k / 5.0 for k in range(-5, 6))  # of the limit of the reference
@@ -18,7 +18,7 @@ def best_single_step(bench: Bench, signals: Sequence[str], duration: float) -> M
     finest = REFINEMENTS[-1]
     levels = [sign * k * finest for k in range(1, round(1.0 / finest) + 1) for sign in (1.0, -1.0)]
     return min(
-        ((Move(0.0, round(level, 6)),) for level in levels),
+        ((ReferenceMove(0.0, round(level, 6)),) for level in levels),
         key=lambda moves: bench.cost(moves, signals, duration),
     )
 
@@ -42,7 +42,7 @@ def _later(fewer: Moves) -> Iterator[Moves]:
     """Yield moves with one more behind those given."""
     for dwell in FIRST_DWELLS:
         for share in _levels(fewer[-1].share):
-            yield (*fewer, Move(dwell, share))
+            yield (*fewer, ReferenceMove(dwell, share))
 
 
 def _earlier(fewer: Moves) -> Iterator[Moves]:
@@ -50,7 +50,7 @@ def _earlier(fewer: Moves) -> Iterator[Moves]:
     first, *others = fewer
     for dwell in FIRST_DWELLS:
         for share in _levels(first.share):
-            yield (Move(0.0, share), Move(dwell, first.share), *others)
+            yield (ReferenceMove(0.0, share), ReferenceMove(dwell, first.share), *others)
 
 
 def _pulses(count: int, duration: float) -> Iterator[Moves]:
@@ -58,7 +58,7 @@ def _pulses(count: int, duration: float) -> Iterator[Moves]:
     even = (duration - REST) / count
     for dwell in (max((d for d in DWELLS if d <= even), default=DWELLS[0]), DWELLS[1]):
         for size in SHARES:
-            yield tuple(Move(dwell if k else 0.0, size * (-1) ** k) for k in range(count))
+            yield tuple(ReferenceMove(dwell if k else 0.0, size * (-1) ** k) for k in range(count))
 
 
 def _exchanged(bench: Bench, moves: Moves, signals: Sequence[str], duration: float) -> Moves:
@@ -77,7 +77,7 @@ def _exchanged(bench: Bench, moves: Moves, signals: Sequence[str], duration: flo
     return moves
 
 
-def _other_moves(move: Move, first: bool) -> Iterator[Move]:
+def _other_moves(move: ReferenceMove, first: bool) -> Iterator[ReferenceMove]:
     """Yield moves with another level or, but for the first, another instant."""
     for share in _levels(move.share):
         yield move._replace(share=share)
