@@ -316,14 +316,12 @@ def validate(
     """
     from exfit.analysis import validation
 
-    case = loaded(case, values)
-    own = values_of(case, changes_of(case, values))
-    return validation.validate(case, own, record, step, at).comparisons
+    return validation.validate(loaded(case, values), values, record, step, at).comparisons
 
 
 def validation_result(
     case: CaseOrPath,
-    values: ValuesOrResult,
+    values: ValuesOrResult | None,
     record: Record | Path | str | None = None,
     step: float | Sequence[float] = (),
     at: float | Sequence[float] = (),
@@ -331,17 +329,16 @@ def validation_result(
 ) -> "ValidationResult":
     """Compare a case with its records as `validate` does, with all that a report shows of it.
 
-    ``sources`` says where values come from that are given by name. Raises ExfitError as it does.
+    Without ``values`` they are those of the model as found, or else the start values: no record was
+    fitted then. ``sources`` says where values come from that are given by name.
     """
     from exfit.analysis import validation
     from exfit.analysis.descriptions.validation_description import validation_result
 
-    case = loaded(case, values)
-    own = values_of(case, changes_of(case, values))
     if isinstance(values, FitResult):
         sources = values.sources
-    compared = validation.validate(case, own, record, step, at)
-    return validation_result(compared, own, versions(), sources or {})
+    compared = validation.validate(loaded(case, values), values, record, step, at)
+    return validation_result(compared, versions(), sources or {})
 
 
 def profile(

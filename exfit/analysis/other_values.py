@@ -88,6 +88,16 @@ def as_found_of(case: Case, tests: Sequence[tuple[ExperimentSetup, Values]]) -> 
     return replace(unit, comparisons=tuple(kept))
 
 
+def model_as_found(case: Case) -> tuple[Case, Values]:
+    """Return a case with the exciter that the case says was found, and its values.
+
+    They are the case's own where it does not say. Raises CaseError where they cannot be used.
+    """
+    section = case.as_found or AsFoundSection()
+    before = _case_before(case, section)
+    return before, values_of(before, dict(section.parameters))
+
+
 def _of_unit(unit: AsFound, section: AsFoundSection) -> AsFound:
     """Return a model as found with its place in the planner's base."""
     return replace(unit, bus=section.bus, machine_id=section.id, file=section.file)

@@ -14,6 +14,8 @@ from exfit.analysis.causes.run_quality import (
     unstable_rest_notes,
     voltage_notes,
 )
+from exfit.analysis.given_values import ValuesOrResult, changes_of
+from exfit.analysis.other_values import model_as_found
 from exfit.analysis.solution import aligned, validation_of
 from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
@@ -21,6 +23,7 @@ from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
 from exfit.fitting.setup import ExperimentSetup
+from exfit.fitting.system import values_of
 from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
 from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.record import Record
@@ -48,10 +51,19 @@ class ComparedTest(NamedTuple):
 
 
 class Validation(NamedTuple):
-    """The tests that were compared, the fitted ones first, and a case that has just these."""
+    """The tests that were compared, the fitted ones first, and a case that has just these.
+
+    ``values`` are those of the unit.
+    """
 
     case: Case
+    values: Values
     tests: tuple[ComparedTest, ...]
+
+    @property
+    def fitted(self) -> bool:
+        """Whether the values were fitted to some of the records."""
+        return not all(test.comparison.validation for test in self.tests)
 
     @property
     def comparisons(self) -> list[Comparison]:
@@ -61,34 +73,43 @@ class Validation(NamedTuple):
 
 def validate(
     case: Case,
-    values: Values,
+    values: ValuesOrResult | None,
     record: Record | Path | str | None,
     step: float | Sequence[float],
     at: float | Sequence[float],
 ) -> Validation:
     """Return the comparisons with the fitted records, then with those that no fit saw.
 
-    A ``record`` by hand, whose steps may be given, takes the place of all of these. Where nothing
-    in the case is free no fit saw any. Raises ExfitError where input cannot be used, or where there
-    is nothing to validate on.
+    No fit saw any record where nothing in the case is free, nor without ``values``: they are those
+    of the model as found then. A ``record`` by hand, whose steps may be given, takes the place of
+    the others. Raises ExfitError where input cannot be used, or where there is nothing to validate
+    on.
     """
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
-    saw = case.recordings if case.free() else ()
-    fitted = tuple(_fitted(case, recording, values) for recording in saw)
+    saw = () if values is None or not case.free() else case.recordings
+    case, own = _with_values(case, values)
+    fitted = tuple(_fitted(case, recording, own) for recording in saw)
     matches = [test.comparison for test in fitted]
     if record is not None:
-        case, test = _validated_by_hand(case, matches, values, record, given)
-        own = (test.recording,)
-        case = replace(case, validations=own) if saw else _with_records(case, own)
-        return Validation(case, (*fitted, test))
+        case, test = _validated_by_hand(case, matches, own, record, given)
+        by_hand = (test.recording,)
+        case = replace(case, validations=by_hand) if saw else _with_records(case, by_hand)
+        return Validation(case, own, (*fitted, test))
     recordings = (*(() if saw else case.recordings), *case.validations)
     if not recordings:
         raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
-    unseen = [(each, build_experiment(case, each, values)) for each in recordings]
-    validated = (_validated(case, matches, *pair, values) for pair in unseen)
-    return Validation(case, (*fitted, *validated))
+    unseen = [(each, build_experiment(case, each, own)) for each in recordings]
+    validated = (_validated(case, matches, *pair, own) for pair in unseen)
+    return Validation(case, own, (*fitted, *validated))
+
+
+def _with_values(case: Case, values: ValuesOrResult | None) -> tuple[Case, Values]:
+    """Return the case whose model the values are of, and all values: None is the model as found."""
+    if values is None:
+        return model_as_found(case)
+    return case, values_of(case, changes_of(case, values))
 
 
 def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:

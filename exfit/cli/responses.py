@@ -20,10 +20,13 @@ from exfit.cli.options import (
     print_json,
     set_option,
 )
-from exfit.errors import CaseError
+from exfit.errors import CaseError, ExfitError
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+
+
+OTHER_VALUES = "--parameters FILE, or --as-found for the model before any fit"
 
 
 @click.command()
@@ -69,6 +72,11 @@ def simulate(
 @case_argument
 @parameters_option
 @click.option(
+    "--as-found",
+    is_flag=True,
+    help="Values before any fit: of the model as found, or else the start values.",
+)
+@click.option(
     "--record",
     type=GivenFile(Kind.RECORD),
     metavar="FILE",
@@ -94,6 +102,7 @@ def simulate(
 def validate(
     case: Path,
     parameters: Path | None,
+    as_found: bool,
     record: Path | None,
     steps: tuple[float, ...],
     instants: tuple[float, ...],
@@ -101,8 +110,9 @@ def validate(
 ) -> None:
     """Compare fitted values with the records of CASE that were not fitted.
 
-    The values are those of the last fit of the case, or of --parameters; where nothing is free in
-    CASE, its own, and all of its records are validated. The steps of --record are
+    The values are those of the last fit of the case, or of --parameters. With --as-found they are
+    those of a planner's model as it is, and where nothing is free in CASE its own: all records of
+    the case are validated then. The steps of --record are
     found in it and shown; --step -0.05 and --at 1.0 replace what is found, each of several steps
     has its own. Writes validation.json, samples and overlays to runs/CASE-validate, or to DIR;
     exfit report makes a report of that folder.
@@ -114,17 +124,22 @@ def validate(
     from exfit.output import run_folder
     from exfit.util.typed import plain
 
-    loaded, source = _with_source(case, parameters)
+    if as_found and parameters is not None:
+        raise ExfitError("--as-found and --parameters: only one of them says whose values they are")
+    loaded, source = (load(case), None) if as_found else _with_source(case, parameters)
     folder = output.folder_of(loaded, "validate")
     if record is not None:
         run_folder.refuse_inputs("validate", [record], folder, [record.stem])
-    values = {} if source is None else read_parameters(loaded, source)
+    values = None if as_found else {} if source is None else read_parameters(loaded, source)
     sources = {} if source is None else sources_in(source)
     result = workflows.validation_result(loaded, values, record, steps, instants, sources)
     result = replace(
         result,
-        origin=_whose(parameters, source),
-        options=tuple(_options(parameters, record, steps, instants)),
+        origin=result.origin if source is None else f"values of {parameters or 'the last fit'}",
+        options=(
+            *(("--as-found",) if as_found else ()),
+            *_options(parameters, record, steps, instants),
+        ),
         inputs={**result.inputs, **_hash_of(source)},
         files={**result.files, "parameters": "" if source is None else source.name},
     )
@@ -159,7 +174,7 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
         return case, parameters
     if source is None:
         raise CaseError(
-            [f"{path}: no earlier fit of this case; run exfit fit, or give --parameters FILE"]
+            [f"{path}: no earlier fit of this case; run exfit fit, or give {OTHER_VALUES}"]
         )
     return case, source
 
@@ -180,12 +195,3 @@ def _options(
             yield from (option, str(path))
     for option, numbers in (("--step", steps), ("--at", instants)):
         yield from (word for number in numbers for word in (option, f"{number!r}"))
-
-
-def _whose(parameters: Path | None, source: Path | None) -> str:
-    """Return whose values are validated."""
-    from exfit.analysis.descriptions.validation_description import OF_CASE
-
-    if source is None:
-        return OF_CASE
-    return f"values of {parameters or 'the last fit'}"

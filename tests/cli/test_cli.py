@@ -577,6 +577,16 @@ def test_the_report_of_a_validation_has_the_record_by_hand_and_whose_values_they
     assert "--against compares fits, and this is a validation" in against.err
 
 
+def test_a_model_as_found_is_validated_before_any_fit(run):
+    ran = run("validate", case_file(), "--as-found", "--no-plots")
+    assert ran.code == 3  # so far off is the start
+    assert ran.out.startswith("the model as found, before any fit\nnot accepted: ")
+    assert "\nvalidated: record (up.csv), down-step (" in ran.out
+    refused = run("validate", "case.yaml", "--as-found", "--parameters", "values.yaml")
+    assert (refused.code, refused.out) == (1, "")
+    assert "--as-found and --parameters: only one" in refused.err
+
+
 def test_a_step_that_is_given_takes_the_place_of_the_one_found(run):
     """Each alone, or both; a wrong one is not accepted."""
     other = other_record(2.0 - TRUTH)

@@ -1,11 +1,13 @@
 """The report of a planner's model as it is beside recorded events: nothing was fitted."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from grid_events import FIXED, TRUTH, event_case, recorded
 from pages import Page
 
+from exfit.case.load import load_case
 from exfit.errors import ExfitError
 from exfit.output.report import write_report
 from exfit.output.run_folder import write_validation
@@ -85,6 +87,23 @@ def test_the_model_as_found_is_shown_where_it_is_another_one(page, folder, resul
     same = Page(write_report(tmp_path).read_text(encoding="utf-8"))
     assert "as-found" in page.ids
     assert "as-found" not in same.ids
+
+
+def test_the_model_as_found_is_validated_on_what_its_case_would_fit(folder):
+    """Of a case for a fit, which has not been made: the unit of the planner's base, as it is."""
+    found = {"source": "unit3.dyr", "parameters": TRUTH}
+    case = event_case(folder.parent, "trip", validate=["night"], as_found=found)
+    result = validation_result(case, None)
+    assert [(match.name, match.validation) for match in result.matches] == [
+        ("record", True), ("night", True)
+    ]  # fmt: skip
+    assert result.values.items() >= TRUTH.items()
+    assert result.origin == "the model as found, before any fit"
+    assert "fitted" not in result.sources.values()
+    assert [test.role for test in result.tests] == ["validation"] * 2
+    start = validation_result(replace(load_case(case), as_found=None), None)
+    errors = [[match.channels["q"].rmse for match in each.matches] for each in (result, start)]
+    assert 2.0 * max(errors[0]) < min(errors[1])  # seeded: 3 times; noise of vt leaves 5e-4 pu
 
 
 def test_the_file_of_a_validation_holds_all_of_it(result):

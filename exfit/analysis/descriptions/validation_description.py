@@ -16,27 +16,24 @@ from exfit.analysis.descriptions.case_description import (
 )
 from exfit.analysis.other_values import as_found_of
 from exfit.analysis.validation import Validation
-from exfit.case.case import Case
 from exfit.results.description import RecordedTest
 from exfit.results.validation_result import ValidationResult
 from exfit.util.sources import NOT_STATED
 
-Values = Mapping[str, float]
-
 OF_CASE, GIVEN = "values of the case, in which nothing is free", "given values"
+AS_FOUND = "the model as found, before any fit"
 
 
 def validation_result(
     validation: Validation,
-    values: Values,
     versions: Mapping[str, str],
     sources: Mapping[str, str] = MappingProxyType({}),
 ) -> ValidationResult:
     """Return a validation with all that a report shows of it.
 
-    ``values`` are all of them, ``sources`` where those come from that were given beside the case.
+    ``sources`` says where those values come from that were given beside the case.
     """
-    case, tests = validation.case, validation.tests
+    case, values, tests = validation
     setups = [test.setup for test in tests]
     own = [(test.setup, test.values) for test in tests]
     return ValidationResult(
@@ -44,9 +41,9 @@ def validation_result(
         about=case.about,
         model=case.subject,
         saturation=case.saturation,
-        origin=GIVEN if case.free() else OF_CASE,
+        origin=GIVEN if validation.fitted else AS_FOUND if case.free() else OF_CASE,
         values={name: values[name] for name in case.values()},
-        sources=_sources(case, values, sources),
+        sources=_sources(validation, sources),
         ties={name: tie.text for name, tie in case.ties.by_name.items()},
         matches=tuple(validation.comparisons),
         versions=versions,
@@ -61,9 +58,10 @@ def validation_result(
     )
 
 
-def _sources(case: Case, values: Values, sources: Mapping[str, str]) -> dict[str, str]:
+def _sources(validation: Validation, sources: Mapping[str, str]) -> dict[str, str]:
     """Return where every value comes from: what differs from the case is by who gave it."""
-    of_case, free = case.values(), case.free()
+    case, values, _ = validation
+    of_case, free = case.values(), case.free() if validation.fitted else ()
     changed = [name for name in of_case if name not in free and values[name] != of_case[name]]
     given = {name: word for name, word in sources.items() if name in of_case}
     others = [name for name in changed if name not in case.ties.by_name]
