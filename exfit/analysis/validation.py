@@ -88,8 +88,7 @@ def validate(
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
-    saw = () if values is None or not case.free() else case.recordings
-    case, own = _with_values(case, values)
+    case, own, saw = _with_values(case, values)
     fitted = tuple(_fitted(case, recording, own) for recording in saw)
     matches = [test.comparison for test in fitted]
     if record is not None:
@@ -105,11 +104,17 @@ def validate(
     return Validation(case, own, (*fitted, *validated))
 
 
-def _with_values(case: Case, values: ValuesOrResult | None) -> tuple[Case, Values]:
-    """Return the case whose model the values are of, and all values: None is the model as found."""
+def _with_values(
+    case: Case, values: ValuesOrResult | None
+) -> tuple[Case, Values, tuple[Recording, ...]]:
+    """Return the case whose model the values are of, all values, and what a fit saw of its records.
+
+    Without values it is the model as found.
+    """
     if values is None:
-        return model_as_found(case)
-    return case, values_of(case, changes_of(case, values))
+        return (*model_as_found(case), ())
+    saw = case.recordings if case.free() else ()
+    return case, values_of(case, changes_of(case, values)), saw
 
 
 def _numbers(given: float | Sequence[float]) -> tuple[float, ...]:

@@ -24,6 +24,7 @@ from exfit.errors import CaseError, ExfitError
 
 if TYPE_CHECKING:
     from exfit.case.case import Case
+    from exfit.results.validation_result import ValidationResult
 
 
 OTHER_VALUES = "--parameters FILE, or --as-found for the model before any fit"
@@ -122,7 +123,6 @@ def validate(
     from exfit import workflows
     from exfit.fitting.overrides import read_parameters, sources_in
     from exfit.output import run_folder
-    from exfit.util.typed import plain
 
     if as_found and parameters is not None:
         raise ExfitError("--as-found and --parameters: only one of them says whose values they are")
@@ -130,31 +130,17 @@ def validate(
     folder = output.folder_of(loaded, "validate")
     if record is not None:
         run_folder.refuse_inputs("validate", [record], folder, [record.stem])
-    values = None if as_found else {} if source is None else read_parameters(loaded, source)
-    sources = {} if source is None else sources_in(source)
-    result = workflows.validation_result(loaded, values, record, steps, instants, sources)
-    result = replace(
-        result,
-        origin=result.origin if source is None else f"values of {parameters or 'the last fit'}",
-        options=(
-            *(("--as-found",) if as_found else ()),
-            *_options(parameters, record, steps, instants),
-        ),
-        inputs={**result.inputs, **_hash_of(source)},
-        files={**result.files, "parameters": "" if source is None else source.name},
-    )
-    comparisons = result.matches
+    by_hand = (record, steps, instants)
+    if source is None:
+        result = workflows.validation_result(loaded, None if as_found else {}, *by_hand)
+    else:
+        values, sources = read_parameters(loaded, source), sources_in(source)
+        result = workflows.validation_result(loaded, values, *by_hand, sources)
+        result = _of_file(result, source, parameters)
+    options = (*(["--as-found"] if as_found else []), *_options(parameters, *by_hand))
+    result = replace(result, options=options)
     figures = run_folder.write_validation(result, folder)
-    if output.as_json:
-        print_json({"validation": [plain(comparison) for comparison in comparisons]})
-    elif output.shown:
-        from exfit.output import terminal
-
-        console = terminal.console()
-        console.print(result.origin, soft_wrap=True, markup=False)
-        terminal.validation(console, comparisons)
-        console.print()
-        terminal.written(console, folder)
+    _show(result, folder, output)
     output.draw(figures)
     if not result.accepted:
         raise SystemExit(NOT_CONVERGED)
@@ -179,11 +165,34 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
     return case, source
 
 
-def _hash_of(parameters: Path | None) -> dict[str, str]:
-    """Return the hash of the file whose values are validated, by its label."""
+def _of_file(
+    result: "ValidationResult", source: Path, parameters: Path | None
+) -> "ValidationResult":
+    """Return a validation that says which file its values are from: as given, or the last fit's."""
     from exfit.records.reading import file_hash
 
-    return {} if parameters is None else {"parameters": file_hash(parameters)}
+    return replace(
+        result,
+        origin=f"values of {parameters or 'the last fit'}",
+        inputs={**result.inputs, "parameters": file_hash(source)},
+        files={**result.files, "parameters": source.name},
+    )
+
+
+def _show(result: "ValidationResult", folder: Path, output: Output) -> None:
+    """Print a validation, as JSON or as tables."""
+    from exfit.util.typed import plain
+
+    if output.as_json:
+        print_json({"validation": [plain(match) for match in result.matches]})
+    elif output.shown:
+        from exfit.output import terminal
+
+        console = terminal.console()
+        console.print(result.origin, soft_wrap=True, markup=False)
+        terminal.validation(console, result.matches)
+        console.print()
+        terminal.written(console, folder)
 
 
 def _options(
