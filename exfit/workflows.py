@@ -1,6 +1,5 @@
 """What can be done with a case: the functions behind the commands and behind ``import exfit``."""
 
-import time as clock
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -11,41 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit import estimate
-from exfit.analysis.case_search import SearchTask, search_outcome, with_lines
-from exfit.analysis.descriptions.case_description import (
-    criteria_of,
-    fixed_values,
-    identified_values,
-    input_hashes,
-    input_names,
-    parts_of,
-    tests_of,
-    text_of,
-    values_by_part,
-)
 from exfit.analysis.diagnostics import rest_notes, simulation_notes
-from exfit.analysis.given_values import ValuesOrResult, changes_of, given_values, with_values
+from exfit.analysis.fit_run import FitRequest, fit_result
+from exfit.analysis.given_values import ValuesOrResult, changes_of, with_values
 from exfit.analysis.iteration_responses import (
     LiveResponse,
-    live_response,
 )
-from exfit.analysis.minima import minima_notes, minima_of
-from exfit.analysis.solution import (
-    analysed,
-    comparisons_of,
-    evidence_of,
-    fit_notes,
-    fitted_parameters,
-    iteration_of,
-)
-from exfit.analysis.verdict import verdict_of
 from exfit.case import load
 from exfit.case.case import Case
+from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment, plain_simulator
+from exfit.fitting.external import external_simulator, program_of, refuse_external, simulated_by
 from exfit.fitting.recordings import read_section
-from exfit.fitting.search import checked_strategy, fitted, search_options
+from exfit.fitting.search import checked_strategy, search_options
 from exfit.fitting.setup import with_enough_substeps
-from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.fitting.system import values_of
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
@@ -98,98 +76,12 @@ def fit(
         >>> result = exfit.fit("case.yaml", progress=lambda iteration: print(iteration.cost))
         >>> result.parameters["KA"].value
     """
-    began = clock.perf_counter()
     case = with_values(loaded(case, values), values)
     method = checked_strategy(strategy or case.estimate.strategy)
     options = search_options(case, search)
-    start = case.values()
-    setups, problem = fitted(case)
-    counter = SimulationCounter()
-    unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
-    used = [*setups, *unseen]
-    # before the search: whoever edits the case meanwhile changes nothing of this fit
-    hashes, case_text = input_hashes(case, used), text_of(case)
-    task = SearchTask(case, setups, unseen, method, options, counter)
-    task, problem, line_notes = with_lines(task, problem, search_progress)
-    residuals = problem.residuals
-
-    def announce(line: estimate.SolverIteration) -> None:
-        response = None if live is None else live_response(task.setups[0], residuals, line.x)
-        if live is not None and response is not None:
-            live(response)
-        progress(iteration_of(line, residuals))
-
-    outcome = search_outcome(task, problem, announce, search_progress)
-    problem, setups, unseen, found, determined = outcome
-    residuals = problem.residuals
-    best = found.best
-    history = [iteration_of(line, residuals) for line in found.history]
-    values = residuals.values(best.x)
-    fine = [setup.with_enough_substeps(values) for setup in setups]
-    comparisons = comparisons_of(fine, residuals, values, history)
-    analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
-    minima = minima_of(residuals, found, analysis.uncertainty)
-    interrupted = analysis.interrupted or found.interrupted
-    evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted)
-    own_values = values_by_part(case, values)
-    models = {part.kind: part.name for part in case.parts.all}
-    parameters = fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why)
-    identified = identified_values(parameters, analysis.validation)
-    return FitResult(
-        case=case.path,
-        about=case.about,
-        model=case.subject,
-        strategy=method,
-        saturation=case.saturation,
-        parameters=parameters,
-        ties={name: tie.text for name, tie in case.ties.by_name.items()},
-        fixed=fixed_values(case, values),
-        machine=own_values.get("machine", {}),
-        machine_model=models.get("machine"),
-        network=own_values.get("network", {}),
-        network_model=models.get("network"),
-        stabiliser=own_values.get("stabiliser", {}),
-        stabiliser_model=models.get("stabiliser"),
-        governor=own_values.get("governor", {}),
-        governor_model=models.get("governor"),
-        cost=best.cost,
-        comparisons=comparisons,
-        knowledge=analysis.uncertainty,
-        minima=minima,
-        status=best.status,
-        message=best.message,
-        success=best.success,
-        interrupted=interrupted,
-        phase_ends=analysis.phase_ends,
-        history=tuple(history),
-        nfev=best.nfev,
-        njev=best.njev,
-        simulations=counter.simulations,
-        substeps=counter.substeps,
-        seconds=clock.perf_counter() - began,
-        notes=(
-            *found.notes,
-            *line_notes,
-            *minima_notes(residuals, found, minima, analysis.uncertainty),
-            *fit_notes(case, residuals, best, setups, comparisons, analysis),
-        ),
-        validation=analysis.validation,
-        versions=versions(),
-        inputs=hashes,
-        verdict=verdict_of(evidence),
-        given_values=given_values(case),
-        typical_values=analysis.typical_values,
-        windows=analysis.windows,
-        sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
-        strategy_given=method != case.estimate.strategy,
-        parts=tuple(parts_of(case)),
-        tests=tuple(tests_of(case, used, identified)),
-        behaviour=analysis.behaviour,
-        files=input_names(case, used),
-        case_text=case_text,
-        as_found=analysis.as_found,
-        criteria=criteria_of(case),
-    )
+    with program_of(case) as program:
+        request = FitRequest(case, method, options, progress, search_progress, live)
+        return fit_result(request, program)
 
 
 def load_case(path: str | PathLike[str]) -> Case:
@@ -269,9 +161,18 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
         >>> exfit.simulate("case.yaml", {"KA": 400.0}).response.signals["vt"]
     """
     case = loaded(case, values)
-    values = values_of(case, changes_of(case, values))
+    with program_of(case) as program:
+        return _simulated(case, values_of(case, changes_of(case, values)), program)
+
+
+def _simulated(
+    case: Case, values: Mapping[str, float], program: ExternalProgram | None
+) -> SimulationResult:
+    """Return a response of a case to values, simulated by a program where one is given."""
     if case.recordings:
         setup = build_experiment(case, case.recordings[0], values).with_enough_substeps(values)
+        if program is not None:
+            (setup,) = simulated_by(program, case, [setup])
         response = setup.response(values)
         comparison = compare_with_record(setup, "record", values) if setup.channels else None
         notes = [] if comparison is None else rest_notes(setup, comparison)
@@ -282,6 +183,8 @@ def simulate(case: CaseOrPath, values: ValuesOrResult | None = None) -> Simulati
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     simulator = with_enough_substeps(simulator, at, case.path)
+    if program is not None:
+        simulator = external_simulator(program, case, simulator)
     response = simulator.response(at)
     notes = simulation_notes(case, simulator, at, response)
     return SimulationResult(response, None, tuple(notes))
@@ -363,7 +266,9 @@ def profile(
     from exfit.analysis import profiles
 
     names = [names] if isinstance(names, str) else names
-    return profiles.profile(loaded(case), names, progress)
+    case = loaded(case)
+    refuse_external(case, "profile")
+    return profiles.profile(case, names, progress)
 
 
 def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Design":

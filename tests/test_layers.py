@@ -19,6 +19,7 @@ MAY_IMPORT = {
     "estimate": set(),
     "inference": set(),
     "engine": set(),
+    "external": set(),
     "models": {"engine"},
     "plants": {"models", "engine", "signals"},
     "simulation": {"plants", "models", "engine"},
@@ -26,7 +27,7 @@ MAY_IMPORT = {
     "case": {"models", "plants", "records", "signals"},
     "fitting": {
         "case", "simulation", "plants", "models", "engine", "records", "dsp", "estimate",
-        "inference", "signals",
+        "inference", "signals", "external",
     },
     "results": {"fitting", "simulation", "dsp", "signals", "inference"},
 }  # fmt: skip

@@ -17,6 +17,7 @@ from exfit.fitting.driving_noise.weighing import (
     why_not_weighed,
     with_minima_of,
 )
+from exfit.fitting.external import settled, with_setups
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
@@ -61,6 +62,10 @@ def search_outcome(
     options, counter = task.options, task.counter
     problem, found = weighed_search(task, problem, announce, progress)
     setups, unseen = as_fitted(task.setups, problem), task.unseen
+    if task.case.external is not None:
+        values = problem.residuals.values(found.best.x)
+        setups, unseen = settled(setups, values), settled(unseen, values)
+        problem = with_setups(problem, setups)
     if options.weights == "balanced":
         unseen = weighted_alike(unseen, problem.residuals)
     profiled = options.search != "local"
@@ -138,7 +143,8 @@ def _weighted_search(
     task: SearchTask, problem: FitProblem, announce: Announce, progress: Watch
 ) -> tuple[FitProblem, SearchResult]:
     def search_of(problem: FitProblem) -> SearchResult:
-        doubt = doubt_of(task.case, problem, task.setups, task.unseen)
+        external = task.case.external is not None  # whose runs are too dear to judge its ends
+        doubt = None if external else doubt_of(task.case, problem, task.setups, task.unseen)
         return search(
             task.case, problem, task.method, announce, progress, task.counter, task.options, doubt
         )

@@ -22,6 +22,7 @@ from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
+from exfit.fitting.external import refuse_external
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
 from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
@@ -85,6 +86,7 @@ def validate(
     the others. Raises ExfitError where input cannot be used, or where there is nothing to validate
     on.
     """
+    refuse_external(case, "validate")
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])

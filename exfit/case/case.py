@@ -15,11 +15,12 @@ from exfit.case.schema import (
     AsFoundSection,
     BumpTest,
     Estimate,
+    ExternalPlant,
     FreeSection,
     Governor,
     Limit,
+    NativePlant,
     Parameters,
-    Plant,
     RecordFile,
     Recording,
     ReportRequest,
@@ -59,7 +60,8 @@ class Case:
     ``given_records`` holds, by name, the records that were given as arrays instead of files,
     ``given_values`` the values of parameters that were given in place of those of the sections,
     ``given_sources`` where values that were given beside the case come from, ``given_std_errors``
-    their standard errors.
+    their standard errors. ``external`` is the section of another program that simulates the
+    unit: ``plant`` is its twin then, and the search local unless the case says otherwise.
     """
 
     path: Path
@@ -68,7 +70,7 @@ class Case:
     model: str | None
     saturation: SaturationName
     efd_times_speed: bool
-    plant: Plant
+    plant: NativePlant
     stabiliser: Stabiliser | None
     governor: Governor | None
     test: BumpTest | None
@@ -83,6 +85,7 @@ class Case:
     report: ReportRequest
     parts: Parts
     ties: Ties
+    external: ExternalPlant | None = None
     given_records: Mapping[str, Record] = field(default_factory=dict)
     given_values: Mapping[str, GivenValue] = field(default_factory=dict)
     given_sources: Mapping[str, str] = field(default_factory=dict)
@@ -98,6 +101,11 @@ class Case:
         """Return the case of checked content that is, or would be, in the file ``path``."""
         sections: dict[str, Any] = dict(checked.document)
         del sections["programme"]  # of one that is a programme there is a case for each fit
+        external = sections["plant"]
+        if isinstance(external, ExternalPlant):
+            sections |= {"plant": external.plant, "external": external}
+            if "search" not in checked.document.estimate.model_fields_set:
+                sections["estimate"] = sections["estimate"].model_copy(update={"search": "local"})
         return cls(
             path=path, from_file=from_file, parts=checked.parts, ties=checked.ties, **sections
         )

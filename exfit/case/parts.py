@@ -34,6 +34,7 @@ Contradictions = Iterator[tuple[str, str]]
 
 # in place of a kind that does not exist, which is a fault of its own
 ANY_PLANT = replace(OPEN_CIRCUIT, events=EVENTS, signals=RECORDED)
+EXTERNAL = "external"  # the type of a plant that another program simulates
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 
@@ -110,8 +111,12 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
 
 
 def kind_of(plant: Data) -> PlantKind:
-    """Return the kind of a plant section; one that allows everything where there is none."""
-    return KINDS.get(str(plant.get("type")), ANY_PLANT)
+    """Return the kind of a plant section; one that allows everything where there is none.
+
+    That of a plant that another program simulates is the kind of its twin.
+    """
+    key = "twin" if plant.get("type") == EXTERNAL else "type"
+    return KINDS.get(str(plant.get(key)), ANY_PLANT)
 
 
 def in_plant(parts: Parts, kind: PlantKind, given: Data) -> Parts:

@@ -32,8 +32,20 @@ def files_in(content: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
     model = content.get("model")
     named = [model] if isinstance(model, str) and model.endswith(".py") else []
     named += [file for key in NAMING_FILES for file in _files(content.get(key))]
+    named += [word for word in command_of(content) if _is_own_file(folder, word)]
     files = [part for name in named for part in _parts(folder / name)]
     return tuple(dict.fromkeys(files))
+
+
+def command_of(content: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the command by which another program simulates a case, () where none does."""
+    plant = content.get("plant")
+    command = plant.get("command") if isinstance(plant, Mapping) else None
+    return (
+        tuple(word for word in command if isinstance(word, str))
+        if isinstance(command, list)
+        else ()
+    )
 
 
 def free_of(case: Path) -> tuple[str, ...]:
@@ -89,6 +101,11 @@ def _files(content: Any) -> Iterator[str]:
     if isinstance(content, list):
         for entry in content:
             yield from _files(entry)
+
+
+def _is_own_file(folder: Path, word: str) -> bool:
+    """Return whether a word of a command is a file beside the case, such as a script."""
+    return not Path(word).is_absolute() and (folder / word).is_file()
 
 
 def _parts(file: Path) -> Iterator[Path]:

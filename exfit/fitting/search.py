@@ -13,8 +13,17 @@ from exfit import estimate
 from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.errors import CaseError, SimulationError
+from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
+from exfit.fitting.external import (
+    PROGRAM_STEP,
+    PROGRAM_TOLERANCE,
+    descent_by_twin,
+    is_external,
+    simulated_by,
+    start_tried,
+)
 from exfit.fitting.global_search import (
     FurtherDescents,
     SearchResult,
@@ -46,14 +55,21 @@ CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
 
 
-def fitted(case: Case) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
+def fitted(
+    case: Case, program: ExternalProgram | None = None
+) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
     """Return the tests of a case with the records that it is fitted to, and what is made small.
 
-    Raises ExfitError where there is none, or one that cannot be fitted.
+    They are simulated by a ``program`` where one is given. Raises ExfitError where there is none,
+    or one that cannot be fitted.
     """
     start = case.values()
     setups = tuple(setup.with_enough_substeps(start) for setup in build_experiments(case, start))
+    if program is not None:
+        setups = simulated_by(program, case, setups)
     problem = problem_of(residuals_of(case, setups, start))
+    if program is not None:
+        start_tried(case, problem.residuals, program)
     refuse_unfit(case, problem)
     return setups, problem
 
@@ -84,6 +100,9 @@ def search_options(case: Case, search: str | None) -> Estimate:
     """
     if search is None:
         return case.estimate
+    if case.external is not None and search != "local":
+        text = "not allowed with plant external, whose runs take long; must be local"
+        raise CaseError([f"{case.path}: search: {search}: {text}"])
     return case.estimate.model_copy(update={"search": checked_search(search)})
 
 
@@ -146,9 +165,17 @@ class CaseSearches:
 
     def one(self, method: str, announce: Announce) -> estimate.Result:
         """Return the end of a descent from the start of the case."""
-        options, jacobian = self.options, JACOBIANS[self.options.jacobian](self.residuals)
+        if self.options.jacobian == "exact" and is_external(self.residuals):
+            by_twin = partial(self._descent, method)
+            return descent_by_twin(self.residuals, by_twin, announce)
+        jacobian = JACOBIANS[self.options.jacobian](self.residuals)
+        descent = self._descent(method, estimate.OneByOne(self.residuals, jacobian))
+        return descent.run(self.residuals.start, announce)
+
+    def _descent(self, method: str, functions: estimate.Functions) -> estimate.Descent:
+        options = self.options
         descent = estimate.Descent(
-            functions=estimate.OneByOne(self.residuals, jacobian),
+            functions=functions,
             method=method,
             max_iterations=options.most_iterations,
             jacobian_error=jacobian_error(options.jacobian, options.difference_step),
@@ -156,7 +183,10 @@ class CaseSearches:
             searches=searches_of(options),
             **self._limits,
         )
-        return descent.run(self.residuals.start, announce)
+        if not is_external(self.residuals):
+            return descent
+        xtol = max(descent.xtol, PROGRAM_STEP)
+        return replace(descent, ftol=PROGRAM_TOLERANCE, xtol=xtol)
 
     def refined(self, end: estimate.Result, announce: Announce) -> estimate.Result:
         """Return the descent from an end with the full tolerances of the case."""

@@ -14,6 +14,7 @@ from threading import Thread
 from typing import Any, NamedTuple
 
 from exfit.fleet.plan import PlannedCase
+from exfit.util.ended_processes import ending, last_lines
 from exfit.util.interrupts import ENDING
 from exfit.util.threads import THREADS
 
@@ -24,10 +25,7 @@ PROGRAM = (
 )
 ONE_THREAD = (THREADS, "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 NO_PLUGINS = {"PYDANTIC_DISABLE_PLUGINS": "__all__"}  # else all packages are searched for some
-LINES_OF_ERRORS = 3  # of a worker that has died, in the reason for it
 TO_END = 5.0  # s: for a process without its pipe, and for the thread that listens to it
-HIGHEST_CODE = 255  # with which a program ends by itself
-MOST_ERRORS = 10_000  # bytes of them that are looked at
 
 
 class Answer(NamedTuple):
@@ -97,36 +95,15 @@ class WorkerProcess:
             self._process.kill()
             code = self._process.wait()
         self._listener.join(TO_END)
-        reason = ": ".join(filter(None, (_ending(code), self._last_errors())))
+        reason = ": ".join(
+            filter(
+                None, (ending(code, "the worker"), last_lines(self._errors, self._errors_before))
+            )
+        )
         for file in (self._tasks, self._answers, self._errors):
             with suppress(OSError):  # what could not be sent
                 file.close()
         return reason
-
-    def _last_errors(self) -> str:
-        """Return the last lines that were written about errors during the last case."""
-        end = self._errors.seek(0, os.SEEK_END)
-        self._errors.seek(max(self._errors_before, end - MOST_ERRORS))
-        lines = self._errors.read().decode(errors="replace").splitlines()
-        return " | ".join([line.strip() for line in lines if line.strip()][-LINES_OF_ERRORS:])
-
-
-def _ending(code: int) -> str:
-    """Return how a process of this exit code ended."""
-    if code < 0:
-        return f"the worker was ended by {_signal_name(-code)}"
-    if code > HIGHEST_CODE:  # an exception of Windows
-        return f"the worker was ended by {code:#x}"
-    return f"the worker ended with exit code {code}"
-
-
-def _signal_name(number: int) -> str:
-    """Return the name of a signal, with what is likely behind it."""
-    try:
-        name = signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
-    return f"{name}, for want of memory or by hand" if name == "SIGKILL" else name
 
 
 @contextmanager

@@ -67,6 +67,8 @@ class Simulator:
     at ``times - delay``: before the start, where all is at rest, and after the end that there.
     """
 
+    alone = True  # its signals are those of its system, which may be simulated in other ways
+
     def __init__(
         self,
         system: System,

@@ -105,6 +105,22 @@ def test_code_is_run_where_it_is_trusted_and_part_of_the_key(tmp_path, record):
     assert planned_case(case, tmp_path, trusting).task.key != first.key
 
 
+def test_a_command_is_run_where_it_is_trusted_and_its_script_is_part_of_the_key(tmp_path, record):
+    script = tmp_path / "simulator.py"
+    script.write_text("")
+    plant = {"type": "external", "twin": "open-circuit", "command": ["python", "simulator.py"]}
+    case = case_file(tmp_path / "a.yaml", record, plant=plant)
+    refused = planned_case(case, tmp_path, SETTINGS)
+    assert refused.task is None
+    assert "command python" in refused.entry.reason
+    assert "--trust" in refused.entry.reason
+    trusting = BatchSettings(trust=True)
+    first = planned_case(case, tmp_path, trusting).task
+    assert script in first.files
+    script.write_text("# other")
+    assert planned_case(case, tmp_path, trusting).task.key != first.key
+
+
 def test_a_case_that_cannot_be_read_is_a_row(tmp_path):
     planned = planned_case(tmp_path / "gone.yaml", tmp_path, SETTINGS)
     assert (planned.task, planned.entry.status) == (None, "refused")

@@ -6,6 +6,7 @@ from typing import Any
 from exfit.case.checks.as_found import as_found_faults
 from exfit.case.checks.breaker import breaker_faults, driving_signals
 from exfit.case.checks.bump_test import bump_test_faults, missing_without_record
+from exfit.case.checks.external import external_faults
 from exfit.case.checks.model import parameter_faults
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
@@ -59,6 +60,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     yield from governor_faults(content, parts, kind)
     yield from source_faults(content, parts, kind)
     yield from plants_of_records_faults(content, kind)
+    yield from external_faults(content, parts)
     yield from _missing_test_faults(content, kind)
     if "records" not in content:
         yield from _recording_faults(content, content, kind)

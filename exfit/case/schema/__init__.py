@@ -13,8 +13,10 @@ from exfit.case.schema.phasors import (
     VoltagePhasor,
 )
 from exfit.case.schema.plants import (
+    ExternalPlant,
     Governor,
     InfiniteBus,
+    NativePlant,
     OpenCircuit,
     Plant,
     SaturationName,
@@ -59,6 +61,7 @@ __all__ = [
     "CurrentPhasor",
     "CurveColumn",
     "Estimate",
+    "ExternalPlant",
     "Filter",
     "FindableStep",
     "FreeSection",
@@ -66,6 +69,7 @@ __all__ = [
     "InfiniteBus",
     "Limit",
     "MedianSection",
+    "NativePlant",
     "OpenCircuit",
     "Parameters",
     "PhasesSection",

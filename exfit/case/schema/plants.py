@@ -8,10 +8,12 @@ from pydantic import Field
 from exfit.case.schema.values import (
     STATED,
     STD_ERRORS,
+    Count,
     FreeSection,
     Frozen,
     Given,
     Number,
+    Positive,
     Section,
     Sources,
     StdErrors,
@@ -165,9 +167,51 @@ class NoPlant(PlantSection):
     type: Literal["none"] = Field(description="Kind of plant.")
 
 
-Plant = (
+class ExternalPlant(PlantSection):
+    """A unit that another program simulates; its twin, a plant of exfit, has all else.
+
+    The keys of the twin stand beside those of the program.
+    """
+
+    type: Literal["external"] = Field(description="Kind of plant.")
+    command: tuple[Text, ...] = Field(
+        min_length=1,
+        description="The program with its arguments; it runs in the folder of the case.",
+    )
+    twin: Literal["open-circuit", "infinite-bus"] = Field(
+        description="The plant of exfit that gives the exact derivatives."
+    )
+    parallel: Count = Field(default=1, description="How many processes of it run side by side.")
+    time_limit: Positive = Field(default=60.0, description="For each run, s.")
+    names: Frozen[Text] = Field(
+        default_factory=nothing,
+        description="Names of parameters in the program, where they are others, such as KA: K_A.",
+    )
+    machine: Text = MACHINE
+    parameters: Frozen[Given] = MACHINE_DATA
+    free: Frozen[FreeSection] = MACHINE_FREE
+    network: Frozen[Number] = Field(
+        default_factory=nothing, description="As that of the twin infinite-bus."
+    )
+    swing: Swing = Field(default="power", description=SWING)
+    sources: Sources = STATED
+    std_errors: StdErrors = STD_ERRORS
+
+    @property
+    def plant(self) -> "OpenCircuit | InfiniteBus":
+        """The twin as a plant of its own."""
+        shared = ("machine", "parameters", "free", "sources", "std_errors")
+        sections = {key: getattr(self, key) for key in shared}
+        if self.twin == "open-circuit":
+            return OpenCircuit.model_construct(type=self.twin, **sections)
+        network, swing = self.network, self.swing
+        return InfiniteBus.model_construct(type=self.twin, **sections, network=network, swing=swing)
+
+
+NativePlant = (
     OpenCircuit | InfiniteBus | GridPlayback | Playback | MachinePlayback | MachineOnLoad | NoPlant
 )
+Plant = NativePlant | ExternalPlant
 SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 

@@ -75,8 +75,8 @@ def compressed(residuals: Residuals) -> Residuals:
 
     The Gauss-Newton matrix J'J is the same as well, so each method goes the same way. They are the
     same residuals where compression would not save much, or where it does not hold: with filters,
-    with a robust loss or periodic disturbances, and where the instants at which a record is read,
-    or its scale, are found.
+    with a robust loss or periodic disturbances, where another program simulates, and where the
+    instants at which a record is read, or its scale, are found.
 
     Source: Golub & Van Loan 2013, section 5.3 (the least-squares problem of a factor R is that of
     all rows).
@@ -94,7 +94,8 @@ def _compressed_experiment(whole: Experiment) -> Experiment:
     simulator = whole.simulator.on_grid()
     changing = any(nuisance.kind in CHANGING_SAMPLES for nuisance in whole.nuisances)
     plain = all(channel.plain for channel in whole.channels)
-    possible = plain and not (changing or whole.sines or whole.whitening)
+    added = whole.sines or whole.whitening or not whole.simulator.alone
+    possible = plain and not (changing or added)
     errors_on_grid = NEIGHBOURS * len(simulator.times) * len(whole.channels)
     if not possible or LEAST_GAIN * errors_on_grid >= sum(whole.sizes):
         return whole

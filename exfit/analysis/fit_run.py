@@ -1,0 +1,151 @@
+"""A fit from its case to its result: what `exfit.fit` and the command do."""
+
+import time as clock
+from collections.abc import Callable
+from typing import NamedTuple
+
+from exfit import estimate
+from exfit.analysis.case_search import SearchTask, search_outcome, with_lines
+from exfit.analysis.descriptions.case_description import (
+    criteria_of,
+    fixed_values,
+    identified_values,
+    input_hashes,
+    input_names,
+    parts_of,
+    tests_of,
+    text_of,
+    values_by_part,
+)
+from exfit.analysis.given_values import given_values
+from exfit.analysis.iteration_responses import (
+    LiveResponse,
+    live_response,
+)
+from exfit.analysis.minima import minima_notes, minima_of
+from exfit.analysis.solution import (
+    analysed,
+    comparisons_of,
+    evidence_of,
+    fit_notes,
+    fitted_parameters,
+    iteration_of,
+)
+from exfit.analysis.verdict import verdict_of
+from exfit.case.case import Case
+from exfit.case.schema import Estimate
+from exfit.external.program import ExternalProgram
+from exfit.fitting.build import build_experiment
+from exfit.fitting.external import program_notes, simulated_by
+from exfit.fitting.search import fitted
+from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.results.model import FitResult, Iteration
+from exfit.util.versions import versions
+
+
+class FitRequest(NamedTuple):
+    """What is fitted, how, and what is called meanwhile; see `exfit.fit`."""
+
+    case: Case
+    method: str
+    options: Estimate
+    progress: Callable[[Iteration], None]
+    search_progress: Callable[[estimate.Progress], None]
+    live: Callable[[LiveResponse], None] | None
+
+
+def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResult:
+    """Return the result of a fit, simulated by a program where one is given."""
+    began = clock.perf_counter()
+    case, method, options, progress, search_progress, live = request
+    start = case.values()
+    setups, problem = fitted(case, program)
+    counter = SimulationCounter()
+    unseen = tuple(build_experiment(case, recording, start) for recording in case.validations)
+    if program is not None:
+        unseen = simulated_by(program, case, unseen)
+    used = [*setups, *unseen]
+    # before the search: whoever edits the case meanwhile changes nothing of this fit
+    hashes, case_text = input_hashes(case, used), text_of(case)
+    task = SearchTask(case, setups, unseen, method, options, counter)
+    task, problem, line_notes = with_lines(task, problem, search_progress)
+    residuals = problem.residuals
+
+    def announce(line: estimate.SolverIteration) -> None:
+        response = None if live is None else live_response(task.setups[0], residuals, line.x)
+        if live is not None and response is not None:
+            live(response)
+        progress(iteration_of(line, residuals))
+
+    outcome = search_outcome(task, problem, announce, search_progress)
+    problem, setups, unseen, found, determined = outcome
+    residuals = problem.residuals
+    best = found.best
+    history = [iteration_of(line, residuals) for line in found.history]
+    values = residuals.values(best.x)
+    fine = [setup.with_enough_substeps(values) for setup in setups]
+    comparisons = comparisons_of(fine, residuals, values, history)
+    analysis = analysed(case, problem, best, determined, fine, comparisons, unseen, history)
+    minima = minima_of(residuals, found, analysis.uncertainty)
+    interrupted = analysis.interrupted or found.interrupted
+    evidence = evidence_of(case, residuals, best, fine, comparisons, analysis, interrupted)
+    own_values = values_by_part(case, values)
+    models = {part.kind: part.name for part in case.parts.all}
+    parameters = fitted_parameters(case, residuals, values, analysis.uncertainty, analysis.why)
+    identified = identified_values(parameters, analysis.validation)
+    return FitResult(
+        case=case.path,
+        about=case.about,
+        model=case.subject,
+        strategy=method,
+        saturation=case.saturation,
+        parameters=parameters,
+        ties={name: tie.text for name, tie in case.ties.by_name.items()},
+        fixed=fixed_values(case, values),
+        machine=own_values.get("machine", {}),
+        machine_model=models.get("machine"),
+        network=own_values.get("network", {}),
+        network_model=models.get("network"),
+        stabiliser=own_values.get("stabiliser", {}),
+        stabiliser_model=models.get("stabiliser"),
+        governor=own_values.get("governor", {}),
+        governor_model=models.get("governor"),
+        cost=best.cost,
+        comparisons=comparisons,
+        knowledge=analysis.uncertainty,
+        minima=minima,
+        status=best.status,
+        message=best.message,
+        success=best.success,
+        interrupted=interrupted,
+        phase_ends=analysis.phase_ends,
+        history=tuple(history),
+        nfev=best.nfev,
+        njev=best.njev,
+        simulations=counter.simulations if program is None else program.counts.runs,
+        substeps=counter.substeps,
+        seconds=clock.perf_counter() - began,
+        notes=(
+            *found.notes,
+            *line_notes,
+            *minima_notes(residuals, found, minima, analysis.uncertainty),
+            *fit_notes(case, residuals, best, setups, comparisons, analysis),
+            *([] if program is None else program_notes(case, program, [*setups, *unseen])),
+        ),
+        validation=analysis.validation,
+        versions=versions(),
+        inputs=hashes,
+        verdict=verdict_of(evidence),
+        given_values=given_values(case),
+        typical_values=analysis.typical_values,
+        windows=analysis.windows,
+        sources=case.sources(fitted=[parameter.name for parameter in residuals.free]),
+        strategy_given=method != case.estimate.strategy,
+        parts=tuple(parts_of(case)),
+        tests=tuple(tests_of(case, used, identified)),
+        behaviour=analysis.behaviour,
+        files=input_names(case, used),
+        case_text=case_text,
+        as_found=analysis.as_found,
+        criteria=criteria_of(case),
+    )
