@@ -20,7 +20,12 @@ from exfit.case import load
 from exfit.case.case import Case
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment, plain_simulator
-from exfit.fitting.external import external_simulator, program_of, refuse_external, simulated_by
+from exfit.fitting.forms.external import (
+    external_simulator,
+    program_of,
+    refuse_external,
+    simulated_by,
+)
 from exfit.fitting.recordings import read_section
 from exfit.fitting.search import checked_strategy, search_options
 from exfit.fitting.setup import with_enough_substeps

@@ -17,7 +17,7 @@ from exfit.fitting.driving_noise.weighing import (
     why_not_weighed,
     with_minima_of,
 )
-from exfit.fitting.external import settled, with_setups
+from exfit.fitting.forms.external import settled, with_setups
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of

@@ -14,7 +14,7 @@ from exfit.analysis.causes.run_quality import (
     unstable_rest_notes,
     voltage_notes,
 )
-from exfit.analysis.typical_values import typical_values_used
+from exfit.analysis.intervals.typical_values import typical_values_used
 from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
 from exfit.case.schema import BumpTest, ReferenceTable

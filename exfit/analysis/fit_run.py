@@ -36,7 +36,7 @@ from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment
-from exfit.fitting.external import program_notes, simulated_by
+from exfit.fitting.forms.external import program_notes, simulated_by
 from exfit.fitting.search import fitted
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.results.model import FitResult, Iteration

@@ -19,6 +19,7 @@ from exfit.analysis.diagnostics import (
 )
 from exfit.analysis.given_values import given_value_notes
 from exfit.analysis.intervals.determination import Determination
+from exfit.analysis.intervals.typical_values import influence_of_typical_values
 from exfit.analysis.intervals.value_errors import (
     allowing_for,
     allowing_for_bias,
@@ -28,7 +29,6 @@ from exfit.analysis.intervals.value_errors import (
 from exfit.analysis.intervals.windows import spread_over_windows, with_spread
 from exfit.analysis.iteration_responses import skipped_response_notes, with_iteration_responses
 from exfit.analysis.other_values import as_found_of, phase_ends
-from exfit.analysis.typical_values import influence_of_typical_values
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
 from exfit.fitting.channel_weights import balanced, weight_notes

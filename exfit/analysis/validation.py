@@ -22,7 +22,7 @@ from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
 from exfit.fitting.build import build_experiment
-from exfit.fitting.external import refuse_external
+from exfit.fitting.forms.external import refuse_external
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
 from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record

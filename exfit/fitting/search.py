@@ -16,7 +16,7 @@ from exfit.errors import CaseError, SimulationError
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
-from exfit.fitting.external import (
+from exfit.fitting.forms.external import (
     PROGRAM_STEP,
     PROGRAM_TOLERANCE,
     descent_by_twin,

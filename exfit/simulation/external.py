@@ -17,7 +17,7 @@ Counts = NDArray[np.int64]
 Values = Mapping[str, float]
 
 
-class Outcome(Protocol):
+class RunOutcome(Protocol):
     """A run of another program: its signals, or why it has none."""
 
     @property
@@ -32,7 +32,7 @@ class Outcome(Protocol):
 class Program(Protocol):
     """Another program that simulates."""
 
-    def runs(self, requests: Sequence[Mapping[str, Any]]) -> Sequence[Outcome]:
+    def runs(self, requests: Sequence[Mapping[str, Any]]) -> Sequence[RunOutcome]:
         """Return the run of each request: "values", "steps", "times", "signals"."""
 
 

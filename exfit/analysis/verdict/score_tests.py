@@ -14,7 +14,7 @@ from exfit.analysis.causes.linear import LinearFit, blocks, linear_model, moving
 from exfit.analysis.causes.steps import CORRECT_INSTANT, CORRECT_STEP
 from exfit.analysis.causes.trials import Opened, freed_within, with_freed, with_opened
 from exfit.analysis.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
-from exfit.analysis.typical_values import parameters_of
+from exfit.analysis.intervals.typical_values import parameters_of
 from exfit.errors import SimulationError
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind

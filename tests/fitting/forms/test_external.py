@@ -11,7 +11,7 @@ from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.workflows import profile
 
-PROGRAM = Path(__file__).parents[1] / "support" / "outside_program.py"
+PROGRAM = Path(__file__).parents[2] / "support" / "outside_program.py"
 PLANT = {"machine": "ONE_AXIS", "parameters": {"Tpd0": 6.0, "S10": 0.0, "S12": 0.0}}
 TRUTH = {"TATB": 0.1, "TB": 10.0, "K": 200.0, "TE": 0.05, "EMIN": -100.0, "EMAX": 100.0}
 FREE = {

@@ -8,7 +8,7 @@ from cases import FIRST_ORDER, TIME, TRUTH
 from records import config, found_in
 
 from exfit import Record
-from exfit.analysis.typical_values import influence_of_typical_values, typical_values_used
+from exfit.analysis.intervals.typical_values import influence_of_typical_values, typical_values_used
 from exfit.case.case import Case
 from exfit.fitting.search import fitted
 from exfit.fitting.uncertainty import uncertainty_at
