@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exfit.analysis.causes.events_before_fit import event_causes
 from exfit.analysis.causes.rest import unsteady_signals
 from exfit.analysis.causes.run_quality import (
     step_error_notes,
@@ -144,8 +145,19 @@ def _validated(
     if setup.name == SINGLE:  # fit is no name for what was not fitted
         setup = replace(setup, experiment=replace(setup.experiment, name=LONE_RECORD))
     comparison = validation_of(case, fitted, setup, values)
-    notes = (*comparison.notes, *_run_notes(case, setup, comparison, values))
+    notes = (
+        *comparison.notes,
+        *_event_notes(case, recording),
+        *_run_notes(case, setup, comparison, values),
+    )
     return ComparedTest(recording, setup, values, replace(comparison, notes=notes))
+
+
+def _event_notes(case: Case, recording: Recording) -> Iterator[str]:
+    """Yield what is wrong with the record of a grid event, as before a fit."""
+    if case.seen_from(recording).kind.finds_rest:
+        for cause in event_causes(case, recording):
+            yield cause.sentence
 
 
 def _run_notes(
@@ -189,6 +201,7 @@ def _validated_by_hand(
         steps=tuple(_steps(setup, own_values, given)),
         notes=(
             *_notes(test, comparison, fitted, own_values),
+            *_event_notes(case, recording),
             *_run_notes(case, setup, comparison, own_values),
         ),
     )

@@ -40,7 +40,7 @@ def judged(
         _why_not(validation, signal, fitted, limits[signal], accept is not None)
         for signal in validation.judging
     )
-    reason = next(filter(None, reasons), "")
+    reason = "; ".join(filter(None, reasons))
     limit = limits[validation.judging[0]]
     return replace(validation, validation=True, limit=limit, accepted=not reason, reason=reason)
 

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
+import yaml
 from grid_events import FIXED, TRUTH, event_case, recorded
 from pages import Page
 
@@ -70,6 +71,20 @@ def test_it_says_whose_values_they_are_and_has_no_word_of_a_fit(page):
     assert rows["Recorder"] == "PMU, 230 kV side"
     body = page.text.split("The case")[0].lower()
     assert [word for word in OF_A_FIT if word in body] == []
+
+
+def test_what_is_wrong_with_the_record_of_an_event_is_noted(folder, result, page, tmp_path):
+    """As before a fit: here p is counted towards the unit."""
+    assert result.notes == ()
+    assert "None." in page.text
+    case = event_case(folder.parent, "trip", free=False, parameters=PARAMETERS)
+    content = yaml.safe_load(case.read_text())
+    content["record"]["channels"]["p"] = {"column": "p", "scale": -1}
+    case.write_text(yaml.safe_dump(content))
+    (note,) = validation_result(case, {}).notes
+    assert note.startswith("record: ")
+    assert "p" in note.split()
+    assert "scale: -1" in note
 
 
 def test_values_have_their_sources(page):
