@@ -6,15 +6,18 @@ from unittest import mock
 
 import numpy as np
 import pytest
+import yaml
 from grid_events import TRUTH, event_case, recorded
 
 from exfit.case.load import load_case
 from exfit.fitting.build import build_experiments
 from exfit.fitting.driving_noise import responses
 from exfit.fitting.driving_noise.responses import carried_noise, noise_of_inputs, with_added
+from exfit.results.verdict import GOOD, MATCHES
 from exfit.workflows import fit
 
 NOISE = 2e-4
+WRONG = 1.02  # of X''d: residuals show no such error by themselves
 FACTORS = (0.0, 0.01, 0.1, 1.0)  # of NOISE: the stator makes five times as much of it
 STEP = 1e-5  # of a sample, for a difference quotient
 
@@ -180,3 +183,25 @@ def test_intervals_hold_the_truth_and_a_bias_of_many_deviations_goes():
         assert abs(row["bias"]) < 1.5, name
     plain = playback_noise.figures([*playback_noise.fits(3, free, plain=True)], free)
     assert plain["machine.Xppd"]["bias"] > 3.0
+
+
+@pytest.mark.long
+def test_a_given_value_is_contradicted_where_it_is_wrong_and_not_by_what_drives(tmp_path):
+    """X''d lets the noise pass: without its bias, right data are 4 deviations from what matches."""
+    from studies import playback_noise
+
+    content = playback_noise.content(playback_noise.FREE)
+    playback_noise.write_record(tmp_path / "event.csv", playback_noise.event_of(), 1.0, 1.0, 0)
+    verdicts = []
+    for factor in (1.0, WRONG):
+        machine = content["plant"]["parameters"]
+        parameters = {**machine, "Xppd": factor * machine["Xppd"]}
+        changed = {**content, "plant": {**content["plant"], "parameters": parameters}}
+        path = tmp_path / "case.yaml"
+        path.write_text(yaml.safe_dump(changed))
+        verdicts.append(fit(path).verdict)
+    right, wrong = verdicts
+    assert right.verdict == GOOD
+    assert not right.causes
+    assert wrong.verdict == MATCHES
+    assert wrong.reason.startswith("the record contradicts machine.")

@@ -65,6 +65,11 @@ class Evidence:
         return self.residuals.values(self.solution.x)
 
     @property
+    def weighed_by_noise(self) -> bool:
+        """Whether the noise of what drives the simulations weighs the errors."""
+        return any(each.whitening is not None for each in self.residuals.experiments)
+
+    @property
     def comparisons(self) -> tuple[Comparison, ...]:
         """The matches with the records of the fit."""
         return tuple(record.comparison for record in self.records)

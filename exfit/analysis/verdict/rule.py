@@ -34,9 +34,7 @@ def verdict_of(evidence: Evidence) -> Verdict:
     tests = residual_tests(evidence)
     words, reason = _judged(evidence, tests)
     carried = any(test.carried > NEGLIGIBLE for test in tests)
-    weighed = any(record.setup.experiment.whitening is not None for record in evidence.records)
-    exact = words == GOOD and not (carried or weighed)
-    contradicted = contradictions(evidence) if exact else []
+    contradicted = contradictions(evidence) if words == GOOD and not carried else []
     if contradicted:
         words, reason = MATCHES, contradicted[0].reason
     matched = words in (GOOD, MATCHES) and all(test.are_noise for test in tests)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import erfc, exp, log, sqrt
+from math import erfc, exp, hypot, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from exfit.analysis.causes.trials import Opened, freed_within, with_freed, with_
 from exfit.analysis.causes.unit import LARGEST_FACTOR, RARE, SATURATION, of_machine, remedy_of
 from exfit.analysis.intervals.typical_values import parameters_of
 from exfit.errors import SimulationError
+from exfit.fitting.driving_noise.weighing import BIAS_KNOWN_TO, shift_of, without_bias
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.nuisances.kinds import Nuisance, NuisanceKind
 from exfit.fitting.residuals import LEAST_NOISE, Residuals
@@ -89,19 +90,22 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
     own variances: chi-square of one degree of freedom, if the value is right. It may be exceeded
     with 1 %, divided by the number of values (Bonferroni).
 
+    Where the errors are weighed by the noise of what drives the simulation, the bias that it has
+    by each value is taken out, too; it is as uncertain as the variance of that noise.
+
     Source: Rao 1948, the score test (Proc. Camb. Phil. Soc. 44, 50-57).
     """
     if evidence.uncertainty is None:
         return []
     try:
-        linear, directions = _linearised(evidence)
+        linear, directions, shift = _linearised(evidence)
     except SimulationError:
         return []
     spread = _spread(evidence)
     scores = [
         score
         for held, direction in directions
-        if (score := _score(held, direction, linear, spread)) is not None
+        if (score := _score(held, direction, linear, spread, shift)) is not None
     ]
     rejected = [each for each in scores if _tail(each.chi_square) * len(scores) < REJECTED]
     largest = max((each.chi_square for each in rejected), default=0.0)
@@ -123,20 +127,26 @@ def _spread(evidence: Evidence) -> Array:
     return np.repeat(spreads, evidence.residuals.sizes)
 
 
-def _score(held: Held, direction: Array, linear: LinearFit, spread: Array) -> Contradiction | None:
-    """Return the test of a value; None where it does nothing, or only an unlikely change would."""
+def _score(
+    held: Held, direction: Array, linear: LinearFit, spread: Array, shift: Array
+) -> Contradiction | None:
+    """Return the test of a value; None where it does nothing, or only an unlikely change would.
+
+    ``shift`` (M,) was taken from the errors for the bias by the noise of what drives.
+    """
     own = linear.beyond(direction)
     square = float(own @ own)
     if not square > (SAME**2) * float(direction @ direction):
         return None
-    error = float(np.linalg.norm(spread * own)) / square
+    by_bias = BIAS_KNOWN_TO * float(own @ shift)
+    error = hypot(float(np.linalg.norm(spread * own)), by_bias) / square
     change = -float(own @ linear.errors) / square
     if not held.unit and max(error, abs(change)) > LARGEST_CHANGE:
         return None
     return Contradiction((change / error) ** 2, held, change)
 
 
-def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]]:
+def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]], Array]:
     """Return the linear model, and what each value that the case holds fixed does to the errors.
 
     All derivatives are taken at once. A voltage that the test takes from the record is as uncertain
@@ -145,7 +155,9 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     extended, of_test, fixed = _left_open(evidence)
     count = len(evidence.solution.x)
     added = extended.free[count:]
-    theta = np.array([*evidence.solution.x, *(free.scaled(free.start) for free in added)])
+    theta = np.append(evidence.solution.x, extended.start[count:])
+    if evidence.weighed_by_noise:
+        extended, _ = without_bias(extended, theta)
     errors, slopes = extended.errors(theta)
     own, others = np.split(slopes / slopes_of(extended, theta), [count], axis=1)
     column = {free.name: each for free, each in zip(added, others.T, strict=True)}
@@ -158,7 +170,8 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     known = np.column_stack([own[:, moving(evidence)], *from_record])
     influence, _ = evidence.residuals.influence(errors)
     tested = [each for each in directions if each[0].words]
-    return linear_model(influence, known), [*tested, *_of_channels(evidence, errors)]
+    tested.extend(_of_channels(evidence, errors))
+    return linear_model(influence, known), tested, shift_of(extended)
 
 
 def _left_open(evidence: Evidence) -> tuple[Residuals, list[Held], dict[str, float]]:
@@ -229,7 +242,12 @@ def _steps_of_test(evidence: Evidence, experiment: Experiment) -> tuple[InputSte
 
 
 def _of_channels(evidence: Evidence, errors: Array) -> Iterator[tuple[Held, Array]]:
-    """Yield scale and offset of each channel, by what is simulated: a record has noise."""
+    """Yield scale and offset of each channel, by what is simulated: a record has noise.
+
+    None of errors that the noise of what drives weighs: what is simulated has that noise, too.
+    """
+    if evidence.weighed_by_noise:
+        return
     for number, places in enumerate(blocks(evidence)):
         experiment = evidence.residuals.experiments[number]
         for channel, rows in zip(experiment.channels, places, strict=True):

@@ -141,11 +141,20 @@ def without_bias(residuals: Residuals, theta: Array) -> tuple[Residuals, Array]:
 
 def bias_of(residuals: Residuals, theta: Array) -> Array | None:
     """Return the bias (N,) of scaled parameters that `without_bias` took out; None without one."""
-    shifts = [e.whitening.shift for e in residuals.experiments if e.whitening is not None]
-    if not shifts:
+    if all(experiment.whitening is None for experiment in residuals.experiments):
         return None
     jacobian = residuals.errors(theta)[1]
-    return np.asarray(np.linalg.lstsq(jacobian, -np.concatenate(shifts), rcond=UNSEEN)[0])
+    return np.asarray(np.linalg.lstsq(jacobian, -shift_of(residuals), rcond=UNSEEN)[0])
+
+
+def shift_of(residuals: Residuals) -> Array:
+    """Return what was taken from the errors (M,) of the records for the bias."""
+    return np.concatenate(
+        [
+            np.zeros(sum(each.sizes)) if each.whitening is None else each.whitening.shift
+            for each in residuals.experiments
+        ]
+    )
 
 
 def added_gradient(residuals: Residuals, theta: Array) -> Array:

@@ -62,12 +62,12 @@ def test_chi_square_is_by_how_much_the_value_set_free_lowers_the_cost(evidence):
 def test_the_scores_of_noise_are_chi_square(evidence):
     """Of two signals, one much noisier; the mean of 4000 has a standard error of 0.022."""
     fitted = evidence(drawn("ripple", (16, 1, 7)).sound)
-    linear, directions = _linearised(fitted)
+    linear, directions, shift = _linearised(fitted)
     spread, rng = _spread(fitted), np.random.default_rng(1)
     held, direction = next(each for each in directions if TPD0 in each[0].words)
     always = Held(held.words, unit="pu")  # tested however much it would have to change
     scores = [
-        _score(always, direction, linear._replace(errors=noise), spread).chi_square
+        _score(always, direction, linear._replace(errors=noise), spread, shift).chi_square
         for noise in spread * rng.standard_normal((DRAWS, len(spread)))
     ]
     assert np.mean(scores) == pytest.approx(1.0, abs=0.1)
