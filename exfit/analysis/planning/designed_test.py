@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from exfit.analysis.planning.candidates import LAST_DWELL, REST, Bench, Moves, Stage
-from exfit.analysis.planning.exchange import best_moves, best_single_step
+from exfit.analysis.planning.exchange import best_moves, best_single_step, gains
 from exfit.analysis.planning.experiment_design import noise_levels, refuse_noise
 from exfit.analysis.planning.limits import Extremes, Limits, extremes_of
 from exfit.case.case import Case
@@ -30,7 +30,6 @@ from exfit.util.text import near
 from exfit.util.typed import plain
 
 MOST_STEPS_OF_TEST, MOST_CHANNELS = 4, 3
-LEAST_GAIN = 0.01  # of the criterion, for which a step or a channel is added
 SHORTER = 0.5  # of the duration, for comparison
 SPREAD = 0.2  # by how much a parameter may be another than the case says
 CRITERIA = ("A", "D")
@@ -179,18 +178,12 @@ def _stages(bench: Bench, duration: float) -> Iterator[_Candidate]:
     for more in _further_channels(bench, moves, signals, duration):
         signals = more
         yield candidate(f"+ {signals[-1]}", moves, signals, duration)
-    moves = best_single_step(bench, signals, duration)
+    pool = [best_single_step(bench, signals, duration)]
     for count in range(2, MOST_STEPS_OF_TEST + 1):
-        more_moves = best_moves(bench, moves, signals, duration)
-        if not _gains(*(bench.cost(m, signals, duration) for m in (moves, more_moves))):
+        best, pool = pool[0], best_moves(bench, pool, signals, duration)
+        if not pool or not gains(*(bench.cost(m, signals, duration) for m in (best, pool[0]))):
             return
-        moves = more_moves
-        yield candidate(f"{count} steps", moves, signals, duration)
-
-
-def _gains(before: float, after: float) -> bool:
-    """Return whether a criterion is so much smaller that an addition is worth it."""
-    return after <= (1.0 - LEAST_GAIN) * before
+        yield candidate(f"{count} steps", pool[0], signals, duration)
 
 
 def _first_channels(bench: Bench) -> tuple[str, ...]:
@@ -207,7 +200,7 @@ def _further_channels(
     while len(signals) < MOST_CHANNELS:
         others = [c.signal for c in bench.candidates if c.signal not in signals]
         costs = {signal: bench.cost(moves, (*signals, signal), duration) for signal in others}
-        if not costs or not _gains(cost, min(costs.values())):
+        if not costs or not gains(cost, min(costs.values())):
             return
         added = min(costs, key=lambda signal: costs[signal])
         signals, cost = (*signals, added), costs[added]

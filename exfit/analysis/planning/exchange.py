@@ -10,6 +10,7 @@ SHARES = tuple(k / 5.0 for k in range(-5, 6))  # of the limit of the reference
 REFINEMENTS = (0.1, 0.05, 0.025)  # of that limit, about the best of these
 FIRST_DWELLS = (0.2, 1.0, 3.0)  # s, of a further step
 MOST_SWEEPS = 6
+LEAST_GAIN = 0.01  # of the criterion, for which a step or a channel is added
 LEAST_GAIN_OF_SWEEP = 1e-3  # of the criterion
 
 
@@ -23,19 +24,33 @@ def best_single_step(bench: Bench, signals: Sequence[str], duration: float) -> M
     )
 
 
-def best_moves(bench: Bench, fewer: Moves, signals: Sequence[str], duration: float) -> Moves:
-    """Return the best moves with one more than those given, or these where no more are allowed.
+def best_moves(
+    bench: Bench, fewer: Sequence[Moves], signals: Sequence[str], duration: float
+) -> list[Moves]:
+    """Return moves with one more than those given, the best first; none where none are allowed.
 
-    A coordinate exchange from the best start of each family.
+    The best of ``fewer`` is what the search begins with; where a further move gains nothing from
+    there, as when it leaves no time for one, the others of them follow.
     """
 
     def cost(moves: Moves) -> float:
         return bench.cost(moves, signals, duration)
 
-    families = _later(fewer), _earlier(fewer), _pulses(len(fewer) + 1, duration)
-    starts = [min(family, key=cost) for family in families]
-    ends = [_exchanged(bench, start, signals, duration) for start in starts if cost(start) < inf]
-    return min(ends, key=cost, default=fewer)
+    ends: list[Moves] = []
+    for before in fewer:
+        families = _later(before), _earlier(before), _pulses(len(before) + 1, duration)
+        starts = [min(family, key=cost) for family in families]
+        allowed = (start for start in starts if cost(start) < inf)
+        exchanged = [_exchanged(bench, start, signals, duration) for start in allowed]
+        ends = sorted(dict.fromkeys([*ends, *exchanged]), key=cost)
+        if ends and gains(cost(fewer[0]), cost(ends[0])):
+            break
+    return ends
+
+
+def gains(before: float, after: float) -> bool:
+    """Return whether a criterion is so much smaller that an addition is worth it."""
+    return after <= (1.0 - LEAST_GAIN) * before
 
 
 def _later(fewer: Moves) -> Iterator[Moves]:
