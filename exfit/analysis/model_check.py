@@ -1,7 +1,7 @@
 """Whether a case can be trusted before a fit: derivatives, bypasses, sub-steps, a flat run."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from exfit.case.case import Case
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Experiment
+from exfit.fitting.forms.external import differences_from_twin
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -41,7 +42,8 @@ class Check:
     ``deviations`` holds, for each free parameter, the largest difference between the exact column
     of the Jacobian and the central difference at each of STEPS, relative to the column's largest
     element; ``step_error`` is by how much halving every step moves the response (pu). ``warnings``
-    are what to correct before a fit.
+    are what to correct before a fit. ``from_program`` is by how much, at most and per unit, the
+    twin of another program differs from it: by record, by signal.
     """
 
     deviations: Mapping[str, tuple[float, ...]]
@@ -52,6 +54,7 @@ class Check:
     drift: float
     notes: tuple[str, ...]
     warnings: tuple[str, ...] = ()
+    from_program: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def agrees(self) -> bool:
@@ -100,6 +103,7 @@ def check(case: Case) -> Check:
             *dict.fromkeys(_rest_notes(experiments, values)),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
+        from_program=differences_from_twin(case, setups, values),
     )
 
 

@@ -288,6 +288,30 @@ def start_tried(case: Case, residuals: Residuals, program: ExternalProgram) -> N
             raise SimulationError(f"{case.path}: {fault} (at the start values, twice)") from fault
 
 
+def differences_from_twin(
+    case: Case, setups: Sequence[ExperimentSetup], values: Values
+) -> dict[str, dict[str, float]]:
+    """Return by how much, at most and per unit, program and twin differ: by record, by signal.
+
+    Nothing where no other program simulates the case. Raises ExfitError where it has no run.
+    """
+    with program_of(case) as program:
+        if program is None:
+            return {}
+        return _differences(settled(simulated_by(program, case, setups), values))
+
+
+def _differences(setups: Sequence[ExperimentSetup]) -> dict[str, dict[str, float]]:
+    return {
+        setup.name: {
+            signal: float(np.max(np.abs(difference)))
+            for signal, difference in setup.experiment.simulator.differences.items()
+        }
+        for setup in setups
+        if isinstance(setup.experiment.simulator, CorrectedSimulator)
+    }
+
+
 def program_notes(
     case: Case, program: ExternalProgram, setups: Sequence[ExperimentSetup]
 ) -> Iterator[str]:
@@ -303,11 +327,6 @@ def program_notes(
         f"derivatives by the twin {section.twin}; search and intervals are local; intervals and "
         "diagnoses are by the twin, corrected by its difference to the program at the result"
     )
-    for setup in setups:
-        simulator = setup.experiment.simulator
-        if isinstance(simulator, CorrectedSimulator):
-            listed = ", ".join(
-                f"{signal} {np.max(np.abs(difference)):.2g} pu"
-                for signal, difference in simulator.differences.items()
-            )
-            yield f"{setup.name}: largest difference of program and twin: {listed}"
+    for name, differences in _differences(setups).items():
+        listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
+        yield f"{name}: largest difference of program and twin: {listed}"

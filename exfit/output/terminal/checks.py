@@ -27,6 +27,11 @@ def check(console: Console, result: Check) -> None:
     step = f"{result.step:g} s"
     paragraph(console, f"sub-steps: {result.substeps} in each step of {step}")
     paragraph(console, f"halving every step moves the response by {result.step_error:.1e} pu")
+    for record, differences in result.from_program.items():
+        listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
+        paragraph(
+            console, f"largest difference of program and twin at the start, {record}: {listed}"
+        )
     paragraph(console, f"bypassed: {', '.join(result.bypassed) or 'nothing'}")
     remarks(console, "warning:", result.warnings)
     notes(console, result.notes)

@@ -9,7 +9,7 @@ import pytest
 import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
-from exfit.workflows import profile
+from exfit.workflows import check, profile
 
 PROGRAM = Path(__file__).parents[2] / "support" / "outside_program.py"
 PLANT = {"machine": "ONE_AXIS", "parameters": {"Tpd0": 6.0, "S10": 0.0, "S12": 0.0}}
@@ -105,6 +105,12 @@ def test_a_simulation_is_the_programs_own(record):
     values = {name: TRUTH[name] for name in FREE}
     by_program = exfit.simulate(external(record, **other), values).response.signals["vt"]
     assert np.std(by_program - record.signals["vt"]) == pytest.approx(NOISE, rel=0.2)
+
+
+def test_a_check_sets_program_and_twin_side_by_side(record):
+    alike = check(external(record)).from_program["fit"]["vt"]
+    other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
+    assert alike < 1e-6 < 1e-3 < check(external(record, **other)).from_program["fit"]["vt"]
 
 
 @pytest.mark.parametrize(
