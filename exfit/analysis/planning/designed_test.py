@@ -31,6 +31,7 @@ from exfit.util.typed import plain
 
 MOST_STEPS_OF_TEST, MOST_CHANNELS = 4, 3
 SHORTER = 0.5  # of the duration, for comparison
+LONGEST = 600.0  # s of a test: the search simulates it a thousand times
 SPREAD = 0.2  # by how much a parameter may be another than the case says
 CRITERIA = ("A", "D")
 
@@ -123,8 +124,10 @@ def designed_test(
     bench = _bench(case, of, limits, channels, criterion, noise)
     times = bench.base.simulator.times
     duration = float(times[-1] - times[0]) if duration is None else duration
-    if not REST + LAST_DWELL < duration < inf:
-        raise CaseError([f"duration: {duration:g} s: must exceed {REST + LAST_DWELL:g} s"])
+    shortest = REST + LAST_DWELL
+    if not shortest < duration <= LONGEST:
+        limits_of_it = f"must exceed {shortest:g} s and be at most {LONGEST:g} s"
+        raise CaseError([f"duration: {duration:g} s: {limits_of_it}"])
     stages = [*_stages(bench, duration)]
     best = stages[-1].stage
     moves = best_single_step(bench, best.channels, duration)

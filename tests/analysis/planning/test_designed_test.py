@@ -136,8 +136,11 @@ def test_what_cannot_be_is_refused_by_name():
         exfit.design_test(CASE, ["KX"], channels=["x"])
     with pytest.raises(CaseError, match="criterion: E: must be one of A, D"):
         exfit.design_test(CASE, criterion="E")
-    with pytest.raises(CaseError, match="duration: 1 s: must exceed 2 s"):
-        exfit.design_test(CASE, duration=1.0)
+    for duration in (1.0, 1e6, np.nan):
+        with pytest.raises(
+            CaseError, match=r"duration: .* s: must exceed 2 s and be at most 600 s"
+        ):
+            exfit.design_test(CASE, duration=duration)
     with pytest.raises(CaseError, match="no reference whose steps are simulated"):
         exfit.design_test(load_case(CONFIGS / "first_order.yaml"))
 
