@@ -1,6 +1,6 @@
 """What a case file names, at a glance: read at once and without a check, faulty or not."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ def files_in(content: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
     model = content.get("model")
     named = [model] if isinstance(model, str) and model.endswith(".py") else []
     named += [file for key in NAMING_FILES for file in _files(content.get(key))]
-    named += [word for word in command_of(content) if _is_own_file(folder, word)]
+    named += scripts_of(command_of(content), folder)
     files = [part for name in named for part in _parts(folder / name)]
     return tuple(dict.fromkeys(files))
 
@@ -103,9 +103,9 @@ def _files(content: Any) -> Iterator[str]:
             yield from _files(entry)
 
 
-def _is_own_file(folder: Path, word: str) -> bool:
-    """Return whether a word of a command is a file beside the case, such as a script."""
-    return not Path(word).is_absolute() and (folder / word).is_file()
+def scripts_of(command: Sequence[str], folder: Path) -> list[str]:
+    """Return the words of a command that are files beside the case, such as a script."""
+    return [word for word in command if not Path(word).is_absolute() and (folder / word).is_file()]
 
 
 def _parts(file: Path) -> Iterator[Path]:

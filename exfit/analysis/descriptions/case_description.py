@@ -1,10 +1,12 @@
 """A case in words and tables, as its report shows it: its models, its tests, its files."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 
 from exfit.analysis.descriptions.played_description import played_in
 from exfit.case.case import Case
 from exfit.case.parts import Part
+from exfit.case.peek import scripts_of
 from exfit.case.schema import (
     AngleTable,
     BumpTest,
@@ -56,6 +58,7 @@ def input_hashes(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str
         hashes["parameters"] = file_hash(case.parameter_file)
     if case.model is not None and case.model.endswith(".py"):
         hashes["model"] = file_hash(case.folder / case.model)
+    hashes |= {label: file_hash(script) for label, script in _scripts(case).items()}
     return hashes | {label: record.sha256 for label, record in _records(case, setups)}
 
 
@@ -65,8 +68,17 @@ def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]
         "case": case.path.name,
         "model": (case.folder / (case.model or "")).name,
         "parameters": "" if case.parameter_file is None else case.parameter_file.name,
+        **{label: script.name for label, script in _scripts(case).items()},
         **{label: record.source.name for label, record in _records(case, setups)},
     }
+
+
+def _scripts(case: Case) -> dict[str, Path]:
+    """Return the files beside a case of another program that simulates it, by their labels."""
+    if case.external is None:
+        return {}
+    scripts = scripts_of(case.external.command, case.folder)
+    return {f"program{number or ''}": case.folder / word for number, word in enumerate(scripts)}
 
 
 def _records(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[tuple[str, Record]]:

@@ -1,6 +1,8 @@
 """Fits of a unit that another program simulates."""
 
+import shutil
 import sys
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +26,7 @@ BUMP = {"vt0": 1.0, "vref": [{"at": 1.0, "step": 0.05}]}
 SAME_COST = 1e-3  # the minimum of a program with its own integration
 
 
-def case(record, plant):
+def case(record, plant, folder="."):
     content = {
         "model": "SEXS",
         "plant": plant,
@@ -34,7 +36,7 @@ def case(record, plant):
     }
     if plant["type"] != "external":
         content["estimate"] = {"search": "local"}
-    return Case.from_dict(content, record)
+    return Case.from_dict(content, record, folder)
 
 
 def external(record, *arguments, **changes):
@@ -98,6 +100,15 @@ def test_a_twin_that_differs_leads_to_the_minimum_of_the_program(record, native)
     result = exfit.fit(external(record, **other, parallel=2))
     assert result.cost == pytest.approx(native.cost, rel=SAME_COST)
     assert result.parameters["TE"].value == pytest.approx(native.parameters["TE"].value, rel=0.01)
+
+
+def test_the_hash_of_the_script_is_among_those_of_a_result(record, tmp_path):
+    plant = external(record).external
+    command = [sys.executable, shutil.copy(PROGRAM, tmp_path / "mine.py").name]
+    own = {**PLANT, "type": "external", "twin": "open-circuit", "names": dict(plant.names)}
+    result = exfit.fit(case(record, {**own, "command": command}, tmp_path))
+    assert result.inputs["program"] == sha256(PROGRAM.read_bytes()).hexdigest()
+    assert result.files["program"] == "mine.py"
 
 
 def test_a_simulation_is_the_programs_own(record):
