@@ -7,7 +7,7 @@ residuals are noise nothing of that is done.
 """
 
 from collections.abc import Iterator, Sequence
-from math import isfinite
+from math import inf, isfinite
 
 from exfit.analysis.causes.channels import (
     clipped_channel,
@@ -67,8 +67,8 @@ BY_TRIAL: tuple[Recogniser, ...] = (
     fixed_values,
     wrong_limit,
     further_step,
-    averaging,
 )
+OF_RECORDER: tuple[Recogniser, ...] = (averaging,)
 FAR_LESS_LIKELY = 50.0  # log-likelihood below the likeliest: a cause is not worth a line
 
 
@@ -80,10 +80,25 @@ def causes_of(evidence: Evidence, matched: bool) -> tuple[Cause, ...]:
     """
     nothing_to_explain = matched or evidence.interrupted
     recognisers = ALWAYS if nothing_to_explain else (*FROM_RESIDUALS, *BY_TRIAL)
-    suspicions = sorted(_suspicions(evidence, recognisers), key=lambda each: -each.likelihood)
+    suspicions = [*_suspicions(evidence, recognisers)]
+    if not nothing_to_explain:
+        suspicions += _of_recorder(evidence, suspicions)
+    suspicions = sorted(suspicions, key=lambda each: -each.likelihood)
     if not nothing_to_explain:
         suspicions = likely(with_model(evidence, suspicions))
     return tuple(dict.fromkeys(suspicion.cause for suspicion in suspicions))
+
+
+def _of_recorder(evidence: Evidence, others: Sequence[Suspicion]) -> list[Suspicion]:
+    """Return what the recorder may do, in a grid event only what explains more than all others.
+
+    One device measures what drives the unit and what is compared, over the same windows.
+    """
+    suspicions = [*_suspicions(evidence, OF_RECORDER)]
+    if not evidence.case.kind.finds_rest:
+        return suspicions
+    most = max((each.likelihood for each in others if isfinite(each.likelihood)), default=-inf)
+    return [each for each in suspicions if each.likelihood > most]
 
 
 def likely(suspicions: Sequence[Suspicion]) -> list[Suspicion]:
