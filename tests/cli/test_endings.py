@@ -27,7 +27,7 @@ pytestmark = [
 
 
 @pytest.fixture
-def former_fit(run, prepared_folder, request):
+def former_fit(run, prepared_folder, in_prepared_folder, request):
     """Have the fit that some commands read."""
     needed = request.node.callspec.params["name"] not in FEW
     if needed and not (prepared_folder / "fit" / "result.json").is_file():

@@ -26,9 +26,9 @@ ALI = 0 and AH = 0 leave a lag.
 The first input is the speed, the second the electrical power. The standard of
 2005 prints PE; IEC 61970-302 says that it should read -PE, the sign of the
 swing equation, which is taken here. With typical data the power's transducer is
--80 s² / ((s³ + 82 s² + 161 s + 80) 2 H s): the standard's but for the sign. M is 2 H;
-programs that read M = 0 as the 2 H of the machine need its value here. Typical
-data are the standard's, as CIM has them, but for M.
+-80 s² / ((s³ + 82 s² + 161 s + 80) 2 H s): the standard's but for the sign. M
+is 2 H; programs that read M = 0 as the 2 H of the machine need its value here.
+Typical data are the standard's, as CIM has them, but for M.
 """
 
 from exfit.engine.trace import Signal
