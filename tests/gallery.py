@@ -40,7 +40,7 @@ OTHERS = ("thesis_", "verdict_")  # pictures of other pages: those of tests/stud
 BEGIN, END = "<!-- gallery -->", "<!-- /gallery -->"
 
 DPI = 84  # of the figures: 756 points wide, that of a page
-COLOURS = 256  # of a figure; its lines have a few, each with shades to white
+COLOURS = 96  # of a figure; its lines have a few, each with shades to white
 HEIGHT = 40  # lines of the terminal
 SECONDS = 0.09  # that a fit takes, which no two runs share; docs/performance.md
 FRAME = ("rgba(255,255,255,0.35)", "#d0d7de")  # white on white, and a grey that is seen
