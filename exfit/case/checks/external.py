@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from exfit.case.checks.node import ContentNode
 from exfit.case.parts import EXTERNAL, Parts, plants_of_records
 from exfit.case.yaml import Fault
+from exfit.plants import KINDS
 from exfit.util.text import near
 
 
@@ -13,10 +14,11 @@ def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
     plant = content.at("plant")
     if plant.at("type").value != EXTERNAL:
         return
-    if plant.at("twin").value == "open-circuit":
+    twin = KINDS.get(str(plant.at("twin").value))
+    if twin is not None and not twin.on_load:
         for key in ("network", "swing"):
             if key in plant:
-                yield plant.at(key).fault("not allowed with twin open-circuit")
+                yield plant.at(key).fault(f"not allowed with twin {twin.name}")
     symbols = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
     for name in plant.at("names").content:
         if name not in symbols:
