@@ -183,30 +183,26 @@ def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
         _draw(responses, ("vt", "efd"), folder / f"{model.name}.png")
         caption = f"The response of the case `configs/models/{case.name}`, which has typical data."
         pages.append(_model_page(model, caption, folder))
-    for model in STABILISERS.values():
-        with_it, without = (
-            STABILISER_CASE.format(stabiliser=line)
-            for line in (f"stabiliser: {{model: {model.name}}}", "")
-        )
-        responses = {"with stabiliser": _response(with_it), "without": _response(without)}
-        _draw(responses, ("p",), folder / f"{model.name}.png")
-        caption = (
-            "The active power of a GENROU machine with ST1A on load, after a step of 2 % of the "
-            "reference. All data are typical."
-        )
-        pages.append(_model_page(model, caption, folder))
-    for model in GOVERNORS.values():
-        with_it, without = (
-            GOVERNOR_CASE.format(governor=line)
-            for line in (f"governor: {{model: {model.name}}}", "")
-        )
-        responses = {"with governor": _response(with_it), "without": _response(without)}
-        _draw(responses, ("p",), folder / f"{model.name}.png")
-        caption = (
-            "The active power of a GENROU machine with ST1A on load, when the grid's frequency "
-            "rises by 0.1 Hz of 60 Hz at 1 s. All data are typical."
-        )
-        pages.append(_model_page(model, caption, folder))
+    on_load = "The active power of a GENROU machine with ST1A on load, "
+    added = (
+        (STABILISERS, "stabiliser", STABILISER_CASE, "after a step of 2 % of the reference."),
+        (
+            GOVERNORS,
+            "governor",
+            GOVERNOR_CASE,
+            "when the grid's frequency rises by 0.1 Hz of 60 Hz at 1 s.",
+        ),
+    )
+    for models, kind, case_text, event in added:
+        for model in models.values():
+            with_it, without = (
+                case_text.format(**{kind: line})
+                for line in (f"{kind}: {{model: {model.name}}}", "")
+            )
+            responses = {f"with {kind}": _response(with_it), "without": _response(without)}
+            _draw(responses, ("p",), folder / f"{model.name}.png")
+            caption = f"{on_load}{event} All data are typical."
+            pages.append(_model_page(model, caption, folder))
     for machine in MACHINES.values():
         responses = {"": _response(MACHINE_CASE.format(name=machine.name))}
         _draw(responses, ("vt", "efd"), folder / f"{machine.name}.png")
