@@ -30,6 +30,15 @@ DRIVING_SCALE = "driving_scale"  # what a recorded input is multiplied by
 
 MEASURED = "vc1"  # the voltage that the exciter measures: an output, and an input added to it
 
+# what an exciter sees of limiters where none acts
+UNLIMITED: Mapping[str, float] = {
+    "vsum": 0.0,
+    "vuel": -inf,
+    "voel": inf,
+    "vuel_out": -inf,
+    "voel_out": inf,
+}
+
 
 class Names(SimpleNamespace):
     """Values by name, as a model reads and writes them."""
@@ -43,12 +52,15 @@ def exciter_inputs(**given: Signal) -> Names:
 
     ``vt`` terminal voltage, ``vc1`` the same with load compensation, ``ifd`` field current, ``p``
     and ``q`` active and reactive power of the machine, ``speed`` of the machine, ``vref``
-    reference, ``vs`` stabiliser, ``vuel`` and ``voel`` under- and overexcitation limiter, at their
-    gates.
+    reference, ``vs`` stabiliser. Of the limiters: ``vsum`` what those of the summation kind add to
+    the voltage error (under- and overexcitation and stator current), ``vuel`` and ``voel`` the
+    takeover gates of under- and overexcitation, ``vuel_out`` and ``voel_out`` the gates that some
+    models draw instead at the output of the regulator. A limiter of the stator current uses the
+    gate of the side on which it acts.
     """
-    still = {"vs": 0.0, "p": 0.0, "q": 0.0, "speed": 1.0, "vuel": -inf, "voel": inf}
+    still = {"vs": 0.0, "p": 0.0, "q": 0.0, "speed": 1.0}
     compensated = {"vc1": given["vt"]} if "vt" in given else {}
-    return Names(**{**still, **compensated, **given})
+    return Names(**{**still, **UNLIMITED, **compensated, **given})
 
 
 def exciter_parameters(p: Signals, model: Model, saturation: SaturationForm) -> Names:
