@@ -22,8 +22,9 @@ from exfit.case.case import Case
 from exfit.case.schema import SINGLE, Recording
 from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
+from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment
-from exfit.fitting.forms.external import refuse_external
+from exfit.fitting.forms.external import as_by_program, program_of
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
 from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
@@ -87,22 +88,36 @@ def validate(
     the others. Raises ExfitError where input cannot be used, or where there is nothing to validate
     on.
     """
-    refuse_external(case, "validate")
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
-    case, own, saw = _with_values(case, values)
-    fitted = tuple(_fitted(case, recording, own) for recording in saw)
+    with program_of(case) as program:
+        return _compared(*_with_values(case, values), record, given, program)
+
+
+def _compared(
+    case: Case,
+    own: Values,
+    saw: tuple[Recording, ...],
+    record: Record | Path | str | None,
+    given: GivenSteps,
+    program: ExternalProgram | None,
+) -> Validation:
+    """Return the comparisons, by a program where one is given; a fit ``saw`` some records."""
+    fitted = tuple(_fitted(case, recording, own, program) for recording in saw)
     matches = [test.comparison for test in fitted]
     if record is not None:
-        case, test = _validated_by_hand(case, matches, own, record, given)
+        case, test = _validated_by_hand(case, matches, own, record, given, program)
         by_hand = (test.recording,)
         case = replace(case, validations=by_hand) if saw else _with_records(case, by_hand)
         return Validation(case, own, (*fitted, test))
     recordings = (*(() if saw else case.recordings), *case.validations)
     if not recordings:
         raise CaseError([f"{case.path}: validate: {NOTHING_TO_VALIDATE_ON}"])
-    unseen = [(each, build_experiment(case, each, own)) for each in recordings]
+    unseen = [
+        (each, as_by_program(program, case, build_experiment(case, each, own), own))
+        for each in recordings
+    ]
     validated = (_validated(case, matches, *pair, own) for pair in unseen)
     return Validation(case, own, (*fitted, *validated))
 
@@ -128,8 +143,11 @@ def _with_records(case: Case, recordings: tuple[Recording, ...]) -> Case:
     return replace(case, record=None, records=recordings, validations=())
 
 
-def _fitted(case: Case, recording: Recording, values: Values) -> ComparedTest:
+def _fitted(
+    case: Case, recording: Recording, values: Values, program: ExternalProgram | None
+) -> ComparedTest:
     setup = build_experiment(case, recording, values).with_enough_substeps(values)
+    setup = as_by_program(program, case, setup, values)
     comparison = compare_with_record(setup, setup.name, values)
     return ComparedTest(recording, setup, values, comparison)
 
@@ -179,6 +197,7 @@ def _validated_by_hand(
     values: Values,
     record: Record | Path | str,
     given: GivenSteps,
+    program: ExternalProgram | None,
 ) -> tuple[Case, ComparedTest]:
     """Return how values do on a record that the case does not name, judged by ``fitted`` ones.
 
@@ -194,7 +213,8 @@ def _validated_by_hand(
     if isinstance(record, Record):
         case = replace(case, given_records={**case.given_records, recording.name: record})
     test = with_steps_of_record(case, recording, values, given)
-    setup, own_values = aligned(case, test.setup, values)
+    setup = as_by_program(program, case, test.setup, values)
+    setup, own_values = aligned(case, setup, values)
     comparison = validation_of(case, fitted, setup, own_values)
     comparison = replace(
         comparison,

@@ -62,7 +62,7 @@ class ExternalProgram:
 
     def runs(self, requests: Sequence[Mapping[str, Any]]) -> list[ExternalRun]:
         """Return the runs of requests, side by side; each names its "signals" and "times"."""
-        keys = [json.dumps(request, sort_keys=True) for request in requests]
+        keys = [_key(request) for request in requests]
         missing = {
             key: request
             for key, request in zip(keys, requests, strict=True)
@@ -75,6 +75,11 @@ class ExternalProgram:
             outcomes = self._side_by_side([*missing.values()])
             self._outcomes |= zip(missing, outcomes, strict=True)
         return [self._outcomes[key] for key in keys]
+
+    def remembered(self, request: Mapping[str, Any]) -> ExternalRun | None:
+        """Return the run of a request that was made before and has not failed, None else."""
+        outcome = self._outcomes.get(_key(request))
+        return None if outcome is None or outcome.failure else outcome
 
     def forget_failures(self) -> None:
         """Have runs that failed be asked for again."""
@@ -107,6 +112,11 @@ class ExternalProgram:
         finally:
             self._free.put(process)
         return run_of(answer, request["signals"], len(request["times"]))
+
+
+def _key(request: Mapping[str, Any]) -> str:
+    """Return what distinguishes a request from others."""
+    return json.dumps(request, sort_keys=True)
 
 
 @contextmanager

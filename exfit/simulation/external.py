@@ -32,6 +32,9 @@ class RunOutcome(Protocol):
 class Program(Protocol):
     """Another program that simulates."""
 
+    def remembered(self, request: Mapping[str, Any]) -> RunOutcome | None:
+        """Return the run of a request that was made before and has not failed, None else."""
+
     def runs(self, requests: Sequence[Mapping[str, Any]]) -> Sequence[RunOutcome]:
         """Return the run of each request: "values", "steps", "times", "signals"."""
 
@@ -68,8 +71,8 @@ class TwinSimulator(Simulator):
         return result
 
 
-class ExternalSimulator(TwinSimulator):
-    """Simulates ``signals`` in another program; exact derivatives are those of the twin.
+class ProgramSimulator(TwinSimulator):
+    """A simulator of a twin whose ``signals`` another program gives, or has given.
 
     ``names`` are those of the parameters that have another name there.
     """
@@ -97,6 +100,10 @@ class ExternalSimulator(TwinSimulator):
             "times": times.tolist(),
             "signals": list(self.signals),
         }
+
+
+class ExternalSimulator(ProgramSimulator):
+    """Simulates its signals in another program; exact derivatives are those of the twin."""
 
     def substeps(self, values: Values) -> int:
         """Return the sub-steps of the twin; raises SimulationError where the program has failed."""
@@ -145,7 +152,7 @@ class ExternalSimulator(TwinSimulator):
         requests = [
             simulator.request(values)
             for simulator, values in zip(simulators, sets, strict=True)
-            if isinstance(simulator, ExternalSimulator)
+            if isinstance(simulator, ProgramSimulator)
         ]
         samples, parts = samples.copy(), parts.copy()
         for k, run in enumerate(self.program.runs(requests)):
@@ -153,20 +160,19 @@ class ExternalSimulator(TwinSimulator):
                 parts[k] = NO_SUBSTEPS
                 samples[k] = np.nan
                 continue
-            for place, name in enumerate(outputs):
-                if name in run.signals:
-                    samples[k, :, place] = run.signals[name]
+            _put(samples[k], run, outputs)
         return samples, parts
 
 
-class CorrectedSimulator(TwinSimulator):
+class CorrectedSimulator(ProgramSimulator):
     """Simulates the twin, with a difference (M,) per unit that is added to some signals.
 
     It is that between another program and the twin at one set of values, where both agree so.
+    Where the program remembers a run, that run is the response; it is asked for none.
     """
 
-    def __init__(self, twin: Simulator, differences: Mapping[str, Array]) -> None:
-        super().__init__(twin)
+    def __init__(self, external: ExternalSimulator, differences: Mapping[str, Array]) -> None:
+        super().__init__(external, external.program, external.signals, external.names)
         self.differences = differences
 
     def samples_of_many(
@@ -177,7 +183,14 @@ class CorrectedSimulator(TwinSimulator):
     ) -> tuple[Array, Counts]:
         """Return outputs (K, M, ny) of K sets, corrected."""
         samples, parts = super().samples_of_many(sets, outputs, tests)
-        return samples + self._added(outputs), parts
+        samples = samples + self._added(outputs)
+        for k, values in enumerate(sets):
+            simulator = self if tests is None else tests[k]
+            assert isinstance(simulator, ProgramSimulator)
+            run = self.program.remembered(simulator.request(values))
+            if run is not None:
+                _put(samples[k], run, outputs)
+        return samples, parts
 
     def tangents_of_many(
         self,
@@ -193,3 +206,10 @@ class CorrectedSimulator(TwinSimulator):
     def _added(self, outputs: tuple[str, ...]) -> Array:
         nothing = np.zeros(len(self.times))
         return np.stack([self.differences.get(name, nothing) for name in outputs], axis=1)
+
+
+def _put(samples: Array, run: RunOutcome, outputs: tuple[str, ...]) -> None:
+    """Put the signals of a run in the place of those of outputs (M, ny)."""
+    for place, name in enumerate(outputs):
+        if name in run.signals:
+            samples[:, place] = run.signals[name]

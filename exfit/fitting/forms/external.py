@@ -120,7 +120,7 @@ def _corrected(setup: ExperimentSetup, values: Values) -> CorrectedSimulator:
     at = setup.with_start_values(values)
     simulator, signals = setup.experiment.with_inputs(at), setup.experiment.signals
     parameters = setup.experiment.parameters(at)
-    own = cast(ExternalSimulator, setup.experiment.simulator).twin
+    own = cast(ExternalSimulator, setup.experiment.simulator)
     try:
         outside, _ = simulator.samples(parameters, signals)
     except SimulationError as fault:
@@ -286,6 +286,16 @@ def start_tried(case: Case, residuals: Residuals, program: ExternalProgram) -> N
             experiment.samples(values)
         except SimulationError as fault:
             raise SimulationError(f"{case.path}: {fault} (at the start values, twice)") from fault
+
+
+def as_by_program(
+    program: ExternalProgram | None, case: Case, setup: ExperimentSetup, values: Values
+) -> ExperimentSetup:
+    """Return a test as a program simulates it at the values; as it is without a program."""
+    if program is None:
+        return setup
+    (by_program,) = settled(simulated_by(program, case, [setup]), values)
+    return by_program
 
 
 def differences_from_twin(

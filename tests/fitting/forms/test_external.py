@@ -100,6 +100,9 @@ def test_a_twin_that_differs_leads_to_the_minimum_of_the_program(record, native)
     result = exfit.fit(external(record, **other, parallel=2))
     assert result.cost == pytest.approx(native.cost, rel=SAME_COST)
     assert result.parameters["TE"].value == pytest.approx(native.parameters["TE"].value, rel=0.01)
+    # what is shown of start and iterations are runs of the program, which it remembers
+    start = exfit.simulate(external(record, **other)).response.signals["vt"]
+    assert np.array_equal(result.comparisons[0].overlays["vt"].start, start)
 
 
 def test_the_hash_of_the_script_is_among_those_of_a_result(record, tmp_path):
@@ -122,6 +125,13 @@ def test_a_check_sets_program_and_twin_side_by_side(record):
     alike = check(external(record)).from_program["fit"]["vt"]
     other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
     assert alike < 1e-6 < 1e-3 < check(external(record, **other)).from_program["fit"]["vt"]
+
+
+def test_a_validation_is_by_the_program(record):
+    other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
+    values = {name: TRUTH[name] for name in FREE}
+    match = exfit.validate(external(record, **other), values, record)[-1]
+    assert match.rmse == pytest.approx(NOISE, rel=0.2)
 
 
 @pytest.mark.parametrize(
