@@ -16,14 +16,8 @@ from exfit.errors import CaseError, SimulationError
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
-from exfit.fitting.forms.external import (
-    PROGRAM_STEP,
-    PROGRAM_TOLERANCE,
-    descent_by_twin,
-    is_external,
-    simulated_by,
-    start_tried,
-)
+from exfit.fitting.forms.external import is_external, simulated_by, start_tried
+from exfit.fitting.forms.twin_descent import descent_by_twin
 from exfit.fitting.global_search import (
     FurtherDescents,
     SearchResult,
@@ -52,6 +46,8 @@ from exfit.util.text import near
 Array = NDArray[np.float64]
 
 CUTS = {"parabola": estimate.to_parabola, "half": estimate.to_half}
+PROGRAM_TOLERANCE = 1e-5  # of the cost: no gain that is less is worth a run
+PROGRAM_STEP = 1e-4  # of scaled parameters: no step that is less
 LIKELIHOOD_RATIO = 3.84  # chi-square of one degree of freedom, 95 %
 
 

@@ -119,10 +119,13 @@ class ExternalSimulator(ProgramSimulator):
         outputs: tuple[str, ...],
         tests: Sequence[Simulator] | None = None,
     ) -> tuple[Array, Counts]:
-        """Return outputs (K, M, ny) of K sets; a run that failed has no sub-steps."""
+        """Return outputs (K, M, ny) of K sets; a run that failed has no sub-steps.
+
+        Where the twin has no start at rest, which has no derivative either, there is no run.
+        """
         if set(outputs) <= set(self.signals):
             samples = np.full((len(sets), len(self.times), len(outputs)), np.nan)
-            parts = np.ones(len(sets), dtype=np.int64)
+            parts = self._substeps_of_many(self._vectors(sets))
         else:
             samples, parts = super().samples_of_many(sets, outputs, tests)
         return self._with_runs(samples, parts, sets, outputs, tests)
@@ -149,18 +152,14 @@ class ExternalSimulator(ProgramSimulator):
     ) -> tuple[Array, Counts]:
         """Return the samples of the twin with the signals of the program in place of its own."""
         simulators = [self] * len(sets) if tests is None else tests
-        requests = [
-            simulator.request(values)
-            for simulator, values in zip(simulators, sets, strict=True)
-            if isinstance(simulator, ProgramSimulator)
-        ]
+        reached = np.flatnonzero(parts != NO_SUBSTEPS).tolist()
+        requests = [_request(simulators[k], sets[k]) for k in reached]
         samples, parts = samples.copy(), parts.copy()
-        for k, run in enumerate(self.program.runs(requests)):
+        for k, run in zip(reached, self.program.runs(requests), strict=True):
             if run.failure:
-                parts[k] = NO_SUBSTEPS
-                samples[k] = np.nan
-                continue
-            _put(samples[k], run, outputs)
+                parts[k], samples[k] = NO_SUBSTEPS, np.nan
+            else:
+                _put(samples[k], run, outputs)
         return samples, parts
 
 
@@ -186,8 +185,7 @@ class CorrectedSimulator(ProgramSimulator):
         samples = samples + self._added(outputs)
         for k, values in enumerate(sets):
             simulator = self if tests is None else tests[k]
-            assert isinstance(simulator, ProgramSimulator)
-            run = self.program.remembered(simulator.request(values))
+            run = self.program.remembered(_request(simulator, values))
             if run is not None:
                 _put(samples[k], run, outputs)
         return samples, parts
@@ -206,6 +204,12 @@ class CorrectedSimulator(ProgramSimulator):
     def _added(self, outputs: tuple[str, ...]) -> Array:
         nothing = np.zeros(len(self.times))
         return np.stack([self.differences.get(name, nothing) for name in outputs], axis=1)
+
+
+def _request(simulator: Simulator, values: Values) -> dict[str, Any]:
+    """Return the request for a run of a simulator that is one of a program."""
+    assert isinstance(simulator, ProgramSimulator)
+    return simulator.request(values)
 
 
 def _put(samples: Array, run: RunOutcome, outputs: tuple[str, ...]) -> None:

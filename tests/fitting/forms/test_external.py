@@ -11,6 +11,7 @@ import pytest
 import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
+from exfit.fitting.forms.twin_descent import ProgramFunctions
 from exfit.workflows import check, profile
 
 PROGRAM = Path(__file__).parents[2] / "support" / "outside_program.py"
@@ -125,6 +126,17 @@ def test_a_check_sets_program_and_twin_side_by_side(record):
     alike = check(external(record)).from_program["fit"]["vt"]
     other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
     assert alike < 1e-6 < 1e-3 < check(external(record, **other)).from_program["fit"]["vt"]
+
+
+def test_an_interruption_of_the_quotients_keeps_the_best_point(record, monkeypatch):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ProgramFunctions, "correct", interrupted)
+    other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
+    result = exfit.fit(external(record, **other))
+    assert result.interrupted
+    assert result.cost < 1e-2 * result.history[0].cost
 
 
 def test_a_validation_is_by_the_program(record):
