@@ -68,6 +68,9 @@ def search_outcome(
         problem = with_setups(problem, setups)
     if options.weights == "balanced":
         unseen = weighted_alike(unseen, problem.residuals)
+    if task.case.external is not None:
+        determined = determined_by_twin(problem, found, setups, progress)
+        return SearchOutcome(problem, setups, unseen, found, determined)
     profiled = options.search != "local"
     determined = determination(problem, found, setups, profiled, progress)
     for _ in range(MOST_MINIMA):
@@ -76,6 +79,23 @@ def search_outcome(
         found = continued_from(determined.lower, found, problem, announce, counter, options)
         determined = determination(problem, found, setups, profiled, progress)
     return SearchOutcome(problem, setups, unseen, found, determined)
+
+
+def determined_by_twin(
+    problem: FitProblem,
+    found: SearchResult,
+    setups: tuple[ExperimentSetup, ...],
+    progress: Watch,
+) -> Determination:
+    """Return how well the records determine the parameters of a program, by its corrected twin.
+
+    Profiles take no run. Where they lead to a lower cost, which the program need not have, the
+    intervals are those of linear theory.
+    """
+    determined = determination(problem, found, setups, True, progress)
+    if determined.lower is None:
+        return determined
+    return determination(problem, found, setups, False, progress)
 
 
 def with_lines(

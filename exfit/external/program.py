@@ -48,6 +48,7 @@ class ExternalProgram:
         for process in self._processes:
             self._free.put(process)
         self._outcomes: dict[str, ExternalRun] = {}
+        self._values: set[str] = set()
         self._numbers = count(1)
         self._earlier_failures = 0
 
@@ -68,6 +69,7 @@ class ExternalProgram:
             for key, request in zip(keys, requests, strict=True)
             if key not in self._outcomes
         }
+        self._values |= {_key(request["values"]) for request in missing.values()}
         if len(missing) == 1 or len(self._processes) == 1:
             for key, request in missing.items():
                 self._outcomes[key] = self._run(request)
@@ -78,6 +80,8 @@ class ExternalProgram:
 
     def remembered(self, request: Mapping[str, Any]) -> ExternalRun | None:
         """Return the run of a request that was made before and has not failed, None else."""
+        if _key(request["values"]) not in self._values:  # a search asks for many
+            return None
         outcome = self._outcomes.get(_key(request))
         return None if outcome is None or outcome.failure else outcome
 
@@ -114,9 +118,9 @@ class ExternalProgram:
         return run_of(answer, request["signals"], len(request["times"]))
 
 
-def _key(request: Mapping[str, Any]) -> str:
-    """Return what distinguishes a request from others."""
-    return json.dumps(request, sort_keys=True)
+def _key(content: Mapping[str, Any]) -> str:
+    """Return what distinguishes a request, or its values, from others."""
+    return json.dumps(content, sort_keys=True)
 
 
 @contextmanager

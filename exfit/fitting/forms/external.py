@@ -175,8 +175,8 @@ def program_notes(
     restarts = f"; it was started anew {counts.restarts} times" if counts.restarts else ""
     yield f"simulated by {' '.join(section.command)}: {counts.runs} runs{failed}{restarts}"
     yield (
-        f"derivatives by the twin {section.twin}; search and intervals are local; intervals and "
-        "diagnoses are by the twin, corrected by its difference to the program at the result"
+        f"derivatives by the twin {section.twin}; the search is local; intervals and diagnoses are "
+        "by the twin, corrected by its difference to the program at the result"
     )
     for name, differences in _differences(setups).items():
         listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
