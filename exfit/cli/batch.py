@@ -66,7 +66,9 @@ def _part(_: click.Context, __: click.Parameter, value: str) -> tuple[int, int]:
     type=click.Choice(["failed"]),
     help="Fit again what failed, crashed or exceeded the time limit in an earlier run.",
 )
-@click.option("--trust", is_flag=True, help="Run the Python code that cases name as their model.")
+@click.option(
+    "--trust", is_flag=True, help="Run the code that cases name: models in Python, commands."
+)
 @click.option(
     "--time-limit",
     type=click.FloatRange(min=0.0, min_open=True),
@@ -114,8 +116,8 @@ def batch(
     all at once and keeps what is done.
 
     A case that cannot be read, fails, crashes or does not end is a row with its reason, and the
-    others go on; it is tried again with --retry failed. A case whose model is a file of Python is
-    run with --trust only.
+    others go on; it is tried again with --retry failed. A case whose model is a file of Python,
+    or whose plant is a command, is run with --trust only.
 
     With --scheduler the workers of a Dask cluster fit the cases: they need exfit in the versions of
     this computer, but none of its files. The package distributed comes with exfit[cluster].

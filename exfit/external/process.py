@@ -17,6 +17,8 @@ from exfit.util.ended_processes import ending, last_lines
 from exfit.util.text import show_value
 
 NAME = "the program"
+# a program that hangs does not see that its input has ended, where exfit itself is killed
+GUARD = "import os, sys; sys.stdin.buffer.read(); os.killpg(int(sys.argv[1]), 9)"
 TO_END = 5.0  # s: for a process that was ended, and for the thread that listens to it
 
 
@@ -75,6 +77,7 @@ class _Running:
         except (OSError, ValueError) as fault:
             self._errors.close()
             raise ProgramError(f"{command[0]} cannot be started: {fault}") from fault
+        self._guard = _guard_of(self._process.pid)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._requests, self._answers = self._process.stdin, self._process.stdout
@@ -104,6 +107,9 @@ class _Running:
 
     def end(self) -> None:
         """Kill the process with its group and wait for it."""
+        if self._guard is not None:
+            self._guard.kill()
+            self._guard.communicate()
         if sys.platform == "win32":
             self._process.kill()
         else:
@@ -114,6 +120,19 @@ class _Running:
         for file in (self._requests, self._answers, self._errors):
             with suppress(OSError):  # what could not be sent
                 file.close()
+
+
+def _guard_of(group: int) -> subprocess.Popen[bytes] | None:
+    """Start what kills a group of processes when this process ends; not on Windows."""
+    if sys.platform == "win32":
+        return None
+    return subprocess.Popen(
+        [sys.executable, "-S", "-E", "-c", GUARD, str(group)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,  # where the group has ended by itself
+        start_new_session=True,
+    )
 
 
 def _listen(answers: IO[bytes], lines: "SimpleQueue[bytes]") -> None:

@@ -86,7 +86,7 @@ def batch(
         part: (number, of): only every such share of the cases, so that several computers that see
             the folder have all of them, each once.
         retry_failed: fits again what failed, crashed, or took too long.
-        trust: runs the code of cases whose model is a file of Python.
+        trust: runs the code of cases whose model is a file of Python or whose plant is a command.
         time_limit: of a case, s; inf: none.
         strategy: of the descent from the start of each case; None: the case's own.
         search: "global" or "local"; None: the case's own.

@@ -1,13 +1,17 @@
 """The process of another program: its answers, its end."""
 
 import os
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
+import exfit
 from exfit.external.process import ExternalProcess, ProgramError
 
+on_linux = pytest.mark.skipif(sys.platform != "linux", reason="the states are those of /proc")
 ECHO = "import sys, json\nfor line in sys.stdin:\n    print({answer}, flush=True)\n"
 
 
@@ -51,6 +55,7 @@ def test_what_is_no_answer_is_reported_and_the_process_started_anew(answer, reas
         assert program.starts == starts
 
 
+@on_linux
 def test_a_process_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
     pids = tmp_path / "pids"
     code = (
@@ -64,17 +69,13 @@ def test_a_process_that_hangs_is_ended_with_all_that_it_has_started(tmp_path):
         program.answer({"id": 1}, 3.0)
     own, child = map(int, pids.read_text().split())
     assert not is_alive(own)
-    for _ in range(100):  # until the system has removed it
-        if not is_alive(child) or "Z" in state(child):
-            break
-        time.sleep(0.05)
-    assert not is_alive(child) or "Z" in state(child)
+    wait_for(lambda: "Z" in state(child))
 
 
 def state(pid):
+    """Return the state of a process as Linux has it, Z where there is none."""
     try:
-        with open(f"/proc/{pid}/stat", encoding="ascii") as file:  # noqa: PTH123
-            return file.read().split()[2]
+        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").split()[2]
     except OSError:
         return "Z"
 
@@ -82,3 +83,32 @@ def state(pid):
 def test_a_command_that_does_not_exist_is_named(tmp_path):
     with pytest.raises(ProgramError, match="no-such-program cannot be started"):
         ExternalProcess(["no-such-program"], tmp_path).answer({"id": 1}, 5.0)
+
+
+HANGING = "import os; open('pid', 'w').write(str(os.getpid())); import time; time.sleep(600)"
+KILLED = f"""
+import sys
+from pathlib import Path
+from exfit.external.process import ExternalProcess
+ExternalProcess([sys.executable, "-c", {HANGING!r}], Path(".")).answer({{"id": 1}}, 600.0)
+"""
+
+
+@on_linux
+def test_a_process_that_hangs_ends_where_this_one_is_killed(tmp_path):
+    path = str(Path(exfit.__file__).parents[1])
+    parent = subprocess.Popen(
+        [sys.executable, "-c", KILLED], cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}
+    )
+    wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text())
+    time.sleep(0.2)  # until its guard has been started, too
+    parent.kill()
+    parent.wait()
+    wait_for(lambda: "Z" in state((tmp_path / "pid").read_text()))
+
+
+def wait_for(condition, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
