@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 @click.option(
     "--models",
     metavar="NAME[,NAME]",
-    help="Exciters, or files of models; all: the whole catalogue (default: those of the same type, "
-    "AC, DC or ST, as that of CASE).",
+    help="Exciters, or files of models; AC, DC, ST: all of a type; all: the whole catalogue "
+    "(default: those of the type of CASE's). A type has the form of the edition of IEEE Std 421.5 "
+    "that CASE's is of.",
     shell_complete=completion.several_exciters,
 )
 @click.option(

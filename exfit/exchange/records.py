@@ -143,16 +143,14 @@ def read_values(definition: Definition, line: int, fields: tuple[Field, ...]) ->
 
 def record_fields(definition: Definition, values: Mapping[str, float]) -> list[str]:
     """Return the fields behind a record's id, each number in the digits that give it back."""
-    given = {**dict.fromkeys(definition.record.ignored, 0.0), **values}
-    given |= dict(definition.record.absent)
+    record = definition.record
+    integers = dict(record.icons)
+    given = {**dict.fromkeys(record.ignored, 0.0), **integers, **values, **dict(record.absent)}
     if {"E1", "SE1", "E2", "SE2"} <= given.keys() and given["E1"] > given["E2"]:
         for first, second in zip(*SORTED, strict=True):
             given[first], given[second] = given[second], given[first]
-    integers = dict(definition.record.icons)
     return [
-        str(int(given.get(name, integers[name])))
-        if name in integers
-        else repr(float(given[name])).upper()
+        str(int(given[name])) if name in integers else repr(float(given[name])).upper()
         for name in definition.names
     ]
 
@@ -208,14 +206,14 @@ def _lacking(definition: Definition) -> Iterable[tuple[str, str]]:
 
 def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, warning) for what the model has in one way only."""
-    symbols = [row.symbol for row in definition.model.sheet]
+    explained = {*definition.record.ignored, *(row.symbol for row in definition.model.sheet)}
     for name, modelled in (*definition.record.icons, *definition.record.absent):
         value = given.get(name, modelled)
         if name in definition.codes and value in SIGNALS:
             continue
         if name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH:
             continue
-        if value != modelled and name not in symbols:
+        if value != modelled and name not in explained:
             yield name, f"{show(value)} is not modelled; {show(modelled)} is taken"
 
 

@@ -11,12 +11,12 @@ from exfit.case.starting.starting_case import ALONE
 from exfit.errors import CaseError
 from exfit.fleet.fits import FitRun, FitSeries, PlannedFit, Progress, run_all
 from exfit.models import MODELS, find
-from exfit.models.families import relatives
+from exfit.models.families import FAMILIES, members, relatives, without_doubles
 from exfit.results.model import FitResult
 from exfit.util.typed import plain
 from exfit.workflows import CaseOrPath, loaded
 
-ALL = "all"  # in place of names: the whole catalogue
+ALL = "all"  # in place of names: the catalogue, one form of each type
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +68,9 @@ def rank(
 
     Args:
         case: a case, or the path of its file.
-        models: names of exciters or files of models; "all": the whole catalogue; none: those of
-            the same type (AC, DC, ST) as that of the case.
+        models: names of exciters or files of models; "DC", "AC", "ST": all of a type; "all": the
+            whole catalogue; none: those of the same type as that of the case. Where a type has a
+            form of 2005 and one of 2016, each of these takes that of the edition of the case.
         progress: called with the fit that runs and how far it is.
         finished: called with every fit that has ended.
         search: "global", or "local" for the descent from the typical data alone.
@@ -110,8 +111,13 @@ def _names(own: str, given: Sequence[str]) -> Sequence[str]:
     if not given:
         return relatives(own, exciters)
     if [name.lower() for name in given] == [ALL]:
-        return [own, *(name for name in exciters if name != own)]
-    return given
+        return [own, *(name for name in without_doubles(own, exciters) if name != own)]
+    return [name for entry in given for name in _of_entry(entry, own, exciters)]
+
+
+def _of_entry(entry: str, own: str, exciters: Sequence[str]) -> Sequence[str]:
+    """Return the names that an entry of a list of models stands for: a type for several."""
+    return members(entry.upper(), own, exciters) if entry.upper() in FAMILIES else [entry]
 
 
 def ranking_of(case: Case, series: FitSeries) -> Ranking:

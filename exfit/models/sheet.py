@@ -116,6 +116,11 @@ def sheet(*rows: Row) -> Sheet:
     )
 
 
+def renamed(rows: Sheet, **symbols: str) -> Sheet:
+    """Return a data sheet with other symbols for some quantities, ``VRMAX="EFEMAX"``."""
+    return tuple(row._replace(symbol=symbols.get(row.symbol, row.symbol)) for row in rows)
+
+
 @dataclass(frozen=True)
 class DynamicsRecord:
     """How a planner's file lists a model: the symbols of its constants (CONs) in their order.
@@ -124,8 +129,8 @@ class DynamicsRecord:
     only value that the model stands for, unless its sheet has the symbol; ``absent`` are symbols
     that the model does not have, with the only value that it stands for; ``held`` are those of the
     model that the record does not have, with the value that makes the model that of the record;
-    ``ignored`` are symbols that act only where a limiter does, which none is here, or otherwise not
-    in the model's own equations: any value will do; ``doubt`` says what is not settled about the
+    ``ignored`` are symbols (integers too) that act only where a limiter does, or otherwise not in
+    the model's own equations: any value will do; ``doubt`` says what is not settled about the
     order; ``spelled`` are symbols with their names in the file, where these differ by more than
     capitals; ``times_speed`` says that efd is multiplied by the speed there.
     """
@@ -170,6 +175,8 @@ def record(
 # what is not settled about orders of PSLF
 OF_A_LIST = "its order is that of a public list of parameters, not confirmed by a file"
 AS_IN_PSSE = "its order is taken to be that of PSS/E, not confirmed by a file"
+# what is not settled about orders of PSS/E
+OF_ONE_PROGRAM = "its order is that of another open program, not confirmed by a file"
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def test_a_first_model_that_does_not_match_ends_with_exit_code_3(run):
     assert ran[:2] == (3, "")
 
 
-@pytest.mark.parametrize("models", ["AC8C", "AC8B,ac8b", ""])
+@pytest.mark.parametrize("models", ["AC88", "AC8B,ac8b", ""])
 def test_models_that_do_not_exist_or_repeat_are_refused(run, models):
     ran = run("rank", CASE, "--models", models)
     assert (ran.code, ran.out) == (1, "")

@@ -386,7 +386,8 @@ def test_what_a_record_cannot_say_of_a_model_is_warned_of():
         record = definition.record
         own = typical(definition.model.sheet)
         values = {**own, **dict.fromkeys(record.ignored, 7.5), **dict(record.absent)}
-        icons = [(name, value) for name, value in record.icons if name not in own]
+        taken = {*own, *record.ignored}
+        icons = [(name, value) for name, value in record.icons if name not in taken]
         # a code that no signal stands for: the slope of the voltage
         of_icons = {name: value + ((name, value) in icons) for name, value in record.icons}
         of_icons |= dict.fromkeys(definition.codes, 6)

@@ -36,13 +36,29 @@ def test_all_is_the_whole_catalogue_of_exciters(case):
     assert "FIRST_ORDER" not in every
 
 
+def test_a_type_is_all_of_its_models_and_may_stand_beside_names(case):
+    plan = names(planned_models(case, ["st", "AC8B"]))
+    assert {"ST1A", "SEXS", "AC8B"} < {*plan}
+    assert {family_of(name) for name in plan if name != "AC8B"} == {"ST"}
+
+
+def test_a_form_of_another_edition_is_ranked_where_it_is_named(case):
+    for models in ((), "all", ["AC"]):
+        assert "AC8C" not in names(planned_models(case, models))
+    plan = planned_models(case, ["AC8B", "AC8C"])
+    assert names(plan) == ["AC8B", "AC8C"]
+    later = plan[1].case
+    assert "AC8B" not in names(planned_models(later))
+    assert {"AC8C", "EXAC1"} < {*names(planned_models(later, "all"))}
+
+
 def test_an_alias_is_the_model_that_it_stands_for(case):
     assert names(planned_models(case, ["esac1a", "ac8b"])) == ["AC1A", "AC8B"]
 
 
 def test_models_that_cannot_be_planned_are_refused(case):
-    with pytest.raises(ModelError, match="AC8C is not in the catalogue"):
-        planned_models(case, ["AC8C"])
+    with pytest.raises(ModelError, match="AC88 is not in the catalogue"):
+        planned_models(case, ["AC88"])
     with pytest.raises(CaseError, match="models: esac1a: given more than once"):
         planned_models(case, ["AC1A", "esac1a"])
     for name in ("machine_playback", "first_order"):

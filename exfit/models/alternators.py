@@ -1,0 +1,47 @@
+"""What alternator exciters share since IEEE Std 421.5-2016: the machine, the supply."""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    Limited,
+    compound_source,
+    field_ceiling,
+    limited_integrator,
+    rectifier,
+    smaller,
+    where,
+)
+from exfit.models.sheet import sheet
+
+# the limits of the alternator that the edition of 2016 gave to all its types, out of reach
+FIELD_LIMITS = sheet(
+    ("VFEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
+    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+)
+# the source of the regulator's power stage: terminal voltage alone, and a ceiling 1.5 times that
+SUPPLY = sheet(
+    ("SW1", 1.0, "1", (1.0, 2.0), "supply of the power stage: 1 terminals, 2 independent"),
+    ("KP", 1.0, "pu", (0.01, 100.0), "potential source gain"),
+    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+    ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
+    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+    ("KC1", 0.05, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
+    ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the supply"),
+)
+
+
+def alternator(efe: Signal, vfe: Signal, s: Signal, u: Signal, p: Signal) -> tuple[Signal, Limited]:
+    """Return efd and the slope of VE: 1 / sTE from VEMIN to where VFE = VFEMAX, and a rectifier."""
+    vemax = field_ceiling(s.VE, vfe, p)
+    ve, slope = limited_integrator(efe - vfe, s.VE, p.TE, p.VEMIN, vemax)
+    return rectifier(ve, p.KC * u.ifd), slope
+
+
+def supply(u: Signal, vfe: Signal, p: Signal) -> Signal:
+    """Return VB, what the power stage of the regulator gets, at most VBMAX.
+
+    A rectifier loaded with the exciter's field current, behind the terminals (SW1 = 1) or behind a
+    source that does not depend on them (SW1 = 2).
+    """
+    terminals = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
+    source = where(p.SW1 < 1.5, terminals, p.KP)
+    return smaller(rectifier(source, p.KC1 * vfe), p.VBMAX)

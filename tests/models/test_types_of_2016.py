@@ -1,0 +1,79 @@
+"""The exciters of IEEE Std 421.5-2016 are those of 2005 while what was added does nothing."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from on_load import system, values_on_load
+from oracle import system_of, typical_values
+
+from exfit.models.machines import MACHINES
+from exfit.simulation.inputs import Inputs, InputStep
+from exfit.simulation.simulator import Simulator
+
+NONE = 9999.0  # pu: a limit that is never met
+
+
+class Form(NamedTuple):
+    """The form of 2005 of an exciter, and what makes the new one equal to it.
+
+    ``held`` are values of the new exciter, ``symbols`` its symbols of old quantities, ``changes``
+    values of the old one that are not the typical ones.
+    """
+
+    name: str
+    held: Mapping[str, float]
+    symbols: Mapping[str, str] = MappingProxyType({})
+    changes: Mapping[str, float] = MappingProxyType({})
+
+
+SUPPLY = {"SW1": 2.0, "KP": 1.0, "KC1": 0.0, "VBMAX": NONE}  # of one, whatever happens
+# the changes: lags that typical data leave out
+FORMS = {
+    "AC8C": Form("AC8B", SUPPLY, changes={"TR": 0.02, "TA": 0.05}),
+}
+
+
+def values_of(form, old):
+    """Return the values that make an exciter of 2016 equal to that of 2005."""
+    renamed = {new: old[symbol] for new, symbol in form.symbols.items()}
+    kept = {symbol: value for symbol, value in old.items() if symbol not in form.symbols.values()}
+    return {**kept, **renamed, **form.held}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_it_is_that_of_2005_over_large_steps_on_open_circuit(name):
+    """Of both signs, so that the ceilings and the floors are met."""
+    form = FORMS[name]
+    old = {**typical_values(form.name), **form.changes}
+    new = typical_values(name) | values_of(form, old)
+    steps = (InputStep(0.1, 0.2), InputStep(1.5, -0.3), InputStep(3.0, 0.1))
+    compare(system_of(form.name), old, system_of(name), new, Inputs(0.0, 5.0, steps))
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_it_is_that_of_2005_over_a_dip_on_load(name):
+    form = FORMS[name]
+    machine = MACHINES["GENROU"]
+    old = {**values_on_load(machine, exciter=form.name), **form.changes}
+    new = values_on_load(machine, exciter=name) | values_of(form, old)
+    dip = (InputStep(0.2, -0.3, "E", ramp=0.05), InputStep(0.5, 0.3, "E", ramp=0.05))
+    built = [system(machine, exciter=each) for each in (form.name, name)]
+    compare(built[0], old, built[1], new, Inputs(0.0, 2.0, dip))
+
+
+def compare(old_system, old, new_system, new, inputs):
+    """Assert that two systems respond alike, and much."""
+    times = np.linspace(0.0, inputs.end, 501)
+
+    def response(built, values):
+        own = {symbol: values[symbol] for symbol in built.parameters}
+        return Simulator(built, inputs, times, 1e-3).response(own, ("vt", "efd", "vref")).signals
+
+    expected, signals = response(old_system, old), response(new_system, new)
+    assert np.ptp(expected["efd"]) > 0.5
+    for name in ("vt", "efd", "vref"):
+        # the same equations, in other words at most: rounding
+        assert np.abs(signals[name] - expected[name]).max() < 1e-9, name
