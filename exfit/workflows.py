@@ -23,7 +23,7 @@ from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.forms.external import (
     external_simulator,
     program_of,
-    refuse_external,
+    refuse_without_equations,
     simulated_by,
 )
 from exfit.fitting.recordings import read_section
@@ -272,8 +272,8 @@ def profile(
 
     names = [names] if isinstance(names, str) else names
     case = loaded(case)
-    refuse_external(case, "profile")
-    return profiles.profile(case, names, progress)
+    with program_of(case) as program:
+        return profiles.profile(case, names, progress, program)
 
 
 def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Design":
@@ -291,7 +291,9 @@ def identify(case: CaseOrPath, noise: Mapping[str, float] | None = None) -> "Des
     """
     from exfit.analysis.planning import experiment_design
 
-    return experiment_design.identify(loaded(case), noise or {})
+    case = loaded(case)
+    refuse_without_equations(case, "identify")
+    return experiment_design.identify(case, noise or {})
 
 
 def check(case: CaseOrPath) -> "Check":

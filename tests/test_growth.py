@@ -150,10 +150,10 @@ def test_a_plant_is_one_file_one_section_and_one_line(copy):
         "from exfit.plants.offset import OFFSET\n",
     )
     copy.add("exfit/plants/kinds.py", "        ALONE,\n", "        OFFSET,\n")
-    copy.add("exfit/case/schema/plants.py", "\nNativePlant = (", SECTION + "\n")
+    copy.add("exfit/case/schema/plants.py", "\nPlant = (", SECTION + "\n")
     copy.add(
         "exfit/case/schema/plants.py",
-        "    OpenCircuit | InfiniteBus | GridPlayback",
+        "    OpenCircuit\n    | InfiniteBus",
         "    OffsetPlant\n    | ",
     )
     test = {"vt0": 0.0, "duration": 3.0, "vref": [{"at": 0.5, "step": 1.0}]}

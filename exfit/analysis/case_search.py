@@ -64,12 +64,12 @@ def search_outcome(
     setups, unseen = as_fitted(task.setups, problem), task.unseen
     if task.case.external is not None:
         values = problem.residuals.values(found.best.x)
-        setups, unseen = settled(setups, values), settled(unseen, values)
+        setups, unseen = settled(setups, values, problem.residuals), settled(unseen, values)
         problem = with_setups(problem, setups)
     if options.weights == "balanced":
         unseen = weighted_alike(unseen, problem.residuals)
     if task.case.external is not None:
-        determined = determined_by_twin(problem, found, setups, progress)
+        determined = determined_by_twin(task.case, problem, found, setups, progress)
         return SearchOutcome(problem, setups, unseen, found, determined)
     profiled = options.search != "local"
     determined = determination(problem, found, setups, profiled, progress)
@@ -82,6 +82,7 @@ def search_outcome(
 
 
 def determined_by_twin(
+    case: Case,
     problem: FitProblem,
     found: SearchResult,
     setups: tuple[ExperimentSetup, ...],
@@ -90,11 +91,12 @@ def determined_by_twin(
     """Return how well the records determine the parameters of a program, by its corrected twin.
 
     Profiles take no run. Where they lead to a lower cost, which the program need not have, the
-    intervals are those of linear theory.
+    intervals are those of linear theory; so they are without a twin.
     """
-    determined = determination(problem, found, setups, True, progress)
-    if determined.lower is None:
-        return determined
+    if not case.has_no_equations:
+        determined = determination(problem, found, setups, True, progress)
+        if determined.lower is None:
+            return determined
     return determination(problem, found, setups, False, progress)
 
 

@@ -36,7 +36,7 @@ from exfit.case.case import Case
 from exfit.case.schema import Estimate
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment
-from exfit.fitting.forms.external import program_notes, simulated_by
+from exfit.fitting.forms.external import LINEAR_ALONE, program_notes, simulated_by
 from exfit.fitting.search import fitted
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.results.model import FitResult, Iteration
@@ -131,6 +131,7 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
             *minima_notes(residuals, found, minima, analysis.uncertainty),
             *fit_notes(case, residuals, best, setups, comparisons, analysis),
             *([] if program is None else program_notes(case, program, [*setups, *unseen])),
+            *([LINEAR_ALONE] if case.has_no_equations else []),
         ),
         validation=analysis.validation,
         versions=versions(),

@@ -14,7 +14,7 @@ from exfit.case.case import Case
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Experiment
-from exfit.fitting.forms.external import differences_from_twin
+from exfit.fitting.forms.external import differences_of_program
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -42,8 +42,9 @@ class Check:
     ``deviations`` holds, for each free parameter, the largest difference between the exact column
     of the Jacobian and the central difference at each of STEPS, relative to the column's largest
     element; ``step_error`` is by how much halving every step moves the response (pu). ``warnings``
-    are what to correct before a fit. ``from_program`` is by how much, at most and per unit, the
-    twin of another program differs from it: by record, by signal.
+    are what to correct before a fit. ``from_program`` is by how much, at most and per unit, another
+    program differs from its twin, by record, by signal; or from the record where it has no twin:
+    then it has no equations either, and nothing else but the notes holds.
     """
 
     deviations: Mapping[str, tuple[float, ...]]
@@ -55,6 +56,7 @@ class Check:
     notes: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     from_program: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    has_equations: bool = True
 
     @property
     def agrees(self) -> bool:
@@ -88,7 +90,7 @@ def check(case: Case) -> Check:
     first = experiments[0].simulator
     at = experiments[0].parameters(values)
     return Check(
-        deviations=deviations(Residuals(experiments, free, fixed, case.ties)),
+        deviations=_deviations(case, Residuals(experiments, free, fixed, case.ties)),
         bypassed=tuple(name for name in first.time_constants if at[name] < SHORTEST),
         substeps=max(
             experiment.simulator.substeps(experiment.parameters(values))
@@ -103,8 +105,13 @@ def check(case: Case) -> Check:
             *dict.fromkeys(_rest_notes(experiments, values)),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),
-        from_program=differences_from_twin(case, setups, values),
+        has_equations=not case.has_no_equations,
+        from_program=differences_of_program(case, setups, values),
     )
+
+
+def _deviations(case: Case, residuals: Residuals) -> dict[str, tuple[float, ...]]:
+    return {} if case.has_no_equations else deviations(residuals)
 
 
 def _ready(case: Case, warnings: Sequence[str]) -> tuple[ExperimentSetup, ...]:

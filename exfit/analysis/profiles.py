@@ -13,6 +13,7 @@ from exfit.analysis.case_search import SearchTask, weighed_search, with_lines
 from exfit.analysis.diagnostics import search_range_notes
 from exfit.analysis.intervals.profile_hull import (
     FoundMinimum,
+    ProfilesAboutMinima,
     limits_of,
     other_minima,
     profiles_about,
@@ -20,7 +21,10 @@ from exfit.analysis.intervals.profile_hull import (
 )
 from exfit.case.case import Case
 from exfit.errors import CaseError
+from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment
+from exfit.fitting.channel_weights import as_fitted
+from exfit.fitting.forms.external import program_notes, settled, with_setups
 from exfit.fitting.global_search import SearchResult
 from exfit.fitting.problem import FitProblem
 from exfit.fitting.residuals import Residuals
@@ -35,6 +39,10 @@ from exfit.util.text import near
 Array = NDArray[np.float64]
 
 LOWER = "the profiles led to a lower minimum than the fit: they are about that one"
+LOWER_BY_TWIN = (
+    "the profiles led to a lower cost of the corrected twin, which the program need not have: a "
+    "fit from there shows whether it has"
+)
 ENCLOSED = "the intervals enclose another minimum, which the record does not refute"
 MOST_MINIMA = 3  # that lie each below the other by more than rounding: two are rare
 
@@ -120,19 +128,25 @@ def profile(
     case: Case,
     names: Iterable[str] = (),
     progress: Callable[[estimate.Progress], None] = lambda _: None,
+    program: ExternalProgram | None = None,
 ) -> Profiles:
     """Fit a case and return the profiles of some of its free parameters, all by default.
 
     ``progress`` is called with how far it is; an interruption keeps what is done of the profiles,
-    one of the fit before them is passed on. Raises ExfitError for input that cannot be used.
+    one of the fit before them is passed on. Where a ``program`` simulates the case its corrected
+    twin has the profiles, or, without a twin, the program itself. Raises ExfitError for input that
+    cannot be used.
 
     Source: Venzon & Moolgavkar 1988.
     """
-    setups, problem = fitted(case)
+    setups, problem = fitted(case, program)
     names = tuple(names)
     if not any(setup.automatic_sines for setup in setups):  # else more may become free
         _indices(case, problem.residuals, names)
     setups, problem, found = _found(case, setups, problem, progress)
+    by_twin = program is not None and not case.has_no_equations
+    if by_twin:
+        setups, problem = _by_twin(setups, problem, found.best.x)
     wanted = _indices(case, problem.residuals, names)
     residuals, records, others = problem.compressed, names_of_records(setups), other_minima(found)
     x = found.best.x
@@ -141,7 +155,7 @@ def profile(
         rises = {index: uncertainty.rises[name] for name, index in wanted.items()}
         solution = FoundMinimum(x, estimate.half_square(residuals(x)))
         profiles = profiles_about(residuals, solution, others, rises, POINTS, progress)
-        if profiles.lower is None or profiles.interrupted:
+        if profiles.lower is None or profiles.interrupted or by_twin:
             break
         x = profiles.lower  # its residuals, and so the rise, are others
     first = next(iter(profiles.by_index.values()))[0]
@@ -153,8 +167,8 @@ def profile(
         ),
         notes=(
             *search_range_notes(case),
-            *_notes(found.best, first.x),
-            *([ENCLOSED] if any(others for _, *others in profiles.by_index.values()) else []),
+            *_notes(found.best, profiles, by_twin),
+            *([] if program is None else program_notes(case, program, setups, "profiles")),
         ),
         interrupted=profiles.interrupted,
     )
@@ -194,12 +208,24 @@ def _found(
     return task.setups, problem, found
 
 
-def _notes(best: estimate.Result, x: Array) -> Iterator[str]:
-    """Yield what must be known of the minimum x that the profiles are about."""
+def _by_twin(
+    setups: tuple[ExperimentSetup, ...], problem: FitProblem, x: Array
+) -> tuple[tuple[ExperimentSetup, ...], FitProblem]:
+    """Return the tests and the problem of the twin of a program, corrected at a point (N,)."""
+    setups = settled(as_fitted(setups, problem), problem.residuals.values(x))
+    return setups, with_setups(problem, setups)
+
+
+def _notes(best: estimate.Result, profiles: ProfilesAboutMinima, by_twin: bool) -> Iterator[str]:
+    """Yield what must be known of the minimum that the profiles are about, and of others."""
     if not best.success:
         yield f"the fit did not end at a minimum: {best.message}"
-    if not np.array_equal(x, best.x):
+    if by_twin and profiles.lower is not None:
+        yield LOWER_BY_TWIN
+    if not np.array_equal(next(iter(profiles.by_index.values()))[0].x, best.x):
         yield LOWER
+    if any(others for _, *others in profiles.by_index.values()):
+        yield ENCLOSED
 
 
 def _profile(

@@ -110,7 +110,8 @@ def analysed(
         ends += phase_ends(case, setups, problem.residuals, history)
         validated = [aligned(case, setup, values) for setup in unseen]
         validation += [validation_of(case, fitted, *pair) for pair in validated]
-        behaviour = behaviour_of([(setup, values) for setup in setups], validated)
+        if not case.has_no_equations:
+            behaviour = behaviour_of([(setup, values) for setup in setups], validated)
         as_found = as_found_of(case, [*((setup, values) for setup in setups), *validated])
         if uncertainty is not None:
             at = problem, best.x, names_of_records(setups)

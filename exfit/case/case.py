@@ -19,8 +19,8 @@ from exfit.case.schema import (
     FreeSection,
     Governor,
     Limit,
-    NativePlant,
     Parameters,
+    Plant,
     RecordFile,
     Recording,
     ReportRequest,
@@ -61,7 +61,8 @@ class Case:
     ``given_values`` the values of parameters that were given in place of those of the sections,
     ``given_sources`` where values that were given beside the case come from, ``given_std_errors``
     their standard errors. ``external`` is the section of another program that simulates the
-    unit: ``plant`` is its twin then, and the search local unless the case says otherwise.
+    unit: ``plant`` is its twin then, where it has one, and the search local unless the case says
+    otherwise.
     """
 
     path: Path
@@ -70,7 +71,7 @@ class Case:
     model: str | None
     saturation: SaturationName
     efd_times_speed: bool
-    plant: NativePlant
+    plant: Plant
     stabiliser: Stabiliser | None
     governor: Governor | None
     test: BumpTest | None
@@ -103,7 +104,7 @@ class Case:
         del sections["programme"]  # of one that is a programme there is a case for each fit
         external = sections["plant"]
         if isinstance(external, ExternalPlant):
-            sections |= {"plant": external.plant, "external": external}
+            sections.update(plant=external.plant, external=external)
             if "search" not in checked.document.estimate.model_fields_set:
                 sections["estimate"] = sections["estimate"].model_copy(update={"search": "local"})
         return cls(
@@ -233,6 +234,11 @@ class Case:
     def kind(self) -> PlantKind:
         """The kind of its plant."""
         return KINDS[self.plant.type]
+
+    @property
+    def has_no_equations(self) -> bool:
+        """Whether another program simulates it and no plant of exfit is its twin."""
+        return self.external is not None and self.external.twin is None
 
     @property
     def on_load(self) -> bool:

@@ -23,8 +23,10 @@ from exfit.plants import (
     MACHINE,
     NETWORK,
     OPEN_CIRCUIT,
+    OUTSIDE,
     STABILISER,
     PlantKind,
+    model_of_names,
 )
 from exfit.signals import RECORDED
 from exfit.util.text import Place, near
@@ -34,7 +36,7 @@ Contradictions = Iterator[tuple[str, str]]
 
 # in place of a kind that does not exist, which is a fault of its own
 ANY_PLANT = replace(OPEN_CIRCUIT, events=EVENTS, signals=RECORDED)
-EXTERNAL = "external"  # the type of a plant that another program simulates
+EXTERNAL = OUTSIDE.name  # the type of a plant that another program simulates
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 
@@ -92,7 +94,11 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
     """
     plant = _mapping(data.get("plant"))
     kind = kind_of(plant)
-    exciter = _exciter(data, folder, faults, model_sha256) if kind.has_exciter else None
+    exciter = None
+    if kind is OUTSIDE:
+        exciter = _named(plant, data)
+    elif kind.has_exciter:
+        exciter = _exciter(data, folder, faults, model_sha256)
     machine = _machine(plant, faults) if kind.has_machine else None
     stabiliser = _added(data, "stabiliser", STABILISERS, faults)
     governor = _added(data, "governor", GOVERNORS, faults)
@@ -113,9 +119,9 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
 def kind_of(plant: Data) -> PlantKind:
     """Return the kind of a plant section; one that allows everything where there is none.
 
-    That of a plant that another program simulates is the kind of its twin.
+    That of a plant that another program simulates is the kind of its twin, where it has one.
     """
-    key = "twin" if plant.get("type") == EXTERNAL else "type"
+    key = "twin" if plant.get("type") == EXTERNAL and "twin" in plant else "type"
     return KINDS.get(str(plant.get(key)), ANY_PLANT)
 
 
@@ -292,6 +298,17 @@ def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Mode
     except ModelError as error:
         faults.append(Fault(("model",), str(error)))
         return None
+
+
+def _named(plant: Data, data: Data) -> Model:
+    """Return what stands for the model of another program: the parameters that a case names."""
+    command = plant.get("command")
+    words = [str(word) for word in command] if isinstance(command, list) else []
+    files = [word for word in words[1:] if not word.startswith("-")]
+    section = _mapping(data.get("parameters"))
+    names = (name for key in ("fixed", "free") for name in _mapping(section.get(key)))
+    name = Path([*files, *words, EXTERNAL][0]).stem
+    return model_of_names(name, dict.fromkeys(names))
 
 
 def _machine(plant: Data, faults: list[Fault]) -> Machine | None:

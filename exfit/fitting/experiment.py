@@ -239,7 +239,7 @@ class Experiment:
         samples, slopes, parts = self.simulator.tangents_of_many(
             [self.parameters(values) for values in sets],
             self.signals,
-            [[self._direction(move) for move in own] for own in moves],
+            [[self.direction(move) for move in own] for own in moves],
             self._tests(sets),
         )
         samples = self._all_with_sines(samples, sets)
@@ -267,7 +267,7 @@ class Experiment:
         self, values: Values, moves: Sequence[Values]
     ) -> tuple[Array, Array]:
         """Return the simulated signals (M, channels) and their derivatives (M, channels, N)."""
-        directions = [self._direction(move) for move in moves]
+        directions = [self.direction(move) for move in moves]
         simulator = self.with_inputs(values)
         samples, slopes = simulator.tangents(self.parameters(values), self.signals, directions)
         return self._with_sines(samples, values), self._slopes_with_sines(slopes, values, moves)
@@ -299,7 +299,7 @@ class Experiment:
             disturbed[:, place] += sine.slopes(self.simulator.times, values, moves)
         return disturbed
 
-    def _direction(self, move: Values) -> Direction:
+    def direction(self, move: Values) -> Direction:
         """Return a direction as the simulator takes it."""
         own = self.own.keys()
         names = self.simulator.system.parameters

@@ -16,7 +16,7 @@ from exfit.errors import CaseError, SimulationError
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiments
 from exfit.fitting.descents import STAGES, Announce, Doubt, no_doubt
-from exfit.fitting.forms.external import is_external, simulated_by, start_tried
+from exfit.fitting.forms.external import has_twin, is_external, simulated_by, start_tried
 from exfit.fitting.forms.twin_descent import descent_by_twin
 from exfit.fitting.global_search import (
     FurtherDescents,
@@ -35,6 +35,7 @@ from exfit.fitting.residuals import (
 )
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
+from exfit.simulation.external import QUOTIENT_STEP
 from exfit.util.strategies import (
     DEFAULT_STRATEGY,
     FROM_FURTHER_STARTS,
@@ -161,7 +162,7 @@ class CaseSearches:
 
     def one(self, method: str, announce: Announce) -> estimate.Result:
         """Return the end of a descent from the start of the case."""
-        if self.options.jacobian == "exact" and is_external(self.residuals):
+        if self.options.jacobian == "exact" and has_twin(self.residuals):
             by_twin = partial(self._descent, method)
             return descent_by_twin(self.residuals, by_twin, announce)
         jacobian = JACOBIANS[self.options.jacobian](self.residuals)
@@ -174,7 +175,7 @@ class CaseSearches:
             functions=functions,
             method=method,
             max_iterations=options.most_iterations,
-            jacobian_error=jacobian_error(options.jacobian, options.difference_step),
+            jacobian_error=self._jacobian_error,
             good_enough=_good_enough(options, self.residuals),
             searches=searches_of(options),
             **self._limits,
@@ -183,6 +184,14 @@ class CaseSearches:
             return descent
         xtol = max(descent.xtol, PROGRAM_STEP)
         return replace(descent, ftol=PROGRAM_TOLERANCE, xtol=xtol)
+
+    @property
+    def _jacobian_error(self) -> float | None:
+        """The error of the Jacobian, as a share; None where it is exact."""
+        jacobian, step = self.options.jacobian, self.options.difference_step
+        if jacobian == "exact" and is_external(self.residuals) and not has_twin(self.residuals):
+            return jacobian_error("forward", QUOTIENT_STEP)
+        return jacobian_error(jacobian, step)
 
     def refined(self, end: estimate.Result, announce: Announce) -> estimate.Result:
         """Return the descent from an end with the full tolerances of the case."""

@@ -9,6 +9,7 @@ from exfit.plants.kinds import EVENTS, KINDS
 from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
+from exfit.plants.outside import OUTSIDE, model_of_names
 from exfit.plants.parts import (
     DRIVING_SCALE,
     GOVERNOR,
@@ -41,6 +42,7 @@ __all__ = [
     "MEASURED",
     "NETWORK",
     "OPEN_CIRCUIT",
+    "OUTSIDE",
     "REFERENCES",
     "RESTING",
     "SATURATION",
@@ -64,6 +66,7 @@ __all__ = [
     "initial",
     "machine_on_load",
     "machine_playback",
+    "model_of_names",
     "open_circuit",
     "playback",
     "rests_at",

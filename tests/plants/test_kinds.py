@@ -8,7 +8,6 @@ from pydantic import TypeAdapter
 from sources import ROOT, nodes
 
 from exfit.case import schema
-from exfit.case.parts import EXTERNAL
 from exfit.models import MODELS
 from exfit.models.machines import MACHINES
 from exfit.plants import EVENTS, KINDS, SATURATION, Equipment
@@ -39,7 +38,7 @@ def sections():
 
 
 def test_each_kind_has_a_section_of_the_schema_and_each_section_a_kind():
-    assert sections().keys() == KINDS.keys() | {EXTERNAL}  # whose kind is that of its twin
+    assert sections().keys() == KINDS.keys()
 
 
 def test_what_a_test_may_change_has_a_key_there(kind):

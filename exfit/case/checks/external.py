@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 
 from exfit.case.checks.node import ContentNode
-from exfit.case.parts import EXTERNAL, Parts, plants_of_records
+from exfit.case.parts import EXTERNAL, OF_RECORD, Parts, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.plants import KINDS
 from exfit.util.text import near
+
+OF_TWIN = ("machine", "parameters", "free", "network", "swing")
 
 
 def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
@@ -14,11 +16,7 @@ def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
     plant = content.at("plant")
     if plant.at("type").value != EXTERNAL:
         return
-    twin = KINDS.get(str(plant.at("twin").value))
-    if twin is not None and not twin.on_load:
-        for key in ("network", "swing"):
-            if key in plant:
-                yield plant.at(key).fault(f"not allowed with twin {twin.name}")
+    yield from _twin_faults(plant) if "twin" in plant else _named_faults(content, plant, parts)
     symbols = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
     for name in plant.at("names").content:
         if name not in symbols:
@@ -29,3 +27,31 @@ def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
         yield content.at("estimate", "search").fault(
             "global: not allowed with plant external, whose runs take long; must be local"
         )
+
+
+def _twin_faults(plant: ContentNode) -> Iterator[Fault]:
+    """Yield what a twin lacks, and what it does not have."""
+    if "machine" not in plant:
+        yield plant.at("machine").fault("is missing")
+    twin = KINDS.get(str(plant.at("twin").value))
+    if twin is not None and not twin.on_load:
+        for key in ("network", "swing"):
+            if key in plant:
+                yield plant.at(key).fault(f"not allowed with twin {twin.name}")
+
+
+def _named_faults(content: ContentNode, plant: ContentNode, parts: Parts) -> Iterator[Fault]:
+    """Yield what only a twin has, and parameters that cannot be named as they are."""
+    for key in OF_TWIN:
+        if key in plant:
+            yield plant.at(key).fault("only with plant.twin")
+    if "model" in content.at("as_found"):
+        yield content.at("as_found", "model").fault("only with plant.twin")
+    for part in parts.all:
+        for symbol in part.symbols:
+            place = next(
+                key for key in ("fixed", "free") if symbol in content.at("parameters", key)
+            )
+            if not symbol.isidentifier() or symbol in OF_RECORD:
+                text = "not a name, as KA is; plant.names has the name in the program"
+                yield content.at("parameters", place, symbol).fault(text)

@@ -7,12 +7,19 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.parts import Parts, kind_of, network_part, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
-from exfit.plants import HEARD, PlantKind, Stabilised, rests_at, rests_with_output
+from exfit.plants import HEARD, OUTSIDE, PlantKind, Stabilised, rests_at, rests_with_output
 from exfit.util.text import show
+
+PROGRAM_HAS_IT = "the program has its own"
 
 
 def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield a model that is missing, or what describes one where there is none."""
+    if kind is OUTSIDE:
+        for key in ("model", "saturation", "efd_times_speed", "stabiliser", "governor"):
+            if key in content:
+                yield content.at(key).fault(f"only with plant.twin: {PROGRAM_HAS_IT}")
+        return
     if kind.has_exciter:
         if "model" not in content:
             yield content.at("model").fault("is missing")

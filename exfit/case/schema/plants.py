@@ -170,7 +170,8 @@ class NoPlant(PlantSection):
 class ExternalPlant(PlantSection):
     """A unit that another program simulates; its twin, a plant of exfit, has all else.
 
-    The keys of the twin stand beside those of the program.
+    The keys of the twin stand beside those of the program. Without a twin the parameters are those
+    that the case names, and derivatives are quotients of the program's runs.
     """
 
     type: Literal["external"] = Field(description="Kind of plant.")
@@ -178,8 +179,10 @@ class ExternalPlant(PlantSection):
         min_length=1,
         description="The program with its arguments; it runs in the folder of the case.",
     )
-    twin: Literal["open-circuit", "infinite-bus"] = Field(
-        description="The plant of exfit that gives the exact derivatives."
+    twin: Literal["open-circuit", "infinite-bus"] | None = Field(
+        default=None,
+        description="The plant of exfit that gives the exact derivatives; default: none, they are "
+        "quotients of the program's runs.",
     )
     parallel: Count = Field(default=1, description="How many processes of it run side by side.")
     time_limit: Positive = Field(default=60.0, description="For each run, s.")
@@ -187,7 +190,7 @@ class ExternalPlant(PlantSection):
         default_factory=nothing,
         description="Names of parameters in the program, where they are others, such as KA: K_A.",
     )
-    machine: Text = MACHINE
+    machine: Text | None = Field(default=None, description="Machine model of the twin.")
     parameters: Frozen[Given] = MACHINE_DATA
     free: Frozen[FreeSection] = MACHINE_FREE
     network: Frozen[Number] = Field(
@@ -198,8 +201,10 @@ class ExternalPlant(PlantSection):
     std_errors: StdErrors = STD_ERRORS
 
     @property
-    def plant(self) -> "OpenCircuit | InfiniteBus":
-        """The twin as a plant of its own."""
+    def plant(self) -> "OpenCircuit | InfiniteBus | ExternalPlant":
+        """The twin as a plant of its own, or this one where it has none."""
+        if self.twin is None:
+            return self
         shared = ("machine", "parameters", "free", "sources", "std_errors")
         sections = {key: getattr(self, key) for key in shared}
         if self.twin == "open-circuit":
@@ -208,10 +213,16 @@ class ExternalPlant(PlantSection):
         return InfiniteBus.model_construct(type=self.twin, **sections, network=network, swing=swing)
 
 
-NativePlant = (
-    OpenCircuit | InfiniteBus | GridPlayback | Playback | MachinePlayback | MachineOnLoad | NoPlant
+Plant = (
+    OpenCircuit
+    | InfiniteBus
+    | GridPlayback
+    | Playback
+    | MachinePlayback
+    | MachineOnLoad
+    | NoPlant
+    | ExternalPlant
 )
-Plant = NativePlant | ExternalPlant
 SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 
 

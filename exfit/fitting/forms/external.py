@@ -11,14 +11,24 @@ from numpy.typing import NDArray
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.external.program import ExternalProgram, running
-from exfit.fitting.problem import FitProblem
+from exfit.fitting.problem import FitProblem, free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
-from exfit.simulation.external import CorrectedSimulator, ExternalSimulator
+from exfit.simulation.external import (
+    CorrectedSimulator,
+    ExternalSimulator,
+    LinearSimulator,
+    ProgramSimulator,
+    QuotientSimulator,
+)
+from exfit.simulation.inputs import Direction
 from exfit.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
+
+BY_QUOTIENTS = "no twin: derivatives are quotients of its runs; the search is local"
+LINEAR_ALONE = "no twin: intervals are those of linear theory, by quotients at the result"
 
 
 @contextmanager
@@ -64,27 +74,34 @@ def external_simulator(
         text = f"{driving}: steps and ramps only are allowed with plant external"
         raise CaseError([f"{case.path}: test: {text}"])
     names = {} if case.external is None else case.external.names
-    return ExternalSimulator(twin, program, signals, names)
+    if not case.has_no_equations:
+        return ExternalSimulator(twin, program, signals, names)
+    limits = {
+        parameter.name: (parameter.low, parameter.high) for parameter in free_parameters(case)
+    }
+    return QuotientSimulator(twin, program, signals, names, limits)
 
 
-def refuse_external(case: Case, command: str) -> None:
-    """Raise CaseError where another program simulates a case, for a command that has no use of it.
-
-    It would show the twin in place of the program.
-    """
-    if case.external is not None:
-        raise CaseError([f"{case.path}: plant.type: external: not allowed with {command}"])
+def refuse_without_equations(case: Case, command: str) -> None:
+    """Raise CaseError where a program without a twin simulates a case, for what simulates much."""
+    if case.has_no_equations:
+        text = f"missing; {command} needs the equations of a plant of exfit"
+        raise CaseError([f"{case.path}: plant.twin: {text}"])
 
 
-def settled(setups: Sequence[ExperimentSetup], values: Values) -> tuple[ExperimentSetup, ...]:
+def settled(
+    setups: Sequence[ExperimentSetup], values: Values, moving: Residuals | None = None
+) -> tuple[ExperimentSetup, ...]:
     """Return tests whose twin is corrected by its difference to the program at the values.
 
-    What follows a search simulates no more in the program. Raises SimulationError where the program
-    has no run there.
+    What follows a search simulates no more in the program. Without a twin the response is linear in
+    what is free in the residuals ``moving``; where none are given, the tests stay as they are.
+    Raises SimulationError where the program has no run there.
     """
     return tuple(
-        replace(setup, experiment=replace(setup.experiment, simulator=_corrected(setup, values)))
+        replace(setup, experiment=replace(setup.experiment, simulator=simulator))
         for setup in setups
+        for simulator in [_settled(setup, values, moving)]
     )
 
 
@@ -95,7 +112,7 @@ def with_setups(problem: FitProblem, setups: Sequence[ExperimentSetup]) -> FitPr
     return FitProblem(residuals, residuals)
 
 
-def _corrected(setup: ExperimentSetup, values: Values) -> CorrectedSimulator:
+def _settled(setup: ExperimentSetup, values: Values, moving: Residuals | None) -> ProgramSimulator:
     at = setup.with_start_values(values)
     simulator, signals = setup.experiment.with_inputs(at), setup.experiment.signals
     parameters = setup.experiment.parameters(at)
@@ -104,13 +121,31 @@ def _corrected(setup: ExperimentSetup, values: Values) -> CorrectedSimulator:
         outside, _ = simulator.samples(parameters, signals)
     except SimulationError as fault:
         raise SimulationError(f"{setup.case}: record {setup.name}: {fault}") from fault
+    if isinstance(simulator, QuotientSimulator):
+        if moving is None:
+            return own
+        return LinearSimulator(simulator, parameters, _directions(moving, setup, at))
     twin, _ = cast(ExternalSimulator, simulator).twin.samples(parameters, signals)
     return CorrectedSimulator(own, dict(zip(signals, (outside - twin).T, strict=True)))
+
+
+def _directions(residuals: Residuals, setup: ExperimentSetup, values: Values) -> list[Direction]:
+    """Return how each free parameter moves the simulation of a test at values."""
+    theta = np.array([each.scaled(values.get(each.name, each.start)) for each in residuals.free])
+    return [setup.experiment.direction(move) for move in residuals.moves(theta)]
 
 
 def is_external(residuals: Residuals) -> bool:
     """Return whether another program simulates the records."""
     return any(isinstance(each.simulator, ExternalSimulator) for each in residuals.experiments)
+
+
+def has_twin(residuals: Residuals) -> bool:
+    """Return whether the derivatives of a program's responses are those of a plant of exfit."""
+    simulators = [each.simulator for each in residuals.experiments]
+    return is_external(residuals) and not any(
+        isinstance(simulator, QuotientSimulator) for simulator in simulators
+    )
 
 
 def start_tried(case: Case, residuals: Residuals, program: ExternalProgram) -> None:
@@ -139,17 +174,30 @@ def as_by_program(
     return by_program
 
 
-def differences_from_twin(
+def differences_of_program(
     case: Case, setups: Sequence[ExperimentSetup], values: Values
 ) -> dict[str, dict[str, float]]:
-    """Return by how much, at most and per unit, program and twin differ: by record, by signal.
+    """Return by how much, at most and per unit, a program differs: by record, by signal.
 
-    Nothing where no other program simulates the case. Raises ExfitError where it has no run.
+    From its twin or, where it has none, from the record. Nothing where no other program simulates
+    the case. Raises ExfitError where it has no run.
     """
     with program_of(case) as program:
         if program is None:
             return {}
-        return _differences(settled(simulated_by(program, case, setups), values))
+        tests = settled(simulated_by(program, case, setups), values)
+        if case.has_no_equations:
+            return {setup.name: _differences_from_record(setup, values) for setup in tests}
+        return _differences(tests)
+
+
+def _differences_from_record(setup: ExperimentSetup, values: Values) -> dict[str, float]:
+    at = setup.with_start_values(values)
+    simulated, _ = setup.experiment.samples(at)
+    return {
+        channel.signal: float(np.nanmax(np.abs(samples - setup.experiment.measured(channel, at))))
+        for channel, samples in zip(setup.experiment.channels, simulated.T, strict=True)
+    }
 
 
 def _differences(setups: Sequence[ExperimentSetup]) -> dict[str, dict[str, float]]:
@@ -164,9 +212,15 @@ def _differences(setups: Sequence[ExperimentSetup]) -> dict[str, dict[str, float
 
 
 def program_notes(
-    case: Case, program: ExternalProgram, setups: Sequence[ExperimentSetup]
+    case: Case,
+    program: ExternalProgram,
+    setups: Sequence[ExperimentSetup],
+    followed: str = "intervals and diagnoses",
 ) -> Iterator[str]:
-    """Yield what a program was asked for, and by how much its twin differs at the result."""
+    """Yield what a program was asked for, and by how much its twin differs at the result.
+
+    ``followed`` is what followed the search, by the twin.
+    """
     section = case.external
     if section is None:
         return
@@ -174,9 +228,12 @@ def program_notes(
     failed = f", of which {counts.failed} failed" if counts.failed else ""
     restarts = f"; it was started anew {counts.restarts} times" if counts.restarts else ""
     yield f"simulated by {' '.join(section.command)}: {counts.runs} runs{failed}{restarts}"
+    if section.twin is None:
+        yield BY_QUOTIENTS
+        return
     yield (
-        f"derivatives by the twin {section.twin}; the search is local; intervals and diagnoses are "
-        "by the twin, corrected by its difference to the program at the result"
+        f"derivatives by the twin {section.twin}; the search is local; {followed} are by the twin, "
+        "corrected by its difference to the program at the result"
     )
     for name, differences in _differences(setups).items():
         listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())

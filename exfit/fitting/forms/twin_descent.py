@@ -21,11 +21,10 @@ from exfit.estimate import half_square
 from exfit.fitting.descents import Announce, following
 from exfit.fitting.experiment import Channel
 from exfit.fitting.residuals import Residuals
-from exfit.simulation.external import TwinSimulator
+from exfit.simulation.external import QUOTIENT_STEP, TwinSimulator
 
 Array = NDArray[np.float64]
 
-QUOTIENT_STEP = 1e-3  # of scaled parameters: far above the tolerances of programs that integrate
 FAILED_STEPS = 2  # in a row, after which the derivatives of the twin are doubted
 VISIBLE_GAIN = 1e-3  # of the cost: what a step must promise to be missed
 DISTINCT = 0.3  # of the residuals: by how much program and twin may differ

@@ -8,6 +8,22 @@ from exfit.output.terminal.terminal import notes, paragraph, plain_table, remark
 
 def check(console: Console, result: Check) -> None:
     """Show what a check shows of a case."""
+    if result.has_equations:
+        _equations(console, result)
+    else:
+        paragraph(console, "without a twin there are no equations to check")
+    other = "twin" if result.has_equations else "record"
+    for record, differences in result.from_program.items():
+        listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
+        paragraph(
+            console, f"largest difference of program and {other} at the start, {record}: {listed}"
+        )
+    remarks(console, "warning:", result.warnings)
+    notes(console, result.notes)
+
+
+def _equations(console: Console, result: Check) -> None:
+    """Show what a check shows of the equations: derivatives, a flat run, sub-steps."""
     if result.deviations:
         paragraph(console, "exact Jacobian against central differences, relative, by their step")
         heads = [f"{step:.0e}" for step in STEPS]
@@ -27,14 +43,7 @@ def check(console: Console, result: Check) -> None:
     step = f"{result.step:g} s"
     paragraph(console, f"sub-steps: {result.substeps} in each step of {step}")
     paragraph(console, f"halving every step moves the response by {result.step_error:.1e} pu")
-    for record, differences in result.from_program.items():
-        listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
-        paragraph(
-            console, f"largest difference of program and twin at the start, {record}: {listed}"
-        )
     paragraph(console, f"bypassed: {', '.join(result.bypassed) or 'nothing'}")
-    remarks(console, "warning:", result.warnings)
-    notes(console, result.notes)
 
 
 def _verdict(console: Console, good: bool, yes: str, no: str) -> None:

@@ -12,7 +12,7 @@ import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.forms.twin_descent import ProgramFunctions
-from exfit.workflows import check, profile
+from exfit.workflows import check, identify, profile
 
 PROGRAM = Path(__file__).parents[2] / "support" / "outside_program.py"
 PLANT = {"machine": "ONE_AXIS", "parameters": {"Tpd0": 6.0, "S10": 0.0, "S12": 0.0}}
@@ -146,11 +146,90 @@ def test_a_validation_is_by_the_program(record):
     assert match.rmse == pytest.approx(NOISE, rel=0.2)
 
 
+def without_twin(record, **changes):
+    command = [sys.executable, str(PROGRAM)]
+    own = {"type": "external", "command": command, "names": {"K": "K_A", "T": "machine.Tpd0"}}
+    content = {
+        "plant": {**own, "parallel": 2, "time_limit": 20.0},
+        "test": BUMP,
+        "record": {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}},
+        "parameters": {"fixed": {"TATB": 0.1, "T": 6.0}, "free": FREE},
+    }
+    return Case.from_dict({**content, **changes}, record)
+
+
+def test_without_a_twin_quotients_of_the_programs_runs_lead_to_the_same_minimum(record, native):
+    case = without_twin(record)
+    result = exfit.fit(case)
+    assert result.cost == pytest.approx(native.cost, rel=SAME_COST)
+    assert result.simulations <= 25
+    for name, parameter in native.parameters.items():
+        own = result.parameters[name]
+        # a quotient over 1e-3 of its parameter is wrong by about as much
+        assert own.value == pytest.approx(parameter.value, abs=0.1 * parameter.std_error)
+        assert own.std_error == pytest.approx(parameter.std_error, rel=0.02)
+    (start,) = result.comparisons
+    assert np.array_equal(start.overlays["vt"].start, exfit.simulate(case).response.signals["vt"])
+
+
+def test_without_a_twin_what_a_record_leaves_open_is_found_by_the_program(record):
+    shifted = exfit.Record.from_arrays(record.time + 0.13, dict(record.signals))
+    test = {"vt0": 1.0, "vref": [{"at": {"start": 1.05, "min": 1.0, "max": 1.4}, "step": 0.05}]}
+    file = {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}}
+    validate = [{"name": "later", "test": test, "record": file}]
+    case = without_twin(record, validate=validate)
+    result = exfit.fit(case.with_record(shifted, "later"))
+    (later,) = result.validation
+    assert later.rmse == pytest.approx(NOISE, rel=0.2)
+    assert [*later.of_record.values()] == pytest.approx([1.13], abs=2e-3)
+
+
+def test_without_a_twin_profiles_are_the_programs_own(record, native):
+    (found,) = profile(without_twin(record), "K").profiles
+    interval = native.parameters["K"].interval
+    assert found.low == pytest.approx(interval[0], abs=0.1)
+    assert found.high == pytest.approx(interval[1], abs=0.1)
+
+
+def test_profiles_are_those_of_the_corrected_twin(record, native):
+    other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
+    profiles = profile(external(record, **other), "K")
+    interval = native.parameters["K"].interval
+    assert profiles.profiles[0].low == pytest.approx(interval[0], abs=0.2)
+    assert profiles.profiles[0].high == pytest.approx(interval[1], abs=0.2)
+    assert any("profiles are by the twin, corrected" in note for note in profiles.notes)
+
+
+def test_without_a_twin_a_check_compares_the_start_with_the_record(record):
+    shown = check(without_twin(record))
+    assert not shown.has_equations
+    assert shown.deviations == {}
+    assert 1e-3 < shown.from_program["fit"]["vt"] < 0.05
+    with pytest.raises(CaseError, match=r"plant.twin: missing; identify needs the equations"):
+        identify(without_twin(record))
+
+
+@pytest.mark.parametrize(
+    ("changes", "place"),
+    [
+        ({"model": "SEXS"}, "model: only with plant.twin"),
+        ({"parameters": {"fixed": {"vt0": 1.0}, "free": FREE}}, "parameters.fixed.vt0: not a name"),
+        ({"parameters": {"free": {"machine.H": {"start": 1.0}}}}, "free.machine.H: not a name"),
+        ({"parameters": {"free": {"K": {"start": 1.0}}}}, "parameters.free.K.min: is missing"),
+        ({"as_found": {"model": "SEXS"}}, "as_found.model: only with plant.twin"),
+    ],
+)
+def test_faults_without_a_twin_are_named(changes, place, record):
+    with pytest.raises(CaseError, match=place):
+        without_twin(record, **changes)
+
+
 @pytest.mark.parametrize(
     ("changes", "place"),
     [
         ({"network": {"X": 0.1}}, "plant.network: not allowed with twin open-circuit"),
         ({"names": {"KQ": "x"}}, "plant.names.KQ: not a parameter"),
+        ({"machine": None}, "plant.machine: has no value"),
         ({"command": []}, "plant.command: 0 entries; at least 1 needed"),
         ({"twin": "playback"}, "plant.twin: 'playback' is not possible"),
     ],
@@ -160,8 +239,6 @@ def test_faults_of_the_section_are_named(changes, place, record):
         external(record, **changes)
 
 
-def test_a_global_search_and_profiles_are_refused(record):
+def test_a_global_search_is_refused(record):
     with pytest.raises(CaseError, match="search: global: not allowed with plant external"):
         exfit.fit(external(record), search="global")
-    with pytest.raises(CaseError, match="not allowed with profile"):
-        profile(external(record))

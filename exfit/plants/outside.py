@@ -1,0 +1,68 @@
+"""A unit that another program simulates, of which exfit knows the names of its parameters alone."""
+
+from collections.abc import Iterable
+from functools import cache
+from math import inf
+from typing import Any
+
+from exfit.engine.system import Motion, Rest, Signals, System
+from exfit.models.sheet import Model, Parameter
+from exfit.plants.parts import VT0, symbols
+from exfit.plants.plant import PlantKind, compared, present
+from exfit.signals import COMPARED
+
+STATE = "rest"  # a system has at least one; it never moves
+
+
+def model_of_names(name: str, parameters: Iterable[str]) -> Model:
+    """Return a model with these parameters and no data sheet; its equations are elsewhere."""
+    return Model(
+        name=name,
+        title="the model of another program",
+        drawing="",
+        aliases=(),
+        sheet=tuple(Parameter(symbol, 0.0, "", -inf, inf, "") for symbol in parameters),
+        states=(),
+        setpoints=(),
+        records=(),
+        inputs=(),
+        equations=_nowhere,
+        rest=_nowhere,
+    )
+
+
+def _nowhere(*_: Any) -> Any:
+    raise NotImplementedError("the equations are those of another program")
+
+
+@cache
+def outside(model: Model, inputs: tuple[str, ...]) -> System:
+    """Return what stands for the unit: all signals stay where they are, vt at its start."""
+
+    def rest(_: Signals) -> Rest:
+        return Rest({STATE: 0.0}, {})
+
+    def equations(p: Signals, _: Signals, x: Signals, __: Signals) -> Motion:
+        signals = {**dict.fromkeys(COMPARED, 0.0), "vt": p[VT0], STATE: x[STATE]}
+        return Motion({STATE: 0.0}, {}, signals)
+
+    return System(
+        parameters=(*symbols("", model.sheet), VT0),
+        setpoints=(),
+        states=(STATE,),
+        inputs=inputs,
+        outputs=(*COMPARED, STATE),
+        time_constants=(),
+        rest=rest,
+        motion=equations,
+    )
+
+
+OUTSIDE = PlantKind(
+    name="external",
+    title="a unit that another program simulates",
+    needs=("exciter",),
+    events=("vref", "vs", "pref", "E", "angle"),
+    signals=compared(COMPARED),
+    build=lambda equipment: outside(present(equipment.exciter), equipment.inputs),
+)
