@@ -121,6 +121,11 @@ def renamed(rows: Sheet, **symbols: str) -> Sheet:
     return tuple(row._replace(symbol=symbols.get(row.symbol, row.symbol)) for row in rows)
 
 
+def with_typical(rows: Sheet, **values: float) -> Sheet:
+    """Return a data sheet with other typical values for some symbols, ``KA=210.0``."""
+    return tuple(row._replace(typical=values.get(row.symbol, row.typical)) for row in rows)
+
+
 @dataclass(frozen=True)
 class DynamicsRecord:
     """How a planner's file lists a model: the symbols of its constants (CONs) in their order.

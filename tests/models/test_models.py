@@ -288,7 +288,8 @@ def test_what_acts_on_load_only_does_so_there(exciter):
     for symbol in symbols:
         changed = Names(**{**vars(base), symbol: 1.5 * values[symbol]})
         for power in (0.0, 0.7):
-            u = exciter_inputs(vt=1.0, ifd=1.8, p=power, q=0.3 * power)
+            # a stabiliser acts on load only, and so does its place
+            u = exciter_inputs(vt=1.0, ifd=1.8, p=power, q=0.3 * power, vs=0.01 * power)
             rests, motions = [], []
             for p in (base, changed):
                 x, d = Names(), Names()

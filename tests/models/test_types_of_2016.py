@@ -30,9 +30,12 @@ class Form(NamedTuple):
 
 
 SUPPLY = {"SW1": 2.0, "KP": 1.0, "KC1": 0.0, "VBMAX": NONE}  # of one, whatever happens
+LOOP = {"SW1": 1.0, "VAMAX": NONE, "VAMIN": -NONE}  # from the terminals, no further limit
 # the changes: lags that typical data leave out
 FORMS = {
     "AC8C": Form("AC8B", SUPPLY, changes={"TR": 0.02, "TA": 0.05}),
+    "ST1C": Form("ST1A", {}, changes={"TA": 0.02, "KF": 0.01}),
+    "ST4C": Form("ST4B", {**LOOP, "TG": 0.0, "VGMAX": NONE}, changes={"TA": 0.0, "KG": 0.5}),
 }
 
 

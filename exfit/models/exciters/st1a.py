@@ -28,12 +28,12 @@ it).
 from exfit.engine.trace import Signal
 from exfit.models.blocks import (
     clip,
+    inf,
     lag,
     larger,
     lead_lag,
     limited_lag,
     regulator_output,
-    smaller,
     washout,
 )
 from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, OF_A_LIST, SearchRange, record, sheet
@@ -91,6 +91,8 @@ PSLF_RECORDS = (
 
 STATES = "VC VL VL1 VA VF"
 
+Gate = tuple[Signal, Signal]  # the value of UEL that a signal is at least, of OEL at most
+
 
 def leads(vi: Signal, first: Signal, second: Signal, p: Signal) -> Signal:
     """Return the output of both lead-lags, whose states are given."""
@@ -102,30 +104,53 @@ def excess(u: Signal, p: Signal) -> Signal:
     return p.KLR * larger(u.ifd - p.ILR, 0.0)
 
 
-def gated(va: Signal, u: Signal, p: Signal) -> Signal:
-    """Return what the limiters leave of the regulator's output."""
-    return smaller(larger(clip(va, p.VAMIN, p.VAMAX) - excess(u, p), u.vuel), u.voel)
+def gated(va: Signal, taken: Signal, gate: Gate, p: Signal) -> Signal:
+    """Return what is left of the regulator's output behind its limits, ``taken`` and a gate."""
+    return clip(clip(va, p.VAMIN, p.VAMAX) - taken, *gate)
+
+
+def regulated(
+    error: Signal,
+    taken: Signal,
+    gates: tuple[Gate, Gate],
+    s: Signal,
+    u: Signal,
+    p: Signal,
+    d: Signal,
+) -> Signal:
+    """Write the slopes behind the summing point into d and return efd.
+
+    ``taken`` is subtracted from the regulator's output; limiters hold its input and its output
+    between the two ``gates``.
+    """
+    at_input, at_output = gates
+    vl, gain = leads(error, s.VL, s.VL1, p), leads(1.0, 0.0, 0.0, p)
+    fed_back = gated(regulator_output(s, p, vl, gain, taken), taken, at_output, p)
+    vf, _ = washout(fed_back, s.VF, p.KF, p.TF)
+    vi = clip(clip(error - vf, p.VIMIN, p.VIMAX), *at_input)
+    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
+    vl1, d.VL1 = lead_lag(vl, s.VL1, p.TC1, p.TB1)
+    va, d.VA = limited_lag(vl1, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
+    vr = gated(va, taken, at_output, p)
+    _, d.VF = washout(vr, s.VF, p.KF, p.TF)
+    return clip(vr, u.vt * p.VRMIN, u.vt * p.VRMAX - p.KC * u.ifd)
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = u.vref + u.vs - vc
-    vl, gain = leads(error, s.VL, s.VL1, p), leads(1.0, 0.0, 0.0, p)
-    fed_back = gated(regulator_output(s, p, vl, gain, excess(u, p)), u, p)
-    vf, _ = washout(fed_back, s.VF, p.KF, p.TF)
-    vi = clip(error - vf, p.VIMIN, p.VIMAX)
-    vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
-    vl1, d.VL1 = lead_lag(vl, s.VL1, p.TC1, p.TB1)
-    va, d.VA = limited_lag(vl1, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    vr = gated(va, u, p)
-    _, d.VF = washout(vr, s.VF, p.KF, p.TF)
-    return clip(vr, u.vt * p.VRMIN, u.vt * p.VRMAX - p.KC * u.ifd)
+    gates = (-inf, inf), (u.vuel, u.voel)
+    return regulated(u.vref + u.vs - vc, excess(u, p), gates, s, u, p, d)
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    va = efd + excess(u, p)
+    return at_rest(efd, excess(u, p), u, p, x) - u.vs
+
+
+def at_rest(efd: Signal, taken: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref without a stabiliser."""
+    va = efd + taken
     error = va / p.KA
     x.VC, x.VL, x.VL1, x.VA, x.VF = u.vc1, error, error, va, efd
-    return u.vc1 + error - u.vs
+    return u.vc1 + error

@@ -1,0 +1,172 @@
+"""The static exciters of IEEE Std 421.5-2016 against their block diagrams, limits and gates."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagrams import alone, lag, lead_lag, pid, rectified, standing, washout
+from oracle import drawn_values, lively_values, typical_values
+
+from exfit.models import MODELS
+from exfit.plants import Names
+
+EFD, IFD, VT = 1.3, 1.1, 0.9
+
+
+# --- transfer functions ---------------------------------------------------------------------------
+
+
+def bridge(p):
+    """Return VB, on the first arc of the rectifier or at its ceiling."""
+    source = p.KP * VT if p.SW1 < 1.5 else p.KP
+    return min(rectified(source, p.KC * IFD), p.VBMAX)
+
+
+# each gives the way from the voltage error to efd, and that of the measured voltage to the error
+
+
+def st1c(p):
+    forward = lead_lag(p.TC, p.TB) * lead_lag(p.TC1, p.TB1) * lag(p.KA, p.TA)
+    return forward.fed_back(washout(p.KF, p.TF)), lag(1.0, p.TR)
+
+
+def st4c(p):
+    inner = pid(p.KPM, p.KIM) * lag(bridge(p), p.TA)
+    feedback = lag(p.KG, p.TG) if p.KG * EFD < p.VGMAX else 0.0
+    return pid(p.KPR, p.KIR) * inner.fed_back(feedback), lag(1.0, p.TR)
+
+
+DIAGRAMS = {"ST1C": st1c, "ST4C": st4c}
+INDEPENDENT = {"SW1": 2.0}
+CASES = [
+    *((name, {}) for name in DIAGRAMS),
+    *((name, INDEPENDENT) for name in ("ST4C",)),
+    ("ST4C", {"TA": 0.0}),
+    ("ST4C", {"TG": 0.0}),
+    ("ST4C", {"TA": 0.0, "TG": 0.0}),
+    ("ST4C", {"TA": 0.0, "TG": 0.0, "VGMAX": 0.05}),  # nothing is fed back
+]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("name", "changes"), CASES)
+def test_a_small_step_is_that_of_the_block_diagram(name, changes, seed):
+    """Of the reference and of the measured voltage; Runge-Kutta errs by 1e-8 of it."""
+    values = drawn_values(name, seed) | changes
+    forward, measured = DIAGRAMS[name](SimpleNamespace(**values))
+    times, of_reference = alone(name, values, vref=1e-6, vt=VT, step=2.5e-4)
+    _, of_voltage = alone(name, values, vc1=1e-6, vt=VT, step=2.5e-4)
+    for efd, expected in (
+        (of_reference, 1e-6 * forward.step(times)),
+        (of_voltage, -1e-6 * (measured * forward).step(times)),
+    ):
+        # 1e-8 pu of rounding where the step of efd is small
+        assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
+
+
+# --- ceilings and floors --------------------------------------------------------------------------
+
+
+def limits(name, p):
+    """Return the floor and the ceiling of efd by the diagram."""
+    if name == "ST1C":
+        return VT * p.VRMIN, VT * p.VRMAX - p.KC * IFD
+    return bridge(p) * max(p.VMMIN, p.VAMIN), bridge(p) * min(p.VMMAX, p.VAMAX)
+
+
+LARGE = {
+    "ST1C": {"VAMAX": 99.0, "VAMIN": -99.0},
+    "ST4C": {"VRMAX": 9.0, "VRMIN": -9.0, "KIM": 20.0},
+}
+
+
+@pytest.mark.parametrize(("name", "changes"), LARGE.items())
+def test_a_large_step_reaches_the_limits_of_the_diagram_and_never_passes_them(name, changes):
+    values = lively_values(name) | changes
+    floor, ceiling = limits(name, SimpleNamespace(**values))
+    _, efd = alone(name, values, vref=[3.0, -3.0], vt=VT, time=3.0, step=1e-3)
+    assert efd[-1] == pytest.approx([ceiling, floor], rel=1e-9)
+    assert efd.max() <= ceiling + 1e-9
+    assert efd.min() >= floor - 1e-9
+
+
+# --- limiters and the stabiliser ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_what_limiters_add_is_a_step_of_the_reference(name):
+    values = lively_values(name)
+    _, by_limiter = alone(name, values, held={"vsum": 0.01}, step=1e-3)
+    _, by_reference = alone(name, values, vref=0.01, step=1e-3)
+    assert by_limiter == pytest.approx(by_reference, abs=1e-12)
+    assert np.ptp(by_limiter) > 1e-3
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_a_gate_at_the_input_replaces_the_error(name):
+    """The step of the reference that gives this error does the same; OEL has the last word."""
+    values = lively_values(name) | {"VIMAX": 9.0, "VIMIN": -9.0, "TR": 0.0, "KF": 0.0}
+    u, _, _ = standing(name, values)
+    for held, error in (
+        ({"vuel": 0.08}, 0.08),
+        ({"voel": -0.03}, -0.03),
+        ({"vuel": 0.08, "voel": 0.02}, 0.02),
+    ):
+        _, gated = alone(name, values, held=held, time=0.2, step=1e-3)
+        _, stepped = alone(name, values, vref=error - (u.vref - u.vc1), time=0.2, step=1e-3)
+        assert gated == pytest.approx(stepped, abs=1e-9)
+        assert np.ptp(gated) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["ST1C", "ST4C"])
+def test_a_gate_at_the_output_is_the_output(name):
+    values = lively_values(name) | {"TA": 0.0}
+    vb = bridge(SimpleNamespace(**values)) if "SW1" in values else 1.0
+    for held, output in (
+        ({"vuel_out": 0.5}, 0.5),
+        ({"voel_out": 0.1}, 0.1),
+        ({"vuel_out": 0.5, "voel_out": 0.1}, 0.1),
+    ):
+        _, efd = alone(name, values, held=held, efd=0.3 * vb, vt=VT, time=0.1, step=1e-3)
+        assert efd == pytest.approx(vb * output)
+
+
+def test_the_stabiliser_of_st1c_is_added_where_vos_says():
+    """At the error it is a step of the reference; behind it it is added to VA."""
+    values = lively_values("ST1C")
+    _, by_reference = alone("ST1C", values, vref=0.01, step=1e-3)
+    _, at_error = alone("ST1C", values, held={"vs": 0.01}, step=1e-3)
+    assert at_error == pytest.approx(by_reference, abs=1e-12)
+    _, behind = alone("ST1C", values | {"VOS": 2.0}, held={"vs": 0.01}, step=1e-3)
+    assert behind[0] - EFD == pytest.approx(0.01, abs=1e-12)
+
+
+def test_the_field_voltage_loop_of_st4c_closes_on_itself():
+    """The PI sees the very field voltage that it gives, whatever limit or gate cuts it."""
+    rng = np.random.default_rng(11)
+    values = typical_values("ST4C") | {"TA": 0.0, "TG": 0.0, "VMMAX": 0.5, "VMMIN": -0.3}
+    for _ in range(300):
+        u, p, x = standing("ST4C", values | {"VGMAX": rng.choice([0.05, 9.0])}, efd=EFD)
+        p.KPM, p.KG, x.VR, x.VM = rng.uniform([0.0, 0.0, -3.0, -0.5], [5.0, 2.0, 3.0, 0.5])
+        u.voel_out, u.vuel_out = rng.choice([np.inf, 0.1]), rng.choice([-np.inf, 0.05])
+        d = Names()
+        efd = MODELS["ST4C"].equations(x, u, p, d)
+        vr = np.clip(p.KPR * (u.vref - u.vc1) + x.VR, p.VRMIN, p.VRMAX)
+        inner = p.KPM * (vr - min(p.KG * efd, p.VGMAX)) + x.VM
+        vm = min(max(np.clip(inner, p.VMMIN, p.VMMAX), u.vuel_out), u.voel_out)
+        vb = min(rectified(p.KP * u.vt, p.KC * u.ifd), p.VBMAX)
+        assert efd == pytest.approx(vb * np.clip(vm, p.VAMIN, p.VAMAX), abs=1e-12)
+
+
+# --- records --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_a_record_lists_every_parameter_once(name):
+    (record,) = MODELS[name].records
+    integers = [symbol for symbol, _ in record.icons]
+    listed = [*integers, *record.cons]
+    assert len(set(listed)) == len(listed)
+    own = {row.symbol for row in MODELS[name].sheet}
+    assert own <= set(listed)
+    assert set(listed) - own <= {*integers, *record.ignored, *dict(record.absent)}
