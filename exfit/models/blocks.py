@@ -302,10 +302,10 @@ def exciter_demand(efd: Signal, KE: Signal, p: Signal) -> Signal:
 
 
 def exciter(
-    vr: Signal, efd: Signal, KE: Signal, p: Signal, low: Signal = -inf
+    vr: Signal, efd: Signal, KE: Signal, p: Signal, low: Signal = -inf, high: Signal = inf
 ) -> tuple[Signal, Limited]:
     """1 / sTE with KE EFD + VX(EFD) fed back: an exciter without a rectifier."""
-    return limited_integrator(vr - exciter_demand(efd, KE, p), efd, p.TE, low)
+    return limited_integrator(vr - exciter_demand(efd, KE, p), efd, p.TE, low, high)
 
 
 def field_demand(ve: Signal, ifd: Signal, p: Signal) -> Signal:

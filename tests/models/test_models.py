@@ -230,7 +230,7 @@ def responses(model, sets, saturation="quadratic", size=0.3):
 
 def tried(row, value):
     """Return values of a parameter, near and far from its own, and beyond zero."""
-    factors = [value * factor for factor in (0.005, 0.01, 0.05, 0.2, 0.5, 2.0, 5.0, -0.03)]
+    factors = [value * factor for factor in (0.005, 0.01, 0.05, 0.2, 0.5, 2.0, 5.0, -0.03, 0.015)]
     shifts = [value + shift for shift in (-5.0, -0.5, 0.5, 1.0)]
     return [v for v in (*factors, *shifts) if row.low <= v <= row.high and v != value]
 

@@ -20,14 +20,13 @@ Not modelled: UEL or OEL at the summing point, SWITCH (unused in PSS/E).
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import (
-    commutator_start,
-    exciter,
-    lag,
-    larger,
-    lead_lag,
-    limited_lag,
-    washout,
+from exfit.models.blocks import larger
+from exfit.models.commutators import (
+    COMMUTATOR_SETPOINTS,
+    COMMUTATOR_STATES,
+    commutator_rest,
+    excited,
+    regulator_input,
 )
 from exfit.models.sheet import (
     EXCITER_LAG,
@@ -79,26 +78,12 @@ PSLF_RECORDS = (
     ),
 )
 
-STATES = "VC VL VR EFD VF"
-SETPOINTS = "KE0 VRMAX0 VRMIN0"
+STATES = COMMUTATOR_STATES
+SETPOINTS = COMMUTATOR_SETPOINTS
+rest = commutator_rest
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
-    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
-    gated = larger(vl, u.vuel)
-    low, high = u.vt * s.VRMIN0, u.vt * s.VRMAX0
-    vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, low, high)
-    efd, d.EFD = exciter(vr, s.EFD, s.KE0, p, low=0.0)
-    return efd
-
-
-def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
-    """Write the states that hold efd into x and return vref."""
-    start = commutator_start(efd, p)
-    x.KE0, x.VRMAX0, x.VRMIN0 = start.KE, start.VRMAX, start.VRMIN
-    error = start.vr / p.KA
-    x.VC, x.VL, x.VR, x.EFD, x.VF = u.vc1, error, start.vr, efd, efd
-    return u.vc1 + error - u.vs
+    vl = regulator_input(s, u, p, d)
+    return excited(larger(vl, u.vuel), u.vt, s, p, d)
