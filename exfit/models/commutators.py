@@ -9,9 +9,7 @@ COMMUTATOR_STATES = "VC VL VR EFD VF"
 COMMUTATOR_SETPOINTS = "KE0 VRMAX0 VRMIN0"
 
 
-def regulator_input(
-    s: Signal, u: Signal, p: Signal, d: Signal, limiters: Signal = 0.0
-) -> Signal:
+def regulator_input(s: Signal, u: Signal, p: Signal, d: Signal, limiters: Signal = 0.0) -> Signal:
     """Return the voltage error, with what limiters add, behind the lead TC and the lag TB."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)

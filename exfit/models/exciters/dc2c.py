@@ -28,36 +28,17 @@ from exfit.models.commutators import (
     excited,
     regulator_input,
 )
-from exfit.models.sheet import (
-    EXCITER_LAG,
-    FEEDBACK,
-    FREE,
-    LAG_OF_KF,
-    REGULATOR_LAG,
-    record,
-    sheet,
-)
+from exfit.models.exciters import dc2a
+from exfit.models.sheet import OF_ONE_PROGRAM, record, sheet
 
 ALIASES = ("ESDC2C",)
 
-SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 300.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
-    ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("TB", 0.0, "s", (0.0, 100.0), "regulator lag"),
-    ("TC", 0.0, "s", (0.0, 100.0), "regulator lead"),
-    ("VRMAX", 4.95, "pu", (-9999.0, 9999.0), "regulator ceiling at rated voltage, or 0"),
-    ("VRMIN", -4.9, "pu", (-9999.0, 9999.0), "regulator floor at rated voltage"),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant, or 0"),
-    ("TE", 1.33, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.02, "pu", (0.0, 10.0), "stabilising feedback gain", FEEDBACK),
-    ("TF", 0.675, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("E1", 3.05, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.279, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 2.29, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.117, "pu", (0.0, 100.0), "saturation at E2"),
-    ("VEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter voltage"),
-    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+SHEET = (
+    *dc2a.SHEET,
+    *sheet(
+        ("VEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter voltage"),
+        ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+    ),
 )
 
 RECORDS = (
@@ -65,7 +46,8 @@ RECORDS = (
         "DC2C",
         "TR KA TA TB TC VRMAX VRMIN KE TE KF TF E1 SE1 E2 SE2 VEMAX VEMIN",
         icons={"OEL": 1, "UEL": 1},
-        doubt="its order is from one public source",
+        ignored="OEL UEL",
+        doubt=OF_ONE_PROGRAM,
     ),
 )
 

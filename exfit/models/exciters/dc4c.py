@@ -1,4 +1,4 @@
-"""DC4C: commutator exciter, PID regulator, compound supply (421.5-2016).
+"""DC4C: commutator exciter, PID regulator, own supply (IEEE Std 421.5-2016).
 
                   VRMAX/KA             VUEL  VOEL
 vref + vs ─►(+)─►[KPR + KIR/s      ]───►HV───►LV────┐
@@ -24,13 +24,13 @@ takeover gates. The limits of the lag and of EFD are non-windup; the integral is
 frozen while the PID is at its limit. DC4B multiplies with VT before the lag TA:
 with TA = 0 and VB = VT they are one model. KE and VRMAX are used as given, also
 0. The drawing is PowerWorld's and InterPSS's; VFE as the current of the
-rectifier is InterPSS's. Typical data are the standard's, as GridKit has them;
-the saturation is DC4B's (the SE of 1.54 at 4.8 there lets no EFD pass 1.5).
+rectifier is InterPSS's. Typical data are the standard's, as GridKit has them,
+but for saturation (DC4B's; the SE of 1.54 at 4.8 lets no EFD pass 1.5) and KC1.
 """
 
 from exfit.engine.trace import Signal
+from exfit.models.alternators import SUPPLY, supply
 from exfit.models.blocks import (
-    compound_source,
     exciter,
     exciter_demand,
     lag,
@@ -38,47 +38,42 @@ from exfit.models.blocks import (
     limited_lag,
     pi_rest,
     pid,
-    rectifier,
     smaller,
     washout,
-    where,
 )
 from exfit.models.sheet import (
     EXCITER_LAG,
     FREE,
     LAG_OF_KF,
+    OF_ONE_PROGRAM,
     REGULATOR_LAG,
     SearchRange,
     record,
     sheet,
 )
 
-SHEET = sheet(
-    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KPR", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KIR", 20.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
-    ("KDR", 20.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
-    ("TDR", 0.01, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
-    ("VRMAX", 2.7, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-    ("VRMIN", -2.7, "pu", (-9999.0, 9999.0), "regulator floor"),
-    ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
-    ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
-    ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
-    ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
-    ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
-    ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
-    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
-    ("E1", 2.33, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
-    ("SE1", 0.27, "pu", (0.0, 100.0), "saturation at E1"),
-    ("E2", 1.75, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
-    ("SE2", 0.08, "pu", (0.0, 100.0), "saturation at E2"),
-    ("KP", 1.0, "pu", (0.0001, 100.0), "potential source gain"),
-    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
-    ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
-    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
-    ("KC1", 0.0, "pu", (0.0, 10.0), "rectifier loading of the supply"),
-    ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the supply"),
-    ("SW1", 1.0, "1", (1.0, 2.0), "source of the supply: 1 terminals, 2 its own"),
+SHEET = (
+    *sheet(
+        ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+        ("KPR", 80.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
+        ("KIR", 20.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+        ("KDR", 20.0, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
+        ("TDR", 0.01, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
+        ("VRMAX", 2.7, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+        ("VRMIN", -2.7, "pu", (-9999.0, 9999.0), "regulator floor"),
+        ("KA", 1.0, "pu", (0.0001, 100000.0), "regulator gain"),
+        ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
+        ("KE", 1.0, "pu", (-10.0, 10.0), "exciter constant"),
+        ("TE", 0.8, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+        ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
+        ("TF", 1.0, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+        ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+        ("E1", 2.33, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+        ("SE1", 0.27, "pu", (0.0, 100.0), "saturation at E1"),
+        ("E2", 1.75, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+        ("SE2", 0.08, "pu", (0.0, 100.0), "saturation at E2"),
+    ),
+    *SUPPLY,
 )
 
 RECORDS = (
@@ -87,12 +82,12 @@ RECORDS = (
         "TR KPR KIR KDR TDR VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2 "
         "KP KI XL THETAP KC1 VBMAX",
         icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
-        doubt="its order is from one public source",
+        ignored="OEL UEL SCL",
+        doubt=OF_ONE_PROGRAM,
     ),
 )
 
 STATES = "VC VI VD VR EFD VF"
-POSITION_B = 1.5  # SW1 beyond it
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
@@ -104,20 +99,15 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, low, high)
     gated = smaller(larger(vpid, u.vuel), u.voel)
     vr, d.VR = limited_lag(gated, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    efd, d.EFD = exciter(vr * supply(s.EFD, u, p), s.EFD, p.KE, p, p.VEMIN)
+    vb = supply(u, exciter_demand(s.EFD, p.KE, p), p)
+    efd, d.EFD = exciter(vr * vb, s.EFD, p.KE, p, p.VEMIN)
     return efd
-
-
-def supply(efd: Signal, u: Signal, p: Signal) -> Signal:
-    """Return VB, what the regulator is fed with while the exciter gives efd."""
-    terminals = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
-    ve = where(p.SW1 < POSITION_B, terminals, p.KP)
-    return smaller(rectifier(ve, p.KC1 * exciter_demand(efd, p.KE, p)), p.VBMAX)
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    x.VR = exciter_demand(efd, p.KE, p) / supply(efd, u, p)
+    vfe = exciter_demand(efd, p.KE, p)
+    x.VR = vfe / supply(u, vfe, p)
     error, x.VI = pi_rest(x.VR / p.KA, p.KPR, p.KIR)
     x.VC, x.VD, x.EFD, x.VF = u.vc1, error, efd, efd
     return u.vc1 + error - u.vs
