@@ -19,6 +19,7 @@ __all__ = [
     "Limited",
     "Saturation",
     "clip",
+    "closed",
     "commutator_start",
     "compound_source",
     "cos",
@@ -228,6 +229,15 @@ def regulator_output(s: Signal, p: Signal, vl: Signal, gain: Signal, taken: Sign
     loop = p.KA * gain * p.KF * rate(p.TF)
     prompt = (p.KA * vl + loop * (s.VF + taken)) / (1.0 + loop)
     return where(p.TA < SHORTEST, prompt, s.VA)
+
+
+def closed(error: Signal, gain: Signal, held: Signal, back: Signal) -> Signal:
+    """Return what is left of an error that a loop without a lag takes ``back`` y from.
+
+    ``gain`` times what is left, plus ``held``, is y. A limit of either may be put on the result,
+    since the loop is monotonous.
+    """
+    return (error - back * held) / (1.0 + back * gain)
 
 
 def rectifier(ve: Signal, load: Signal) -> Signal:

@@ -6,14 +6,14 @@ nothing of states; ceilings are the roots of the equations that hold where a lim
 
 import numpy as np
 import pytest
-from diagrams import alone, field_current, rectified, saturation, standing
+from diagrams import Rotating, alone, field_current, frequency_response, rectified, saturation
 from oracle import rates_at_rest, system_of, typical_values
 from scipy.optimize import brentq
 
 from exfit.errors import SimulationError
 from exfit.models import MODELS
 from exfit.models.sheet import typical
-from exfit.plants import SATURATION, Names, exciter_inputs, exciter_parameters
+from exfit.plants import SATURATION, exciter_parameters
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
 
@@ -67,22 +67,7 @@ def holding_current(ve, ifd, p):
     return field_current(ve, ifd, vars(p))
 
 
-def slope(function, at, h=1e-5):
-    return (function(at + h) - function(at - h)) / (2.0 * h)
-
-
 # --- linear behaviour -----------------------------------------------------------------------------
-
-
-class Rotating:
-    """efd = a VE - b IFD and VFE = c VE + KD IFD, small and around the start."""
-
-    def __init__(self, p):
-        ve = brentq(lambda ve: behind_rectifier(ve, IFD, p) - EFD, EFD, 3.0 * EFD, xtol=1e-13)
-        self.a = slope(lambda ve: behind_rectifier(ve, IFD, p), ve)
-        self.b = -slope(lambda ifd: behind_rectifier(ve, ifd, p), IFD)
-        self.c = slope(lambda ve: holding_current(ve, IFD, p), ve)
-        self.vfe = holding_current(ve, IFD, p)
 
 
 def pid(s, KP, KI, KD, TD):
@@ -94,7 +79,7 @@ def solved(s, p, forward, back, supply=0.0):
 
     e = vref + vs - vc1 / (1 + sTR), and sTE VE = VFD - VFE.
     """
-    at = Rotating(p)
+    at = Rotating(vars(p), EFD, IFD)
     under = s * p.TE + (1.0 + back) * at.c
     measured = -forward / (1.0 + s * p.TR)
     ve = np.array([forward, forward, supply, measured, -(1.0 + back) * p.KD]) / under
@@ -112,7 +97,7 @@ def exac2(s, p):
 
 
 def ac7b(s, p):
-    at = Rotating(p)
+    at = Rotating(vars(p), EFD, IFD)
     amplifier = p.KP * VT * pid(s, p.KPA, p.KIA, 0.0, 0.0)
     regulator = amplifier * pid(s, p.KPR, p.KIR, p.KDR, p.TDR)
     # the feedback of efd = a VE - b IFD, written with VE = (VFE - KD IFD) / c
@@ -132,33 +117,10 @@ def esac8b(s, p):
 FUNCTIONS = {"AC7B": ac7b, "ESAC8B": esac8b, "EXAC1": exac1, "EXAC2": exac2}
 
 
-def frequency_response(name, p, h=1e-5):
-    """Return efd per unit of each input (frequencies, inputs), by central differences."""
-    model = MODELS[name]
-    u, _, x = standing(name, vars(p), **START)
-    n = len(model.states)
-    start = np.array([*(vars(x)[one] for one in model.states), *(vars(u)[one] for one in INPUTS)])
-
-    def motion(at):
-        d = Names()
-        states = Names(**dict(zip(model.states, at[:n], strict=True)))
-        seen = exciter_inputs(**dict(zip(INPUTS, at[n:], strict=True)))
-        efd = model.equations(states, seen, p, d)
-        slopes = [getattr(vars(d)[one], "slope", vars(d)[one]) for one in model.states]
-        return np.array([*slopes, efd])
-
-    unit = h * np.eye(len(start))
-    whole = np.array([(motion(start + e) - motion(start - e)) / (2.0 * h) for e in unit]).T
-    A, B, C, D = whole[:n, :n], whole[:n, n:], whole[n, :n], whole[n, n:]
-    return np.array(
-        [C @ np.linalg.solve(2j * np.pi * f * np.eye(n) - A, B) + D for f in FREQUENCIES]
-    )
-
-
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_linear_exciter_is_its_block_diagram(name):
     p = parameters(name)
-    got = frequency_response(name, p)
+    got = frequency_response(name, p, INPUTS, FREQUENCIES, START)
     expected = np.array([FUNCTIONS[name](2j * np.pi * f, p) for f in FREQUENCIES])
     size = np.maximum(np.abs(expected).max(axis=0), 1e-3)
     # differences over 1e-5: rounding over it, and a third derivative times its square

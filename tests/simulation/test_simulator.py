@@ -527,12 +527,15 @@ def freezes(exciter, values, inputs):
 TRIED = {"MAX": ("above", (0.5, 0.1, 0.05, 1e-3)), "MIN": ("below", (0.1, 0.9, 1.3, 9.0))}
 # what bounds a signal that other signals make up for, or that no start needs
 WIDE = ("VBMAX", "VGMAX", "VHMAX")
+AT_A_PI = {"REXS": "VIMAX"}  # whose input is zero at rest
 
 
 def limits_of(exciter):
     """Return the limits that a start may lie beyond."""
     symbols = [row.symbol for row in MODELS[exciter].sheet]
-    return [s for s in symbols if s.endswith(("MAX", "MIN")) and s not in WIDE]
+    return [
+        s for s in symbols if s.endswith(("MAX", "MIN")) and s not in (*WIDE, AT_A_PI.get(exciter))
+    ]
 
 
 def refusal(exciter, values):

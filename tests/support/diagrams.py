@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from scipy import signal
+from scipy.optimize import brentq
 
 from exfit.engine.trace import clip
 from exfit.models import MODELS
@@ -95,6 +96,24 @@ def field_current(ve, ifd, p):
     return p["KE"] * ve + saturation(ve, p)[0] + p.get("KD", 0.0) * ifd
 
 
+def slope(function, at, h=1e-5):
+    return (function(at + h) - function(at - h)) / (2.0 * h)
+
+
+class Rotating:
+    """efd = a VE - b IFD and VFE = c VE + KD IFD, small and around a start."""
+
+    def __init__(self, p, efd, ifd):
+        def behind(ve, ifd):
+            return rectified(ve, p["KC"] * ifd)
+
+        ve = brentq(lambda ve: behind(ve, ifd) - efd, efd, 3.0 * efd + 1.0, xtol=1e-13)
+        self.a = slope(lambda ve: behind(ve, ifd), ve)
+        self.b = -slope(lambda ifd: behind(ve, ifd), ifd)
+        self.c = slope(lambda ve: field_current(ve, ifd, p), ve)
+        self.vfe = field_current(ve, ifd, p)
+
+
 # --- an exciter that nothing answers --------------------------------------------------------------
 
 
@@ -145,3 +164,26 @@ def alone(name, values, vref=0.0, vc1=0.0, time=0.5, step=1e-3, held=None, **sta
         k4 = slopes(x + step * k3, middle)
         x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     return times, np.array(found)
+
+
+def frequency_response(name, p, inputs, frequencies, start, h=1e-5):
+    """Return efd per unit of each input (frequencies, inputs), by central differences."""
+    model = MODELS[name]
+    u, _, x = standing(name, vars(p), **start)
+    n = len(model.states)
+    rest = np.array([*(vars(x)[state] for state in model.states), *(vars(u)[i] for i in inputs)])
+
+    def motion(at):
+        d = Names()
+        states = Names(**dict(zip(model.states, at[:n], strict=True)))
+        given = exciter_inputs(**vars(u) | dict(zip(inputs, at[n:], strict=True)))
+        efd = model.equations(states, given, p, d)
+        slopes = [getattr(vars(d)[state], "slope", vars(d)[state]) for state in model.states]
+        return np.array([*slopes, efd])
+
+    unit = h * np.eye(len(rest))
+    whole = np.array([(motion(rest + e) - motion(rest - e)) / (2.0 * h) for e in unit]).T
+    A, B, C, D = whole[:n, :n], whole[:n, n:], whole[n, :n], whole[n, n:]
+    return np.array(
+        [C @ np.linalg.solve(2j * np.pi * f * np.eye(n) - A, B) + D for f in frequencies]
+    )

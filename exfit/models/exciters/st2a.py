@@ -15,16 +15,8 @@ and so KI, acts on load only. Not modelled: UEL and OEL at the summing point.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import (
-    compound_source,
-    lag,
-    larger,
-    limited_integrator,
-    limited_lag,
-    rectifier,
-    washout,
-    where,
-)
+from exfit.models.blocks import lag, larger, limited_integrator, limited_lag, washout
+from exfit.models.compound import supply
 from exfit.models.sheet import (
     AS_IN_PSSE,
     EXCITER_LAG,
@@ -67,25 +59,19 @@ PSLF_RECORDS = (
 STATES = "VC VR EFD VF"
 
 
-def source(u: Signal, p: Signal) -> Signal:
-    """Return VB, the voltage behind the rectifier."""
-    ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI)
-    return where((p.KP <= 0.0) & (p.KI <= 0.0), 1.0, rectifier(ve, p.KC * u.ifd))
-
-
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(s.EFD, s.VF, p.KF, p.TF)
     error = larger(u.vref + u.vs - vc - vf, u.vuel)
     vr, d.VR = limited_lag(error, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
-    vb = source(u, p)
+    vb = supply(u, p)
     efd, d.EFD = limited_integrator(vr * vb - p.KE * s.EFD, s.EFD, p.TE, 0.0, p.EFDMAX)
     return efd
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
     """Write the states that hold efd into x and return vref."""
-    vr = p.KE * efd / source(u, p)
+    vr = p.KE * efd / supply(u, p)
     x.VC, x.VR, x.EFD, x.VF = u.vc1, vr, efd, efd
     return u.vc1 + vr / p.KA - u.vs

@@ -1,0 +1,128 @@
+"""EXPIC1: proportional and integral regulator, compound source (PSS/E EXPIC1).
+
+                  VR1                              VRMAX      EFDMAX
+vref + vs ►(+)►[KA (1 + sTA1)]►[    1 + sTA3    ]►[clip]┬►(x)►[clip]► E0
+          -▲ ▲-[      s      ] [(1+sTA2)(1+sTA4)] VRMIN │  ▲  EFDMIN
+           │ │    VR2                                   │  VB
+vc1►[  1  ]┘ │                                          │
+    [1+sTR]  └──────────[       sKF      ]◄─────────────┘
+                        [(1+sTF1)(1+sTF2)]
+
+E0 ─►(+)─►[  1  ]─┬─► efd
+     -▲   [ sTE ] │
+      └─── VFE ◄──┘
+
+VFE = KE EFD + VX(EFD); with TE = 0 efd = E0, and neither KE nor the saturation
+acts. VB = VE FEX(KC IFD / VE) with VE = |KP VT + j KI IT|, and 1 where
+KP = KI = 0. The current IT, and so KI, acts on load only. The integral stops
+while the PI is at its limits VR1, VR2; the two clamps have no state. With
+TF1 = TF2 = 0 there is no feedback, with TA2 = TA4 = 0 no TA3.
+
+OPAL-RT's model and GridKit's, after PowerWorld's drawing, agree; a third open
+model feeds efd back and takes TA2 for a lead. Typical data are CIM's (ExcPIC)
+but for TF1, KE and the saturation, which do nothing there. Not modelled: UEL
+and OEL other than at the summing point.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    SHORTEST,
+    clip,
+    closed,
+    exciter_demand,
+    lag,
+    pi,
+    pi_rest,
+    rate,
+    second_order,
+    second_order_lead,
+    where,
+)
+from exfit.models.compound import supply
+from exfit.models.sheet import FREE, record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("KA", 3.15, "1/s", (0.001, 100000.0), "gain of the PI", FREE),
+    ("TA1", 1.0, "s", (0.0, 100.0), "lead of the PI", FREE),
+    ("VR1", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PI"),
+    ("VR2", -0.87, "pu", (-9999.0, 9999.0), "floor of the PI"),
+    ("TA2", 0.01, "s", (0.0, 100.0), "regulator lag"),
+    ("TA3", 0.0, "s", (0.0, 100.0), "regulator lead"),
+    ("TA4", 0.0, "s", (0.0, 100.0), "second regulator lag"),
+    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("KF", 0.0, "pu", (0.0, 10.0), "stabilising feedback gain"),
+    ("TF1", 1.0, "s", (0.0, 100.0), "stabilising feedback time constant"),
+    ("TF2", 0.0, "s", (0.0, 100.0), "stabilising feedback lag"),
+    ("EFDMAX", 8.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage"),
+    ("EFDMIN", -0.87, "pu", (-9999.0, 9999.0), "floor of the field voltage"),
+    ("KE", 1.0, "pu", (0.0, 10.0), "exciter constant"),
+    ("TE", 0.0, "s", (0.0, 100.0), "exciter time constant"),
+    ("E1", 2.8, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.08, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 3.7, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.33, "pu", (0.0, 100.0), "saturation at E2"),
+    ("KP", 6.5, "pu", (0.0, 100.0), "potential source gain"),
+    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+    ("KC", 0.08, "pu", (0.0, 100.0), "rectifier loading factor"),
+)
+
+RECORDS = (
+    record(
+        "EXPIC1",
+        "TR KA TA1 VR1 VR2 TA2 TA3 TA4 VRMAX VRMIN KF TF1 TF2 EFDMAX EFDMIN KE TE E1 SE1 E2 SE2 "
+        "KP KI KC",
+    ),
+)
+
+STATES = "VC VA VL DVL VF DVF EFD"
+
+
+def both(T1: Signal, T2: Signal) -> tuple[Signal, Signal]:
+    """Return the coefficients of (1 + sT1) (1 + sT2), where a lag beyond notice is none."""
+    first, second = (where(T < SHORTEST, 0.0, T) for T in (T1, T2))
+    return first + second, first * second
+
+
+def filtered(va: Signal, x: Signal, v: Signal, p: Signal) -> tuple[Signal, Signal, Signal]:
+    """Return what both lags and the lead make of the PI, and the slopes of their states."""
+    return second_order_lead(va, x, v, p.TA3, 0.0, *both(p.TA2, p.TA4))
+
+
+def stabilised(vr: Signal, x: Signal, v: Signal, p: Signal) -> tuple[Signal, Signal, Signal]:
+    """Return the stabilising feedback of VR, and the slopes of its states."""
+    _, slope, bend = second_order(vr, x, v, *both(p.TF1, p.TF2))
+    return p.KF * slope, slope, bend
+
+
+def fed_back(error: Signal, s: Signal, p: Signal) -> tuple[Signal, Signal, Signal]:
+    """Return the stabilising feedback, which may wait for itself, and the slopes of its states."""
+    proportional = p.KA * p.TA1
+    unit, held = filtered(1.0, 0.0, 0.0, p)[0], filtered(0.0, s.VL, s.DVL, p)[0]
+    vf, back = stabilised(0.0, s.VF, s.DVF, p)[0], stabilised(1.0, 0.0, 0.0, p)[0]
+    left = closed(error - vf, unit * proportional, unit * s.VA + held, back)
+    va = clip(proportional * left + s.VA, p.VR2, p.VR1)
+    return stabilised(clip(unit * va + held, p.VRMIN, p.VRMAX), s.VF, s.DVF, p)
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = u.vref + u.vs + u.vsum - vc
+    vf, d.VF, d.DVF = fed_back(error, s, p)
+    va, d.VA = pi(error - vf, s.VA, p.KA * p.TA1, p.KA, p.VR2, p.VR1)
+    vl, d.VL, d.DVL = filtered(va, s.VL, s.DVL, p)
+    vr = clip(vl, p.VRMIN, p.VRMAX)
+    e0 = clip(vr * supply(u, p), p.EFDMIN, p.EFDMAX)
+    d.EFD = (e0 - exciter_demand(s.EFD, p.KE, p)) * rate(p.TE)
+    return where(p.TE < SHORTEST, e0, s.EFD)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vr = where(p.TE < SHORTEST, efd, exciter_demand(efd, p.KE, p)) / supply(u, p)
+    error, x.VA = pi_rest(vr, p.KA * p.TA1, p.KA)
+    x.VC, x.VL, x.VF, x.EFD = u.vc1, vr, vr, efd
+    x.DVL, x.DVF = 0.0, 0.0
+    return u.vc1 + error - u.vs
