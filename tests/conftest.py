@@ -8,15 +8,16 @@ import hypothesis
 import pytest
 from oracle import EXCITERS, SATURATED, SURROUNDED
 
-from exfit.models import GOVERNORS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 
-CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS}
+CATALOGUE = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
 # one of each family: without a plant; commutators; rotating rectifiers; static; compound; a round
-# rotor and salient poles; a stabiliser of one input, one of two; two governors
+# rotor and salient poles; a stabiliser of one input, one of two; two governors; limiters of each
+# side
 FEW = (
     "FIRST_ORDER", "DC1A", "AC1A", "ST1A", "ST4B", "GENROU", "GENSAE", "STAB1", "PSS2B", "TGOV1",
-    "HYGOV",
+    "HYGOV", "OEL2C", "UEL1",
 )  # fmt: skip
 
 hypothesis.settings.register_profile("few", max_examples=30, deadline=None, derandomize=True)

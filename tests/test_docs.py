@@ -25,7 +25,7 @@ from exfit.cli import main
 from exfit.cli.options import NOT_CONVERGED
 from exfit.errors import CaseError
 from exfit.fitting.recordings import measured, phasors_of
-from exfit.models import GOVERNORS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import run_folder
 from exfit.util.strategies import STRATEGIES
@@ -279,7 +279,8 @@ def test_the_model_of_the_page_starts_at_rest_and_follows_a_step(cases):
 
 @pytest.mark.parametrize("name", ["README.md", "docs/models/index.md"])
 def test_every_model_is_named(name):
-    assert {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS} <= set(re.findall(r"\w+", PAGES[name]))
+    catalogue = {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}
+    assert catalogue <= set(re.findall(r"\w+", PAGES[name]))
 
 
 @pytest.mark.long

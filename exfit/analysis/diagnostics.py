@@ -26,7 +26,7 @@ from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.inference.wording import listed
 from exfit.models.blocks import SHORTEST
-from exfit.plants import BREAKER, GOVERNOR, NETWORK, REFERENCES, SPEED
+from exfit.plants import BREAKER, GOVERNOR, NETWORK, REFERENCES, SPEED, acts_without_load
 from exfit.results.comparisons import Comparison
 from exfit.simulation.inputs import Inputs
 from exfit.simulation.simulator import Response, Simulator
@@ -168,9 +168,17 @@ def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
         if names and part.kind != "network":
             listed = ", ".join(f"{symbol} {typical[part.prefix + symbol]:g}" for symbol in names)
             yield f"typical values taken for {part.name}: {listed}"
-    for model in (case.parts.stabiliser, case.parts.governor):
-        if model is not None and not case.on_load:
-            yield f"{model.name} does not act: the breaker is open"
+    for name in idle_models(case):
+        yield f"{name} does not act: the breaker is open"
+
+
+def idle_models(case: Case) -> list[str]:
+    """Return the models of a case that do nothing without load, where no test has one."""
+    if case.on_load or case.kind.plays_back:
+        return []
+    added = [case.parts.stabiliser, case.parts.governor]
+    added += [at.model for at in case.parts.limiters if not acts_without_load(at)]
+    return [model.name for model in added if model is not None]
 
 
 def speed_notes(inputs: Inputs, parameters: Mapping[str, float]) -> Iterator[str]:

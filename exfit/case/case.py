@@ -19,6 +19,7 @@ from exfit.case.schema import (
     FreeSection,
     Governor,
     Limit,
+    Limiter,
     Parameters,
     Plant,
     RecordFile,
@@ -74,6 +75,7 @@ class Case:
     plant: Plant
     stabiliser: Stabiliser | None
     governor: Governor | None
+    limiters: tuple[Limiter, ...]
     test: BumpTest | None
     record: RecordFile | None
     records: tuple[Recording, ...]
@@ -363,8 +365,7 @@ class Case:
 
     def _fixed(self, part: Part) -> Mapping[str, float | str]:
         given: Mapping[str, float | str] = _at(self, part.fixed)
-        own = part.symbols
-        return {symbol: given[symbol] for symbol in given if symbol in own}
+        return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
 
     def _sources_of(self, part: Part) -> dict[str, str]:
         """Return where the values of a part come from, and those of the exciter's helpers."""
@@ -379,8 +380,7 @@ class Case:
 
     def _free(self, part: Part) -> Mapping[str, FreeSection]:
         given: Mapping[str, FreeSection] = {} if part.free is None else _at(self, part.free)
-        own = part.symbols
-        return {symbol: given[symbol] for symbol in given if symbol in own}
+        return {symbol: given[symbol] for symbol in given if symbol in part.symbols}
 
     def _helpers(self, given: Mapping[str, Value]) -> dict[str, Value]:
         """Return the names among the exciter's parameters that are none of them."""
@@ -396,5 +396,5 @@ def numbers_of(given: Mapping[str, float | str]) -> dict[str, float]:
 def _at(section: Any, place: Place) -> Any:
     """Return the value at a place of the case."""
     for key in place:
-        section = getattr(section, str(key))
+        section = section[key] if isinstance(key, int) else getattr(section, key)
     return section

@@ -1,4 +1,4 @@
-"""The parts of a case with a data sheet: exciter, machine, network, stabiliser, governor."""
+"""The parts of a case with a data sheet: exciter, machine, network, what is added to them."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -11,7 +11,7 @@ from exfit.case.saturation import saturation_ties
 from exfit.case.ties import Tie, TieError, Ties, is_tie, parse
 from exfit.case.yaml import Fault
 from exfit.errors import ModelError
-from exfit.models import GOVERNORS, STABILISERS, Catalogue, find
+from exfit.models import GOVERNORS, LIMITERS, STABILISERS, Catalogue, find
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES, Machine
 from exfit.models.sheet import Model, Sheet, contradictions, exponential_faults, typical
@@ -25,6 +25,7 @@ from exfit.plants import (
     OPEN_CIRCUIT,
     OUTSIDE,
     STABILISER,
+    Attached,
     PlantKind,
     model_of_names,
 )
@@ -85,6 +86,7 @@ class Parts:
     stabiliser: Model | None
     governor: Model | None
     all: tuple[Part, ...]
+    limiters: tuple[Attached, ...] = ()
 
 
 def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = "") -> Parts:
@@ -113,7 +115,9 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
         parts.append(network_part(_mapping(plant.get("network")), kind))
     added = (("stabiliser", STABILISER, stabiliser), ("governor", GOVERNOR, governor))
     parts += [added_part(kind, prefix, model) for kind, prefix, model in added if model is not None]
-    return Parts(exciter, machine, stabiliser, governor, tuple(parts))
+    places, limiters = limiters_of(data, faults)
+    parts += [limiter_part(at, limiter) for at, limiter in zip(places, limiters, strict=True)]
+    return Parts(exciter, machine, stabiliser, governor, tuple(parts), limiters)
 
 
 def kind_of(plant: Data) -> PlantKind:
@@ -127,13 +131,15 @@ def kind_of(plant: Data) -> PlantKind:
 
 def in_plant(parts: Parts, kind: PlantKind, given: Data) -> Parts:
     """Return the parts in a plant of another kind, of whose network some values are given."""
-    absent = ("network",) if kind.has_exciter else ("network", "exciter", "stabiliser", "governor")
+    limiting = tuple(limiter.kind for limiter in parts.limiters)
+    without = ("exciter", "stabiliser", "governor", *limiting)
+    absent = ("network",) if kind.has_exciter else ("network", *without)
     others = tuple(part for part in parts.all if part.kind not in absent)
     network = (network_part(given, kind),) if kind.on_load else ()
     changed = replace(parts, all=(*others, *network))
     if kind.has_exciter:
         return changed
-    return replace(changed, exciter=None, stabiliser=None, governor=None)
+    return replace(changed, exciter=None, stabiliser=None, governor=None, limiters=())
 
 
 def plants_of_records(data: Data) -> dict[Place, Data]:
@@ -209,9 +215,7 @@ def _tied(data: Data, parts: Parts) -> Iterator[tuple[str, Place, str]]:
         (part.prefix, part.fixed) for part in parts.all if part.kind != "network"
     ]
     for prefix, place in sections:
-        section = data
-        for key in place:
-            section = _mapping(section.get(str(key)))
+        section = _at(data, place)
         for symbol, value in section.items():
             if is_tie(value):
                 yield prefix + symbol, (*place, symbol), value
@@ -256,6 +260,38 @@ def added_part(kind: str, prefix: str, model: Model) -> Part:
         *places,
         lambda values: iter(contradictions(values)),
     )
+
+
+def limiter_part(at: int, limiter: Attached) -> Part:
+    """Return the part of a limiter, an entry of the list of a case."""
+    place = ("limiters", at)
+    return Part(
+        limiter.kind,
+        limiter.model.name,
+        limiter.prefix,
+        limiter.model.sheet,
+        (*place, "parameters"),
+        (*place, "free"),
+        (*place, "sources"),
+        lambda values: iter(contradictions(values)),
+    )
+
+
+def limiters_of(data: Data, faults: list[Fault]) -> tuple[list[int], tuple[Attached, ...]]:
+    """Return the limiters of a case, one of each kind, and their indices; add faults of names."""
+    by_kind: dict[str, tuple[int, Attached]] = {}
+    for at, entry in enumerate(_entries(data.get("limiters"))):
+        section = _mapping(entry)
+        name = _catalogue_name(section, ("limiters", at, "model"), LIMITERS, "limiter", faults)
+        if name is None:
+            continue
+        model, place = LIMITERS[name], section.get("place")
+        limiter = Attached(model, place if isinstance(place, str) else model.places[0])
+        first = by_kind.setdefault(limiter.kind, (at, limiter))[1]
+        if first is not limiter:
+            text = f"{name}: a second one beside {first.model.name}; at most one of each kind"
+            faults.append(Fault(("limiters", at, "model"), text))
+    return [at for at, _ in by_kind.values()], tuple(limiter for _, limiter in by_kind.values())
 
 
 def network_part(given: Data, kind: PlantKind, place: Place = ("plant", "network")) -> Part:
@@ -333,6 +369,18 @@ def _catalogue_name(
         return name.upper()
     faults.append(Fault(place, f"{name!r} is not a {kind} model; {near(name, catalogue)}"))
     return None
+
+
+def _at(data: Data, place: Place) -> dict[str, Any]:
+    """Return the section at a place of the file, an empty one where there is none."""
+    section: Any = data
+    for key in place:
+        if isinstance(key, int):
+            section = _entries(section)[key : key + 1]
+            section = section[0] if section else None
+        else:
+            section = _mapping(section).get(key)
+    return _mapping(section)
 
 
 def _entries(value: Any) -> list[Any]:

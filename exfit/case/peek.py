@@ -125,7 +125,18 @@ def _names(content: Mapping[str, Any], free: bool) -> tuple[str, ...]:
         if not free or place[-1] == "free"
         for name in _section(content, place)
     ]
+    names += _names_of_limiters(content, free)
     return tuple(dict.fromkeys(names))
+
+
+def _names_of_limiters(content: Mapping[str, Any], free: bool) -> Iterator[str]:
+    """Yield the names of the parameters that a file gives its limiters."""
+    limiters = content.get("limiters")
+    for limiter in limiters if isinstance(limiters, list) else ():
+        model = limiter.get("model") if isinstance(limiter, Mapping) else None
+        for key in ("free",) if free else ("free", "parameters"):
+            given = _section(limiter, (key,)) if isinstance(model, str) else ()
+            yield from (f"{str(model)[:3].lower()}.{name}" for name in given)
 
 
 def _section(content: Mapping[str, Any], place: tuple[str, ...]) -> Mapping[str, Any]:

@@ -82,6 +82,11 @@ def machine_content(content: Content, index: int) -> CaseContent:
         if isinstance(inner.get(section), dict):
             inner[section], starts = _with_fixed_starts(inner[section], free, fixed)
             places |= {(section, fixed, symbol): None for symbol in starts}
+    if isinstance(inner.get("limiters"), list):
+        inner["limiters"] = [
+            _with_fixed_starts(entry, "free", "parameters")[0] if isinstance(entry, dict) else entry
+            for entry in inner["limiters"]
+        ]
     if isinstance(inner.get("plant"), dict) and isinstance(test.get("free"), dict):
         inner["plant"] = _with_free(inner["plant"], test["free"])
     return CaseContent(inner, places)

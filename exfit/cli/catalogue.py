@@ -26,12 +26,16 @@ if TYPE_CHECKING:
 )
 def models(name: str | None, folder: Path | None) -> None:
     """List the models, or print the drawing, data sheet and states of one."""
-    from exfit.models import GOVERNORS, MODELS, STABILISERS
+    from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
     from exfit.output import terminal
 
     exciters, machines = MODELS.values(), MACHINES.values()
-    added = {"stabiliser": STABILISERS.values(), "governor": GOVERNORS.values()}
+    added = {
+        "stabiliser": STABILISERS.values(),
+        "governor": GOVERNORS.values(),
+        "limiter": LIMITERS.values(),
+    }
     every: Iterable[Model | Machine] = chain(exciters, machines, *added.values())
     if folder is not None:
         from exfit.output import run_folder
@@ -48,10 +52,11 @@ def models(name: str | None, folder: Path | None) -> None:
 
 def _model(name: str) -> "Model | Machine":
     """Return a model of the catalogue by its name, else the exciter in a file."""
-    from exfit.models import GOVERNORS, STABILISERS, find
+    from exfit.models import GOVERNORS, LIMITERS, STABILISERS, find
     from exfit.models.machines import MACHINES
 
-    shelves: tuple[Mapping[str, Model | Machine], ...] = (STABILISERS, GOVERNORS, MACHINES)
+    added = (STABILISERS, GOVERNORS, LIMITERS)
+    shelves: tuple[Mapping[str, Model | Machine], ...] = (*added, MACHINES)
     listed = (shelf[name.upper()] for shelf in shelves if name.upper() in shelf)
     return next(listed, None) or find(name, Path())
 

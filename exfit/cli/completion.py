@@ -11,9 +11,9 @@ import click
 
 def models(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
     """Return the names of all models of the catalogue, in upper or lower case."""
-    from exfit.models import GOVERNORS, MACHINE_NAMES, MODELS, STABILISERS
+    from exfit.models import GOVERNORS, LIMITERS, MACHINE_NAMES, MODELS, STABILISERS
 
-    names = (*MODELS, *MACHINE_NAMES, *STABILISERS, *GOVERNORS)
+    names = (*MODELS, *MACHINE_NAMES, *STABILISERS, *GOVERNORS, *LIMITERS)
     return _beginning(names, incomplete.upper())
 
 

@@ -14,6 +14,7 @@ from exfit.models.sheet import Model
 from exfit.plants import (
     BREAKER,
     DRIVING,
+    PLAYBACK,
     REFERENCES,
     SATURATION,
     SPEED,
@@ -56,6 +57,7 @@ def _system_of(case: Case, recording: Recording | None) -> System:
         swing=getattr(case.plant, "swing", "power"),
         power_at=getattr(case.plant, "power_at", "recorded-voltage"),
         governor=parts.governor,
+        limiters=parts.limiters,
     )
     if kind.plays_back and parts.exciter is not None:
         _refuse_missing_drivers(case, parts.exciter, equipment.saturation)
@@ -117,11 +119,14 @@ def recorded_in_all(case: Case) -> frozenset[str]:
 def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationForm) -> None:
     """Raise CaseError where a record lacks a signal that the exciter uses."""
     used = driven_by(exciter, saturation)
-    required = [signal for signal in case.kind.required_if_used if signal in used]
+    required = {signal: exciter for signal in case.kind.required_if_used if signal in used}
+    if case.kind is PLAYBACK:
+        for limiter in case.parts.limiters:
+            required |= dict.fromkeys(limiter.model.inputs, limiter.model)
     for place, file in _record_files(case).items():
-        for signal in required:
+        for signal, model in required.items():
             if signal not in file.channels:
-                text = f"channels.{signal}: missing; it drives {exciter.name}"
+                text = f"channels.{signal}: missing; it drives {model.name}"
                 raise CaseError([f"{case.path}: {place}: {text}"])
 
 

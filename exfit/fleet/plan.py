@@ -170,6 +170,12 @@ def _group(content: Mapping[str, Any]) -> str:
         for section in map(content.get, ("plant", "stabiliser", "governor"))
     )
     keys = ("model", "saturation", "efd_times_speed")
-    models = [*map(content.get, keys), plant, *added]
+    limiters = content.get("limiters")
+    attached = [
+        {key: entry.get(key) for key in ("model", "place")}
+        for entry in (limiters if isinstance(limiters, list) else ())
+        if isinstance(entry, Mapping)
+    ]
+    models = [*map(content.get, keys), plant, *added, *attached]
     names = sorted(map(str, free)) if isinstance(free, Mapping) else []
     return json.dumps([*models, names], default=str, sort_keys=True)

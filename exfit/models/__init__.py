@@ -1,4 +1,4 @@
-"""The catalogue of exciters, stabilisers and governors, by the names of IEEE 421.5 and PSS/E."""
+"""The catalogue of exciters and what acts on them, by the names of IEEE 421.5 and PSS/E."""
 
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -8,7 +8,7 @@ from pkgutil import iter_modules
 from types import ModuleType
 
 from exfit.errors import ModelError
-from exfit.models import exciters, governors, stabilisers
+from exfit.models import exciters, governors, limiters, stabilisers
 from exfit.models.sheet import Model, model
 from exfit.models.user_code import run_user_code
 
@@ -46,6 +46,7 @@ def _loaded(package: str, name: str) -> Model:
 MODELS = Catalogue(exciters)
 STABILISERS = Catalogue(stabilisers)
 GOVERNORS = Catalogue(governors)
+LIMITERS = Catalogue(limiters)
 
 MACHINE_NAMES = ("GENROU", "GENROE", "GENSAL", "GENSAE", "ONE_AXIS")  # known without their files
 

@@ -186,14 +186,15 @@ OF_ONE_PROGRAM = "its order is that of another open program, not confirmed by a 
 
 @dataclass(frozen=True)
 class Model:
-    """An exciter, a stabiliser or a governor: the content of its file, under one name.
+    """An exciter, a stabiliser, a governor or a limiter: the content of its file, under one name.
 
     ``equations(s, u, p, d)`` takes states, inputs and parameters, writes the slopes into ``d`` and
     returns the output; ``rest(output, u, p, x)`` writes the states that hold an output at rest into
     ``x`` and returns the reference that does so. Setpoints are what it finds at the start and then
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
     its PSS/E records, its own one first, ``pslf_records`` those of PSLF; ``inputs`` the signals
-    that a stabiliser listens to.
+    that a stabiliser or a limiter listens to, ``places`` where a limiter may act on an exciter, the
+    usual one first.
 
     A governor's output is the turbine's power Pm, its reference ``pref``; it sees ``dw``, the speed
     less 1, and ``p``, the electrical power, all per unit on the machine's base.
@@ -211,6 +212,7 @@ class Model:
     equations: Callable[..., Any]
     rest: Callable[..., Any]
     pslf_records: tuple[DynamicsRecord, ...] = ()
+    places: tuple[str, ...] = ()
 
 
 def model(name: str, parts: Mapping[str, Any]) -> Model:
@@ -237,6 +239,7 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         equations=parts["equations"],
         rest=parts["rest"],
         pslf_records=tuple(parts.get("PSLF_RECORDS", ())),
+        places=tuple(parts.get("PLACES", ())),
     )
 
 

@@ -6,6 +6,7 @@ from exfit.plants.governing import rests_at
 from exfit.plants.grid_playback import RESTING, grid_playback
 from exfit.plants.infinite_bus import INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
+from exfit.plants.limiting import PLACES, acts_without_load, input_at, inputs_for_limiters
 from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
@@ -24,8 +25,18 @@ from exfit.plants.parts import (
     exciter_inputs,
     exciter_parameters,
 )
-from exfit.plants.plant import REFERENCES, Equipment, PlantKind, PowerAt, Stabilised, Swing
-from exfit.plants.playback import DRIVING, initial, playback
+from exfit.plants.plant import (
+    LIMITER_KINDS,
+    REFERENCES,
+    Attached,
+    Equipment,
+    PlantKind,
+    PowerAt,
+    Stabilised,
+    Swing,
+    kind_of_limiter,
+)
+from exfit.plants.playback import DRIVING, PLAYBACK, initial, playback
 from exfit.plants.stabilising import HEARD, rests_with_output
 from exfit.plants.unit import UnitOnLoad
 
@@ -38,17 +49,21 @@ __all__ = [
     "HEARD",
     "INFINITE_BUS",
     "KINDS",
+    "LIMITER_KINDS",
     "MACHINE",
     "MEASURED",
     "NETWORK",
     "OPEN_CIRCUIT",
     "OUTSIDE",
+    "PLACES",
+    "PLAYBACK",
     "REFERENCES",
     "RESTING",
     "SATURATION",
     "SPEED",
     "STABILISER",
     "VT0",
+    "Attached",
     "Equipment",
     "Names",
     "PlantKind",
@@ -57,6 +72,7 @@ __all__ = [
     "Stabilised",
     "Swing",
     "UnitOnLoad",
+    "acts_without_load",
     "alone",
     "exciter_inputs",
     "exciter_parameters",
@@ -64,6 +80,9 @@ __all__ = [
     "grid_playback",
     "infinite_bus",
     "initial",
+    "input_at",
+    "inputs_for_limiters",
+    "kind_of_limiter",
     "machine_on_load",
     "machine_playback",
     "model_of_names",

@@ -8,6 +8,7 @@ from exfit.engine.trace import Signal, cos, sin, sqrt
 from exfit.models.machines import Axes
 from exfit.models.phasors import modulus
 from exfit.models.sheet import Sheet, sheet
+from exfit.plants.limiting import signals_of
 from exfit.plants.loaded_machine import Flow, behind, current
 from exfit.plants.parts import (
     MACHINE,
@@ -123,7 +124,7 @@ def grid_playback(
         terminals = Terminals(fluxes, v, i, x["dw"])
         vref = r["vref"] + u["vref"]
         controls = Controls(vref, u.get("vs", 0.0), pref=u.get("pref", 0.0))
-        efd, ifd, vc1 = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
+        efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         measured = terminals
         if power_at == "recorded-voltage":
@@ -140,14 +141,14 @@ def grid_playback(
             "speed": p[initial("speed")] + x["dw"],
             MEASURED: vc1,
         }
-        return motion(d, unit.states, {**x, **outputs})
+        return motion(d, unit.states, {**x, **outputs, **signals})
 
     return System(
         parameters=(*unit.parameters(symbols(NETWORK, network)), VT0, *levels),
         setpoints=unit.setpoints,
         states=unit.states,
         inputs=inputs,
-        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.states))),
+        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.states, *signals_of(unit.limiters)))),
         time_constants=unit.time_constants,
         rest=rest,
         motion=equations,
@@ -162,6 +163,7 @@ def _build(equipment: Equipment) -> System:
         equipment.stabiliser,
         equipment.swing,
         equipment.governor,
+        equipment.limiters,
     )
     inputs = tuple(name for name in REFERENCES if name in equipment.inputs)
     given = equipment.given & {row.symbol for row in AT_START}

@@ -10,6 +10,7 @@ from exfit.models.machines import Axes, Machine
 from exfit.models.phasors import modulus
 from exfit.models.sheet import Model, Sheet, sheet
 from exfit.plants.breaker import BREAKER, breaker_of
+from exfit.plants.limiting import signals_of
 from exfit.plants.loaded_machine import Flow, behind, current
 from exfit.plants.parts import (
     MACHINE,
@@ -24,7 +25,7 @@ from exfit.plants.parts import (
     symbols,
     values_named,
 )
-from exfit.plants.plant import Equipment, PlantKind, Stabilised, Swing, compared, present
+from exfit.plants.plant import Attached, Equipment, PlantKind, Stabilised, Swing, compared, present
 from exfit.plants.unit import (
     ROTOR,
     Controls,
@@ -83,6 +84,7 @@ def infinite_bus(
     stabiliser: Stabilised | None = None,
     swing: Swing = "power",
     governor: Model | None = None,
+    limiters: tuple[Attached, ...] = (),
 ) -> System:
     """Return an exciter on a machine behind R + jX to a stiff source.
 
@@ -97,7 +99,7 @@ def infinite_bus(
     as it is, in rad, ``speed`` 1 when rated.
     """
     refuse_taken(model, (*OUTPUTS, MEASURED, *ROTOR, *machine.states))
-    unit = UnitOnLoad(model, machine, saturation, stabiliser, swing, governor)
+    unit = UnitOnLoad(model, machine, saturation, stabiliser, swing, governor, limiters)
     network = flow_sheet(given)
 
     def rest(p: Signals) -> Rest:
@@ -123,7 +125,7 @@ def infinite_bus(
         terminals, it = Terminals(fluxes, v, i, dw), modulus(closed.d, closed.q)
         vref = r["vref"] + u["vref"]
         controls = Controls(vref, changed.vs, u.get(MEASURED, 0.0), changed.pref)
-        efd, ifd, vc1 = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
+        efd, ifd, vc1, signals = unit_motion(unit, terminals, controls, UnitState(p, r, x), n, d)
         d.delta = 2.0 * pi * n.f0 * x["dw"]
         if breaker is not None:
             it, d.delta = breaker.until_open(it), breaker.until_open(d.delta)
@@ -135,14 +137,14 @@ def infinite_bus(
                 strict=True,
             )
         )
-        return motion(d, unit.states, {**x, **outputs, MEASURED: vc1})
+        return motion(d, unit.states, {**x, **outputs, **signals, MEASURED: vc1})
 
     return System(
         parameters=(*unit.parameters(symbols(NETWORK, network)), VT0),
         setpoints=(*unit.setpoints, "source"),
         states=unit.states,
         inputs=inputs,
-        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.states))),
+        outputs=tuple(dict.fromkeys((*OUTPUTS, *unit.states, *signals_of(unit.limiters)))),
         time_constants=unit.time_constants,
         rest=rest,
         motion=equations,
@@ -159,6 +161,7 @@ def _build(equipment: Equipment) -> System:
         equipment.stabiliser,
         equipment.swing,
         equipment.governor,
+        equipment.limiters,
     )
 
 

@@ -14,6 +14,7 @@ from exfit.signals import COMPARED
 Component = TypeVar("Component", Model, Machine)
 OF_EXCITER = ("vref", "vs")
 REFERENCES = (*OF_EXCITER, "pref")  # inputs that are given as steps, ramps, tables or records
+LIMITER_KINDS = ("oel", "uel")  # what limiters limit, as their names begin
 Requirement = Literal["exciter", "machine", "network"]
 Swing = Literal["power", "torque"]  # what Pm is in the equation of the speed
 PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
@@ -24,6 +25,33 @@ class Stabilised(NamedTuple):
 
     model: Model
     inputs: tuple[str, ...]
+
+
+class Attached(NamedTuple):
+    """A limiter, and the place at which it acts on the exciter."""
+
+    model: Model
+    place: str
+
+    @property
+    def kind(self) -> str:
+        """What it limits, as its name begins: oel, uel."""
+        return kind_of_limiter(self.model.name)
+
+    @property
+    def prefix(self) -> str:
+        """How its parameters and states begin."""
+        return f"{self.kind}."
+
+    @property
+    def signal(self) -> str:
+        """The name of its output."""
+        return self.prefix + self.model.name
+
+
+def kind_of_limiter(name: str) -> str:
+    """Return what a limiter of the catalogue limits, as its name begins: oel, uel."""
+    return name[:3].lower()
 
 
 class Equipment(NamedTuple):
@@ -44,6 +72,7 @@ class Equipment(NamedTuple):
     swing: Swing = "power"
     power_at: PowerAt = "recorded-voltage"
     governor: Model | None = None
+    limiters: tuple[Attached, ...] = ()
 
 
 def no_network(given: Collection[str]) -> Sheet:

@@ -6,6 +6,15 @@ from functools import cache
 from exfit.engine.system import Motion, Rest, Signals, System
 from exfit.engine.trace import Signal
 from exfit.models.sheet import Model
+from exfit.plants.limiting import (
+    limited_inputs,
+    limiters_rest,
+    limiting,
+    seconds_of,
+    signals_of,
+    states_of,
+    symbols_of,
+)
 from exfit.plants.parts import (
     Names,
     SaturationForm,
@@ -18,7 +27,7 @@ from exfit.plants.parts import (
     state_of,
     symbols,
 )
-from exfit.plants.plant import OF_EXCITER, Equipment, PlantKind, present
+from exfit.plants.plant import OF_EXCITER, Attached, Equipment, PlantKind, present
 
 EFD0, VREF0 = "efd0", "vref0"
 DRIVING = ("vt", "ifd", "p", "q", "speed")  # what may drive an exciter
@@ -47,6 +56,7 @@ def playback(
     driving: tuple[str, ...],
     vref_known: bool = False,
     stabilised: bool = False,
+    limiters: tuple[Attached, ...] = (),
 ) -> System:
     """Return an exciter that recorded signals drive: ``driving`` of vt, ifd, p, q, speed.
 
@@ -56,29 +66,34 @@ def playback(
     parameter ``vref0``, and holds an efd that is found from near efd0. All per unit.
     """
     setpoints = ("vref", "vs") if stabilised else ("vref",)
-    signals = tuple(dict.fromkeys((*setpoints, "vt", *driving, "efd")))
-    refuse_taken(model, signals)
+    recorded_outputs = tuple(dict.fromkeys((*setpoints, "vt", *driving, "efd")))
+    refuse_taken(model, recorded_outputs)
+    states = (*model.states, *states_of(limiters))
     levels = tuple(initial(signal) for signal in driving)
 
     def rest(p: Signals) -> Rest:
         values = exciter_parameters(p, model, saturation)
         u = exciter_inputs(**{signal: p[initial(signal)] for signal in driving})
+        waiting = limiters_rest(limiters, u, p)
         if not vref_known:
             exciter = rest_of(model, p[EFD0], u, values)
-            return Rest(exciter.states, exciter.setpoints)
+            return Rest({**exciter.states, **waiting}, exciter.setpoints)
         efd = held_by(
             p[VREF0], p[EFD0], lambda efd: rest_of(model, efd, u, values).setpoints["vref"]
         )
         exciter = rest_of(model, efd, u, values)
-        return Rest(exciter.states, {**exciter.setpoints, "vref": p[VREF0]})
+        return Rest({**exciter.states, **waiting}, {**exciter.setpoints, "vref": p[VREF0]})
 
     def equations(p: Signals, r: Signals, x: Signals, u: Signals) -> Motion:
         recorded = {signal: p[initial(signal)] + u[signal] for signal in driving}
         vref, vs, d = r["vref"] + u["vref"], u.get("vs", 0.0), Names()
         u_exciter = exciter_inputs(vref=vref, vs=vs, **recorded)
+        signals = limiting(limiters, u_exciter, p, x, d)
+        u_exciter = exciter_inputs(**{**vars(u_exciter), **limited_inputs(limiters, signals)})
         values = exciter_parameters(p, model, saturation)
         efd = model.equations(state_of(model, x, r), u_exciter, values, d)
-        return motion(d, model.states, {"vref": vref, "vs": vs, **recorded, "efd": efd, **x})
+        outputs = {"vref": vref, "vs": vs, **recorded, "efd": efd, **signals}
+        return motion(d, states, {**outputs, **x})
 
     return System(
         parameters=(
@@ -86,12 +101,13 @@ def playback(
             *levels,
             EFD0,
             *((VREF0,) if vref_known else ()),
+            *symbols_of(limiters),
         ),
         setpoints=("vref", *model.setpoints),
-        states=model.states,
+        states=states,
         inputs=(*setpoints, *driving),
-        outputs=(*signals, *model.states),
-        time_constants=tuple(seconds("", model.sheet)),
+        outputs=(*recorded_outputs, *states, *signals_of(limiters)),
+        time_constants=(*seconds("", model.sheet), *seconds_of(limiters)),
         rest=rest,
         motion=equations,
     )
@@ -105,6 +121,7 @@ def _build(equipment: Equipment) -> System:
         driving,
         vref_known="vref" in equipment.given,
         stabilised="vs" in equipment.inputs,
+        limiters=equipment.limiters,
     )
 
 

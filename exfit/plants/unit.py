@@ -9,6 +9,14 @@ from exfit.models.machines import Axes, Machine
 from exfit.models.phasors import modulus
 from exfit.models.sheet import Model
 from exfit.plants.governing import REFERENCE, governing, governor_rest
+from exfit.plants.limiting import (
+    limited_inputs,
+    limiters_rest,
+    limiting,
+    seconds_of,
+    states_of,
+    symbols_of,
+)
 from exfit.plants.loaded_machine import Flow, compensated, loaded_at_rest
 from exfit.plants.parts import (
     GOVERNOR,
@@ -25,7 +33,7 @@ from exfit.plants.parts import (
     symbols,
     values_of,
 )
-from exfit.plants.plant import Stabilised, Swing
+from exfit.plants.plant import Attached, Stabilised, Swing
 from exfit.plants.stabilising import stabiliser_rest, stabilising
 
 # the rotor's angle to where the voltage behind R + jX is at the start (rad), its speed less 1 (pu)
@@ -41,6 +49,7 @@ class UnitOnLoad(NamedTuple):
     stabiliser: Stabilised | None = None
     swing: Swing = "power"
     governor: Model | None = None
+    limiters: tuple[Attached, ...] = ()
 
     @property
     def added(self) -> tuple[tuple[str, Model], ...]:
@@ -53,7 +62,8 @@ class UnitOnLoad(NamedTuple):
     def states(self) -> tuple[str, ...]:
         """All states by their names in the system."""
         added = (prefix + name for prefix, model in self.added for name in model.states)
-        return (*self.machine.states, *ROTOR, *self.exciter.states, *added)
+        limiting = states_of(self.limiters)
+        return (*self.machine.states, *ROTOR, *self.exciter.states, *added, *limiting)
 
     @property
     def setpoints(self) -> tuple[str, ...]:
@@ -70,6 +80,7 @@ class UnitOnLoad(NamedTuple):
             *symbols(MACHINE, self.machine.sheet),
             *network,
             *(name for prefix, model in self.added for name in symbols(prefix, model.sheet)),
+            *symbols_of(self.limiters),
         )
 
     @property
@@ -79,6 +90,7 @@ class UnitOnLoad(NamedTuple):
             *seconds("", self.exciter.sheet),
             *seconds(MACHINE, self.machine.sheet),
             *(name for prefix, model in self.added for name in seconds(prefix, model.sheet)),
+            *seconds_of(self.limiters),
         )
 
 
@@ -137,11 +149,12 @@ class UnitState(NamedTuple):
 
 
 class Excited(NamedTuple):
-    """What a unit shows beside its terminals."""
+    """What a unit shows beside its terminals; the outputs of its limiters by name."""
 
     efd: Signal
     ifd: Signal
     vc1: Signal
+    limiters: Signals
 
 
 def unit_at_rest(
@@ -158,6 +171,7 @@ def unit_at_rest(
     values = exciter_parameters(p, unit.exciter, unit.saturation)
     exciter = rest_of(unit.exciter, ifd, u, values)
     states = {**values_of(fluxes, unit.machine.states), "delta": stator.delta, "dw": 0.0}
+    states |= limiters_rest(unit.limiters, u, p)
     if unit.stabiliser is not None:
         heard = Names(speed=0.0, p=power, vt=vt, pa=0.0, none=0.0)
         states |= stabiliser_rest(unit.stabiliser, heard, p)
@@ -212,9 +226,11 @@ def unit_motion(
         q=reactive,
         speed=1.0 + at.dw,
     )
+    signals = limiting(unit.limiters, u, p, x, d)
+    u = exciter_inputs(**{**vars(u), **limited_inputs(unit.limiters, signals)})
     values = exciter_parameters(p, unit.exciter, unit.saturation)
     efd = unit.exciter.equations(state_of(unit.exciter, x, r), u, values, d)
     unit.machine.slopes(at.fluxes, efd, ifd, at.i, of_machine, d)
     unit.machine.q_slopes(at.fluxes, at.i, of_machine, d)
     d.dw = acceleration(unit.swing, Pm, power, x["dw"], of_machine)
-    return Excited(efd, ifd, vc1)
+    return Excited(efd, ifd, vc1, signals)

@@ -6,10 +6,15 @@ from math import nan
 from typing import Annotated, NamedTuple
 
 from exfit.simulation.limit_hits import LimitHit
+from exfit.simulation.limits import LIMITER_PREFIXES
 from exfit.simulation.small_signal import SmallSignal
 from exfit.util.sources import NOT_STATED, TYPICAL
 
-PARTS = ("machine", "network", "stabiliser", "governor")  # their parameters are named machine.Tpd0
+# their parameters are named machine.Tpd0
+PARTS = (
+    *("machine", "network", "stabiliser", "governor"),
+    *(prefix.removesuffix(".") for prefix in LIMITER_PREFIXES),
+)
 
 
 class SheetRow(NamedTuple):

@@ -16,7 +16,6 @@ from exfit.fitting.uncertainty import UncertaintyAnalysis
 from exfit.inference import Interval, IntervalMethod, closed
 from exfit.results.comparisons import Comparison
 from exfit.results.description import (
-    PARTS,
     Behaviour,
     GivenInPlace,
     PartDescription,
@@ -185,7 +184,8 @@ class FitResult:
     ``parameters`` holds the fitted ones under their names in the system: KA, machine.Tpd0.
     ``fixed`` are the exciter's others, and helpers; ``machine``, ``network``, ``stabiliser`` and
     ``governor`` are all values of these parts by symbol, the fitted ones among them; their models
-    are None where the case has no such part. Values that follow others by ``ties`` are among these.
+    are None where the case has no such part; ``limiters`` holds those by kind (oel, uel). Values
+    that follow others by ``ties`` are among these.
     ``sources`` says where every value comes from: typical, nameplate ..., not stated;
     ``typical_values`` what those that are typical and not 0 would move, if they were 20 % off.
 
@@ -240,6 +240,8 @@ class FitResult:
     verdict: Verdict | None = None
     governor: Mapping[str, float] = field(default_factory=dict)
     governor_model: str | None = None
+    limiters: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    limiter_models: Mapping[str, str] = field(default_factory=dict)
     given_values: Mapping[str, GivenInPlace] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
     typical_values: Mapping[str, TypicalValue] = field(default_factory=dict)
@@ -284,8 +286,9 @@ class FitResult:
     def values(self) -> dict[str, float]:
         """Every parameter of all parts, those that were fitted last."""
         every = dict(self.fixed)
-        for kind in PARTS:
-            own: Mapping[str, float] = getattr(self, kind)
+        of_unit = {"machine": self.machine, "network": self.network}
+        added = {"stabiliser": self.stabiliser, "governor": self.governor, **self.limiters}
+        for kind, own in {**of_unit, **added}.items():
             every |= {f"{kind}.{symbol}": value for symbol, value in own.items()}
         others = {name: value for name, value in every.items() if name not in self.parameters}
         return {**others, **{name: parameter.value for name, parameter in self.parameters.items()}}

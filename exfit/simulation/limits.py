@@ -6,8 +6,12 @@ from typing import Any, NamedTuple
 
 from exfit.engine.system import System, Trace, trace
 from exfit.engine.trace import Node, evaluate, in_order
+from exfit.plants import LIMITER_KINDS
 
 Values = Mapping[str, float]
+
+LIMITER_PREFIXES = tuple(f"{kind}." for kind in LIMITER_KINDS)  # of what belongs to a limiter
+ROUNDING_AT_REST = 1e-9  # pu
 
 
 class EquationLimit(NamedTuple):
@@ -49,7 +53,7 @@ def limits_passed(system: System, values: Values) -> str:
         x, low, high = (everything[operand] for operand in node.operands)
         for passed, limit, side in ((x > high, 2, "above"), (x < low, 1, "below")):
             name = limit_name(node.operands[limit])
-            if passed and name:
+            if passed and name and not name.startswith(LIMITER_PREFIXES):
                 faults.append(
                     f"the start needs {x:.6g}, {side} {name} = {(low, high)[limit - 1]:.6g}"
                 )
@@ -68,23 +72,85 @@ def equation_limits(system: System) -> tuple[EquationLimit, ...]:
     """Return every limit of a system that is not infinite, in the order of the signal.
 
     They are its states' non-windup limits, its clamps, gates to a fixed parameter, and contacts
-    that force a value to one; neither the arcs of a rectifier nor what only cannot be negative.
+    that force a value to one; neither the arcs of a rectifier nor what only cannot be negative. A
+    limiter of excitation is one limit by the name of its output, oel.OEL2C, whatever it has inside.
     """
     of = traced(system)
     states = {node: node for node in of.x}
     clamps = [(node, held) for node, held in zip(of.x, of.clamped, strict=True) if node is not held]
-    limits = []
+    found: list[EquationLimit | None] = []
     for state, held in clamps:
         _, low, high = held.operands
-        limits += [
-            _limiter(state, bound, sign, state) for bound, sign in ((low, -1.0), (high, 1.0))
-        ]
+        found += [_limiter(state, bound, sign, state) for bound, sign in ((low, -1.0), (high, 1.0))]
     ours = {held for _, held in clamps}
     for node in in_order([*of.slopes, *of.outputs, *of.clamped]):
         if node not in ours:
-            limits += list(_clamp(node, states))
-    finite = (limit for limit in limits if limit is not None)
-    return tuple(sorted(dict.fromkeys(finite), key=lambda limit: limit.value.index))
+            found += list(_clamp(node, states))
+    limits = [limit for limit in found if limit is not None and not _inside_limiter(limit)]
+    limits += _of_limiters(system)
+    return tuple(sorted(dict.fromkeys(limits), key=lambda limit: limit.value.index))
+
+
+def limiter_outputs(system: System) -> dict[str, Node]:
+    """Return the outputs of a system's limiters by name."""
+    names, of = set(system.states), traced(system)
+    return {
+        name: node
+        for name, node in zip(system.outputs, of.outputs, strict=True)
+        if name.startswith(LIMITER_PREFIXES) and name not in names
+    }
+
+
+def acting_at_rest(system: System, values: Values) -> str:
+    """Name the limiters of excitation that act at the start already, and by how much."""
+    rest = at_rest(traced(system), values)
+    faults: dict[str, str] = {}
+    for name, output in limiter_outputs(system).items():
+        for limit in _gates_of(system, name, output):
+            numbers = evaluate([limit.value, limit.bound], rest)
+            value, bound = float(numbers[limit.value]), float(numbers[limit.bound])
+            if limit.sign * (value - bound) > ROUNDING_AT_REST:
+                own = f"with {value:.4g} pu" if limit.value is output else f"at {bound:.4g} pu"
+                gate = "" if limit.value is output else f", where its gate has {value:.4g} pu"
+                faults.setdefault(name, f"{name} acts at the start already, {own}{gate}")
+    return "; ".join(faults.values())
+
+
+def _of_limiters(system: System) -> Iterator[EquationLimit]:
+    """Yield the limits that limiters of excitation are."""
+    for name, output in limiter_outputs(system).items():
+        yield from _gates_of(system, name, output)
+
+
+def _gates_of(system: System, name: str, output: Node) -> Iterator[EquationLimit]:
+    """Yield the gates at which a limiter takes over; the sum where it is added."""
+    of = traced(system)
+    # an overexcitation limiter is a ceiling
+    sign = 1.0 if name.startswith("oel.") else -1.0
+    gates = (_gated(node, output) for node in in_order([*of.slopes, *of.outputs]))
+    values = [value for value in dict.fromkeys(gates) if value is not None]
+    for value in values:
+        yield EquationLimit(name, "", sign, value, output, False)
+    if not values:
+        zero = output.graph.constant(0.0)
+        yield EquationLimit(name, "", -sign, output, zero, False)
+
+
+def _gated(node: Node, output: Node) -> Node | None:
+    """Return what a node takes the output of a limiter in place of; None where it does not."""
+    if not any(operand is output for operand in node.operands[1:]):
+        return None
+    if node.op == "clip":
+        return node.operands[0]
+    condition, chosen, other = node.operands if node.op == "select" else (node, node, node)
+    if condition.op != "<" or {*condition.operands} != {chosen, other}:
+        return None
+    return other if chosen is output else chosen
+
+
+def _inside_limiter(limit: EquationLimit) -> bool:
+    """Return whether a limit belongs to the equations of a limiter."""
+    return limit.limit.startswith(LIMITER_PREFIXES) or limit.signal.startswith(LIMITER_PREFIXES)
 
 
 def _clamp(node: Node, states: Mapping[Node, Node]) -> Iterator[EquationLimit | None]:

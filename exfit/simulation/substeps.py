@@ -13,7 +13,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.plants import VT0
 from exfit.simulation.grid import ON_GRID
 from exfit.simulation.kernels import linear_kernel, places_of_time_constants, time_constants
-from exfit.simulation.limits import limits_passed
+from exfit.simulation.limits import acting_at_rest, limits_passed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -97,7 +97,9 @@ def why_unreachable(system: System, step: float, values: Values, p: Array) -> Si
         for name, slope, moves in states
         if finite and moves and math.isfinite(slope)
     ]
-    why = limits_passed(system, values) or ", ".join(moved) or "the values do not define one"
+    limiting = acting_at_rest(system, values) if finite else ""
+    passed = limiting or limits_passed(system, values)
+    why = passed or ", ".join(moved) or "the values do not define one"
     at = f" at vt0 = {values[VT0]:g} pu" if VT0 in values else ""
     return SimulationError(f"no state of rest{at}: {why}")
 

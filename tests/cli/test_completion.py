@@ -11,7 +11,7 @@ import yaml
 
 import exfit
 from exfit import cli
-from exfit.models import GOVERNORS, MACHINE_NAMES, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, MACHINE_NAMES, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.util.strategies import STRATEGIES
 
@@ -184,4 +184,4 @@ def test_every_model_of_the_catalogue_is_offered(place):
         "exfit", _EXFIT_COMPLETE="bash_complete", COMP_WORDS="exfit models ", COMP_CWORD="2"
     )
     names = {line.partition(",")[2] for line in found.splitlines()}
-    assert names == {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS}
+    assert names == {*MODELS, *MACHINES, *STABILISERS, *GOVERNORS, *LIMITERS}

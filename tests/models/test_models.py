@@ -28,7 +28,7 @@ from exfit.engine.kernel import Kernel, LinearKernel, Span
 from exfit.engine.system import trace
 from exfit.engine.trace import in_order
 from exfit.errors import ModelError, SimulationError
-from exfit.models import GOVERNORS, MODELS, STABILISERS, find, from_file
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS, find, from_file
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
 from exfit.models.sheet import crossed_limits, saturation_faults, typical
@@ -89,7 +89,7 @@ def test_a_lead_is_fitted_only_where_its_lag_does_not_cancel_it(model):
 
 
 def test_no_data_but_an_exciter_s_are_fitted_unless_a_case_says_so():
-    parts = (*MACHINES.values(), *STABILISERS.values(), *GOVERNORS.values())
+    parts = (*MACHINES.values(), *STABILISERS.values(), *GOVERNORS.values(), *LIMITERS.values())
     assert not [row.symbol for part in parts for row in part.sheet if row.free]
 
 
@@ -399,7 +399,7 @@ def test_a_model_is_found_by_its_name_and_aliases_in_any_case(model, tmp_path):
 
 def test_the_catalogue_lists_every_file_of_a_model():
     files = {path.stem for path in FILES.glob("*/*.py") if "\ndef equations(" in path.read_text()}
-    assert files == {name.lower() for name in (*MODELS, *STABILISERS, *GOVERNORS)}
+    assert files == {name.lower() for name in (*MODELS, *STABILISERS, *GOVERNORS, *LIMITERS)}
 
 
 def test_no_two_models_share_a_name():
@@ -414,7 +414,7 @@ def test_finding_a_model_loads_its_file_alone(name):
         f"print(find({name!r}, Path()).name, 'PSS1A' in STABILISERS, len(MODELS));"
         "print(*(file for file in sys.argv[1:] if 'exfit.models.exciters.' + file in sys.modules))"
     )
-    files = [known.lower() for known in (*MODELS, *STABILISERS, *GOVERNORS)]
+    files = [known.lower() for known in (*MODELS, *STABILISERS, *GOVERNORS, *LIMITERS)]
     environment = {**os.environ, "PYTHONPATH": str(FILES.parents[1])}
     done = subprocess.run(
         [sys.executable, "-c", code, *files],

@@ -7,14 +7,14 @@ import pytest
 from oracle import lively_values, system_of
 
 from exfit.errors import SimulationError
-from exfit.models import GOVERNORS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.simulator import Simulator
 
 ROWS = [
     row
-    for models in (MODELS, STABILISERS, GOVERNORS, MACHINES)
+    for models in (MODELS, STABILISERS, GOVERNORS, LIMITERS, MACHINES)
     for model in models.values()
     for row in model.sheet
 ]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from oracle import WITHOUT_PLANT
 
-from exfit.models import GOVERNORS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import catalogue_page, plots
 from exfit.output.catalogue_page import sample_response
@@ -15,9 +15,8 @@ from exfit.output.catalogue_page import sample_response
 )
 def test_every_model_has_its_figure_and_the_page_shows_it(names, tmp_path):
     exciters = {name: MODELS[name] for name in names}
-    others = {
-        name: model for shelf in (MACHINES, STABILISERS, GOVERNORS) for name, model in shelf.items()
-    }
+    shelves = (MACHINES, STABILISERS, GOVERNORS, LIMITERS)
+    others = {name: model for shelf in shelves for name, model in shelf.items()}
     catalogue = {**exciters, **others}
     folder, files = tmp_path, catalogue_page.write_overview(tmp_path, catalogue.values())
     page = (folder / "index.html").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from exfit.models import GOVERNORS, MODELS, STABILISERS
+from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output.drawings import block_diagram, diagram_and_remarks, document
 from exfit.output.drawings.formulas import SIZE
@@ -17,7 +17,7 @@ from exfit.output.drawings.layout import picture
 from exfit.output.drawings.letters import SIDES, read
 from exfit.output.drawings.parts import CLIP
 
-CATALOGUE = {**MODELS, **STABILISERS, **GOVERNORS, **MACHINES}
+CATALOGUE = {**MODELS, **STABILISERS, **GOVERNORS, **LIMITERS, **MACHINES}
 SVG = "{http://www.w3.org/2000/svg}"
 ARROWS = "►◄▲▼"
 CAPITAL = 0.36 * SIZE  # half of the height of letters without what hangs below their line

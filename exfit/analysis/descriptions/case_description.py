@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from exfit.analysis.descriptions.played_description import played_in
 from exfit.case.case import Case
@@ -40,6 +41,7 @@ from exfit.util.text import rounded
 
 Estimated = tuple[float, float | None]  # a value, and half of its 95 % interval
 Identified = Mapping[str, Estimated]  # what a fit found about its records, by name
+Value = TypeVar("Value")
 
 
 def labelled_records(case: Case) -> list[str]:
@@ -106,6 +108,11 @@ def values_by_part(case: Case, values: Mapping[str, float]) -> dict[str, dict[st
     }
 
 
+def of_limiters(case: Case, by_kind: Mapping[str, Value]) -> dict[str, Value]:
+    """Return what belongs to the limiters of a case, by their kinds."""
+    return {limiter.kind: by_kind[limiter.kind] for limiter in case.parts.limiters}
+
+
 def fixed_values(case: Case, values: Mapping[str, float]) -> dict[str, float]:
     """Return the values of the exciter, and of helpers of ties, that are not free."""
     others = tuple(part.prefix for part in case.parts.all if part.prefix)
@@ -124,6 +131,7 @@ def parts_of(case: Case) -> Iterator[PartDescription]:
         "exciter": parts.exciter,
         "stabiliser": parts.stabiliser,
         "governor": parts.governor,
+        **{limiter.kind: limiter.model for limiter in parts.limiters},
     }
     for part in parts.all:
         model = parts.machine if part.kind == "machine" else models.get(part.kind)

@@ -12,6 +12,7 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.checks.nuisance import nuisance_faults
 from exfit.case.checks.plant import (
     governor_faults,
+    limiter_faults,
     model_faults,
     plants_of_records_faults,
     stabiliser_faults,
@@ -59,6 +60,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     if kind is not OUTSIDE:
         yield from stabiliser_faults(content, parts, kind)
         yield from governor_faults(content, parts, kind)
+        yield from limiter_faults(content, parts, kind)
     yield from source_faults(content, parts, kind)
     yield from plants_of_records_faults(content, kind)
     yield from external_faults(content, parts)
@@ -127,7 +129,8 @@ def _recording_faults(
     yield from recorded_reference_faults(test, record, kind, has_record)
     if has_record:
         yield from record_faults(test, record)
-        fits = any(content.at(section, "free").content for section in WITH_PARAMETERS)
+        sections = [*map(content.at, WITH_PARAMETERS), *content.at("limiters").entries]
+        fits = any(section.at("free").content for section in sections)
         yield from channels_faults(record.at("channels"), kind, fits or not kind.finds_rest)
         yield from stabiliser_channel_faults(record.at("channels"), content.at("stabiliser"), kind)
         yield from level_faults(record.at("channels"), plant.at("network"), kind)

@@ -1,4 +1,4 @@
-"""What contradicts itself between the plant of a case, its model, stabiliser and governor."""
+"""What contradicts itself between the plant of a case, its model, and what is added to it."""
 
 from collections.abc import Iterator
 
@@ -7,8 +7,19 @@ from exfit.case.checks.node import ContentNode
 from exfit.case.parts import Parts, kind_of, network_part, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
-from exfit.plants import HEARD, OUTSIDE, PlantKind, Stabilised, rests_at, rests_with_output
-from exfit.util.text import show
+from exfit.plants import (
+    HEARD,
+    OUTSIDE,
+    Attached,
+    PlantKind,
+    Stabilised,
+    acts_without_load,
+    input_at,
+    inputs_for_limiters,
+    rests_at,
+    rests_with_output,
+)
+from exfit.util.text import show, show_value
 
 PROGRAM_HAS_IT = "the program has its own"
 
@@ -24,7 +35,15 @@ def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
         if "model" not in content:
             yield content.at("model").fault("is missing")
         return
-    keys = ("model", "saturation", "efd_times_speed", "parameters", "stabiliser", "governor")
+    keys = (
+        "model",
+        "saturation",
+        "efd_times_speed",
+        "parameters",
+        "stabiliser",
+        "governor",
+        "limiters",
+    )
     for key in keys:
         if key in content:
             text = f"not allowed with plant {kind.name}: it has no exciter"
@@ -65,6 +84,39 @@ def governor_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iter
         name = parts.governor.name
         text = f"{name} does not rest at P = {show(power)} pu: one of its limits is in the way"
         yield section.at("parameters").fault(text)
+
+
+def limiter_faults(content: ContentNode, parts: Parts, kind: PlantKind) -> Iterator[Fault]:
+    """Yield limiters at a place that they or the exciter do not have, and what cannot be fitted."""
+    by_kind = {limiter.kind: limiter for limiter in parts.limiters}
+    for part in parts.all:
+        if part.kind in by_kind and kind.has_exciter:
+            section, limiter = content.at(*part.fixed[:-1]), by_kind[part.kind]
+            yield from _place_faults(section, limiter, parts.exciter)
+            idle = kind.closed_loop and not _on_load(content, kind)
+            if idle and not acts_without_load(limiter) and section.at("free").content:
+                text = f"on open circuit {limiter.model.name} does not act: there is no current"
+                yield section.at("free").fault(text)
+
+
+def _place_faults(
+    section: ContentNode, limiter: Attached, exciter: Model | None
+) -> Iterator[Fault]:
+    """Yield a place at which a limiter cannot act."""
+    place, name = section.at("place"), limiter.model.name
+    if limiter.place not in limiter.model.places:
+        places = ", ".join(limiter.model.places)
+        yield place.fault(f"{show_value(limiter.place)}: {name} acts at {places}")
+        return
+    inputs = frozenset() if exciter is None else inputs_for_limiters(exciter)
+    if exciter is None or input_at(limiter) in inputs:
+        return
+    others = [
+        other for other in limiter.model.places if input_at(limiter._replace(place=other)) in inputs
+    ]
+    has = f"it has {', '.join(others)}" if others else "none of its inputs is for this limiter"
+    word = f"{limiter.place} ({input_at(limiter)})"
+    yield place.fault(f"{exciter.name} has no input {word} for {name}: {has}")
 
 
 def _idle_faults(

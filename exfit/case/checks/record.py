@@ -6,7 +6,7 @@ from exfit.case.checks.bump_test import instants_of
 from exfit.case.checks.node import ContentNode
 from exfit.case.checks.phasors import phasors_faults
 from exfit.case.yaml import Fault
-from exfit.plants import PlantKind
+from exfit.plants import LIMITER_KINDS, PlantKind
 from exfit.records.units import base_of_own, needs_base
 from exfit.signals import OF_EVENT, SIGNALS
 from exfit.util.file_names import taken_names
@@ -17,7 +17,7 @@ BEFORE_RECORD = (
     "there; or, if the unit had not settled, give begin before this step, and vt0 at that time"
 )
 AFTER_WINDOW = "leave this step out, or end the window after it"
-PREFIXES_OF_PARTS = ("machine", "network", "stabiliser", "governor")
+PREFIXES_OF_PARTS = ("machine", "network", "stabiliser", "governor", *LIMITER_KINDS)
 
 
 def event_faults(test: ContentNode, record: ContentNode, kind: PlantKind) -> Iterator[Fault]:

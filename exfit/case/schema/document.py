@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from exfit.case.schema.estimate import Estimate, Limit, Parameters, SimulationSection
-from exfit.case.schema.plants import Governor, Plant, SaturationName, Stabiliser
+from exfit.case.schema.plants import Governor, Limiter, Plant, SaturationName, Stabiliser
 from exfit.case.schema.programme import TestOfProgramme
 from exfit.case.schema.records import RecordFile, Recording
 from exfit.case.schema.report import AsFoundSection, ReportRequest
@@ -48,6 +48,11 @@ class CaseDocument(Section):
         default=None,
         description="A turbine with its governor; it acts where the speed follows from the power. "
         "Default: the power of the turbine is constant.",
+    )
+    limiters: tuple[Limiter, ...] = Field(
+        default=(),
+        description="Limiters of over- and underexcitation, at most one of each kind; on open "
+        "circuit only what limits the field current acts.",
     )
     test: BumpTest | None = Field(
         default=None,

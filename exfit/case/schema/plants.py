@@ -21,12 +21,14 @@ from exfit.case.schema.values import (
     nothing,
 )
 from exfit.models import MACHINE_NAMES
-from exfit.plants import HEARD, PowerAt, Swing
+from exfit.plants import HEARD, PLACES, PowerAt, Swing
 
 if TYPE_CHECKING:
     Heard = str
+    Place = str
 else:
     Heard = Literal[HEARD]
+    Place = Literal[PLACES]
 
 MACHINE = Field(description=f"Machine model: {', '.join(MACHINE_NAMES)}.")
 MACHINE_DATA = Field(
@@ -299,3 +301,15 @@ class Governor(AddedModel):
     """A turbine with its governor; it acts where the speed follows from the power."""
 
     model: Text = Field(description="Name of the governor model.")
+
+
+class Limiter(AddedModel):
+    """A limiter of over- or underexcitation."""
+
+    model: Text = Field(description="Name of the limiter model.")
+    place: Place | None = Field(
+        default=None,
+        description="Where it acts on the exciter: takeover, the gate of its kind; "
+        "takeover-output, a second gate at the output of the regulator, where the model has one; "
+        "summing, added to the voltage error. Default: the usual place of the model.",
+    )

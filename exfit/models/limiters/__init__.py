@@ -1,0 +1,1 @@
+"""Limiters of over- and underexcitation and of the stator current, a file for each."""

@@ -1,0 +1,158 @@
+"""OEL2C: overexcitation limiter with selectable pick-up and limiting (IEEE Std 421.5-2016).
+
+ifd ─►[  KSCALE  ]─┬─► i
+      [1 + sTROEL] └─►[KACT]─► iact
+                         VINVMAX           TMAX
+(i/ITFPU)^C2 - 1 ─►[K2]─►[clip]─►(+)─►[   1   ]─► t
+                         VINVMIN  ▲   [s + KFB]
+                                fixed      TMIN
+         IINST
+rate ─►[ 1 ]─► iref ─►[    1     ]─► if
+       [ s ]          [1 + sTAOEL]
+         ILIM
+                             VOELMAX3
+if + bias - iact ─►[    KPOEL + KIOEL/s   ]─► v
+                   [+ sKDOEL/(1 + sTDOEL) ]
+                             VOELMIN3
+       VOELMAX2       VOELMAX1
+v ─►[1 + sTC2OEL]─►[1 + sTC1OEL]─► voel
+    [1 + sTB2OEL]  [1 + sTB1OEL]
+       VOELMIN2       VOELMIN1
+
+fixed is FIXEDRU while i is above ITFPU, FIXEDRD below; t counts to TFCL. The
+reference iref is IINST, and goes to ILIM by KRD once t reaches TFCL, back by
+KRU once t is below TFCL (1 - KZRU); with SW1 = 1 both rates are
+K1 ((i/ITFPU)^C1 - 1) instead. The limiter is inactive with the bias IRESET and
+active with none: activated when t reaches TFCL or iact has been above iref for
+TEN (TEN = 0: always), inactive again when iref is IINST and has been above iact
+by ITHOFF for TOFF. At the summing point VOELMAX1 is 0.
+
+Dynawo has FIXEDRU and FIXEDRD the other way round, so that its timer never runs
+back with the sample data, and no memory of being active: without either
+condition its bias is 0. Followed are the names of the parameters ("fixed delay
+time", "fixed cooling-down time", "reset delay time"; PSCAD, PowerWorld, GridKit). Lists
+call TC1OEL and TC2OEL lags and TB1OEL and TB2OEL leads; the letters, and
+Dynawo, say the reverse, as drawn. Not modelled: the field voltage or the
+exciter's field current as input. Typical data are the first set of the standard's
+sample data (GridKit, PSCAD).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import Limited, clip, lag, limited, limited_lead_lag, pid, where
+from exfit.models.limiter_blocks import BEYOND, latch, leaky_rest, power, timer, waiting_integral
+from exfit.models.sheet import record, sheet
+
+PLACES = ("takeover", "takeover-output", "summing")
+INPUTS = ("ifd",)
+
+SHEET = sheet(
+    ("TC1OEL", 0.1, "s", (0.0, 100.0), "lead of the last block"),
+    ("TB1OEL", 0.1, "s", (0.0, 100.0), "lag of the last block"),
+    ("TC2OEL", 0.1, "s", (0.0, 100.0), "lead of the last but one"),
+    ("TB2OEL", 0.1, "s", (0.0, 100.0), "lag of the last but one"),
+    ("KPOEL", 0.5, "pu", (0.0, 100000.0), "proportional gain"),
+    ("KIOEL", 0.0, "pu", (0.0, 100000.0), "integral gain"),
+    ("KDOEL", 0.0, "pu", (0.0, 10000.0), "derivative gain"),
+    ("TDOEL", 0.1, "s", (0.0, 100.0), "derivative lag"),
+    ("VOELMAX3", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the PID"),
+    ("VOELMIN3", -100.0, "pu", (-1000.0, 1000.0), "floor of the PID"),
+    ("VOELMAX2", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the last block but one"),
+    ("VOELMIN2", -100.0, "pu", (-1000.0, 1000.0), "floor of the last block but one"),
+    ("VOELMAX1", 10.0, "pu", (-1000.0, 1000.0), "ceiling of the output"),
+    ("VOELMIN1", -10.0, "pu", (-1000.0, 1000.0), "floor of the output"),
+    ("IRESET", 100.0, "pu", (0.0, 10000.0), "bias while it is inactive"),
+    ("TEN", 0.2, "s", (0.0, 1000.0), "activation delay"),
+    ("TOFF", 5.0, "s", (0.0, 1000.0), "reset delay"),
+    ("ITHOFF", 0.05, "pu", (-10.0, 100.0), "distance below the reference that resets"),
+    ("KSCALE", 1.0, "1", (0.0001, 1000.0), "scale of the field current"),
+    ("TROEL", 0.01, "s", (0.0, 100.0), "field current transducer lag"),
+    ("KACT", 1.0, "1", (0.0001, 1000.0), "scale of the current that is limited"),
+    ("ITFPU", 3.0, "pu", (0.0001, 1000.0), "field current above which the timer counts"),
+    ("IINST", 6.0, "pu", (0.0001, 10000.0), "instantaneous limit"),
+    ("ILIM", 3.0, "pu", (0.0001, 10000.0), "thermal limit"),
+    ("TAOEL", 0.04, "s", (0.0, 100.0), "lag of the reference"),
+    ("C1", 0.0, "1", (0.0, 100.0), "exponent of the rate with SW1 = 1"),
+    ("K1", 0.0, "pu/s", (-10000.0, 10000.0), "gain of the rate with SW1 = 1"),
+    ("C2", 2.0, "1", (0.0, 100.0), "exponent of the inverse time"),
+    ("K2", 0.0296, "1", (-10000.0, 10000.0), "gain of the inverse time"),
+    ("VINVMAX", 100.0, "1", (-1000.0, 1000.0), "ceiling of the inverse time"),
+    ("VINVMIN", 0.0, "1", (-1000.0, 1000.0), "floor of the inverse time"),
+    ("FIXEDRU", 0.0, "1", (-1000.0, 1000.0), "fixed count above the pick-up"),
+    ("FIXEDRD", -0.001, "1", (-1000.0, 1000.0), "fixed count below the pick-up"),
+    ("TFCL", 1.0, "s", (0.001, 10000.0), "reference of the timer"),
+    ("TMAX", 1.0, "s", (0.0, 10000.0), "ceiling of the timer"),
+    ("TMIN", 0.0, "s", (-10000.0, 1000.0), "floor of the timer"),
+    ("KFB", 0.0, "1/s", (0.0, 1000.0), "feedback of the timer"),
+    ("KRD", -1000.0, "pu/s", (-100000.0, 0.0), "rate of the reference down"),
+    ("KRU", 1000.0, "pu/s", (0.0, 100000.0), "rate of the reference up"),
+    ("KZRU", 0.99, "1", (0.0, 1.0), "share of the timer at which the reference rises"),
+    ("SW1", 0.0, "1", (0.0, 1.0), "rates of the reference: 0 fixed, 1 by the current"),
+)
+
+RECORDS = (
+    record(
+        "OEL2C",
+        "TC1OEL TB1OEL TC2OEL TB2OEL KPOEL KIOEL KDOEL TDOEL VOELMAX3 VOELMIN3 VOELMAX2 VOELMIN2 "
+        "VOELMAX1 VOELMIN1 IRESET TEN TOFF ITHOFF KSCALE TROEL KACT ITFPU IINST ILIM TAOEL C1 K1 "
+        "C2 K2 VINVMAX VINVMIN FIXEDRU FIXEDRD TFCL TMAX TMIN KFB KRD KRU KZRU",
+        icons={"OELINPUT": 0},
+        held={"SW1": 0.0},
+        doubt="its order is that of PowerWorld's list, not confirmed by a file",
+    ),
+)
+
+STATES = "I T IREF IF OVER BELOW ACTIVE INTEG DERIV V2 V1"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return voel."""
+    current, d.I = lag(u.ifd, s.I, p.KSCALE, p.TROEL)
+    actual = p.KACT * current
+    t = clip(s.T, p.TMIN, p.TMAX)
+    d.T = limited(counting(current, p) - p.KFB * t, s.T, p.TMIN, p.TMAX)
+    iref = clip(s.IREF, p.ILIM, p.IINST)
+    d.IREF = limited(rate_of_reference(current, t, p), s.IREF, p.ILIM, p.IINST)
+    filtered, d.IF = lag(iref, s.IF, 1.0, p.TAOEL)
+    d.OVER = timer(actual > iref, s.OVER, p.TEN)
+    d.BELOW = timer(iref > actual + p.ITHOFF, s.BELOW, p.TOFF)
+    d.ACTIVE = activity(s, t, iref, p)
+    error = filtered - actual + where(s.ACTIVE > 0.5, 0.0, p.IRESET)
+    gains = p.KPOEL, p.KIOEL, p.KDOEL, p.TDOEL
+    v, d.INTEG, d.DERIV = pid(error, s.INTEG, s.DERIV, *gains, p.VOELMIN3, p.VOELMAX3)
+    v2, d.V2 = limited_lead_lag(v, s.V2, p.TC2OEL, p.TB2OEL, p.VOELMIN2, p.VOELMAX2)
+    v1, d.V1 = limited_lead_lag(v2, s.V1, p.TC1OEL, p.TB1OEL, p.VOELMIN1, p.VOELMAX1)
+    return v1
+
+
+def counting(current: Signal, p: Signal) -> Signal:
+    """Return how fast the timer counts, without its feedback."""
+    ratio = current / p.ITFPU
+    inverse = clip(p.K2 * (power(ratio, p.C2) - 1.0), p.VINVMIN, p.VINVMAX)
+    return inverse + where(ratio > 1.0, p.FIXEDRU, p.FIXEDRD)
+
+
+def rate_of_reference(current: Signal, t: Signal, p: Signal) -> Signal:
+    """Return how fast the reference moves: down when the time is over, up when it is released."""
+    by_current = p.K1 * (power(current / p.ITFPU, p.C1) - 1.0)
+    up, down = (where(p.SW1 > 0.5, by_current, fixed) for fixed in (p.KRU, p.KRD))
+    left = p.TFCL - t
+    return where(left >= p.KZRU * p.TFCL, up, where(left <= 0.0, down, 0.0))
+
+
+def activity(s: Signal, t: Signal, iref: Signal, p: Signal) -> Limited:
+    """Return the slope of the state that is 1 while the limiter is active."""
+    return latch((t >= p.TFCL) | (s.OVER >= p.TEN), (iref >= p.IINST) & (s.BELOW > p.TOFF))
+
+
+def rest(voel: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x at which it waits for its input to pass its limits."""
+    x.I = p.KSCALE * u.ifd
+    x.T = leaky_rest(counting(x.I, p), p.KFB, p.TMIN, p.TMAX)
+    x.IREF = x.IF = p.IINST
+    x.OVER, x.BELOW = 0.0, p.TOFF + BEYOND
+    x.ACTIVE = where(p.TEN > 0.0, 0.0, 1.0)
+    x.DERIV = p.IINST - p.KACT * x.I + where(p.TEN > 0.0, p.IRESET, 0.0)
+    x.INTEG = waiting_integral(x.DERIV, p.KIOEL, p.VOELMIN3, p.VOELMAX3)
+    x.V2 = clip(p.KPOEL * x.DERIV + x.INTEG, p.VOELMIN3, p.VOELMAX3)
+    x.V2 = clip(x.V2, p.VOELMIN2, p.VOELMAX2)
+    x.V1 = clip(x.V2, p.VOELMIN1, p.VOELMAX1)
