@@ -13,9 +13,10 @@ from exfit.models.blocks import (
 from exfit.models.sheet import sheet
 
 # the limits of the alternator that the edition of 2016 gave to all its types, out of reach
-FIELD_LIMITS = sheet(
-    ("VFEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current"),
-    ("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"),
+FLOOR = sheet(("VEMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the exciter voltage"))
+FIELD_LIMITS = (
+    *sheet(("VFEMAX", 99.0, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field current")),
+    *FLOOR,
 )
 # the source of the regulator's power stage: terminal voltage alone, and a ceiling 1.5 times that
 SUPPLY = sheet(

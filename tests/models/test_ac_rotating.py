@@ -6,8 +6,21 @@ nothing of states; ceilings are the roots of the equations that hold where a lim
 
 import numpy as np
 import pytest
-from diagrams import Rotating, alone, field_current, frequency_response, rectified, saturation
+from diagrams import frequency_response, saturation
 from oracle import rates_at_rest, system_of, typical_values
+from rotating import (
+    EFD,
+    FREQUENCIES,
+    INPUTS,
+    START,
+    VT,
+    around,
+    driven,
+    efd_where,
+    holding_current,
+    pid,
+    solved,
+)
 from scipy.optimize import brentq
 
 from exfit.errors import SimulationError
@@ -16,11 +29,6 @@ from exfit.models.sheet import typical
 from exfit.plants import SATURATION, exciter_parameters
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.simulator import Simulator
-
-FREQUENCIES = np.geomspace(0.01, 50.0, 41)  # Hz
-EFD, IFD, VT = 1.9, 1.8, 1.02  # a start of a machine on load, and off every limit
-START = {"efd": EFD, "ifd": IFD, "vt": VT}
-INPUTS = ("vref", "vs", "vt", "vc1", "ifd")
 
 # no gain and no time constant is zero
 LIVELY = {
@@ -59,31 +67,7 @@ def parameters(name, **changes):
     return exciter_parameters(values, MODELS[name], SATURATION["quadratic"])
 
 
-def behind_rectifier(ve, ifd, p):
-    return rectified(ve, p.KC * ifd)
-
-
-def holding_current(ve, ifd, p):
-    return field_current(ve, ifd, vars(p))
-
-
 # --- linear behaviour -----------------------------------------------------------------------------
-
-
-def pid(s, KP, KI, KD, TD):
-    return KP + KI / s + s * KD / (1.0 + s * TD)
-
-
-def solved(s, p, forward, back, supply=0.0):
-    """Return efd per unit of each input where VFD = forward e - back VFE + supply vt.
-
-    e = vref + vs - vc1 / (1 + sTR), and sTE VE = VFD - VFE.
-    """
-    at = Rotating(vars(p), EFD, IFD)
-    under = s * p.TE + (1.0 + back) * at.c
-    measured = -forward / (1.0 + s * p.TR)
-    ve = np.array([forward, forward, supply, measured, -(1.0 + back) * p.KD]) / under
-    return at.a * ve - at.b * np.array([0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def exac1(s, p):
@@ -97,14 +81,10 @@ def exac2(s, p):
 
 
 def ac7b(s, p):
-    at = Rotating(vars(p), EFD, IFD)
     amplifier = p.KP * VT * pid(s, p.KPA, p.KIA, 0.0, 0.0)
     regulator = amplifier * pid(s, p.KPR, p.KIR, p.KDR, p.TDR)
-    # the feedback of efd = a VE - b IFD, written with VE = (VFE - KD IFD) / c
-    back = regulator * s * p.KF3 / (1.0 + s * p.TF) + amplifier * (p.KF2 + p.KF1 * at.a / at.c)
-    lost = amplifier * p.KF1 * (at.b + at.a * p.KD / at.c)  # what IFD takes off that feedback
-    got = solved(s, p, regulator, back, at.vfe / VT)
-    return got + np.array([0.0] * 4 + [at.a * lost / (s * p.TE + (1.0 + back) * at.c)])
+    back = regulator * s * p.KF3 / (1.0 + s * p.TF) + amplifier * p.KF2
+    return solved(s, p, regulator, back, amplifier * p.KF1, around(p).vfe / VT)
 
 
 def esac8b(s, p):
@@ -128,23 +108,6 @@ def test_the_linear_exciter_is_its_block_diagram(name):
 
 
 # --- ceilings -------------------------------------------------------------------------------------
-
-
-def driven(name, p, levels, seconds=12.0, step=5e-3):
-    """Return efd at the end of each level of vref."""
-    end = seconds * len(levels)
-
-    def at(t):
-        return levels[min(int(t / seconds), len(levels) - 1)]
-
-    efd = alone(name, vars(p), vref=at, time=end, step=step, **START)[1]
-    return efd[:: round(seconds / step)][1:]
-
-
-def efd_where(vfe, p):
-    """Return the efd of a rotating exciter whose field current stands at VFE."""
-    ve = brentq(lambda ve: holding_current(ve, IFD, p) - vfe, 0.01, 50.0, xtol=1e-13)
-    return behind_rectifier(ve, IFD, p)
 
 
 def ceiling_of_exac2(**changes):

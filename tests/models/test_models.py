@@ -242,13 +242,21 @@ def awake_values(model):
     return values | {symbol: values[symbol] or 0.05 for symbol in gains}
 
 
+def switched_values(model):
+    """Return awake data with every switch in its other position: what it selects acts there."""
+    values = awake_values(model)
+    switches = {row.symbol: row.high for row in MODELS[model].sheet if row.symbol.startswith("SW")}
+    return [values | switches] if switches else []
+
+
 def moves(model, symbol, row):
     """Return whether a parameter moves a response, by a bump of any size.
 
     One of 0.3 pu meets the usual limits, a larger one those of the field current; a small one does
     not hold a quick regulator at its limits throughout.
     """
-    for values, size in product((lively_values(model), awake_values(model)), (0.3, 1.0, 0.02)):
+    data = (lively_values(model), awake_values(model), *switched_values(model))
+    for values, size in product(data, (0.3, 1.0, 0.02)):
         (before,) = responses(model, [values], size=size)
         for value in tried(row, values[symbol]):
             try:

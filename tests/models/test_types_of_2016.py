@@ -31,15 +31,21 @@ class Form(NamedTuple):
 
 SUPPLY = {"SW1": 2.0, "KP": 1.0, "KC1": 0.0, "VBMAX": NONE}  # of one, whatever happens
 LOOP = {"SW1": 1.0, "VAMAX": NONE, "VAMIN": -NONE}  # from the terminals, no further limit
-# the changes: lags that typical data leave out
+EFE = {"EFEMAX": "VRMAX", "EFEMIN": "VRMIN"}
+FIELD = {"VFEMAX": NONE, "VEMIN": 0.0}
 PID = {"KPR": "KP", "KIR": "KI", "KDR": "KD", "TDR": "TD"}
 BETWEEN = {"VEMAX": NONE, "VEMIN": 0.0}  # the floor of 2005, and no ceiling
+# the changes: lags that typical data leave out
 LAGS = {"TR": 0.02, "TB": 0.3, "TC": 0.1}
 FORMS = {
     "DC1C": Form("DC1A", BETWEEN, changes=LAGS),
     "DC2C": Form("DC2A", BETWEEN, changes=LAGS),
     # DC4B multiplies with the voltage before the lag TA, DC4C behind it
     "DC4C": Form("DC4B", SUPPLY | {"SW1": 1.0, "KI": 0.0}, PID, {"TR": 0.02, "TA": 0.0}),
+    "AC1C": Form("AC1A", FIELD, EFE, LAGS),
+    "AC2C": Form("AC2A", {"VEMIN": 0.0}, EFE, LAGS),
+    "AC6C": Form("AC6A", FIELD, EFE),
+    "AC7C": Form("AC7B", {"KC1": 0.0, "VBMAX": NONE}, changes={"KDR": 0.1, "KF3": 0.02}),
     "AC8C": Form("AC8B", SUPPLY, changes={"TR": 0.02, "TA": 0.05}),
     "ST1C": Form("ST1A", {}, changes={"TA": 0.02, "KF": 0.01}),
     "ST4C": Form("ST4B", {**LOOP, "TG": 0.0, "VGMAX": NONE}, changes={"TA": 0.0, "KG": 0.5}),

@@ -1,10 +1,10 @@
 """AC8C: alternator exciter, PID and supply of its own (IEEE Std 421.5-2016).
 
-              UEL OEL  VPIDMAX         UEL OEL  VRMAX          VE <= VEMAX
-vref + vs ►(+)►HV─►LV►[KPR + KIR/s   ]►HV─►LV►[  KA  ]►(x)►(+)►[  1  ]─┬►(x)►efd
- + vsum   -▲          [+ sKDR/(1+sTDR)]       [1+sTA]   ▲  -▲  [ sTE ] │  ▲
-           │           VPIDMIN                 VRMIN    │   │    VEMIN │ FEX
-vc1►[  1  ]┘                                            VB  └── VFE ◄──┘  ▲
+              UEL OEL  VPIDMAX        UEL OEL  VRMAX           VE <= VEMAX
+vref + vs ►(+)►HV─►LV►[KPR + KIR/s   ]►HV►LV►[  KA  ]►(x)─►(+)►[  1  ]─┬►(x)►efd
+ + vsum   -▲          [+ sKDR/(1+sTDR)]      [1+sTA]   ▲   -▲  [ sTE ] │  ▲
+           │           VPIDMIN                VRMIN    │    │    VEMIN │ FEX
+vc1►[  1  ]┘                                           VB   └── VFE ◄──┘  ▲
     [1+sTR]                                                      KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX.

@@ -1,0 +1,243 @@
+"""The alternator exciters of IEEE Std 421.5-2016 against their block diagrams, typed a second time.
+
+Transfer functions are algebra in s, ceilings and gates the roots of what holds where a limit acts.
+"""
+
+import cmath
+
+import numpy as np
+import pytest
+from diagrams import alone, frequency_response, rectified, slope
+from rotating import (
+    EFD,
+    FREQUENCIES,
+    IFD,
+    INPUTS,
+    START,
+    VT,
+    around,
+    behind_rectifier,
+    holding_current,
+    pid,
+    solved,
+)
+from scipy.optimize import brentq
+
+from exfit.models import MODELS
+from exfit.models.sheet import typical
+from exfit.plants import SATURATION, exciter_parameters
+
+P, Q = 0.8, 0.3  # on load
+# every block of the diagram takes part, and nothing is near a limit or a knee
+LIVELY = {
+    "AC1C": {"TR": 0.02, "TB": 0.5, "TC": 0.3},
+    "AC2C": {"TR": 0.02, "TB": 1.5, "TC": 0.4, "KA": 80.0, "VFEMAX": 9.0},
+    "AC6C": {"TR": 0.02, "VFELIM": 2.5, "KH": 3.0},
+    "AC7C": {"TR": 0.02, "KDR": 0.2, "TDR": 0.05, "KF2": 0.05, "KF3": 0.02},
+    "AC8C": {"TR": 0.02, "TA": 0.03, "VFEMAX": 9.0},
+}
+SOURCE = {"KI": 0.4, "XL": 0.1, "THETAP": 20.0, "VBMAX": 99.0, "KC1": 0.2}
+INDEPENDENT = SOURCE | {"SW1": 2.0}
+
+
+def parameters(name, **changes):
+    values = typical(MODELS[name].sheet) | LIVELY[name] | changes
+    return exciter_parameters(values, MODELS[name], SATURATION["quadratic"])
+
+
+# --- linear behaviour -----------------------------------------------------------------------------
+
+
+def lead_lag(s, TC, TB):
+    return (1.0 + s * TC) / (1.0 + s * TB)
+
+
+def ac1c(s, p):
+    forward = lead_lag(s, p.TC, p.TB) * p.KA / (1.0 + s * p.TA)
+    return solved(s, p, forward, forward * s * p.KF / (1.0 + s * p.TF))
+
+
+def ac2c(s, p):
+    regulator = p.KB * lead_lag(s, p.TC, p.TB) * p.KA / (1.0 + s * p.TA)
+    return solved(s, p, regulator, regulator * s * p.KF / (1.0 + s * p.TF) + p.KB * p.KH)
+
+
+def ac6c(s, p):
+    acts = around(p).vfe > p.VFELIM
+    limiter = p.KH * lead_lag(s, p.TJ, p.TH) if acts else 0.0
+    forward = p.KA * lead_lag(s, p.TK, p.TA) * lead_lag(s, p.TC, p.TB)
+    return solved(s, p, forward, limiter)
+
+
+def source(vt, vfe, p):
+    """Return VB of a machine with constant powers, by phasors."""
+    current = (P - 1j * Q) / vt
+    gain = cmath.rect(p.KP, np.radians(p.THETAP))
+    ve1 = abs(gain * vt + 1j * (p.KI + gain * p.XL) * current) if p.SW1 == 1.0 else p.KP
+    return min(rectified(ve1, p.KC1 * vfe), p.VBMAX)
+
+
+class Supplied:
+    """VFD = VS VA around the start: VS, and what its changes add to VFD."""
+
+    def __init__(self, p):
+        vfe = around(p).vfe
+        if vars(p).get("SW2") == 2.0:
+            self.vs, self.of_vt, self.of_vfe, self.of_efd = p.KR * EFD, 0.0, 0.0, p.KR
+        else:
+            self.vs, self.of_efd = source(VT, vfe, p), 0.0
+            self.of_vt = slope(lambda vt: source(vt, vfe, p), VT)
+            self.of_vfe = slope(lambda vfe: source(VT, vfe, p), vfe)
+        self.va = vfe / self.vs
+
+
+def ac7c(s, p):
+    at = Supplied(p)
+    amplifier = at.vs * pid(s, p.KPA, p.KIA, 0.0, 0.0)
+    regulator = amplifier * pid(s, p.KPR, p.KIR, p.KDR, p.TDR)
+    back = regulator * s * p.KF3 / (1.0 + s * p.TF) + amplifier * p.KF2 - at.va * at.of_vfe
+    of_efd = amplifier * p.KF1 - at.va * at.of_efd
+    return solved(s, p, regulator, back, of_efd, at.va * at.of_vt)
+
+
+def ac8c(s, p):
+    at = Supplied(p)
+    regulator = pid(s, p.KPR, p.KIR, p.KDR, p.TDR) * p.KA / (1.0 + s * p.TA)
+    return solved(s, p, at.vs * regulator, -at.va * at.of_vfe, 0.0, at.va * at.of_vt)
+
+
+FUNCTIONS = {"AC1C": ac1c, "AC2C": ac2c, "AC6C": ac6c, "AC7C": ac7c, "AC8C": ac8c}
+CASES = [
+    *((name, {}) for name in FUNCTIONS),
+    ("AC6C", {"VFELIM": 99.0}),  # its field current limiter does not act
+    *((name, changes) for name in ("AC7C", "AC8C") for changes in (SOURCE, INDEPENDENT)),
+    ("AC7C", {"SW2": 2.0}),
+]
+
+
+@pytest.mark.parametrize(("name", "changes"), CASES)
+def test_the_linear_exciter_is_its_block_diagram(name, changes):
+    p = parameters(name, **changes)
+    got = frequency_response(name, p, INPUTS, FREQUENCIES, START | {"p": P, "q": Q})
+    expected = np.array([FUNCTIONS[name](2j * np.pi * f, p) for f in FREQUENCIES])
+    size = np.maximum(np.abs(expected).max(axis=0), 1e-3)
+    # differences over 1e-5: rounding over it, and a third derivative times its square
+    assert (np.abs(got - expected) / size).max() < 1e-7
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_what_limiters_add_acts_as_the_reference_does(name):
+    p = vars(parameters(name))
+    expected = alone(name, p, vref=1e-3, time=0.2, **START)[1]
+    got = alone(name, p, held={"vsum": 1e-3}, time=0.2, **START)[1]
+    assert np.abs(expected - EFD).max() > 1e-4
+    np.testing.assert_array_equal(got, expected)
+
+
+# --- ceilings, floors and gates -------------------------------------------------------------------
+
+
+def after(name, p, vref, held=None, seconds=15.0):
+    """Return efd over a large step, with limiters that act from its instant on."""
+    return alone(name, vars(p), vref=vref, held=held, time=seconds, step=5e-3, **START)[1]
+
+
+def held_by(output):
+    """Return the efd of an exciter that gets VFD = output(efd, VFE)."""
+
+    def ceiling(p):
+        def missing(ve):
+            vfe = holding_current(ve, IFD, p)
+            return output(behind_rectifier(ve, IFD, p), vfe, p) - vfe
+
+        return behind_rectifier(brentq(missing, 0.1, 50.0, xtol=1e-13), IFD, p)
+
+    return ceiling
+
+
+def field_voltage(limit):
+    return held_by(lambda efd, vfe, p: limit(p))
+
+
+def floor_of_ve(p):
+    return behind_rectifier(p.VEMIN, IFD, p)
+
+
+def supplied(efd, vfe, p):
+    return min(rectified(p.KP * VT, p.KC1 * vfe), p.VBMAX)
+
+
+BY_VFE = field_voltage(lambda p: p.VFEMAX)
+BY_EFE = field_voltage(lambda p: p.EFEMAX)
+BY_VT = field_voltage(lambda p: VT * p.EFEMAX)
+LIMITS = [
+    ("AC1C", {}, BY_EFE),
+    ("AC1C", {"VFEMAX": 3.0}, BY_VFE),
+    ("AC2C", {"VFEMAX": 4.4}, BY_VFE),
+    ("AC2C", {"EFEMAX": 5.0}, BY_EFE),
+    ("AC6C", {"VFELIM": 99.0, "EFEMAX": 9.0}, BY_VT),
+    ("AC6C", {"VFELIM": 99.0, "VFEMAX": 12.0}, BY_VFE),
+    ("AC7C", {"KC1": 0.1}, held_by(lambda efd, vfe, p: p.VAMAX * supplied(efd, vfe, p))),
+    ("AC7C", {"VBMAX": 3.0}, held_by(lambda efd, vfe, p: p.VAMAX * p.VBMAX)),
+    ("AC7C", {"VFEMAX": 3.0}, BY_VFE),
+    ("AC7C", {"SW2": 2.0}, BY_VFE),  # it supplies itself up to there
+    (
+        "AC8C",
+        {"VRMAX": 6.0, "VFEMAX": 99.0},
+        held_by(lambda efd, vfe, p: p.VRMAX * supplied(efd, vfe, p)),
+    ),
+    ("AC8C", {"VFEMAX": 6.0}, BY_VFE),
+]
+
+
+@pytest.mark.parametrize(("name", "changes", "ceiling"), LIMITS)
+def test_a_large_step_drives_efd_to_its_ceiling_and_never_beyond(name, changes, ceiling):
+    p = parameters(name, **changes)
+    expected = ceiling(p)
+    efd = after(name, p, 0.5)
+    assert expected > 1.02 * EFD
+    assert efd[-1] == pytest.approx(expected, rel=1e-6)
+    assert efd.max() <= expected * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_large_step_down_drives_the_exciter_to_its_floor(name):
+    p = parameters(name, VEMIN=0.9)
+    efd = after(name, p, -0.5)
+    assert efd[-1] == pytest.approx(floor_of_ve(p), rel=1e-9)
+    assert efd.min() >= floor_of_ve(p) * (1.0 - 1e-9)
+
+
+TAKEN_OVER = {
+    **dict.fromkeys(("AC1C", "AC2C", "AC6C"), ("vuel", "voel")),
+    "AC8C": ("vuel_out", "voel_out"),
+}
+
+
+@pytest.mark.parametrize("name", TAKEN_OVER)
+def test_a_gate_takes_the_exciter_over(name):
+    """Whatever the error drives: an upper gate below what would be, a lower one above it."""
+    p = parameters(name, **({"VFELIM": 99.0} if name == "AC6C" else {}))
+    under, over = TAKEN_OVER[name]
+    for share, gate, vref in ((1.1, over, 0.5), (0.9, under, -0.5)):
+        vfe = share * around(p).vfe
+        supply = p.KA * supplied(0.0, vfe, p) if name == "AC8C" else 1.0
+        efd = after(name, p, vref, {gate: vfe / supply})
+        assert efd[-1] == pytest.approx(field_voltage(lambda _, vfe=vfe: vfe)(p), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["AC7C", "AC8C"])
+def test_a_gate_before_the_pid_takes_the_error_over(name):
+    """A step of the error that a gate holds is no step; and the gate gives a step of its own."""
+    p = parameters(name, **({"KF3": 0.0} if name == "AC7C" else {}))
+    assert after(name, p, 0.01, {"voel": 0.0}, 0.5)[-1] == pytest.approx(EFD, abs=1e-9)
+    expected = after(name, p, 0.01, None, 0.5)
+    # over half a second the error does not change: the terminal voltage stays
+    np.testing.assert_allclose(after(name, p, 0.0, {"vuel": 0.01}, 0.5), expected, rtol=1e-12)
+
+
+def test_the_second_gates_of_ac7c_take_the_reference_of_the_inner_loop_over():
+    """At rest KF1 efd is what the gate gives: the inner loop has an integral."""
+    p = parameters("AC7C", KF2=0.0)
+    for x, gate, vref in ((0.45, "voel_out", 0.5), (0.5, "vuel_out", -0.5)):
+        assert after("AC7C", p, vref, {gate: x})[-1] == pytest.approx(x / p.KF1, rel=1e-6)
