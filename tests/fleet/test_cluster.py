@@ -14,6 +14,7 @@ import psutil
 import pytest
 from batches import Events, case_file, record_file
 from clusters import HERE, kill_group, running_cluster, waited, without_times
+from ended_commands import heeding_interrupts
 
 import exfit
 from exfit.fleet import cluster, remote
@@ -143,10 +144,11 @@ def test_an_interruption_ends_all_workers_and_a_lost_scheduler_the_batch(user):
             ("killed", lambda batch: batch.kill(), -signal.SIGKILL),
             ("lost", lambda _: kill_group(there.scheduler), 1),
         ):
-            batch = subprocess.Popen(
-                [sys.executable, "-m", "exfit", *command, "-o", output],
-                stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(HERE)}, text=True,
-            )  # fmt: skip
+            with heeding_interrupts():
+                batch = subprocess.Popen(
+                    [sys.executable, "-m", "exfit", *command, "-o", output],
+                    stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(HERE)}, text=True,
+                )  # fmt: skip
             waited(lambda: len([*Path(output).glob("*/result.json")]) == 3, "the results")  # noqa: B023
             beside = processes_of(there)
             assert beside

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 from writers import WRITERS
 
@@ -25,10 +26,22 @@ def contents(folder):
     }
 
 
-def started(name, place):
-    """Start a command in a folder, in a process of its own, to which Ctrl-C is no stranger."""
+@contextmanager
+def heeding_interrupts():
+    """Have the processes that start inside heed Ctrl-C: what a shell's background runs ignores it.
+
+    They inherit that.
+    """
     former = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, former)
+
+
+def started(name, place):
+    """Start a command in a folder, in a process of its own."""
+    with heeding_interrupts():
         return subprocess.Popen(
             [sys.executable, "-m", "exfit", *WRITERS[name]],
             cwd=place,
@@ -36,8 +49,6 @@ def started(name, place):
             stderr=subprocess.PIPE,
             text=True,
         )
-    finally:
-        signal.signal(signal.SIGINT, former)
 
 
 def undisturbed(name, place):

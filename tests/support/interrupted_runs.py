@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 
 import yaml
 from cases import FILES_OF_A_FIT
+from ended_commands import heeding_interrupts
 from places import ROOT
 
 CASE = ROOT / "configs" / "first_order.yaml"
@@ -39,17 +39,13 @@ class Outcome:
 
 def fit(case, folder):
     """Start a fit, figures included, in a process of its own."""
-    # a process that a shell starts in the background ignores interruptions, and so would this one
-    former = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
+    with heeding_interrupts():
         return subprocess.Popen(
             [*PROGRAM, "fit", str(case), "-o", str(folder)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
         )
-    finally:
-        signal.signal(signal.SIGINT, former)
 
 
 def fit_before(place):

@@ -8,6 +8,7 @@ import time
 from dataclasses import dataclass
 
 from batches import table_of
+from ended_commands import heeding_interrupts
 
 PROGRAM = """
 import sys
@@ -58,13 +59,14 @@ class ResumedBatch:
 
 def start(cases, folder):
     """Start a batch in a process that leads a group of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(cases), str(folder), str(WORKERS)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        start_new_session=True,
-    )
+    with heeding_interrupts():
+        return subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, str(cases), str(folder), str(WORKERS)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            start_new_session=True,
+        )
 
 
 def whole_batch(cases, folder):
