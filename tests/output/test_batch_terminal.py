@@ -7,7 +7,7 @@ import pytest
 from fleets import fleet, row
 
 from exfit.output import terminal
-from exfit.output.terminal.batch import BETWEEN_LINES, FIRST_LINE, MOST_ATTENTION
+from exfit.output.terminal.batches import BETWEEN_LINES, FIRST_LINE, MOST_ATTENTION
 from exfit.output.terminal.terminal import GuardedConsole
 
 

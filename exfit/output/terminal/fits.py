@@ -6,7 +6,6 @@ from rich.console import Console
 from rich.table import Table
 
 from exfit.inference import ParameterEffect
-from exfit.output.terminal.comparisons import comparisons, played, rejections
 from exfit.output.terminal.terminal import (
     NO_BREAK,
     error_of,
@@ -20,6 +19,7 @@ from exfit.output.terminal.terminal import (
     show_table,
     unresolved,
 )
+from exfit.output.terminal.validations import comparisons, played, rejections
 from exfit.results.model import FitResult, FittedParameter
 from exfit.results.search_summary import search_summary
 from exfit.results.verdict import GOOD, MATCHES

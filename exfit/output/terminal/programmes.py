@@ -10,9 +10,9 @@ from rich.text import Text
 from exfit.analysis.model_check import Check
 from exfit.estimate import Progress
 from exfit.output.terminal.checks import check
-from exfit.output.terminal.fit_series import BRIEF, progress_words
 from exfit.output.terminal.fits import fit
 from exfit.output.terminal.saturation import saturation
+from exfit.output.terminal.series import BRIEF, progress_words
 from exfit.output.terminal.terminal import (
     interval,
     paragraph,
