@@ -16,7 +16,7 @@ pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="sends signals of POSIX"),
 ]
 
-CASES = 12
+CASES = 7
 SEED = 3
 
 
