@@ -112,7 +112,9 @@ def _section(name: str, headings: Mapping[str, str], sections: Mapping[str, Sche
             _value(value, headings, sections),
             _cell(value.get("description") or _about(value, sections)) + _default(value),
         )
-        for key, value in section["properties"].items()
+        for key, value in sorted(
+            section["properties"].items(), key=lambda pair: pair[0] not in required
+        )
     ]
     table = _table(("key", "value", "meaning"), rows)
     return f"### {headings[name]}\n\n{_cell(section['description'])}\n\n{table}"

@@ -25,7 +25,11 @@ SYSTEMS = (
     {"sys_platform": "win32", "platform_system": "Windows", "os_name": "nt"},
 )
 # what the metadata of some packages leave out, as their files of licence have it
-OF_LICENCE_FILES = {"axe-playwright-python": "MIT", "pyphen": "GPL-2.0+ or LGPL-2.1+ or MPL-1.1"}
+OF_LICENCE_FILES = {
+    "axe-playwright-python": "MIT",
+    "fmpy": "BSD-2-Clause",
+    "pyphen": "GPL-2.0+ or LGPL-2.1+ or MPL-1.1",
+}
 LONGEST = 60  # characters: more is the text of a licence, not its name
 
 Rows = dict[str, tuple[str, str]]  # package: why it is there, and its licence

@@ -53,6 +53,7 @@ ONLY_IN = {  # where a library may be imported, inside functions too
     "llvmlite": {"engine"},
     "distributed": {"fleet"},
     "dask": {"fleet"},
+    "fmpy": {"external"},
 }
 AT_ONCE = {"numpy", "matplotlib", "scipy", "pydantic", "rich", "llvmlite", "yaml"}
 

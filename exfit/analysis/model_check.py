@@ -15,6 +15,7 @@ from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
 from exfit.fitting.experiment import Experiment
 from exfit.fitting.forms.external import differences_of_program
+from exfit.fitting.forms.fmu import own_value_notes
 from exfit.fitting.problem import free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -102,6 +103,7 @@ def check(case: Case) -> Check:
         notes=(
             *typical_notes(case, case.values()),
             *search_range_notes(case),
+            *own_value_notes(case),
             *dict.fromkeys(_rest_notes(experiments, values)),
         ),
         warnings=(*case_warnings(case), *of_events, *record_warnings(case, setups, case.values())),

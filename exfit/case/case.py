@@ -16,6 +16,7 @@ from exfit.case.schema import (
     BumpTest,
     Estimate,
     ExternalPlant,
+    FmuPlant,
     FreeSection,
     Governor,
     Limit,
@@ -61,9 +62,8 @@ class Case:
     ``given_records`` holds, by name, the records that were given as arrays instead of files,
     ``given_values`` the values of parameters that were given in place of those of the sections,
     ``given_sources`` where values that were given beside the case come from, ``given_std_errors``
-    their standard errors. ``external`` is the section of another program that simulates the
-    unit: ``plant`` is its twin then, where it has one, and the search local unless the case says
-    otherwise.
+    their standard errors. ``external`` is the section of what simulates the unit in place of
+    exfit: ``plant`` is its twin then, if any, and the search local unless the case says otherwise.
     """
 
     path: Path
@@ -88,7 +88,7 @@ class Case:
     report: ReportRequest
     parts: Parts
     ties: Ties
-    external: ExternalPlant | None = None
+    external: ExternalPlant | FmuPlant | None = None
     given_records: Mapping[str, Record] = field(default_factory=dict)
     given_values: Mapping[str, GivenValue] = field(default_factory=dict)
     given_sources: Mapping[str, str] = field(default_factory=dict)
@@ -105,7 +105,7 @@ class Case:
         sections: dict[str, Any] = dict(checked.document)
         del sections["programme"]  # of one that is a programme there is a case for each fit
         external = sections["plant"]
-        if isinstance(external, ExternalPlant):
+        if isinstance(external, ExternalPlant | FmuPlant):
             sections.update(plant=external.plant, external=external)
             if "search" not in checked.document.estimate.model_fields_set:
                 sections["estimate"] = sections["estimate"].model_copy(update={"search": "local"})

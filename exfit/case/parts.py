@@ -23,7 +23,6 @@ from exfit.plants import (
     MACHINE,
     NETWORK,
     OPEN_CIRCUIT,
-    OUTSIDE,
     STABILISER,
     Attached,
     PlantKind,
@@ -37,7 +36,8 @@ Contradictions = Iterator[tuple[str, str]]
 
 # in place of a kind that does not exist, which is a fault of its own
 ANY_PLANT = replace(OPEN_CIRCUIT, events=EVENTS, signals=RECORDED)
-EXTERNAL = OUTSIDE.name  # the type of a plant that another program simulates
+# the types of plants that exfit does not simulate
+ELSEWHERE = tuple(name for name, kind in KINDS.items() if not kind.has_equations)
 OF_RECORD = ("vt0", "delay")  # what a fit finds about a record, under names without a dot
 
 
@@ -97,7 +97,7 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
     plant = _mapping(data.get("plant"))
     kind = kind_of(plant)
     exciter = None
-    if kind is OUTSIDE:
+    if not kind.has_equations:
         exciter = _named(plant, data)
     elif kind.has_exciter:
         exciter = _exciter(data, folder, faults, model_sha256)
@@ -123,9 +123,9 @@ def parts_of(data: Data, folder: Path, faults: list[Fault], model_sha256: str = 
 def kind_of(plant: Data) -> PlantKind:
     """Return the kind of a plant section; one that allows everything where there is none.
 
-    That of a plant that another program simulates is the kind of its twin, where it has one.
+    That of a plant that exfit does not simulate is the kind of its twin, where it has one.
     """
-    key = "twin" if plant.get("type") == EXTERNAL and "twin" in plant else "type"
+    key = "twin" if plant.get("type") in ELSEWHERE and "twin" in plant else "type"
     return KINDS.get(str(plant.get(key)), ANY_PLANT)
 
 
@@ -337,13 +337,14 @@ def _exciter(data: Data, folder: Path, faults: list[Fault], sha256: str) -> Mode
 
 
 def _named(plant: Data, data: Data) -> Model:
-    """Return what stands for the model of another program: the parameters that a case names."""
+    """Return what stands for a model elsewhere: the parameters that a case names."""
     command = plant.get("command")
     words = [str(word) for word in command] if isinstance(command, list) else []
     files = [word for word in words[1:] if not word.startswith("-")]
+    words += [str(plant[key]) for key in ("file", "type") if key in plant]
     section = _mapping(data.get("parameters"))
     names = (name for key in ("fixed", "free") for name in _mapping(section.get(key)))
-    name = Path([*files, *words, EXTERNAL][0]).stem
+    name = Path([*files, *words][0]).stem
     return model_of_names(name, dict.fromkeys(names))
 
 

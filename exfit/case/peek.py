@@ -32,7 +32,7 @@ def files_in(content: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
     model = content.get("model")
     named = [model] if isinstance(model, str) and model.endswith(".py") else []
     named += [file for key in NAMING_FILES for file in _files(content.get(key))]
-    named += scripts_of(command_of(content), folder)
+    named += [*scripts_of(command_of(content), folder), *fmu_of(content)]
     files = [part for name in named for part in _parts(folder / name)]
     return tuple(dict.fromkeys(files))
 
@@ -46,6 +46,11 @@ def command_of(content: Mapping[str, Any]) -> tuple[str, ...]:
         if isinstance(command, list)
         else ()
     )
+
+
+def fmu_of(content: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the FMU that simulates a case, () where none does: no other plant has a file."""
+    return tuple(_files(content.get("plant")))
 
 
 def free_of(case: Path) -> tuple[str, ...]:

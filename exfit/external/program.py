@@ -36,13 +36,19 @@ class RunCounts(NamedTuple):
 class ExternalProgram:
     """A command that simulates: ``parallel`` processes of it, each with a ``time_limit`` (s).
 
-    No run is asked for twice: its outcome is remembered, a failure too.
+    ``place`` is where the case names it. No run is asked for twice: its outcome is remembered, a
+    failure too.
     """
 
     def __init__(
-        self, command: Sequence[str], folder: Path, parallel: int, time_limit: float
+        self,
+        command: Sequence[str],
+        folder: Path,
+        parallel: int,
+        time_limit: float,
+        place: str = "plant.command",
     ) -> None:
-        self.time_limit = time_limit
+        self.time_limit, self.place = time_limit, place
         self._processes = [ExternalProcess(command, folder) for _ in range(parallel)]
         self._free: SimpleQueue[ExternalProcess] = SimpleQueue()
         for process in self._processes:

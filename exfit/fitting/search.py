@@ -98,7 +98,8 @@ def search_options(case: Case, search: str | None) -> Estimate:
     if search is None:
         return case.estimate
     if case.external is not None and search != "local":
-        text = "not allowed with plant external, whose runs take long; must be local"
+        kind = case.external.type
+        text = f"not allowed with plant {kind}, whose runs take long; must be local"
         raise CaseError([f"{case.path}: search: {search}: {text}"])
     return case.estimate.model_copy(update={"search": checked_search(search)})
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from exfit.case.open_values import open_places
-from exfit.case.peek import command_of, content_of, files_in
+from exfit.case.peek import command_of, content_of, files_in, fmu_of
 from exfit.case.yaml import decoded
 from exfit.errors import CaseError, ExfitError, FileError
 from exfit.fleet.folder import IndexEntry, case_name
@@ -145,6 +145,7 @@ def _why_refused(content: Mapping[str, Any], files: Sequence[Path], trust: bool)
         return f"{files[0]}: to be filled in: {', '.join(missing)}"
     code = [file.name for file in files if file.suffix == CODE]
     code += [f"command {word}" for word in command_of(content)[:1]]
+    code += [f"FMU {file}" for file in fmu_of(content)]
     if code and not trust:
         return f"{', '.join(code)}: code that the case names; it is run with --trust only"
     return ""

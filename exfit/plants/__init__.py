@@ -10,7 +10,7 @@ from exfit.plants.limiting import PLACES, acts_without_load, input_at, inputs_fo
 from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
-from exfit.plants.outside import OUTSIDE, model_of_names
+from exfit.plants.outside import model_of_names
 from exfit.plants.parts import (
     DRIVING_SCALE,
     GOVERNOR,
@@ -54,7 +54,6 @@ __all__ = [
     "MEASURED",
     "NETWORK",
     "OPEN_CIRCUIT",
-    "OUTSIDE",
     "PLACES",
     "PLAYBACK",
     "REFERENCES",

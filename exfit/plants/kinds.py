@@ -8,7 +8,7 @@ from exfit.plants.infinite_bus import INFINITE_BUS
 from exfit.plants.machine_on_load import MACHINE_ON_LOAD
 from exfit.plants.machine_playback import MACHINE_PLAYBACK
 from exfit.plants.open_circuit import OPEN_CIRCUIT
-from exfit.plants.outside import OUTSIDE
+from exfit.plants.outside import FMU, OUTSIDE
 from exfit.plants.plant import PlantKind
 from exfit.plants.playback import PLAYBACK
 
@@ -23,6 +23,7 @@ KINDS: Mapping[str, PlantKind] = {
         MACHINE_PLAYBACK,
         ALONE,
         OUTSIDE,
+        FMU,
     )
 }
 

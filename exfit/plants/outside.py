@@ -1,6 +1,7 @@
 """A unit that another program simulates, of which exfit knows the names of its parameters alone."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from math import inf
 from typing import Any
@@ -65,4 +66,7 @@ OUTSIDE = PlantKind(
     events=("vref", "vs", "pref", "E", "angle"),
     signals=compared(COMPARED),
     build=lambda equipment: outside(present(equipment.exciter), equipment.inputs),
+    has_equations=False,
 )
+
+FMU = replace(OUTSIDE, name="fmu", title="a functional mock-up unit (FMU)")

@@ -91,7 +91,7 @@ class PlantKind:
     ``scaled`` driving ones whose scale is one. ``network`` is the data sheet of the network of
     which these values are given, ``network_required`` those that must be. ``per_unit`` says that
     voltages are those of a machine: per unit, and above zero at rest; ``finds_rest`` that the rest
-    before the event is found in the record.
+    before the event is found in the record, ``has_equations`` that exfit simulates it.
     """
 
     name: str
@@ -110,6 +110,7 @@ class PlantKind:
     network_required: tuple[str, ...] = ()
     per_unit: bool = True
     finds_rest: bool = False
+    has_equations: bool = True
 
     @property
     def has_exciter(self) -> bool:

@@ -35,6 +35,10 @@ class RunOutcome(Protocol):
 class Program(Protocol):
     """Another program that simulates."""
 
+    @property
+    def place(self) -> str:
+        """Where a case names it."""
+
     def remembered(self, request: Mapping[str, Any]) -> RunOutcome | None:
         """Return the run of a request that was made before and has not failed, None else."""
 
@@ -113,7 +117,7 @@ class ExternalSimulator(ProgramSimulator):
         parts = super().substeps(values)
         (run,) = self.program.runs([self.request(values)])
         if run.failure:
-            raise SimulationError(f"plant.command: {run.failure}")
+            raise SimulationError(f"{self.program.place}: {run.failure}")
         return parts
 
     def samples_of_many(

@@ -121,6 +121,19 @@ def test_a_command_is_run_where_it_is_trusted_and_its_script_is_part_of_the_key(
     assert planned_case(case, tmp_path, trusting).task.key != first.key
 
 
+def test_an_fmu_is_run_where_it_is_trusted_and_part_of_the_key(tmp_path, record):
+    unit = tmp_path / "unit.fmu"
+    unit.write_bytes(b"")
+    plant = {"type": "fmu", "twin": "open-circuit", "file": "unit.fmu"}
+    case = case_file(tmp_path / "a.yaml", record, plant=plant)
+    assert "FMU unit.fmu: code" in planned_case(case, tmp_path, SETTINGS).entry.reason
+    trusting = BatchSettings(trust=True)
+    first = planned_case(case, tmp_path, trusting).task
+    assert unit in first.files
+    unit.write_bytes(b"other")
+    assert planned_case(case, tmp_path, trusting).task.key != first.key
+
+
 def test_a_case_that_cannot_be_read_is_a_row(tmp_path):
     planned = planned_case(tmp_path / "gone.yaml", tmp_path, SETTINGS)
     assert (planned.task, planned.entry.status) == (None, "refused")

@@ -13,6 +13,7 @@ from exfit.case.schema import (
     BumpTest,
     ChannelSection,
     FindableStep,
+    FmuPlant,
     PhasesSection,
     Recording,
     Reference,
@@ -76,9 +77,11 @@ def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]
 
 
 def _scripts(case: Case) -> dict[str, Path]:
-    """Return the files beside a case of another program that simulates it, by their labels."""
+    """Return the files beside a case of what simulates it in place of exfit, by their labels."""
     if case.external is None:
         return {}
+    if isinstance(case.external, FmuPlant):
+        return {"program": case.folder / case.external.file}
     scripts = scripts_of(case.external.command, case.folder)
     return {f"program{number or ''}": case.folder / word for number, word in enumerate(scripts)}
 

@@ -34,7 +34,7 @@ from exfit.case.checks.sources import source_faults
 from exfit.case.parts import Parts, kind_of
 from exfit.case.ties import Ties
 from exfit.case.yaml import LONGEST_WHOLE, Fault
-from exfit.plants import OUTSIDE, PlantKind
+from exfit.plants import PlantKind
 from exfit.util.strategies import DEFAULT_SEARCH
 
 WITH_PARAMETERS = ("parameters", "plant", "stabiliser", "governor")
@@ -57,7 +57,7 @@ def contradictions(plain: dict[str, Any], parts: Parts, ties: Ties) -> Iterator[
     several = [entry for key in ("records", "validate") for entry in content.at(key).entries]
     yield from model_faults(content, kind)
     yield from parameter_faults(content, parts, ties)
-    if kind is not OUTSIDE:
+    if kind.has_equations:
         yield from stabiliser_faults(content, parts, kind)
         yield from governor_faults(content, parts, kind)
         yield from limiter_faults(content, parts, kind)

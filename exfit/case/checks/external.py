@@ -1,9 +1,9 @@
-"""What contradicts itself in a plant that another program simulates."""
+"""What contradicts itself in a plant that exfit does not simulate."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from exfit.case.checks.node import ContentNode
-from exfit.case.parts import EXTERNAL, OF_RECORD, Parts, plants_of_records
+from exfit.case.parts import ELSEWHERE, OF_RECORD, Parts, kind_of, plants_of_records
 from exfit.case.yaml import Fault
 from exfit.plants import KINDS
 from exfit.util.text import near
@@ -14,18 +14,20 @@ OF_TWIN = ("machine", "parameters", "free", "network", "swing")
 def external_faults(content: ContentNode, parts: Parts) -> Iterator[Fault]:
     """Yield keys that the twin does not have, names that are none, and what takes many runs."""
     plant = content.at("plant")
-    if plant.at("type").value != EXTERNAL:
+    kind = plant.at("type").value
+    if kind not in ELSEWHERE:
         return
     yield from _twin_faults(plant) if "twin" in plant else _named_faults(content, plant, parts)
     symbols = [part.prefix + symbol for part in parts.all for symbol in part.symbols]
-    for name in plant.at("names").content:
-        if name not in symbols:
-            yield plant.at("names", name).fault(f"not a parameter; {near(name, symbols)}")
+    yield from _unknown(plant.at("names"), [*symbols, OF_RECORD[0]], "a parameter")
+    plant_kind = kind_of(plant.content)
+    yield from _unknown(plant.at("inputs"), plant_kind.events, f"an input of {plant_kind.name}")
+    yield from _unknown(plant.at("outputs"), plant_kind.signals, f"a signal of {plant_kind.name}")
     for place in plants_of_records(content.content):
-        yield content.at(*place).fault("not allowed with plant external")
+        yield content.at(*place).fault(f"not allowed with plant {kind}")
     if content.at("estimate", "search").value == "global":
         yield content.at("estimate", "search").fault(
-            "global: not allowed with plant external, whose runs take long; must be local"
+            f"global: not allowed with plant {kind}, whose runs take long; must be local"
         )
 
 
@@ -55,3 +57,11 @@ def _named_faults(content: ContentNode, plant: ContentNode, parts: Parts) -> Ite
             if not symbol.isidentifier() or symbol in OF_RECORD:
                 text = "not a name, as KA is; plant.names has the name in the program"
                 yield content.at("parameters", place, symbol).fault(text)
+
+
+def _unknown(names: ContentNode, possible: Iterable[str], what: str) -> Iterator[Fault]:
+    """Yield the keys that give a name to what does not exist."""
+    words = [*possible]
+    for name in names.content:
+        if name not in words:
+            yield names.at(name).fault(f"not {what}; {near(name, words)}")

@@ -9,7 +9,6 @@ from exfit.case.yaml import Fault
 from exfit.models.sheet import Model, typical
 from exfit.plants import (
     HEARD,
-    OUTSIDE,
     Attached,
     PlantKind,
     Stabilised,
@@ -26,7 +25,7 @@ PROGRAM_HAS_IT = "the program has its own"
 
 def model_faults(content: ContentNode, kind: PlantKind) -> Iterator[Fault]:
     """Yield a model that is missing, or what describes one where there is none."""
-    if kind is OUTSIDE:
+    if not kind.has_equations:
         for key in ("model", "saturation", "efd_times_speed", "stabiliser", "governor"):
             if key in content:
                 yield content.at(key).fault(f"only with plant.twin: {PROGRAM_HAS_IT}")

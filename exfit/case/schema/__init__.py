@@ -14,6 +14,7 @@ from exfit.case.schema.phasors import (
 )
 from exfit.case.schema.plants import (
     ExternalPlant,
+    FmuPlant,
     Governor,
     InfiniteBus,
     Limiter,
@@ -64,6 +65,7 @@ __all__ = [
     "ExternalPlant",
     "Filter",
     "FindableStep",
+    "FmuPlant",
     "FreeSection",
     "Governor",
     "InfiniteBus",

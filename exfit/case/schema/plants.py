@@ -1,7 +1,8 @@
 """The sections of the case file about what surrounds the exciter."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, Literal
+from pathlib import PurePath
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -169,28 +170,24 @@ class NoPlant(PlantSection):
     type: Literal["none"] = Field(description="Kind of plant.")
 
 
-class ExternalPlant(PlantSection):
-    """A unit that another program simulates; its twin, a plant of exfit, has all else.
+class PlantElsewhere(PlantSection):
+    """A unit that exfit does not simulate; its twin, a plant of exfit, has all else.
 
-    The keys of the twin stand beside those of the program. Without a twin the parameters are those
-    that the case names, and derivatives are quotients of the program's runs.
+    The keys of the twin stand beside those of what simulates it. Without a twin the parameters are
+    those that the case names, and derivatives are quotients of the runs.
     """
 
-    type: Literal["external"] = Field(description="Kind of plant.")
-    command: tuple[Text, ...] = Field(
-        min_length=1,
-        description="The program with its arguments; it runs in the folder of the case.",
-    )
+    type: str
     twin: Literal["open-circuit", "infinite-bus"] | None = Field(
         default=None,
         description="The plant of exfit that gives the exact derivatives; default: none, they are "
-        "quotients of the program's runs.",
+        "quotients of the runs.",
     )
     parallel: Count = Field(default=1, description="How many processes of it run side by side.")
     time_limit: Positive = Field(default=60.0, description="For each run, s.")
     names: Frozen[Text] = Field(
         default_factory=nothing,
-        description="Names of parameters in the program, where they are others, such as KA: K_A.",
+        description="Names that parameters have there, where they are others, such as KA: K_A.",
     )
     machine: Text | None = Field(default=None, description="Machine model of the twin.")
     parameters: Frozen[Given] = MACHINE_DATA
@@ -203,7 +200,7 @@ class ExternalPlant(PlantSection):
     std_errors: StdErrors = STD_ERRORS
 
     @property
-    def plant(self) -> "OpenCircuit | InfiniteBus | ExternalPlant":
+    def plant(self) -> "OpenCircuit | InfiniteBus | Self":
         """The twin as a plant of its own, or this one where it has none."""
         if self.twin is None:
             return self
@@ -215,6 +212,54 @@ class ExternalPlant(PlantSection):
         return InfiniteBus.model_construct(type=self.twin, **sections, network=network, swing=swing)
 
 
+class ExternalPlant(PlantElsewhere):
+    """A unit that another program simulates; its twin, a plant of exfit, has all else.
+
+    The keys of the twin stand beside those of the program. Without a twin the parameters are those
+    that the case names, and derivatives are quotients of the program's runs.
+    """
+
+    type: Literal["external"] = Field(description="Kind of plant.")
+    command: tuple[Text, ...] = Field(
+        min_length=1,
+        description="The program with its arguments; it runs in the folder of the case.",
+    )
+
+    @property
+    def simulator(self) -> str:
+        """What simulates the unit."""
+        return " ".join(self.command)
+
+
+class FmuPlant(PlantElsewhere):
+    """A unit that is a functional mock-up unit (FMU); its twin, a plant of exfit, has all else.
+
+    The keys of the twin stand beside those of the FMU. Without a twin the parameters are those
+    that the case names, and derivatives are quotients of the FMU's runs.
+    """
+
+    type: Literal["fmu"] = Field(description="Kind of plant.")
+    file: Text = Field(description="The FMU, of FMI 2 or 3: a path, relative to the case file.")
+    interface: Literal["co-simulation", "model-exchange"] | None = Field(
+        default=None,
+        description="How it is run; default: co-simulation where the FMU has it.",
+    )
+    inputs: Frozen[Text] = Field(
+        default_factory=nothing,
+        description="Names of its inputs, where they are others, such as vref: avr.dVref.",
+    )
+    outputs: Frozen[Text] = Field(
+        default_factory=nothing,
+        description="Names of its variables that are compared, where they are others, such as "
+        "vt: gen.V.",
+    )
+
+    @property
+    def simulator(self) -> str:
+        """What simulates the unit."""
+        return PurePath(self.file).name
+
+
 Plant = (
     OpenCircuit
     | InfiniteBus
@@ -224,6 +269,7 @@ Plant = (
     | MachineOnLoad
     | NoPlant
     | ExternalPlant
+    | FmuPlant
 )
 SaturationName = Literal["quadratic", "exponential", "exponential-se"]
 

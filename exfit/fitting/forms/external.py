@@ -1,6 +1,6 @@
 """A unit that another program simulates: its tests, what is reported of its runs."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import cast
@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exfit.case.case import Case
+from exfit.case.schema import FmuPlant
 from exfit.errors import CaseError, SimulationError
 from exfit.external.program import ExternalProgram, running
+from exfit.fitting.forms.fmu import fmu_program, own_value_notes, refuse_unknown_variables
 from exfit.fitting.problem import FitProblem, free_parameters
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
@@ -33,10 +35,17 @@ LINEAR_ALONE = "no twin: intervals are those of linear theory, by quotients at t
 
 @contextmanager
 def program_of(case: Case) -> Iterator[ExternalProgram | None]:
-    """Provide the program that simulates a case, None where exfit does; end it afterwards."""
+    """Provide the program that simulates a case, None where exfit does; end it afterwards.
+
+    Raises CaseError for an FMU that cannot be run.
+    """
     section = case.external
     if section is None:
         yield None
+        return
+    if isinstance(section, FmuPlant):
+        with fmu_program(case, section) as program:
+            yield program
         return
     folder = case.folder.absolute()
     program = ExternalProgram(section.command, folder, section.parallel, section.time_limit)
@@ -49,19 +58,17 @@ def simulated_by(
 ) -> tuple[ExperimentSetup, ...]:
     """Return the tests of a case as a program simulates them.
 
-    Raises CaseError for a test whose inputs are more than steps and ramps.
+    Raises CaseError for a test whose inputs are more than steps and ramps, and with all variables
+    that an FMU has not.
     """
+    tests = [(setup.experiment.simulator, setup.experiment.signals) for setup in setups]
+    _refuse_recorded_inputs(case, [twin for twin, _ in tests])
+    refuse_unknown_variables(case, tests)
     return tuple(
         replace(
-            setup,
-            experiment=replace(
-                setup.experiment,
-                simulator=external_simulator(
-                    program, case, setup.experiment.simulator, setup.experiment.signals
-                ),
-            ),
+            setup, experiment=replace(setup.experiment, simulator=_simulator(program, case, *test))
         )
-        for setup in setups
+        for setup, test in zip(setups, tests, strict=True)
     )
 
 
@@ -69,10 +76,14 @@ def external_simulator(
     program: ExternalProgram, case: Case, twin: Simulator, signals: tuple[str, ...] = ("vt",)
 ) -> ExternalSimulator:
     """Return the simulator of a test whose signals a program gives; CaseError as `simulated_by`."""
-    if twin.inputs.recorded:
-        driving = ", ".join(twin.inputs.recorded)
-        text = f"{driving}: steps and ramps only are allowed with plant external"
-        raise CaseError([f"{case.path}: test: {text}"])
+    _refuse_recorded_inputs(case, [twin])
+    refuse_unknown_variables(case, [(twin, signals)])
+    return _simulator(program, case, twin, signals)
+
+
+def _simulator(
+    program: ExternalProgram, case: Case, twin: Simulator, signals: tuple[str, ...]
+) -> ExternalSimulator:
     names = {} if case.external is None else case.external.names
     if not case.has_no_equations:
         return ExternalSimulator(twin, program, signals, names)
@@ -87,6 +98,13 @@ def refuse_without_equations(case: Case, command: str) -> None:
     if case.has_no_equations:
         text = f"missing; {command} needs the equations of a plant of exfit"
         raise CaseError([f"{case.path}: plant.twin: {text}"])
+
+
+def _refuse_recorded_inputs(case: Case, twins: Iterable[Simulator]) -> None:
+    recorded = dict.fromkeys(signal for twin in twins for signal in twin.inputs.recorded)
+    if recorded and case.external is not None:
+        text = f"steps and ramps only are allowed with plant {case.external.type}"
+        raise CaseError([f"{case.path}: test: {', '.join(recorded)}: {text}"])
 
 
 def settled(
@@ -227,7 +245,8 @@ def program_notes(
     counts = program.counts
     failed = f", of which {counts.failed} failed" if counts.failed else ""
     restarts = f"; it was started anew {counts.restarts} times" if counts.restarts else ""
-    yield f"simulated by {' '.join(section.command)}: {counts.runs} runs{failed}{restarts}"
+    yield f"simulated by {section.simulator}: {counts.runs} runs{failed}{restarts}"
+    yield from own_value_notes(case)
     if section.twin is None:
         yield BY_QUOTIENTS
         return
