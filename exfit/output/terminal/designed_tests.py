@@ -32,12 +32,12 @@ def designed_test(console: Console, design: DesignedTest) -> None:
     paragraph(console, f"mean: {CRITERIA[design.criterion]}")
     console.print()
     heads = ["mean", *design.of]
-    table = plain_table("test", *heads, numbers=heads)
+    table = plain_table("errors in %", *heads, numbers=heads)
     for stage in design.stages:
-        errors = (percent(stage.errors[name]) for name in design.of)
-        table.add_row(stage.label, percent(stage.criterion), *errors)
+        shares = (stage.criterion, *(stage.errors[name] for name in design.of))
+        table.add_row(stage.label, *(percent(share).removesuffix(" %") for share in shares))
     ratios = design.ratios
-    table.add_row("of best 1 step", "", *(f"{ratios[name]:.2f}" for name in design.of))
+    table.add_row("share of best 1 step", "", *(f"{ratios[name]:.2f}" for name in design.of))
     worst = design.other_values.ratios
     spread = 100.0 * design.other_values.spread
     cells = ("-" if worst[name] is None else f"{worst[name]:.2f}" for name in design.of)
@@ -51,7 +51,7 @@ def designed_test(console: Console, design: DesignedTest) -> None:
     notes(
         console,
         (
-            f"'of best 1 step': standard errors as shares of those of the best single step, which "
+            f"'share of best 1 step': divided by those of the best single step, which "
             f"is {design.single.steps[0].step:+.5g} pu, with the same limits, duration and "
             f"channels ({channels}); '{spread:g} % off': the largest share with each parameter "
             f"{spread:g} % smaller or larger",
