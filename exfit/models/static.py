@@ -7,6 +7,18 @@ from exfit.models.sheet import sheet
 SUPPLY_SWITCH = sheet(
     ("SW1", 1.0, "1", (1.0, 2.0), "supply of the rectifier: 1 terminals, 2 independent"),
 )
+# a source of the terminals' voltage alone, and a ceiling 1.5 times that
+SUPPLY = (
+    *SUPPLY_SWITCH,
+    *sheet(
+        ("KP", 1.0, "pu", (0.01, 100.0), "potential source gain"),
+        ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+        ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
+        ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+        ("KC", 0.05, "pu", (0.0, 100.0), "rectifier loading factor"),
+        ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+    ),
+)
 
 
 def supply(u: Signal, p: Signal) -> Signal:

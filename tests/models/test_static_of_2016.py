@@ -36,11 +36,42 @@ def st4c(p):
     return pid(p.KPR, p.KIR) * inner.fed_back(feedback), lag(1.0, p.TR)
 
 
-DIAGRAMS = {"ST1C": st1c, "ST4C": st4c}
+def st5c(p):
+    chain = lead_lag(p.TC1, p.TB1) * lead_lag(p.TC2, p.TB2) * lag(p.KR, p.T1)
+    return chain, lag(1.0, p.TR)
+
+
+def st6c(p):
+    # VR = (KFF + KM) VA - KM KG/(1+sTG) EFD
+    inner = lag(bridge(p), p.TA).fed_back(lag(p.KM * p.KG, p.TG))
+    return pid(p.KPA, p.KIA, p.KDA, p.TDA) * (p.KFF + p.KM) * inner, lag(1.0, p.TR)
+
+
+def st7c(p):
+    fired = lag(1.0, p.TA)
+    chain = p.KPA * lead_lag(p.TC, p.TB) * fired.fed_back(lag(-p.KIA, p.TIA))
+    return chain, lag(1.0, p.TR) * lead_lag(p.TG, p.TF)
+
+
+def st9c(p):
+    derivative = washout(p.TCD, p.TBD) if p.ZA == 0.0 else 0.0
+    chain = pid(p.KA, p.KA / p.TA) * lag(p.KAS * bridge(p), p.TAS)
+    return chain, lag(1.0, p.TR) * (lag(1.0, 0.0) + derivative)
+
+
+DIAGRAMS = {
+    "ST1C": st1c,
+    "ST4C": st4c,
+    "ST5C": st5c,
+    "ST6C": st6c,
+    "ST7C": st7c,
+    "ST9C": st9c,
+}
 INDEPENDENT = {"SW1": 2.0}
 CASES = [
     *((name, {}) for name in DIAGRAMS),
-    *((name, INDEPENDENT) for name in ("ST4C",)),
+    *((name, INDEPENDENT) for name in ("ST4C", "ST6C", "ST9C")),
+    ("ST9C", {"ZA": 0.0}),
     ("ST4C", {"TA": 0.0}),
     ("ST4C", {"TG": 0.0}),
     ("ST4C", {"TA": 0.0, "TG": 0.0}),
@@ -71,12 +102,24 @@ def limits(name, p):
     """Return the floor and the ceiling of efd by the diagram."""
     if name == "ST1C":
         return VT * p.VRMIN, VT * p.VRMAX - p.KC * IFD
+    if name == "ST5C":  # KC IFD is taken before, the supply limits behind
+        return max(p.VRMIN - p.KC * IFD, VT * p.VRMIN), min(p.VRMAX - p.KC * IFD, VT * p.VRMAX)
+    if name == "ST7C":
+        return VT * p.VRMIN, VT * p.VRMAX
+    if name == "ST9C":
+        return bridge(p) * p.KAS * p.VRMIN, bridge(p) * p.KAS * p.VRMAX
+    if name == "ST6C":
+        return bridge(p) * max(p.VRMIN, p.VMMIN), bridge(p) * min(p.VRMAX, p.VMMAX)
     return bridge(p) * max(p.VMMIN, p.VAMIN), bridge(p) * min(p.VMMAX, p.VAMAX)
 
 
 LARGE = {
     "ST1C": {"VAMAX": 99.0, "VAMIN": -99.0},
     "ST4C": {"VRMAX": 9.0, "VRMIN": -9.0, "KIM": 20.0},
+    "ST5C": {},
+    "ST6C": {"KG": 0.1},
+    "ST7C": {"VMAX": 9.0, "VMIN": -9.0},
+    "ST9C": {},
 }
 
 
@@ -102,23 +145,60 @@ def test_what_limiters_add_is_a_step_of_the_reference(name):
     assert np.ptp(by_limiter) > 1e-3
 
 
+def gate_of(name, error, p, u):
+    """Return the value of a gate that stands for a voltage error."""
+    if name == "ST7C":
+        return u.vc1 + error
+    return p.KA * error if name == "ST9C" else error
+
+
+# nothing is in the way of the gate, and what it has of its own is that of the regulator
+OPEN = {"VIMAX": 9.0, "VIMIN": -9.0, "VMAX": 9.0, "VMIN": -9.0, "TR": 0.0, "KF": 0.0, "KU": 0.0}
+SWITCHED = ("TC1", "TB1", "TC2", "TB2")
+
+
 @pytest.mark.parametrize("name", DIAGRAMS)
 def test_a_gate_at_the_input_replaces_the_error(name):
     """The step of the reference that gives this error does the same; OEL has the last word."""
-    values = lively_values(name) | {"VIMAX": 9.0, "VIMIN": -9.0, "TR": 0.0, "KF": 0.0}
-    u, _, _ = standing(name, values)
-    for held, error in (
-        ({"vuel": 0.08}, 0.08),
-        ({"voel": -0.03}, -0.03),
-        ({"vuel": 0.08, "voel": 0.02}, 0.02),
-    ):
+    values = lively_values(name)
+    values |= {symbol: value for symbol, value in OPEN.items() if symbol in values}
+    if name == "ST5C":
+        values |= {f"T{gate}{time[1:]}": values[time] for gate in "UO" for time in SWITCHED}
+    u, p, _ = standing(name, values)
+    cases = [({"vuel": 0.08}, 0.08), ({"voel": -0.03}, -0.03)]
+    cases += [({"vuel": 0.08, "voel": 0.02}, 0.02)]
+    # OEL of ST9C is at the output
+    for errors, error in cases[:1] if name == "ST9C" else cases:
+        held = {gate: gate_of(name, value, p, u) for gate, value in errors.items()}
         _, gated = alone(name, values, held=held, time=0.2, step=1e-3)
         _, stepped = alone(name, values, vref=error - (u.vref - u.vc1), time=0.2, step=1e-3)
         assert gated == pytest.approx(stepped, abs=1e-9)
         assert np.ptp(gated) > 1e-3
 
 
-@pytest.mark.parametrize("name", ["ST1C", "ST4C"])
+@pytest.mark.parametrize(("limiter", "gate"), [("vuel", "U"), ("voel", "O")])
+def test_st5c_changes_its_lead_lags_while_a_limiter_has_the_gate(limiter, gate):
+    values = lively_values("ST5C")
+    _, p, x = standing("ST5C", values)
+    change = 1e-6 if limiter == "vuel" else -1e-6
+    TC1, TB1, TC2, TB2 = (getattr(p, f"T{gate}{time[1:]}") for time in SWITCHED)
+    chain = lead_lag(TC1, TB1) * lead_lag(TC2, TB2) * lag(p.KR, p.T1)
+    times, efd = alone("ST5C", values, held={limiter: x.VL1 + change}, step=2.5e-4)
+    expected = change * chain.step(times)
+    assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
+
+
+def test_st9c_changes_the_time_of_its_integral_while_uel_has_the_gate():
+    """To the share KU times what UEL adds."""
+    for KU, share in ((1e5, 1.0), (10.0, 0.5), (0.0, 0.0)):
+        values = lively_values("ST9C") | {"KU": KU, "TAS": 0.0, "VRMAX": 9.0}
+        times, efd = alone("ST9C", values, held={"vuel": 0.05}, vt=VT, time=0.2, step=1e-3)
+        p = SimpleNamespace(**values)
+        rise = 0.05 * (1.0 + times * ((1.0 - share) / p.TA + share / p.TAUEL))
+        assert efd - EFD == pytest.approx(p.KAS * bridge(p) * rise, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ST1C", "ST4C", "ST6C", "ST7C"])
 def test_a_gate_at_the_output_is_the_output(name):
     values = lively_values(name) | {"TA": 0.0}
     vb = bridge(SimpleNamespace(**values)) if "SW1" in values else 1.0
@@ -129,6 +209,30 @@ def test_a_gate_at_the_output_is_the_output(name):
     ):
         _, efd = alone(name, values, held=held, efd=0.3 * vb, vt=VT, time=0.1, step=1e-3)
         assert efd == pytest.approx(vb * output)
+
+
+def test_oel_takes_the_output_of_the_regulator_of_st9c():
+    values = lively_values("ST9C") | {"TAS": 0.0}
+    p = SimpleNamespace(**values)
+    _, efd = alone("ST9C", values, held={"voel": 0.1}, vt=VT, time=0.1, step=1e-3)
+    assert efd == pytest.approx(0.1 * p.KAS * bridge(p))
+
+
+def test_the_field_current_limit_of_st6c_holds_its_output_and_its_pid():
+    """17.33 (KCI ILR - IFD) of the standard's data; the PID does not wind up beyond it."""
+    values = lively_values("ST6C") | {"TG": 0.02, "KG": 0.0, "TA": 0.0, "VMMAX": 99.0, "KFF": 0.5}
+    p = SimpleNamespace(**values)
+    ifd = p.KCI * p.ILR - 0.05
+    level = p.KLR * 0.05
+    _, up = alone("ST6C", values, vref=0.5, ifd=ifd, vt=VT, efd=0.5, time=2.0, step=1e-3)
+    # VR = (KFF + KM) VA would be 1.5 times as high
+    assert up[-1] == pytest.approx(level * rectified(p.KP * VT, p.KC * ifd), rel=1e-9)
+
+    def back(t):
+        return 0.5 if t < 2.0 else -0.5
+
+    _, returned = alone("ST6C", values, vref=back, ifd=ifd, vt=VT, efd=0.5, time=2.2, step=1e-3)
+    assert returned[-1] < up[-1]
 
 
 def test_the_stabiliser_of_st1c_is_added_where_vos_says():

@@ -35,6 +35,8 @@ EFE = {"EFEMAX": "VRMAX", "EFEMIN": "VRMIN"}
 FIELD = {"VFEMAX": NONE, "VEMIN": 0.0}
 PID = {"KPR": "KP", "KIR": "KI", "KDR": "KD", "TDR": "TD"}
 BETWEEN = {"VEMAX": NONE, "VEMIN": 0.0}  # the floor of 2005, and no ceiling
+FROM_VT = {"SW1": 1.0, "KP": 1.0, "KI": 0.0, "XL": 0.0, "KC": 0.0, "VBMAX": NONE}
+FROM_VT |= {"VMMAX": NONE, "VMMIN": -NONE}  # the supply VT itself, no further limit
 # the changes: lags that typical data leave out
 LAGS = {"TR": 0.02, "TB": 0.3, "TC": 0.1}
 FORMS = {
@@ -49,6 +51,9 @@ FORMS = {
     "AC8C": Form("AC8B", SUPPLY, changes={"TR": 0.02, "TA": 0.05}),
     "ST1C": Form("ST1A", {}, changes={"TA": 0.02, "KF": 0.01}),
     "ST4C": Form("ST4B", {**LOOP, "TG": 0.0, "VGMAX": NONE}, changes={"TA": 0.0, "KG": 0.5}),
+    "ST5C": Form("ST5B", {}),
+    "ST6C": Form("ST6B", {**FROM_VT, "TA": 0.0}, changes={"ILR": 99.0}),
+    "ST7C": Form("ST7B", {"TA": 0.0}, changes={"TC": 1.2, "TB": 0.9}),
 }
 
 

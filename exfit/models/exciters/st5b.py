@@ -22,7 +22,7 @@ has the gate; while none acts they have no effect.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, limited_lag, limited_lead_lag, smaller
+from exfit.models.blocks import Limited, clip, lag, larger, limited_lag, limited_lead_lag, smaller
 from exfit.models.sheet import FREE, SearchRange, record, sheet
 
 SHEET = sheet(
@@ -48,17 +48,33 @@ RECORDS = (
 
 STATES = "VC VL1 VL2 VE"
 
+Times = tuple[Signal, Signal, Signal, Signal]  # TC1 TB1 TC2 TB2
+
+
+def lead_lags(
+    error: Signal, states: tuple[Signal, Signal], times: Times, p: Signal
+) -> tuple[Signal, Limited, Limited]:
+    """Return the output of two limited lead-lags in series, and the slopes of their states."""
+    low, high = p.VRMIN / p.KR, p.VRMAX / p.KR
+    TC1, TB1, TC2, TB2 = times
+    vl1, first = limited_lead_lag(error, states[0], TC1, TB1, low, high)
+    vl2, second = limited_lead_lag(vl1, states[1], TC2, TB2, low, high)
+    return vl2, first, second
+
+
+def fired(vl: Signal, s: Signal, u: Signal, p: Signal) -> tuple[Signal, Limited]:
+    """Return efd of what the lead-lags give, and the slope of its lag."""
+    loaded = clip(p.KR * vl, p.VRMIN, p.VRMAX) - p.KC * u.ifd
+    return limited_lag(loaded, s.VE, 1.0, p.T1, u.vt * p.VRMIN, u.vt * p.VRMAX)
+
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
-    low, high = p.VRMIN / p.KR, p.VRMAX / p.KR
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = smaller(larger(u.vref - vc, u.vuel), u.voel) + u.vs
-    vl1, d.VL1 = limited_lead_lag(error, s.VL1, p.TC1, p.TB1, low, high)
-    vl2, d.VL2 = limited_lead_lag(vl1, s.VL2, p.TC2, p.TB2, low, high)
-    vr = clip(p.KR * vl2, p.VRMIN, p.VRMAX)
-    loaded = vr - p.KC * u.ifd
-    efd, d.VE = limited_lag(loaded, s.VE, 1.0, p.T1, u.vt * p.VRMIN, u.vt * p.VRMAX)
+    times = p.TC1, p.TB1, p.TC2, p.TB2
+    vl, d.VL1, d.VL2 = lead_lags(error, (s.VL1, s.VL2), times, p)
+    efd, d.VE = fired(vl, s, u, p)
     return efd
 
 

@@ -68,15 +68,21 @@ PSLF_RECORDS = (
 STATES = "VC VG VL VF"
 
 
-def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """Write the slopes of the states into d and return efd."""
-    ceiling, floor = u.vt * p.VRMAX, u.vt * p.VRMIN
+def regulated(reference: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes up to the gates at the output into d and return what they get."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vg, d.VG = lead_lag(vc, s.VG, p.TG, p.TF)
-    error = clip(u.vref, p.VMIN, p.VMAX) + u.vs - vg
-    va = clip(p.KPA * error, floor - p.KH * s.VF, ceiling - p.KL * s.VF)
+    error = clip(reference, p.VMIN, p.VMAX) + u.vs - vg
+    floor, ceiling = u.vt * p.VRMIN - p.KH * s.VF, u.vt * p.VRMAX - p.KL * s.VF
+    va = clip(p.KPA * error, floor, ceiling)
     vl, d.VL = lead_lag(va, s.VL, p.TC, p.TB)
-    efd = clip(smaller(larger(vl + s.VF, u.vuel), u.voel), floor, ceiling)
+    return vl + s.VF
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    gated = smaller(larger(regulated(u.vref, s, u, p, d), u.vuel), u.voel)
+    efd = clip(gated, u.vt * p.VRMIN, u.vt * p.VRMAX)
     _, d.VF = lag(efd, s.VF, p.KIA, p.TIA)
     return efd
 
