@@ -30,11 +30,11 @@ by ITHOFF for TOFF. At the summing point VOELMAX1 is 0.
 Dynawo has FIXEDRU and FIXEDRD the other way round, so that its timer never runs
 back with the sample data, and no memory of being active: without either
 condition its bias is 0. Followed are the names of the parameters ("fixed delay
-time", "fixed cooling-down time", "reset delay time"; PSCAD, PowerWorld, GridKit). Lists
-call TC1OEL and TC2OEL lags and TB1OEL and TB2OEL leads; the letters, and
-Dynawo, say the reverse, as drawn. Not modelled: the field voltage or the
-exciter's field current as input. Typical data are the first set of the standard's
-sample data (GridKit, PSCAD).
+time", "fixed cooling-down time", "reset delay time": PSCAD, PowerWorld,
+GridKit). Lists call TC1OEL and TC2OEL lags and TB1OEL and TB2OEL leads; the
+letters, and Dynawo, say the reverse, as drawn. Not modelled: the field voltage
+or the exciter's field current as input. Typical data are the first set of the
+standard's sample data (GridKit, PSCAD).
 """
 
 from exfit.engine.trace import Signal

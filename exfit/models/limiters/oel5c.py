@@ -13,12 +13,12 @@ ref - K ic ─►[KPOEL + KIOEL/s]─► v
 
 t latches at IFDLIM, and the latch is released at 0: ref is IFDREF2 while it is
 set, IFDREF1 otherwise. The output is v while it is set, or while i has been
-above IFDPULEV for longer than TIFDLEV, and IBIAS otherwise, which has to be above
-what the gate lets pass. Not modelled: the regulator of the exciter's field
-current (VFE, with SW1 in position B) in place of IBIAS, as exciters do not give
-that current out. The integral of t ends at 0 and VOELMAX1 (non-windup). The
+above IFDPULEV for longer than TIFDLEV, and IBIAS otherwise, which has to be
+above what the gate lets pass. The count t ends at 0 and VOELMAX1 (non-windup).
+Not modelled: the regulator of the exciter's field current (VFE, with SW1 in
+position B) in place of IBIAS, as exciters do not give that current out. The
 equations are those of Dynawo, the parameters those of PSCAD's and GridKit's
-lists, whose typical data of the first unit these are.
+lists, whose first set of typical data this is. PSS/E's record is not known.
 """
 
 from exfit.engine.trace import Signal

@@ -1,0 +1,483 @@
+"""What every limiter of the catalogue keeps to, and each against its equations typed again."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from on_load import QUADRATIC, values_on_load
+from oracle import float_run, vector
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+from typed_on_load import Typed
+
+from exfit.engine.kernel import Kernel, Span
+from exfit.engine.system import Rest, System
+from exfit.models import LIMITERS, MODELS
+from exfit.models.blocks import SHORTEST, Limited
+from exfit.models.machines import MACHINES
+from exfit.models.sheet import crossed_limits, typical
+from exfit.plants import (
+    LIMITER_KINDS,
+    MACHINE,
+    NETWORK,
+    PLACES,
+    VT0,
+    Attached,
+    Names,
+    infinite_bus,
+)
+from exfit.plants.parts import motion, values_named
+from exfit.simulation.inputs import Inputs, InputStep
+from exfit.simulation.limit_hits import limits_hit
+from exfit.simulation.limits import acting_at_rest
+from exfit.simulation.simulator import Simulator
+
+SIGNALS = ("ifd", "vt", "p", "q")
+AT_REST = {"ifd": 1.6, "vt": 1.0, "p": 0.6, "q": 0.1}  # pu: within every characteristic
+# data by which a limiter acts within some seconds, and no block is bypassed
+LIVELY = {
+    "OEL2C": {
+        **{"ITFPU": 2.0, "ILIM": 1.9, "IINST": 3.0, "K2": 1.5, "KPOEL": 4.0, "KIOEL": 2.0},
+        **{"KDOEL": 0.1, "TB1OEL": 0.2, "TC2OEL": 0.3, "TOFF": 0.5, "FIXEDRD": -0.6},
+        **{"KRD": -20.0, "KRU": 20.0, "VOELMAX3": 9.0, "VOELMAX2": 8.0, "VOELMAX1": 7.0},
+        **{"KFB": 0.05, "FIXEDRU": 0.1},
+    },
+    "OEL3C": {"ITFPU": 2.0, "TOEL": 0.8, "VOELMAX1": 0.3, "K1": 1.5, "KSCALE": 1.05},
+    "OEL5C": {
+        **{"KSCALE1": 0.5, "TF1": 0.02, "TCOEL": 0.1, "TBOEL": 0.05, "IFDLIM": 0.1},
+        **{"VOELMAX1": 0.3, "KIFDT": 0.1, "IFDPULEV": 1.2, "TIFDLEV": 0.5, "K1": 1.5},
+    },
+    "UEL1": {"KUI": 2.0, "KUL": 3.0, "TU1": 0.1, "TU3": 0.05, "TU4": 0.1, "VUIMIN": -1.0},
+    "UEL2C": {
+        **{"TUP": 0.3, "TUQ": 0.02, "TUV": 0.2, "VBIAS": 0.95, "TQREF": 0.1, "SW1": 2.0},
+        **{"TADJ": 0.2, "TU1": 0.05, "TU2": 0.1, "TU3": 0.2, "TU4": 0.15, "KFIX": 0.8},
+        **{"VUIMIN": -0.5, "VUELMIN1": -0.5},
+    },
+}
+
+
+@pytest.fixture(params=list(LIMITERS))
+def limiter(request):
+    return LIMITERS[request.param]
+
+
+def lively(model):
+    return typical(model.sheet) | LIVELY[model.name]
+
+
+def resting(model, p, u):
+    x = Names()
+    model.rest(0.0, u, p, x)
+    assert vars(x).keys() == set(model.states)
+    return x
+
+
+def slopes_of(model, p, x, u):
+    """Return the slopes of the states and the output."""
+    d = Names()
+    output = model.equations(x, u, p, d)
+    assert vars(d).keys() == set(model.states)
+    slopes = [getattr(d, name) for name in model.states]
+    return [s.slope if isinstance(s, Limited) else s for s in slopes], output
+
+
+def test_it_rests_while_its_inputs_are_within_its_characteristic(limiter):
+    for values in (typical(limiter.sheet), lively(limiter)):
+        p, u = Names(**values), Names(**{name: np.float64(AT_REST[name]) for name in SIGNALS})
+        x = resting(limiter, p, u)
+        slopes, output = slopes_of(limiter, p, x, u)
+        assert np.abs(np.array(slopes, dtype=float)).max() < 1e-12
+        assert np.isfinite(output)
+
+
+def as_system(model):
+    """Return a limiter alone; the inputs are changes from the start."""
+
+    def seen(u):
+        return Names(**{name: AT_REST[name] + u[name] for name in SIGNALS})
+
+    def sheet_of(p):
+        return Names(**{row.symbol: p[row.symbol] for row in model.sheet})
+
+    def rest(p):
+        x = resting(model, sheet_of(p), seen(dict.fromkeys(SIGNALS, 0.0)))
+        return Rest({name: getattr(x, name) for name in model.states}, {})
+
+    def course(p, r, x, u):
+        d = Names()
+        output = model.equations(values_named(x, model.states), seen(u), sheet_of(p), d)
+        return motion(d, model.states, {"output": output, **x})
+
+    return System(
+        parameters=tuple(row.symbol for row in model.sheet),
+        setpoints=(),
+        states=model.states,
+        inputs=SIGNALS,
+        outputs=("output", *model.states),
+        time_constants=tuple(row.symbol for row in model.sheet if row.is_time),
+        rest=rest,
+        motion=course,
+    )
+
+
+def changes(t):
+    """Return how the inputs move: the current above every limit and back, Q below and back."""
+    pulse = np.sin(np.pi * np.clip((t - 0.5) / 4.0, 0.0, 1.0)) ** 2
+    sway = np.sin(3.0 * t) * np.exp(-0.2 * t)
+    return np.stack([1.4 * pulse, 0.03 * sway - 0.04 * pulse, 0.1 * sway, -0.9 * pulse])
+
+
+def run(model, values, step=5e-4, seconds=8.0):
+    """Return the times and the outputs of the compiled limiter."""
+    system = as_system(model)
+    code, p = Kernel(system, system.outputs, 1), vector(system, values)[:, None]
+    time = step * np.arange(round(seconds / step) + 1)
+    (out,) = code.run(p, code.start(p), [Span(changes(time).T.copy(), step, 1)])
+    return time, out[:, :, 0]
+
+
+def test_compiled_code_gives_what_the_plain_equations_give(limiter):
+    system, values = as_system(limiter), lively(limiter)
+    time = 4e-3 * np.arange(1001)
+    u = changes(time).T.copy()
+    (expected,) = float_run(system, values, system.outputs, [Span(u, 4e-3, 1)])
+    code, p = Kernel(system, system.outputs, 1), vector(system, values)[:, None]
+    (got,) = code.run(p, code.start(p), [Span(u, 4e-3, 1)])
+    assert np.abs(got[:, :, 0] - expected).max() < 1e-11 * np.abs(expected).max()
+
+
+# --- a second typing, integrated by another method ------------------------------------------------
+
+
+def stopped(rate, x, low, high):
+    """Return the slope of a state that stops at its limits."""
+    return 0.0 if (x >= high and rate > 0.0) or (x <= low and rate < 0.0) else rate
+
+
+def pi(e, x, p, KP, KI, low, high):
+    y = p[KP] * e + x
+    rate = p[KI] * e
+    held = (y >= p[high] and rate > 0.0) or (y <= p[low] and rate < 0.0)
+    return min(max(y, p[low]), p[high]), 0.0 if held else rate
+
+
+def typed_oel3c(x, u, p):
+    i, v = x
+    e = p["KOEL"] * (p["ITFPU"] ** p["K1"] - i ** p["K1"])
+    v = min(max(v, p["VOELMIN1"]), p["VOELMAX1"])
+    rate = stopped(e / p["TOEL"], v, p["VOELMIN1"], p["VOELMAX1"])
+    output = v + (p["KPOEL"] * e if v < 0.0 else 0.0)
+    slopes = [(p["KSCALE"] * u[0] - i) / p["TF"], rate]
+    return slopes, min(max(output, p["VOELMIN2"]), p["VOELMAX2"])
+
+
+def typed_uel1(x, u, p):
+    _, vt, P, Q = u
+    it = complex(P, -Q) / vt
+    e = abs(p["KUC"] * vt - 1j * it) - p["KUR"] * vt  # VUCMAX and VURMAX stand far away
+    v, d_v = pi(e, x[0], p, "KUL", "KUI", "VUIMIN", "VUIMAX")
+    d_1 = (v - x[1]) / p["TU2"]
+    v1 = x[1] + p["TU1"] * d_1
+    d_3 = (v1 - x[2]) / p["TU4"]
+    output = x[2] + p["TU3"] * d_3
+    return [d_v, d_1, d_3], min(max(output, p["VULMIN"]), p["VULMAX"])
+
+
+def typed_uel2c(x, u, p):
+    _, vt, P, Q = u
+    v, active, qref, q, kadj, integral, x1, x3 = x
+    f = v if v > 1.0 else v / p["VBIAS"] if v <= p["VBIAS"] else 1.0
+    points = [(p[f"P{k}"], p[f"Q{k}"]) for k in range(5)]
+    k = max(1, sum(active > point[0] for point in points[1:-1]) + 1)
+    (p0, q0), (p1, q1) = points[k - 1 : k + 1]
+    limit = q0 + (q1 - q0) / (p1 - p0) * (active - p0)
+    reach = vt**2 / p["XQ"] + Q
+    y, d_i = pi(kadj * (qref - q), integral, p, "KUL", "KUI", "VUIMIN", "VUIMAX")
+    d_1 = (y - x1) / p["TU2"]
+    y1 = x1 + p["TU1"] * d_1
+    # the second block has more lead than lag: at a limit its state follows its output by the lead
+    y3 = x3 + p["TU3"] / p["TU4"] * (y1 - x3)
+    held = min(max(y3, p["VUELMIN1"]), p["VUELMAX1"])
+    return [
+        (vt - v) / p["TUV"],
+        (P / f ** p["K1"] - active) / p["TUP"],
+        (limit * f ** p["K2"] - qref) / p["TQREF"],
+        (Q - q) / p["TUQ"],
+        (reach / np.hypot(reach, P) - kadj) / p["TADJ"],
+        d_i,
+        d_1,
+        (held - x3) / p["TU3"],
+    ], held
+
+
+SMOOTH = {"OEL3C": typed_oel3c, "UEL1": typed_uel1, "UEL2C": typed_uel2c}
+
+
+def test_another_typing_and_method_reach_and_leave_the_limits_together(limiter):
+    if limiter.name not in SMOOTH:
+        pytest.skip("switches on the grid: see the tests of its switching")
+    typed, values = SMOOTH[limiter.name], lively(limiter)
+    time, got = run(limiter, values)
+    first = np.array([AT_REST[name] for name in SIGNALS])
+    x = resting(limiter, Names(**values), Names(**AT_REST))
+    solved = solve_ivp(
+        lambda t, x: typed(x, first + changes(t), values)[0],
+        (0.0, time[-1]),
+        [float(getattr(x, name)) for name in limiter.states],
+        "DOP853",
+        time[::20],
+        rtol=1e-9,
+        atol=1e-11,
+        max_step=2e-3,
+    )
+    expected = np.array(
+        [typed(x, first + changes(t), values)[1] for t, x in zip(solved.t, solved.y.T, strict=True)]
+    )
+    assert np.ptp(expected) > 0.2
+    # a limit is met within a step: the square of its length, times what the slope jumps by
+    assert np.abs(got[::20, 0] - expected).max() < 2e-6
+
+
+# --- switching ------------------------------------------------------------------------------------
+
+
+def at_instants(flags):
+    """Return where a row of truth values changes."""
+    return np.flatnonzero(np.diff(flags.astype(int))) + 1
+
+
+def test_OEL2C_counts_acts_and_is_reset():
+    """Its timer is an integral typed again; it acts when that is full, until the reset delay."""
+    model = LIMITERS["OEL2C"]
+    p = lively(model) | {"KFB": 0.0}
+    time, got = run(model, p, seconds=12.0)
+    states = dict(zip(model.states, got[:, 1:].T, strict=True))
+    ratio = np.maximum(states["I"] / p["ITFPU"], 1e-6)
+    inverse = np.clip(p["K2"] * (ratio ** p["C2"] - 1.0), p["VINVMIN"], p["VINVMAX"])
+    rate = inverse + np.where(ratio > 1.0, p["FIXEDRU"], p["FIXEDRD"])
+    t = np.zeros(len(time))
+    for k, (a, b) in enumerate(pairwise(rate)):
+        t[k + 1] = np.clip(t[k] + 5e-4 * (a + b) / 2.0, p["TMIN"], p["TMAX"])
+    # where the rate jumps, a step of it
+    assert np.abs(states["T"] - t).max() < 5e-4 * 2.0
+    on, off = at_instants(states["ACTIVE"] > 0.5)
+    full = np.argmax(t >= p["TFCL"])
+    assert abs(on - full) <= 3
+    released = (states["IREF"] >= p["IINST"]) & (states["BELOW"] > p["TOFF"])
+    assert released[off]
+    assert not released[off - 1]
+    # at work it brings the reference down to the thermal limit, by the ramp
+    assert states["IREF"][on + round((p["IINST"] - p["ILIM"]) / 20.0 / 5e-4) + 2] == p["ILIM"]
+    assert states["IREF"][-1] == p["IINST"]
+    assert got[-1, 0] == p["VOELMAX1"]
+
+
+def test_OEL5C_acts_by_its_count_or_soon_and_lets_go_when_the_count_is_empty():
+    model = LIMITERS["OEL5C"]
+    p = lively(model)
+    time, got = run(model, p, seconds=12.0)
+    states = dict(zip(model.states, got[:, 1:].T, strict=True))
+    on, off = at_instants(states["LATCH"] > 0.5)
+    assert abs(states["T"][on] - p["IFDLIM"]) < 2e-3
+    assert states["T"][off] == 0.0
+    inactive = (states["LATCH"] < 0.5) & (states["OVER"] <= p["TIFDLEV"])
+    assert np.all(got[inactive, 0] == p["IBIAS"])
+    # while the current is high the timer runs, and is back at zero at once when it is not
+    assert np.all(states["OVER"][states["I"] < p["IFDPULEV"]] == 0.0)
+    alone, soon = run(model, p | {"IFDLIM": 9.0, "VOELMAX1": 9.5})[1], states["I"] > p["IFDPULEV"]
+    first = np.argmax(soon)
+    acts = np.argmax(alone[:, 0] != p["IBIAS"])
+    assert time[acts] - time[first] == pytest.approx(p["TIFDLEV"], abs=2e-3)
+
+
+# --- on load --------------------------------------------------------------------------------------
+
+UP, DOWN = 0.12, -0.37  # pu of the reference: into overexcitation, then into underexcitation
+STEPS = (InputStep(0.5, UP), InputStep(4.0, DOWN), InputStep(8.0, -UP - DOWN))
+END = 12.0
+KA, TA = 60.0, 0.05
+OEL = {"TEN": 0.0, "IINST": 1.85, "ILIM": 0.1, "ITFPU": 99.0, "TROEL": 0.02, "KPOEL": 15.0}
+OEL |= {"VOELMAX1": 40.0, "TB1OEL": 0.1, "TC1OEL": 0.1, "TAOEL": 0.04}
+UEL = {"KUR": 1.7, "KUL": 20.0}
+
+
+def limited_unit():
+    """Return a unit on load with both limiters at the gates of a static exciter, and its values."""
+    machine = MACHINES["GENROU"]
+    attached = tuple(Attached(LIMITERS[name], "takeover") for name in ("OEL2C", "UEL1"))
+    plant = infinite_bus(MODELS["ST1A"], machine, QUADRATIC, limiters=attached)
+    values = values_on_load(machine, exciter="ST1A", network_Rc=0.0, network_Xc=0.0)
+    values |= {"TR": 0.0, "TC": 0.0, "TB": 0.0, "KA": KA, "TA": TA, "KC": 0.0, "KF": 0.0}
+    values |= {"KLR": 0.0, "VAMAX": 99.0, "VAMIN": -99.0, "VRMAX": 99.0, "VRMIN": -99.0}
+    values |= {VT0: 1.0, NETWORK + "P": 0.6, NETWORK + "Q": 0.05, NETWORK + "X": 0.3}
+    for limiter, changed in zip(attached, (OEL, UEL), strict=True):
+        of_limiter = typical(limiter.model.sheet) | changed
+        values |= {limiter.prefix + symbol: value for symbol, value in of_limiter.items()}
+    return plant, values
+
+
+def typed_unit(values):
+    """Return slopes and signals of the same unit, typed again, and its start by a root search."""
+    m = {k.removeprefix(MACHINE): v for k, v in values.items() if k.startswith(MACHINE)}
+    n = {k.removeprefix(NETWORK): v for k, v in values.items() if k.startswith(NETWORK)}
+    typed = Typed("GENROU", m, n)
+    E = abs(values[VT0] - (n["R"] + 1j * n["X"]) * (n["P"] - 1j * n["Q"]) / values[VT0])
+    kur, kuc, kul = (values["uel." + name] for name in ("KUR", "KUC", "KUL"))
+
+    def signals(x):
+        vd, vq, i_d, i_q = typed.stator(x[:6], E, n["R"], n["X"])
+        vt, P, Q = np.hypot(vd, vq), vd * i_d + vq * i_q, vq * i_d - vd * i_q
+        va, i_oel, v_uel = x[6:]
+        voel = min(max(OEL["KPOEL"] * (OEL["IINST"] - i_oel), -10.0), OEL["VOELMAX1"])
+        efd = min(max(va, min(max(v_uel, -18.0), 18.0)), voel)
+        distance = abs(kuc * vt - 1j * complex(P, -Q) / vt) - kur * vt
+        return vt, efd, min(max(kul * distance, -18.0), 18.0), va
+
+    def slopes(x, vref):
+        vt, efd, uel, va = signals(x)
+        moved, ifd = typed.slopes(x[:6], efd, n["P"], E, n["R"], n["X"])
+        return [
+            *moved,
+            (KA * (vref - vt) - va) / TA,
+            (ifd - x[7]) / values["oel.TROEL"],
+            (uel - x[8]) / values["uel.TU2"],
+        ]
+
+    def unknown(z):
+        vref = z[9]
+        vt = signals(z[:9])[0]
+        return [*slopes(z[:9], vref), vt - values[VT0]]
+
+    guess = [1.0, 0.9, 0.3, 0.5, 0.8, 0.0, 1.6, 1.6, -5.0, 1.03]
+    start, _, converged, _ = fsolve(unknown, guess, full_output=True, xtol=1e-13)
+    assert converged == 1
+    return slopes, signals, start[:9], start[9]
+
+
+@pytest.mark.long
+def test_both_limiters_are_reached_held_and_left_on_load_as_typed_again():
+    plant, values = limited_unit()
+    times = np.linspace(0.0, END, 1201)
+    simulator = Simulator(plant, Inputs(0.0, END, STEPS), times, 2.5e-4)
+    got = simulator.response(values).signals
+    slopes, signals, x, vref = typed_unit(values)
+    rows, edges = [x], [0.0, *(step.at for step in STEPS), END]
+    for begin, end in pairwise(edges):
+        vref += sum(step.step for step in STEPS if step.at == begin)
+        inside = times[(times > begin) & (times <= end)]
+        solved = solve_ivp(
+            lambda t, x, vref=vref: slopes(x, vref),
+            (begin, end),
+            x,
+            "DOP853",
+            inside,
+            rtol=1e-9,
+            atol=1e-11,
+            max_step=5e-3,
+        )
+        rows += list(solved.y.T)
+        x = solved.y[:, -1]
+    theirs = np.array([signals(x)[:2] for x in rows])
+    assert np.abs(got["vt"] - theirs[:, 0]).max() < 1e-6
+    # beside a step of the reference efd jumps within a sample: it is compared one later
+    assert np.abs(got["efd"] - theirs[:, 1]).max() < 1e-5
+    # held: the field current at the limit, the machine on its circle, each but for its gain
+    held = (times > 3.5) & (times < 4.0)
+    assert np.abs(got["ifd"][held] - (OEL["IINST"] - got["efd"][held] / OEL["KPOEL"])).max() < 2e-3
+    oel, uel = limits_hit(simulator, values)
+    assert (oel.limit, uel.limit) == ("oel.OEL2C", "uel.UEL1")
+    assert 0.5 < oel.first < 1.5
+    assert 4.0 < uel.first < 6.0
+    # left without delay: a sample after the step the gates are the regulator's again
+    for name, step in (("oel.OEL2C", 4.0), ("uel.UEL1", 8.0)):
+        before, after = np.searchsorted(times, step - 0.005), np.searchsorted(times, step + 0.3)
+        assert got["efd"][before] == pytest.approx(got[name][before], abs=1e-12)
+        assert abs(got["efd"][after] - got[name][after]) > 0.1
+
+
+def test_a_limiter_that_acts_at_the_start_is_refused_with_what_it_lacks():
+    plant, values = limited_unit()
+    assert acting_at_rest(plant, values) == ""
+    beyond = values | {"oel.IINST": 1.4}
+    text = acting_at_rest(plant, beyond)
+    assert text.startswith("oel.OEL2C acts at the start already, at ")
+    assert "where its gate has 1.65" in text
+
+
+# --- sheets and records ---------------------------------------------------------------------------
+
+
+def test_a_sheet_names_each_parameter_once_within_its_range(limiter):
+    for column in ("symbol", "meaning"):
+        entries = [getattr(row, column) for row in limiter.sheet]
+        assert len(set(entries)) == len(entries)
+    for row in limiter.sheet:
+        assert row.symbol.isidentifier()
+        assert row.unit
+        assert row.low <= row.typical <= row.high, row.symbol
+    assert list(crossed_limits(typical(limiter.sheet))) == []
+
+
+def test_a_drawing_is_narrow_and_shows_every_parameter(limiter):
+    text = limiter.title + limiter.drawing
+    assert max(map(len, limiter.drawing.splitlines())) <= 80
+    for row in limiter.sheet:
+        ours = row.symbol in text or (row.symbol[0] in "PQ" and row.symbol[1:].isdigit())
+        assert ours, row.symbol
+
+
+def test_a_record_lists_every_parameter_once(limiter):
+    for record in limiter.records:
+        symbols = [row.symbol for row in limiter.sheet]
+        listed = [*record.cons, *dict(record.held)]
+        assert sorted(listed) == sorted([*symbols, *dict(record.absent), *record.ignored])
+
+
+def test_it_says_what_it_sees_and_where_it_acts(limiter):
+    assert limiter.name[:3].lower() in LIMITER_KINDS
+    assert set(limiter.inputs) <= set(SIGNALS)
+    assert limiter.places
+    assert set(limiter.places) <= set(PLACES)
+
+
+def test_no_parameter_is_inert(limiter):
+    values, away = (
+        lively(limiter),
+        {"SW1": 1.0, "TEN": 2.0, "TOFF": 0.1, "ITHOFF": 9.0, "VURMAX": 1.0, "VUCMAX": 1.0},
+    )
+    fixed = {"UEL2C": {"SW1": 1.0}, "OEL2C": {"SW1": 1.0, "K1": -5.0, "C1": 1.0}}
+
+    def felt(changed):
+        rng = np.random.default_rng(3)
+        motions = []
+        for size in (0.3, 3.0, 300.0):
+            for _ in range(10):
+                x = Names(**{name: size * rng.normal() for name in limiter.states})
+                u = Names(ifd=size, vt=rng.uniform(0.8, 1.2), p=rng.uniform(-1.0, 1.3), q=-size)
+                d = Names()
+                output = limiter.equations(x, u, Names(**changed), d)
+                slopes = [s if isinstance(s, Limited) else (s,) for s in vars(d).values()]
+                motions.append([output, *(float(part) for slope in slopes for part in slope)])
+        return np.array(motions)
+
+    bases = [values, values | fixed.get(limiter.name, {})]
+    starts = [felt(base) for base in bases]
+    for row in limiter.sheet:
+        if limiter.name == "UEL2C" and row.symbol[0] in "PQ" and int(row.symbol[1:]) > 4:
+            continue  # points that are not in use
+        largest = 0.0
+        for base, start in zip(bases, starts, strict=True):
+            moved = away.get(row.symbol, 0.5 * base[row.symbol] or 1.0)
+            with np.errstate(all="ignore"):
+                change = np.abs(felt(base | {row.symbol: moved}) - start)
+            largest = max(largest, float(np.nanmax(change)))
+        assert largest > 1e-9, row.symbol
+
+
+def test_a_time_constant_below_the_shortest_is_bypassed(limiter):
+    p = lively(limiter) | {row.symbol: 0.0 for row in limiter.sheet if row.is_time and row.low == 0}
+    u = Names(**{name: np.float64(AT_REST[name]) for name in SIGNALS})
+    x = resting(limiter, Names(**p), u)
+    slopes, _ = slopes_of(limiter, Names(**p), x, u)
+    assert np.abs(np.array(slopes, dtype=float)).max() < 1e-12
+    assert SHORTEST > 0.0
