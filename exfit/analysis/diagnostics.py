@@ -29,6 +29,7 @@ from exfit.models.blocks import SHORTEST
 from exfit.plants import BREAKER, GOVERNOR, NETWORK, REFERENCES, SPEED, acts_without_load
 from exfit.results.comparisons import Comparison
 from exfit.simulation.inputs import Inputs
+from exfit.simulation.limit_hits import limiter_actions
 from exfit.simulation.simulator import Response, Simulator
 
 Array = NDArray[np.float64]
@@ -207,6 +208,7 @@ def simulation_notes(
     yield from typical_notes(case, values)
     yield from unphysical_notes(case, values)
     yield from speed_notes(simulator.inputs, values)
+    yield from (action.sentence for action in limiter_actions(simulator, values))
     yield from unstable_rest_notes(simulator, values)
     yield from step_error_notes(case, simulator, values, response.signals)
     yield from voltage_notes(case, response.time, response.signals.get("vt"))

@@ -31,6 +31,7 @@ from exfit.analysis.iteration_responses import skipped_response_notes, with_iter
 from exfit.analysis.other_values import as_found_of, phase_ends
 from exfit.case.case import Case
 from exfit.case.saturation import MEANINGS
+from exfit.case.schema import SINGLE
 from exfit.fitting.channel_weights import balanced, weight_notes
 from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.parameters import UNIT, FreeParameter
@@ -235,6 +236,9 @@ def fit_notes(
         yield from given_error_notes(analysis.uncertainty, names_of_records(setups))
     if analysis.windows is not None:
         yield analysis.windows.sentence
+    for match in comparisons:
+        where = "" if match.name == SINGLE else f"{match.name}: "
+        yield from (f"{where}{action.sentence}" for action in match.limiters)
     yield from skipped_response_notes(comparisons)
     if analysis.unfinished:
         yield INTERRUPTED_AFTERWARDS

@@ -22,6 +22,7 @@ from exfit.results.played_records import (
     played_errors,
 )
 from exfit.simulation.inputs import Inputs, InputStep
+from exfit.simulation.limit_hits import limiter_actions
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -70,6 +71,7 @@ def compare_with_record(
         time=setup.record.time,
         overlays=overlays,
         played=_played(setup, overlays, samples) if setup.driving else None,
+        limiters=limiter_actions(setup.experiment.with_inputs(at), setup.experiment.parameters(at)),
     )
 
 

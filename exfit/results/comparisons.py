@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from exfit.dsp.features import Features
 from exfit.results.played_records import PlayedRecord
+from exfit.simulation.limit_hits import LimiterAction
 from exfit.util.typed import IN_FILE
 
 Array = NDArray[np.float64]
@@ -132,8 +133,8 @@ class Comparison:
     plant. ``validation`` is whether the record was not fitted: then ``limit`` is the largest rmse
     (pu) that is accepted, ``reason`` why it is not accepted, and ``of_record`` what was found about
     the record itself; ``steps`` are those of a record that was given by hand, ``notes`` what must
-    be known of it. ``rmse``, ``max_error`` and ``fit_percent`` are those of
-    vt, or of the first signal where there is no vt.
+    be known of it. ``limiters`` are those of excitation that acted. ``rmse``, ``max_error`` and
+    ``fit_percent`` are those of vt, or of the first signal where there is no vt.
     """
 
     DERIVED: ClassVar = {
@@ -160,6 +161,7 @@ class Comparison:
     overlays: Mapping[str, Overlay] = field(default_factory=dict, metadata=IN_FILE)
     iteration_responses: IterationResponses | None = field(default=None, metadata=IN_FILE)
     played: PlayedRecord | None = field(default=None, metadata=IN_FILE)
+    limiters: tuple[LimiterAction, ...] = field(default=(), metadata=IN_FILE)
 
     @property
     def judged_by(self) -> str:

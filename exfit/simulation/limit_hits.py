@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from exfit.engine.system import System
 from exfit.engine.trace import evaluate
-from exfit.simulation.limits import EquationLimit, at_rest, equation_limits, traced
+from exfit.simulation.limits import (
+    EquationLimit,
+    at_rest,
+    equation_limits,
+    limiter_outputs,
+    traced,
+)
 from exfit.simulation.simulator import Run, Simulator
 
 Array = NDArray[np.float64]
@@ -37,6 +43,20 @@ class LimitHit(NamedTuple):
     seconds: float
     first: float
     share: float
+
+
+class LimiterAction(NamedTuple):
+    """A limiter of excitation that acted, oel.OEL2C, and from when to when each time (s)."""
+
+    name: str
+    spans: tuple[tuple[float, float], ...]
+
+    @property
+    def sentence(self) -> str:
+        """When it acted, in words."""
+        first, last = self.spans[0][0], self.spans[-1][1]
+        times = "" if len(self.spans) == 1 else f", {len(self.spans)} times"
+        return f"{self.name} acts from {first:.4g} s to {last:.4g} s{times}"
 
 
 class Nearest(NamedTuple):
@@ -84,6 +104,32 @@ def limits_hit(simulator: Simulator, values: Values) -> tuple[LimitHit, ...]:
         for limiters in _alike(_followed(simulator, values, run))
     ]
     return tuple(sorted((hit for hit in hits if hit is not None), key=lambda hit: hit.first))
+
+
+def limiter_actions(simulator: Simulator, values: Values) -> tuple[LimiterAction, ...]:
+    """Return the limiters of excitation that act in the response to these values, and when.
+
+    Raises SimulationError where the start is no rest.
+    """
+    names = limiter_outputs(simulator.system)
+    if not names:
+        return ()
+    run = simulator.run(values)
+    time = run.time + simulator.delay
+    actions = []
+    followed = _followed(simulator, values, run)
+    for name in names:
+        held = np.any([side.held for side in followed if side.limiter.limit == name], axis=0)
+        if np.any(held):
+            actions.append(LimiterAction(name, tuple(_spans(held, time))))
+    return tuple(actions)
+
+
+def _spans(held: NDArray[np.bool_], time: Array) -> Iterator[tuple[float, float]]:
+    """Yield from when to when something holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
+    for first, after in zip(edges[::2], edges[1::2], strict=True):
+        yield float(time[first]), float(time[after - 1])
 
 
 def limits_at_rest(system: System, values: Values) -> tuple[str, ...]:

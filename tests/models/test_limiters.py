@@ -451,7 +451,7 @@ def test_no_parameter_is_inert(limiter):
         rng = np.random.default_rng(3)
         motions = []
         for size in (0.3, 3.0, 300.0):
-            for _ in range(10):
+            for _ in range(25):
                 x = Names(**{name: size * rng.normal() for name in limiter.states})
                 u = Names(ifd=size, vt=rng.uniform(0.8, 1.2), p=rng.uniform(-1.0, 1.3), q=-size)
                 d = Names()

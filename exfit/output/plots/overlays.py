@@ -1,5 +1,7 @@
 """Measured against simulated."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -24,6 +26,7 @@ from exfit.util.text import percentage
 Array = NDArray[np.float64]
 
 FAINT = 0.4  # opacity of what is not compared
+SHADE = 0.15  # of when a limiter acts
 
 
 def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
@@ -43,9 +46,26 @@ def overlay(comparison: Comparison, title: str, label: str = "") -> Figure:
     for k, (name, overlaid) in enumerate(comparison.overlays.items()):
         _signal(axes[above + 2 * k], comparison, name, overlaid, label)
         _error(axes[above + 2 * k + 1], comparison, overlaid)
+    _limiters(list(axes[above::2]), comparison)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=11)
     return figure
+
+
+def _limiters(panels_of_signals: Sequence[Axes], comparison: Comparison) -> None:
+    """Shade when a limiter acts, with its name in the first panel."""
+    for action in comparison.limiters:
+        for k, axes in enumerate(panels_of_signals):
+            for start, end in action.spans:
+                axes.axvspan(start, end, color=LIMIT, alpha=SHADE, linewidth=0.0)
+            if k == 0:
+                first = action.spans[0][0]
+                axes.annotate(
+                    f" {action.name} acts",
+                    (first, 0.02),
+                    xycoords=("data", "axes fraction"),
+                    fontsize=8,
+                )
 
 
 def _driving(axes: Axes, time: Array, name: str, signal: DrivingSignal) -> None:
