@@ -15,6 +15,7 @@ TYPE_IN_NAME = re.compile(r"(DC|AC|ST)\d")  # as in AC8B, ESAC8B, EXDC2
 OF_THE_STANDARD = re.compile(r"((?:DC|AC|ST)\d+)([ABC])")
 EDITIONS = {"A": 2005, "B": 2005, "C": 2016}  # A and B: what the edition of 2005 contains
 SIMPLIFIED: dict[str, Family] = {
+    "BBSEX1": "ST",
     "EXPIC1": "ST",
     "IEEET1": "DC",
     "IEEET2": "AC",

@@ -95,6 +95,45 @@ def expic1(s, p):
     return driven / (s * p.TE + p.KE + vx_slope)
 
 
+def exst2(s, p):
+    regulator, stabiliser = p.KA * lag(s, p.TA), s * p.KF * lag(s, p.TF)
+    driven = regulator * error(s, p) + source_slopes(p)
+    return driven / (s * p.TE + p.KE + regulator * stabiliser)
+
+
+def exst3(s, p):
+    vb = source(VT, IFD, p)
+    inner = p.KA * lag(s, p.TA)
+    driven = vb * inner * p.KJ * lead_lag(s, p.TC, p.TB) * error(s, p)
+    KG = p.KG if p.KG * EFD < p.VGMAX else 0.0
+    return (driven + EFD / vb * source_slopes(p)) / (1.0 + vb * inner * KG)
+
+
+def alternator(s, p, driven, fed_back):
+    """Return efd where VR = driven e + fed_back efd, and sTE VE = VR - VFE."""
+    at = Rotating(vars(p), EFD, IFD)
+    load = (p.KD + fed_back * at.b) * DIRECT["ifd"]
+    ve = (driven * error(s, p) - load) / (s * p.TE + at.c - fed_back * at.a)
+    return at.a * ve - at.b * DIRECT["ifd"]
+
+
+def exac1a(s, p):
+    regulator = lead_lag(s, p.TC, p.TB) * p.KA * lag(s, p.TA)
+    return alternator(s, p, regulator, -regulator * s * p.KF * lag(s, p.TF))
+
+
+def exac3(s, p):
+    regulator = lead_lag(s, p.TC, p.TB) * p.KA * lag(s, p.TA)
+    stabiliser = s * (p.KF if EFD < p.EFDN else p.KN) * lag(s, p.TF)
+    # VR = KR efd VA around its rest, where VA = VFE / (KR efd)
+    driven, va = p.KR * EFD * regulator, Rotating(vars(p), EFD, IFD).vfe / (p.KR * EFD)
+    return alternator(s, p, driven, p.KR * va - driven * stabiliser)
+
+
+def bbsex1(s, p):
+    return p.K * lead_lag(s, p.T3, p.T4) * lead_lag(s, p.T2, p.T1) * error(s, p)
+
+
 # no gain and no time constant of the first is zero; then each variant of the diagram
 REXS = {
     **{"TR": 0.02, "KVP": 300.0, "KVI": 40.0, "TB1": 0.5, "TC1": 0.3, "TB2": 0.05, "TC2": 0.2},
@@ -119,6 +158,15 @@ LINEAR = [
     ("EXPIC1", expic1, EXPIC1 | {"TA2": 0.0, "TA3": 0.0, "TA4": 0.0, "TF2": 0.0, "TE": 0.0}),
     ("EXPIC1", expic1, EXPIC1 | {"TA2": 0.0, "TF2": 0.0}),
     ("EXPIC1", expic1, {}),
+    ("EXST2", exst2, {"TR": 0.02, "KE": 0.8, "KC": 0.3}),
+    ("EXST2", exst2, {"TA": 0.0, "KF": 0.1}),
+    ("EXST3", exst3, {"TR": 0.02}),
+    ("EXST3", exst3, {"VGMAX": 1.0, "KC": 0.5}),
+    ("EXAC1A", exac1a, {"TR": 0.02, "TB": 0.5, "TC": 0.3}),
+    ("EXAC3", exac3, {"TR": 0.02, "TB": 0.5, "TC": 0.3}),
+    ("EXAC3", exac3, {"EFDN": 2.5}),  # up to the bend of its feedback
+    ("BBSEX1", bbsex1, {}),
+    ("BBSEX1", bbsex1, {"TR": 0.0, "T2": 0.0, "T3": 0.0}),
 ]
 
 
@@ -147,6 +195,16 @@ def of_regulator(p):
     return of_field_current(vr / (p.KH + 1.0 / p.KIP), p)
 
 
+def self_supplied(va, p):
+    """Return the efd of EXAC3 at which a constant VA holds it."""
+
+    def missing(ve):
+        return field_current(ve, IFD, vars(p)) - p.KR * va * rectified(ve, p.KC * IFD)
+
+    ve = brentq(missing, p.E1, 99.0, xtol=1e-13)
+    return rectified(ve, p.KC * IFD)
+
+
 CEILINGS = [
     ("REXS", {"VRMAX": 5.0, "KII": 0.0, "KIP": 2.0}, of_regulator),
     ("REXS", {"VRMAX": 5.0, "KII": 0.0, "FLIMF": 1.0}, of_regulator),
@@ -162,6 +220,15 @@ CEILINGS = [
         {"EFDMAX": 4.0, "TE": 0.2},
         lambda p: brentq(lambda e: field_current(e, 0.0, vars(p)) - 4.0, 0.0, 9.0, xtol=1e-13),
     ),
+    ("EXST2", {}, lambda p: p.EFDMAX),
+    ("EXST2", {"EFDMAX": 9.0, "KE": 0.9}, lambda p: (p.VRMAX + source(VT, IFD, p)) / p.KE),
+    ("EXST2", {"KP": 0.0, "KI": 0.0, "EFDMAX": 9.0}, lambda p: p.VRMAX + 1.0),
+    ("EXST3", {}, lambda p: source(VT, IFD, p)),  # VRMAX = 1
+    ("EXST3", {"EFDMAX": 4.0}, lambda p: 4.0),
+    ("EXAC1A", {}, lambda p: of_field_current(p.VRMAX, p)),
+    ("EXAC3", {"VAMAX": 0.4, "TE": 0.5}, lambda p: self_supplied(p.VAMAX, p)),
+    ("BBSEX1", {"VRMAX": 3.0}, lambda p: 3.0),
+    ("BBSEX1", {"EFDMAX": 3.0}, lambda p: 3.0 * VT),
 ]
 
 
@@ -177,6 +244,19 @@ def test_a_large_step_drives_efd_to_its_ceiling_never_beyond_and_back(name, chan
     # Runge-Kutta leaves a limit by rounding
     assert efd.max() < expected * (1.0 + 1e-9)
     assert efd[-1] < 0.5 * EFD
+
+
+def test_the_low_voltage_limiter_of_EXAC3_holds_efd_above_nothing():
+    p = parameters("EXAC3", {"TE": 0.5, "VAMAX": 9.0, "VLV": 0.9})
+    _, efd = alone("EXAC3", vars(p), vref=-0.5, time=30.0, step=5e-3, **START)
+
+    def missing(efd):
+        ve = efd + p.KC * IFD / np.sqrt(3.0) if 0.4 * efd > p.KC * IFD else np.nan
+        return field_current(ve, IFD, vars(p)) - p.KR * efd * p.KA * p.KLV * (p.VLV - efd)
+
+    held = brentq(missing, 0.7, p.VLV, xtol=1e-13)
+    assert efd[-1] == pytest.approx(held, rel=1e-6)
+    assert efd.min() > 0.5 * held
 
 
 # --- typical data ---------------------------------------------------------------------------------

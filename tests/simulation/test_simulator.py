@@ -586,6 +586,8 @@ def test_a_start_exactly_on_a_limit_is_a_start(exciter):
 def test_values_that_define_no_start_are_refused(exciter):
     values, nan = lively_values(exciter), float("nan")
     wrong = {"KA": 0.0, "K": 0.0, "TE": nan, "TA": nan, "KC": float("inf"), VT0: nan}
+    if exciter == "EXST2":  # whose source is added: a start needs none
+        del wrong["KC"]
     for symbol in wrong.keys() & values.keys():
         with pytest.raises(SimulationError):
             samples(exciter, values | {symbol: wrong[symbol]})
@@ -664,7 +666,8 @@ def test_sub_steps_along_a_response_are_at_least_those_of_its_start(exciter):
 
 
 def test_too_many_sub_steps_are_an_error_that_names_the_time_constant(exciter):
-    times = [T for T in system_of(exciter).time_constants if T in ("TA", "TR")]
+    times = {T for T in system_of(exciter).time_constants if T in ("TA", "TR")}
+    times -= {"TA"} if exciter == "EXST3" else set()  # of its field voltage loop, a rate by itself
     for symbol in times:
         values = lively_values(exciter) | {symbol: 1.5 * SHORTEST}
         with pytest.raises(SimulationError, match=f"{symbol} = 0.00015 s") as caught:

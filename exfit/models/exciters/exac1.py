@@ -70,15 +70,20 @@ PSLF_RECORDS = (
 STATES = "VC VL VR VE VF"
 
 
-def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
-    """Write the slopes of the states into d and return efd."""
+def regulated(vf: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of all states but that of the feedback VF into d and return efd."""
     vfe = field_demand(s.VE, u.ifd, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
+    vl, d.VL = lead_lag(u.vref + u.vs + u.vsum - vc - vf, s.VL, p.TC, p.TB)
     vr, d.VR = limited_lag(vl, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
     return rectifier(ve, p.KC * u.ifd)
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vf, d.VF = washout(field_demand(s.VE, u.ifd, p), s.VF, p.KF, p.TF)
+    return regulated(vf, s, u, p, d)
 
 
 def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:

@@ -28,7 +28,7 @@ from exfit.models.sheet import (
     sheet,
 )
 
-ALIASES = ("ESST2A",)
+ALIASES = ("ESST2A", "EXST2A")
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -46,7 +46,14 @@ SHEET = sheet(
     ("EFDMAX", 4.5, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
 )
 
-RECORDS = (record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),)
+RECORDS = (
+    record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),
+    record(
+        "EXST2A",
+        "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX",
+        doubt="its order is taken to be that of ESST2A, not confirmed by a file",
+    ),
+)
 
 PSLF_RECORDS = (
     record(

@@ -1,0 +1,87 @@
+"""EXST3: controlled rectifier with a field voltage loop (IEEE type ST3 of 1981).
+
+              VIMAX                         VRMAX           EFDMAX
+vref + vs ►(+)►[clip]►[ KJ ]►[1 + sTC]─►(+)─►[  KA  ]─►(x)─►[clip]─┬─► efd
+           -▲  VIMIN         [1 + sTB]  -▲   [1+sTA]    ▲          │
+            │                            │    VRMIN    VB          │
+            │                            │                         │
+vc1 ►[  1  ]┘                            └─[smaller]◄────────[ KG ]┘
+     [1+sTR]                                  ▲
+                                            VGMAX
+
+VB = VE FEX(KC IFD / VE) with VE = |KP∠THETAP VT + j (KI + KP∠THETAP XL) IT|,
+THETAP in degrees (OPAL-RT's model takes radians). The limits of the lag are
+non-windup. The current IT, and so KI, XL and THETAP, act on load only. Two open
+models written after PSS/E's EXST3 agree otherwise. ST3A is this with a lag TA
+of its regulator (KJ there is KA, and KA is KM), a ceiling of VB in place of
+that of efd, and a gate of the UEL, which is added to the error here.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    compound_source,
+    inf,
+    lag,
+    lead_lag,
+    limited_lag,
+    rectifier,
+    smaller,
+)
+from exfit.models.sheet import FREE, LAG_OF_TC, LEAD_OF_TB, record, sheet
+
+SHEET = sheet(
+    ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("VIMAX", 0.2, "pu", (-9999.0, 9999.0), "ceiling of the voltage error"),
+    ("VIMIN", -0.2, "pu", (-9999.0, 9999.0), "floor of the voltage error"),
+    ("KJ", 200.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    ("TC", 1.0, "s", (0.0, 100.0), "regulator lead", LEAD_OF_TB),
+    ("TB", 10.0, "s", (0.0, 100.0), "regulator lag", LAG_OF_TC),
+    ("KA", 7.93, "pu", (0.01, 100000.0), "gain of the field voltage loop", FREE),
+    ("TA", 0.4, "s", (0.001, 10.0), "time constant of the field voltage loop", FREE),
+    ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the field voltage loop"),
+    ("VRMIN", 0.0, "pu", (-9999.0, 9999.0), "floor of the field voltage loop"),
+    ("KG", 1.0, "pu", (0.0, 100.0), "feedback gain of the field voltage loop"),
+    ("KP", 6.15, "pu", (0.01, 100.0), "potential source gain"),
+    ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+    ("EFDMAX", 6.9, "pu", (0.01, 9999.0), "ceiling of the field voltage"),
+    ("KC", 0.2, "pu", (0.0, 100.0), "rectifier loading factor"),
+    ("XL", 0.081, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
+    ("VGMAX", 5.8, "pu", (0.0, 9999.0), "ceiling of the field voltage feedback"),
+    ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+)
+
+RECORDS = (
+    record(
+        "EXST3",
+        "TR VIMAX VIMIN KJ TC TB KA TA VRMAX VRMIN KG KP KI EFDMAX KC XL VGMAX THETAP",
+        doubt="its order is that of two other programs, not confirmed by a file",
+    ),
+)
+
+STATES = "VC VL VR"
+
+
+def source(u: Signal, p: Signal) -> Signal:
+    """Return VB, what the source gives behind its rectifier."""
+    ve = compound_source(u.vt, u.p, u.q, p.KP, p.KI, p.XL, p.THETAP)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    efd = clip(clip(s.VR, p.VRMIN, p.VRMAX) * source(u, p), -inf, p.EFDMAX)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vi = clip(u.vref + u.vs + u.vsum - vc, p.VIMIN, p.VIMAX)
+    vl, d.VL = lead_lag(p.KJ * vi, s.VL, p.TC, p.TB)
+    vg = smaller(p.KG * efd, p.VGMAX)
+    _, d.VR = limited_lag(vl - vg, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    return efd
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vr = efd / source(u, p)
+    vl = vr / p.KA + smaller(p.KG * efd, p.VGMAX)
+    x.VC, x.VL, x.VR = u.vc1, vl, vr
+    return u.vc1 + vl / p.KJ - u.vs
