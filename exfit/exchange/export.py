@@ -11,6 +11,7 @@ from exfit.errors import ExfitError, FileError
 from exfit.exchange.file_format import WIDTH, FileFormat
 from exfit.exchange.psse.files import PSSE_FILES
 from exfit.exchange.records import (
+    PSSE,
     SIGNALS,
     SPEED_FLAG,
     Definition,
@@ -20,7 +21,7 @@ from exfit.exchange.records import (
     definitions,
     outside,
 )
-from exfit.models import MODELS
+from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES
 from exfit.results.model import FitResult
@@ -76,6 +77,7 @@ def export(
         *_exciter(result, program, name),
         *_added(result, "stabiliser", program, warnings),
         *_added(result, "governor", program, warnings),
+        *_limiters(result, program, warnings),
     ]
     if not written:
         raise ExfitError(f"{result.model} has no {program} record")
@@ -194,6 +196,17 @@ def _added(result: FitResult, kind: str, program: str, warnings: list[str]) -> I
     if not codes and inputs != own:
         warnings.append(f"{name} has no codes of its inputs: {', '.join(inputs)} is lost")
     yield replace(record, values={**record.values, **codes})
+
+
+def _limiters(result: FitResult, program: str, warnings: list[str]) -> Iterator[Written]:
+    """Yield the records of the limiters; add what is lost to the warnings."""
+    for kind, name in result.limiter_models.items():
+        records = LIMITERS[name].records if name in LIMITERS and program == PSSE else ()
+        if not records:
+            warnings.append(f"limiter {name} has no {program} record: it is left out")
+            continue
+        yield _written(result, Definition("limiter", LIMITERS[name], records[0]), f"{kind}.")
+        warnings.append(f"{name}: the exciter's record says nothing of its place: set its flag")
 
 
 def _written(result: FitResult, definition: Definition, prefix: str) -> Written:

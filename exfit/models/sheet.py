@@ -274,10 +274,10 @@ def typical(rows: Sheet) -> dict[str, float]:
 
 
 def crossed_limits(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
-    """Yield (symbol, fault) for each lower limit ``...MIN`` that is not below its ``...MAX``."""
+    """Yield (symbol, fault) for each lower limit ``MIN`` that is not below its ``MAX``."""
     for symbol, low in values.items():
-        partner = symbol.removesuffix("MIN") + "MAX"
-        if symbol.endswith("MIN") and partner in values and low >= values[partner]:
+        partner = symbol.replace("MIN", "MAX")
+        if partner != symbol and partner in values and low >= values[partner]:
             yield symbol, f"{low:g} is not below {partner} = {values[partner]:g}"
 
 
