@@ -179,20 +179,13 @@ def share(
 def apply_inputs_inside_steps() -> None:
     """Let FMPy's solver set the inputs wherever it asks for derivatives.
 
-    Its own holds a ramp over each of its steps. It looks beyond a step of the test, whose
-    response it then finds by interpolation: up to there the input is that before it.
+    Its own holds a ramp over each of its steps.
     """
     import fmpy.sundials
 
     class Solver(fmpy.sundials.CVodeSolver):  # type: ignore[misc]
-        until = float("inf")
-
-        def step(self, t: float, tNext: float) -> Any:
-            self.until = self.input.nextEvent(t)
-            return super().step(t, tNext)
-
         def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
-            self.input.apply(min(t, self.until))
+            self.input.apply(t)
             return int(super().f(t, y, ydot, user_data))
 
     fmpy.sundials.CVodeSolver = Solver

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 from zipfile import ZipFile
 
 Interface = Literal["co-simulation", "model-exchange"]
-Use = Literal["number", "parameter", "input"]  # set before the start, set at any time
+Use = Literal["parameter", "input", "output"]  # set before the start, set at any time, read
 
 PACKAGE_MISSING = 'needs the package FMPy: pip install "exfit[fmu]"'
 VERSIONS = ("2.", "3.")  # of FMI
@@ -71,10 +71,10 @@ def _variable(variable: Any) -> FmuVariable:
     kind = f"{variable.variability} {variable.causality}, {variable.type}"
     if variable.type not in NUMBERS or variable.shape:
         return FmuVariable(kind, ())
-    uses: list[Use] = ["number"]
-    own = variable.causality == "parameter"
-    at_the_start = variable.causality in ("local", "output") and variable.initial == "exact"
-    if (own or at_the_start) and variable.variability != "constant":
+    is_output = variable.causality in ("local", "output")
+    starts = variable.causality == "parameter" or (is_output and variable.initial == "exact")
+    uses: list[Use] = ["output"] if is_output else []
+    if starts and variable.variability != "constant":
         uses.append("parameter")
     if variable.causality == "input" or variable.variability == "tunable":
         uses.append("input")

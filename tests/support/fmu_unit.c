@@ -2,7 +2,7 @@
  *
  * FMI is 2 or 3. It prints to the standard output, which a program may do, and ends its process
  * where TE is below SHORTEST. Its input vref is the change of the reference, which is held over a
- * step of a co-simulation.
+ * step of a co-simulation. What drives the lag TE is limited by EMAX.
  */
 #include <math.h>
 #include <stdbool.h>
@@ -12,13 +12,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { VREF, VT, EFD, LEAD, D_VT, D_EFD, D_LEAD, K, TATB, TB, TE, TPD0, VT0, COUNT };
+enum { VREF, VT, EFD, LEAD, D_VT, D_EFD, D_LEAD, K, TATB, TB, TE, TPD0, VT0, EMAX, OVER, COUNT };
 
-typedef struct { double time, v[COUNT]; } Unit;
+typedef struct { double time, v[COUNT]; bool limited, by_events; } Unit;
 
 static void reset(Unit *u) {
-    static const double start[COUNT] = {0, 1, 1, 0, 0, 0, 0, 100, 0.1, 10, 0.05, 6, 1};
+    static const double start[COUNT] = {0, 1, 1, 0, 0, 0, 0, 100, 0.1, 10, 0.05, 6, 1, 100, -1};
     u->time = 0.0;
+    u->limited = u->by_events = false;
     memcpy(u->v, start, sizeof start);
 }
 
@@ -32,7 +33,9 @@ static void slopes(Unit *u) {
     double *v = u->v, error = v[VT0] + v[VT0] / v[K] + v[VREF] - v[VT];
     double out = v[LEAD] + v[TATB] * (error - v[LEAD]);
     v[D_VT] = (v[EFD] - v[VT]) / v[TPD0];
-    v[D_EFD] = (v[K] * out - v[EFD]) / v[TE];
+    v[OVER] = v[K] * out - v[EMAX];
+    if (!u->by_events) u->limited = v[OVER] > 0.0;
+    v[D_EFD] = ((u->limited ? v[EMAX] : v[K] * out) - v[EFD]) / v[TE];
     v[D_LEAD] = (error - v[LEAD]) / v[TB];
 }
 
@@ -53,6 +56,13 @@ static void step(Unit *u, double h) {
     int parts = (int)ceil(h / 5e-4);
     for (int part = 0; part < parts; part++) advance(u, h / parts);
     u->time += h;
+}
+
+/* In a model exchange the limit begins and ends at events alone. */
+static void event(Unit *u) {
+    u->by_events = false;
+    slopes(u);
+    u->by_events = true;
 }
 
 static Unit *made(void) {
@@ -88,7 +98,7 @@ int F(DoStep)(Unit *u, double t, double h, int keep) { step(u, h); return 0; }
 int F(GetDerivatives)(Unit *u, double *dx, size_t n) { slopes(u); memcpy(dx, u->v + D_VT, n * sizeof *dx); return 0; }
 int F(CompletedIntegratorStep)(Unit *u, int keep, int *event, int *end) { *event = *end = 0; return 0; }
 typedef struct { int again, end, nominals, values, timed; double next; } Events;
-int F(NewDiscreteStates)(Unit *u, Events *e) { memset(e, 0, sizeof *e); return 0; }
+int F(NewDiscreteStates)(Unit *u, Events *e) { event(u); memset(e, 0, sizeof *e); return 0; }
 X(CancelStep) X(DeSerializeFMUstate) X(FreeFMUstate) X(GetBoolean) X(GetBooleanStatus)
 X(GetDirectionalDerivative) X(GetFMUstate) X(GetInteger) X(GetIntegerStatus)
 X(GetRealOutputDerivatives) X(GetRealStatus) X(GetStatus) X(GetString) X(GetStringStatus)
@@ -109,9 +119,10 @@ int F(DoStep)(Unit *u, double t, double h, bool keep, bool *event, bool *end, bo
 }
 int F(GetContinuousStateDerivatives)(Unit *u, double *dx, size_t n) { slopes(u); memcpy(dx, u->v + D_VT, n * sizeof *dx); return 0; }
 int F(GetNumberOfContinuousStates)(Unit *u, size_t *n) { *n = 3; return 0; }
-int F(GetNumberOfEventIndicators)(Unit *u, size_t *n) { *n = 0; return 0; }
+int F(GetNumberOfEventIndicators)(Unit *u, size_t *n) { *n = 1; return 0; }
 int F(CompletedIntegratorStep)(Unit *u, bool keep, bool *event, bool *end) { *event = *end = false; return 0; }
 int F(UpdateDiscreteStates)(Unit *u, bool *again, bool *end, bool *nominals, bool *values, bool *timed, double *next) {
+    event(u);
     *again = *end = *nominals = *values = *timed = false;
     *next = 0.0;
     return 0;
@@ -137,4 +148,4 @@ int F(EnterContinuousTimeMode)(Unit *u) OK
 int F(GetContinuousStates)(Unit *u, double *x, size_t n) { memcpy(x, u->v + VT, n * sizeof *x); return 0; }
 int F(SetContinuousStates)(Unit *u, const double *x, size_t n) { memcpy(u->v + VT, x, n * sizeof *x); return 0; }
 int F(GetNominalsOfContinuousStates)(Unit *u, double *x, size_t n) { for (size_t i = 0; i < n; i++) x[i] = 1.0; return 0; }
-int F(GetEventIndicators)(Unit *u, double *z, size_t n) OK
+int F(GetEventIndicators)(Unit *u, double *z, size_t n) { slopes(u); z[0] = u->v[OVER]; return 0; }

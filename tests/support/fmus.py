@@ -12,6 +12,7 @@ import pytest
 SOURCE = Path(__file__).with_name("fmu_unit.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 CAPABLE = sys.platform == "linux" and platform.machine() == "x86_64" and COMPILER is not None
+EVENT = "avr.over"  # its sign changes where the limit begins and ends
 # name, causality, variability, start, state of which it is the derivative; in the order of the C
 VARIABLES = (
     ("vref", "input", "continuous", "0", ""),
@@ -27,6 +28,8 @@ VARIABLES = (
     ("TE", "parameter", "fixed", "0.05", ""),
     ("machine.Tpd0", "parameter", "fixed", "6", ""),
     ("vt0", "parameter", "fixed", "1", ""),
+    ("EMAX", "parameter", "fixed", "100", ""),
+    (EVENT, "local", "continuous", "", ""),
 )
 NAMES = {"K": "avr.K"}
 OUTPUTS = {"vt": "gen.V"}
@@ -53,6 +56,7 @@ def built_fmu(folder, version=2, fixed_step=False, shortest=0.0):
 
 
 def _description(version, fixed_step):
+    events = ' numberOfEventIndicators="1"' if version == 2 else ""
     variable_step = "false" if fixed_step else "true"
     token = "guid" if version == 2 else "instantiationToken"
     interfaces = (
@@ -66,7 +70,7 @@ def _description(version, fixed_step):
     )
     return (
         f'<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="{version}.0" '
-        f'modelName="unit" {token}="unit">{interfaces}'
+        f'modelName="unit" {token}="unit"{events}>{interfaces}'
         f'<DefaultExperiment stepSize="0.001"/><ModelVariables>{variables}</ModelVariables>'
         f"<ModelStructure>{_structure(version)}</ModelStructure></fmiModelDescription>"
     )
@@ -95,6 +99,10 @@ def _structure(version):
         )
     return "".join(
         f'<{kind} valueReference="{at}"/>'
-        for kind, rows in (("Output", outputs), ("ContinuousStateDerivative", derivatives))
+        for kind, rows in (
+            ("Output", outputs),
+            ("ContinuousStateDerivative", derivatives),
+            ("EventIndicator", [[row[0] for row in VARIABLES].index(EVENT)]),
+        )
         for at in rows
     )

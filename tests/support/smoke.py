@@ -105,6 +105,12 @@ def extras() -> None:
     if find_spec("distributed") is None:
         ran = exfit("batch", "unit.yaml", "--scheduler", "tcp://127.0.0.1:1", code=1)
         expect("exfit[cluster]" in ran.stderr, ran.stderr)
+    if find_spec("fmpy") is None:
+        text = TRUTH.format(step=STEP, gain=GAIN)
+        fmu = text.replace("type: open-circuit", "type: fmu, file: unit.fmu, twin: open-circuit")
+        Path("fmu.yaml").write_text(fmu, encoding="utf-8")
+        ran = exfit("simulate", "fmu.yaml", code=1)
+        expect("exfit[fmu]" in ran.stderr, ran.stderr)
     if find_spec("weasyprint") is None:
         ran = exfit("report", "fit", "--pdf", code=1)
         expect("exfit[pdf]" in ran.stderr, ran.stderr)

@@ -87,7 +87,7 @@ def _variable_faults(
     uses: tuple[tuple[str, Mapping[str, str], Use, str], ...] = (
         ("names", {**needed, **section.names}, "parameter", "a parameter that can be set"),
         ("inputs", {**changed, **section.inputs}, "input", "an input"),
-        ("outputs", {**compared, **section.outputs}, "number", "a number"),
+        ("outputs", {**compared, **section.outputs}, "output", "an output"),
     )
     for key, names, use, what in uses:
         possible = description.usable_as(use)
