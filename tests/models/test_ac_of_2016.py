@@ -32,6 +32,9 @@ P, Q = 0.8, 0.3  # on load
 LIVELY = {
     "AC1C": {"TR": 0.02, "TB": 0.5, "TC": 0.3},
     "AC2C": {"TR": 0.02, "TB": 1.5, "TC": 0.4, "KA": 80.0, "VFEMAX": 9.0},
+    "AC3C": {"TR": 0.02, "TB": 0.5, "TC": 0.2, "KIR": 0.8, "KDR": 0.05, "EFDN": 2.5},
+    "AC4C": {"TR": 0.02, "KC": 0.3},
+    "AC5C": {"TR": 0.02, "TF3": 0.3, "KA": 100.0},
     "AC6C": {"TR": 0.02, "VFELIM": 2.5, "KH": 3.0},
     "AC7C": {"TR": 0.02, "KDR": 0.2, "TDR": 0.05, "KF2": 0.05, "KF3": 0.02},
     "AC8C": {"TR": 0.02, "TA": 0.03, "VFEMAX": 9.0},
@@ -60,6 +63,25 @@ def ac1c(s, p):
 def ac2c(s, p):
     regulator = p.KB * lead_lag(s, p.TC, p.TB) * p.KA / (1.0 + s * p.TA)
     return solved(s, p, regulator, regulator * s * p.KF / (1.0 + s * p.TF) + p.KB * p.KH)
+
+
+def ac3c(s, p):
+    feedback = s / (1.0 + s * p.TF) * (p.KF if EFD < p.EFDN else p.KN)
+    # VR = KR efd VA: around the start, KR efd0 dVA + (VFE0 / efd0) defd
+    regulator = p.KR * EFD * p.KA / (1.0 + s * p.TA)
+    forward = regulator * pid(s, p.KPR, p.KIR, p.KDR, p.TDR) * lead_lag(s, p.TC, p.TB)
+    return solved(s, p, forward, 0.0, regulator * feedback - around(p).vfe / EFD)
+
+
+def ac4c(s, p):
+    forward = lead_lag(s, p.TC, p.TB) * p.KA / (1.0 + s * p.TA)
+    return np.array([forward, forward, 0.0, -forward / (1.0 + s * p.TR), 0.0])
+
+
+def ac5c(s, p):
+    regulator = p.KA / (1.0 + s * p.TA)
+    path = s * p.KF / (1.0 + s * p.TF1) * lead_lag(s, p.TF3, p.TF2)
+    return solved(s, p, regulator / (1.0 + regulator * path))
 
 
 def ac6c(s, p):
@@ -106,9 +128,19 @@ def ac8c(s, p):
     return solved(s, p, at.vs * regulator, -at.va * at.of_vfe, 0.0, at.va * at.of_vt)
 
 
-FUNCTIONS = {"AC1C": ac1c, "AC2C": ac2c, "AC6C": ac6c, "AC7C": ac7c, "AC8C": ac8c}
+FUNCTIONS = {
+    "AC1C": ac1c,
+    "AC2C": ac2c,
+    "AC3C": ac3c,
+    "AC4C": ac4c,
+    "AC5C": ac5c,
+    "AC6C": ac6c,
+    "AC7C": ac7c,
+    "AC8C": ac8c,
+}
 CASES = [
     *((name, {}) for name in FUNCTIONS),
+    ("AC3C", {"EFDN": 1.2}),  # beyond the bend of its feedback
     ("AC6C", {"VFELIM": 99.0}),  # its field current limiter does not act
     *((name, changes) for name in ("AC7C", "AC8C") for changes in (SOURCE, INDEPENDENT)),
     ("AC7C", {"SW2": 2.0}),
@@ -150,17 +182,13 @@ def held_by(output):
             vfe = holding_current(ve, IFD, p)
             return output(behind_rectifier(ve, IFD, p), vfe, p) - vfe
 
-        return behind_rectifier(brentq(missing, 0.1, 50.0, xtol=1e-13), IFD, p)
+        return behind_rectifier(brentq(missing, 1.0, 50.0, xtol=1e-13), IFD, p)
 
     return ceiling
 
 
 def field_voltage(limit):
     return held_by(lambda efd, vfe, p: limit(p))
-
-
-def floor_of_ve(p):
-    return behind_rectifier(p.VEMIN, IFD, p)
 
 
 def supplied(efd, vfe, p):
@@ -175,6 +203,15 @@ LIMITS = [
     ("AC1C", {"VFEMAX": 3.0}, BY_VFE),
     ("AC2C", {"VFEMAX": 4.4}, BY_VFE),
     ("AC2C", {"EFEMAX": 5.0}, BY_EFE),
+    ("AC3C", {}, BY_VFE),  # it supplies itself up to there
+    (
+        "AC3C",
+        {"KR": 1.5, "VAMAX": 1.5, "KIR": 0.0},
+        held_by(lambda efd, vfe, p: p.KR * efd * p.VAMAX),
+    ),
+    ("AC4C", {}, lambda p: p.VRMAX - p.KC * IFD),
+    ("AC5C", {}, field_voltage(lambda p: p.VAMAX)),
+    ("AC5C", {"VFEMAX": 5.0}, BY_VFE),
     ("AC6C", {"VFELIM": 99.0, "EFEMAX": 9.0}, BY_VT),
     ("AC6C", {"VFELIM": 99.0, "VFEMAX": 12.0}, BY_VFE),
     ("AC7C", {"KC1": 0.1}, held_by(lambda efd, vfe, p: p.VAMAX * supplied(efd, vfe, p))),
@@ -202,14 +239,15 @@ def test_a_large_step_drives_efd_to_its_ceiling_and_never_beyond(name, changes, 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_large_step_down_drives_the_exciter_to_its_floor(name):
-    p = parameters(name, VEMIN=0.9)
+    p = parameters(name, **({} if name == "AC4C" else {"VEMIN": 0.9}))
+    floor = p.VRMIN if name == "AC4C" else behind_rectifier(p.VEMIN, IFD, p)
     efd = after(name, p, -0.5)
-    assert efd[-1] == pytest.approx(floor_of_ve(p), rel=1e-9)
-    assert efd.min() >= floor_of_ve(p) * (1.0 - 1e-9)
+    assert efd[-1] == pytest.approx(floor, rel=1e-9)
+    assert (efd >= floor - 1e-9).all()
 
 
 TAKEN_OVER = {
-    **dict.fromkeys(("AC1C", "AC2C", "AC6C"), ("vuel", "voel")),
+    **dict.fromkeys(("AC1C", "AC2C", "AC5C", "AC6C"), ("vuel", "voel")),
     "AC8C": ("vuel_out", "voel_out"),
 }
 
@@ -241,3 +279,14 @@ def test_the_second_gates_of_ac7c_take_the_reference_of_the_inner_loop_over():
     p = parameters("AC7C", KF2=0.0)
     for x, gate, vref in ((0.45, "voel_out", 0.5), (0.5, "vuel_out", -0.5)):
         assert after("AC7C", p, vref, {gate: x})[-1] == pytest.approx(x / p.KF1, rel=1e-6)
+
+
+def test_the_gates_of_ac3c_and_ac4c_take_the_input_of_the_regulator_over():
+    for share, gate, vref in ((1.1, "voel", 0.5), (0.9, "vuel", -0.5)):
+        p = parameters("AC4C")
+        efd = after("AC4C", p, vref, {gate: share * EFD / p.KA})
+        assert efd[-1] == pytest.approx(share * EFD, rel=1e-9)
+        # without its feedback VA follows at once; the self-excited alternator then runs away
+        p = parameters("AC3C", KF=0.0, KN=0.0, VFEMAX=9.0)
+        efd = after("AC3C", p, vref, {gate: share * around(p).vfe / (p.KR * EFD) / p.KA})
+        assert (efd[-1] - EFD) * vref > 0.1

@@ -32,6 +32,7 @@ class Form(NamedTuple):
 SUPPLY = {"SW1": 2.0, "KP": 1.0, "KC1": 0.0, "VBMAX": NONE}  # of one, whatever happens
 LOOP = {"SW1": 1.0, "VAMAX": NONE, "VAMIN": -NONE}  # from the terminals, no further limit
 EFE = {"EFEMAX": "VRMAX", "EFEMIN": "VRMIN"}
+VA = {"VAMAX": "VRMAX", "VAMIN": "VRMIN"}
 FIELD = {"VFEMAX": NONE, "VEMIN": 0.0}
 PID = {"KPR": "KP", "KIR": "KI", "KDR": "KD", "TDR": "TD"}
 BETWEEN = {"VEMAX": NONE, "VEMIN": 0.0}  # the floor of 2005, and no ceiling
@@ -46,6 +47,9 @@ FORMS = {
     "DC4C": Form("DC4B", SUPPLY | {"SW1": 1.0, "KI": 0.0}, PID, {"TR": 0.02, "TA": 0.0}),
     "AC1C": Form("AC1A", FIELD, EFE, LAGS),
     "AC2C": Form("AC2A", {"VEMIN": 0.0}, EFE, LAGS),
+    "AC3C": Form("AC3A", {"KIR": 0.0, "VPIDMAX": NONE, "VPIDMIN": -NONE}, changes=LAGS),
+    "AC4C": Form("AC4A", {}, changes={"TR": 0.02, "KC": 0.1}),
+    "AC5C": Form("AC5A", FIELD | {"KC": 0.0, "KD": 0.0}, VA, {"TR": 0.02, "TF3": 0.3}),
     "AC6C": Form("AC6A", FIELD, EFE),
     "AC7C": Form("AC7B", {"KC1": 0.0, "VBMAX": NONE}, changes={"KDR": 0.1, "KF3": 0.02}),
     "AC8C": Form("AC8B", SUPPLY, changes={"TR": 0.02, "TA": 0.05}),

@@ -193,7 +193,10 @@ def test_the_poles_are_the_roots_of_one_plus_the_loop_gain(name):
 def test_the_loop_gain_is_positive_at_low_frequency(name):
     found = small_signal(system_of(name), lively_values(name)).open.response[0]
     assert abs(found) > 1.0
-    assert found.real > 0.0 or found.imag < 0.0  # an integrator turns it by 90 degrees
+    # an integrator turns it by 90 degrees; AC3C has two, as an alternator that feeds its own
+    # regulator is nearly one as well
+    once = found * 1j if name == "AC3C" else found
+    assert once.real > 0.0 or once.imag < 0.0
 
 
 def differences(system, values):

@@ -21,7 +21,8 @@ VA = VFE / KB + KH VFE. With VEMIN = 0 it is AC2A, whose VRMAX and VRMIN are
 EFEMAX and EFEMIN here.
 
 The limiters act at the summing point (vsum) or at the gates. The sources are
-the drawing of 2005 and the program InterPSS, which differ in nothing else.
+the drawing of 2005, which differs in nothing else, the program InterPSS and the
+parameters that PowerWorld lists.
 """
 
 from exfit.engine.trace import Signal
