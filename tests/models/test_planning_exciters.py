@@ -134,6 +134,11 @@ def bbsex1(s, p):
     return p.K * lead_lag(s, p.T3, p.T4) * lead_lag(s, p.T2, p.T1) * error(s, p)
 
 
+def urst5t(s, p):
+    regulator = p.KR * lead_lag(s, p.TC1, p.TB1) * lead_lag(s, p.TC2, p.TB2)
+    return regulator * lag(s, p.T1) * error(s, p) - p.KC * DIRECT["ifd"]
+
+
 # no gain and no time constant of the first is zero; then each variant of the diagram
 REXS = {
     **{"TR": 0.02, "KVP": 300.0, "KVI": 40.0, "TB1": 0.5, "TC1": 0.3, "TB2": 0.05, "TC2": 0.2},
@@ -166,6 +171,7 @@ LINEAR = [
     ("EXAC3", exac3, {"TR": 0.02, "TB": 0.5, "TC": 0.3}),
     ("EXAC3", exac3, {"EFDN": 2.5}),  # up to the bend of its feedback
     ("BBSEX1", bbsex1, {}),
+    ("URST5T", urst5t, {"KC": 0.1}),
     ("BBSEX1", bbsex1, {"TR": 0.0, "T2": 0.0, "T3": 0.0}),
 ]
 
@@ -227,6 +233,7 @@ CEILINGS = [
     ("EXST3", {"EFDMAX": 4.0}, lambda p: 4.0),
     ("EXAC1A", {}, lambda p: of_field_current(p.VRMAX, p)),
     ("EXAC3", {"VAMAX": 0.4, "TE": 0.5}, lambda p: self_supplied(p.VAMAX, p)),
+    ("URST5T", {"KC": 0.1}, lambda p: p.VRMAX - p.KC * IFD),  # VT is above 1
     ("BBSEX1", {"VRMAX": 3.0}, lambda p: 3.0),
     ("BBSEX1", {"EFDMAX": 3.0}, lambda p: 3.0 * VT),
 ]
