@@ -29,7 +29,7 @@ TYPES = {
     "boolean": "true or false",
 }
 WIDTH, HEIGHT, DPI = 7.2, 2.2, 110  # of a figure and of each of its panels, inches
-LABELS = {"vt": "vt (pu)", "efd": "efd (pu)", "p": "p (pu)"}
+LABELS = {name: f"{name} (pu)" for name in ("vt", "efd", "ifd", "p", "q")}
 
 Schema = Mapping[str, Any]
 
@@ -50,6 +50,25 @@ plant: {{type: infinite-bus, machine: GENROU, network: {{f0: 60, X: 0.3, P: 0.7,
 {governor}
 test: {{vt0: 1.0, duration: 40.0, angle: [{{at: 1.0, step: 24.5, unit: rad, ramp: 39.0}}]}}
 """
+LIMITER_CASE = """\
+model: {exciter}
+plant: {{type: infinite-bus, machine: GENROU, network: {{f0: 60, X: 0.3, P: 0.7, Q: 0.1}}}}
+{limiter}
+test: {{vt0: 1.0, duration: 20.0, vref: [{{at: 1.0, step: {step}}}]}}
+"""
+# by limiter: an exciter, data by which it acts, a step of the reference, the signal that is drawn
+LIMITER_EXAMPLES: Mapping[str, tuple[str, str, float, str]] = {
+    "OEL2C": ("ST1A", "ITFPU: 1.9, ILIM: 1.9, IINST: 4.0, KPOEL: 20.0, K2: 2.0", 0.1, "ifd"),
+    "OEL3C": ("AC8C", "ITFPU: 1.9, VOELMAX1: 0.1", 0.1, "ifd"),
+    "OEL5C": (
+        "AC8C",
+        "KSCALE1: 0.52, IFDLIM: 0.3, VOELMAX1: 0.5, KPOEL: 0.3, KIOEL: 1.0",
+        0.1,
+        "ifd",
+    ),
+    "UEL1": ("ST1A", "KUR: 1.6, KUL: 7.0", -0.15, "q"),
+    "UEL2C": ("AC8C", "", -0.15, "q"),
+}
 
 
 # ---- keys of the case file
@@ -175,7 +194,7 @@ def _yaml(value: Any) -> str:
 
 def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
     """Write a page and a figure for each model; return the pages."""
-    from exfit.models import GOVERNORS, MODELS, STABILISERS
+    from exfit.models import GOVERNORS, LIMITERS, MODELS, STABILISERS
     from exfit.models.machines import MACHINES
 
     pages = []
@@ -205,11 +224,29 @@ def model_pages(folder: Path = MODEL_PAGES) -> list[Path]:
             _draw(responses, ("p",), folder / f"{model.name}.png")
             caption = f"{on_load}{event} All data are typical."
             pages.append(_model_page(model, caption, folder))
+    pages += [_limiter_page(model, folder) for model in LIMITERS.values()]
     for machine in MACHINES.values():
         responses = {"": _response(MACHINE_CASE.format(name=machine.name))}
         _draw(responses, ("vt", "efd"), folder / f"{machine.name}.png")
         pages.append(_machine_page(machine, folder))
     return pages
+
+
+def _limiter_page(model: Any, folder: Path) -> Path:
+    """Write the page of a limiter and its figure: a step into its limit, with it and without."""
+    exciter, given, step, signal = LIMITER_EXAMPLES[model.name]
+    limiter = f"limiters: [{{model: {model.name}, parameters: {{{given}}}}}]"
+    with_it, without = (
+        LIMITER_CASE.format(exciter=exciter, limiter=line, step=step) for line in (limiter, "")
+    )
+    responses = {"with limiter": _response(with_it), "without": _response(without)}
+    _draw(responses, (signal,), folder / f"{model.name}.png")
+    data = f", with {given}" if given else ""
+    caption = (
+        f"A GENROU machine with {exciter} on load after a step of {100.0 * step:g} % of the "
+        f"reference. All data are typical{data}."
+    )
+    return _model_page(model, caption, folder)
 
 
 def _response(case: str) -> Any:
