@@ -63,7 +63,7 @@ def simulated_by(
     """
     tests = [(setup.experiment.simulator, setup.experiment.signals) for setup in setups]
     _refuse_recorded_inputs(case, [twin for twin, _ in tests])
-    refuse_unknown_variables(case, tests)
+    refuse_unknown_variables(case, program, tests)
     return tuple(
         replace(
             setup, experiment=replace(setup.experiment, simulator=_simulator(program, case, *test))
@@ -77,7 +77,7 @@ def external_simulator(
 ) -> ExternalSimulator:
     """Return the simulator of a test whose signals a program gives; CaseError as `simulated_by`."""
     _refuse_recorded_inputs(case, [twin])
-    refuse_unknown_variables(case, [(twin, signals)])
+    refuse_unknown_variables(case, program, [(twin, signals)])
     return _simulator(program, case, twin, signals)
 
 
@@ -246,7 +246,7 @@ def program_notes(
     failed = f", of which {counts.failed} failed" if counts.failed else ""
     restarts = f"; it was started anew {counts.restarts} times" if counts.restarts else ""
     yield f"simulated by {section.simulator}: {counts.runs} runs{failed}{restarts}"
-    yield from own_value_notes(case)
+    yield from own_value_notes(case, program)
     if section.twin is None:
         yield BY_QUOTIENTS
         return

@@ -26,13 +26,25 @@ from exfit.util.text import near
 Test = tuple[Simulator, tuple[str, ...]]  # with the signals that are compared
 
 
+class FmuProgram(ExternalProgram):
+    """The program that runs an FMU, with the description that was read when it was laid out."""
+
+    def __init__(
+        self, section: FmuPlant, settings: str, folder: Path, description: FmuDescription
+    ) -> None:
+        limits = (section.parallel, section.time_limit)
+        super().__init__(worker_command(settings), folder, *limits, "plant.file")
+        self.description = description
+
+
 @contextmanager
 def fmu_program(case: Case, section: FmuPlant) -> Iterator[ExternalProgram]:
     """Provide the program that runs the FMU of a case; end it afterwards.
 
     Raises CaseError for a file that cannot be run.
     """
-    interface = _interface(case, section, _description(case, section))
+    description = _description(case, section)
+    interface = _interface(case, section, description)
     try:
         with laid_out(_file(case, section)) as folder:
             settings = {
@@ -41,32 +53,38 @@ def fmu_program(case: Case, section: FmuPlant) -> Iterator[ExternalProgram]:
                 "inputs": dict(section.inputs),
                 "outputs": dict(section.outputs),
             }
-            command = worker_command(json.dumps(settings))
-            limits = (section.parallel, section.time_limit)
-            with running(ExternalProgram(command, folder, *limits, "plant.file")) as program:
+            program = FmuProgram(section, json.dumps(settings), folder, description)
+            with running(program):
                 yield program
     except FmuError as fault:
         raise _fault_of_file(case, section, fault) from None
 
 
-def refuse_unknown_variables(case: Case, tests: Sequence[Test]) -> None:
+def refuse_unknown_variables(case: Case, program: ExternalProgram, tests: Sequence[Test]) -> None:
     """Raise CaseError with all that an FMU cannot be given, or asked for, in the tests of a case.
 
     Nothing where no FMU simulates it.
     """
     section = case.external
-    if isinstance(section, FmuPlant):
-        faults = [*_variable_faults(case, section, _description(case, section), tests)]
+    if isinstance(section, FmuPlant) and isinstance(program, FmuProgram):
+        faults = [*_variable_faults(case, section, program.description, tests)]
         if faults:
             raise CaseError([f"{case.path}: {fault}" for fault in dict.fromkeys(faults)])
 
 
-def own_value_notes(case: Case) -> Iterator[str]:
-    """Yield which parameters of a case an FMU does not take, and has its own values of."""
+def own_value_notes(case: Case, program: ExternalProgram | None = None) -> Iterator[str]:
+    """Yield which parameters of a case an FMU does not take, and has its own values of.
+
+    Raises CaseError for a file that cannot be run, where no program has read it before.
+    """
     section = case.external
     if not isinstance(section, FmuPlant):
         return
-    taken = _description(case, section).usable_as("parameter")
+    if isinstance(program, FmuProgram):
+        description = program.description
+    else:
+        description = _description(case, section)
+    taken = description.usable_as("parameter")
     symbols = [part.prefix + symbol for part in case.parts.all for symbol in part.symbols]
     missing = [
         name for name in (*symbols, OF_RECORD[0]) if section.names.get(name, name) not in taken

@@ -199,11 +199,11 @@ DESCRIPTION = FmuDescription(
 )
 
 
-def test_all_that_an_fmu_has_no_variable_for_is_reported_together(record, tmp_path, monkeypatch):
-    monkeypatch.setattr(forms, "fmu_description", lambda _: DESCRIPTION)
+def test_all_that_an_fmu_has_no_variable_for_is_reported_together(record, tmp_path):
     unit = of_fmu(record, "unit.fmu", names={"K": "avr.k_", "TE": "avr.TE"}, outputs={"vt": "V"})
+    program = forms.FmuProgram(unit.external, "", tmp_path, DESCRIPTION)
     with pytest.raises(CaseError) as faults:
-        forms.refuse_unknown_variables(unit, [(_test_of(unit), ("vt",))])
+        forms.refuse_unknown_variables(unit, program, [(_test_of(unit), ("vt",))])
     text = str(faults.value)
     assert "plant.names.K: unit.fmu has no variable avr.k_; did you mean avr.K?" in text
     assert "plant.names.TE: avr.TE is not a parameter that can be set but fixed calc" in text
