@@ -126,6 +126,11 @@ def with_typical(rows: Sheet, **values: float) -> Sheet:
     return tuple(row._replace(typical=values.get(row.symbol, row.typical)) for row in rows)
 
 
+def not_searched(rows: Sheet, *symbols: str) -> Sheet:
+    """Return a data sheet of which a fit of a bump test leaves some symbols as they are."""
+    return tuple(row._replace(search=None) if row.symbol in symbols else row for row in rows)
+
+
 @dataclass(frozen=True)
 class DynamicsRecord:
     """How a planner's file lists a model: the symbols of its constants (CONs) in their order.

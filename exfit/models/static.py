@@ -1,8 +1,8 @@
-"""What static exciters share from IEEE Std 421.5-2016 on: the supply of the rectifier."""
+"""What static exciters share from IEEE Std 421.5-2016 on: supply and PID."""
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import compound_source, rectifier, smaller, where
-from exfit.models.sheet import sheet
+from exfit.models.sheet import FREE, SearchRange, sheet
 
 SUPPLY_SWITCH = sheet(
     ("SW1", 1.0, "1", (1.0, 2.0), "supply of the rectifier: 1 terminals, 2 independent"),
@@ -18,6 +18,15 @@ SUPPLY = (
         ("KC", 0.05, "pu", (0.0, 100.0), "rectifier loading factor"),
         ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
     ),
+)
+# a PI with a small derivative, in front of the gain of the edition of 2005, which then stays fixed
+PID = sheet(
+    ("KPR", 1.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
+    ("KIR", 0.5, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+    ("KDR", 0.02, "pu s", (0.0, 100000.0), "derivative gain", SearchRange(needs="TDR")),
+    ("TDR", 0.1, "s", (0.0, 10.0), "lag of the derivative", SearchRange(needs="KDR")),
+    ("VPIDMAX", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PID"),
+    ("VPIDMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the PID"),
 )
 
 

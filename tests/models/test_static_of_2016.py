@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagrams import alone, lag, lead_lag, pid, rectified, standing, washout
+from diagrams import Transfer, alone, lag, lead_lag, pid, rectified, standing, washout
 from oracle import drawn_values, lively_values, typical_values
 
 from exfit.models import MODELS
@@ -30,6 +30,19 @@ def st1c(p):
     return forward.fed_back(washout(p.KF, p.TF)), lag(1.0, p.TR)
 
 
+def st2c(p):
+    regulator = pid(p.KPR, p.KIR, p.KDR, p.TDR) * lag(p.KA, p.TA)
+    vb = min(rectified(p.KP * VT, p.KC * IFD), p.VBMAX)
+    forward = regulator * Transfer([vb], [p.TE, p.KE])
+    return forward.fed_back(washout(p.KF, p.TF)), lag(1.0, p.TR)
+
+
+def st3c(p):
+    regulator = pid(p.KPR, p.KIR, p.KDR, p.TDR) * lead_lag(p.TC, p.TB) * lag(p.KA, p.TA)
+    inner = lag(p.KM * bridge(p), p.TM)
+    return regulator * inner.fed_back(p.KG if p.KG * EFD < p.VGMAX else 0.0), lag(1.0, p.TR)
+
+
 def st4c(p):
     inner = pid(p.KPM, p.KIM) * lag(bridge(p), p.TA)
     feedback = lag(p.KG, p.TG) if p.KG * EFD < p.VGMAX else 0.0
@@ -53,6 +66,12 @@ def st7c(p):
     return chain, lag(1.0, p.TR) * lead_lag(p.TG, p.TF)
 
 
+def st8c(p):
+    source = p.KP * VT if p.SW1 < 1.5 else p.KP
+    vb1 = min(rectified(source, p.KC1 * IFD), p.VB1MAX)
+    return pid(p.KPR, p.KIR) * pid(p.KPA, p.KIA) * lag(p.KA * vb1, p.TA), lag(1.0, p.TR)
+
+
 def st9c(p):
     derivative = washout(p.TCD, p.TBD) if p.ZA == 0.0 else 0.0
     chain = pid(p.KA, p.KA / p.TA) * lag(p.KAS * bridge(p), p.TAS)
@@ -61,16 +80,20 @@ def st9c(p):
 
 DIAGRAMS = {
     "ST1C": st1c,
+    "ST2C": st2c,
+    "ST3C": st3c,
     "ST4C": st4c,
     "ST5C": st5c,
     "ST6C": st6c,
     "ST7C": st7c,
+    "ST8C": st8c,
     "ST9C": st9c,
 }
 INDEPENDENT = {"SW1": 2.0}
 CASES = [
     *((name, {}) for name in DIAGRAMS),
-    *((name, INDEPENDENT) for name in ("ST4C", "ST6C", "ST9C")),
+    *((name, INDEPENDENT) for name in ("ST3C", "ST4C", "ST6C", "ST8C", "ST9C")),
+    ("ST3C", {"VGMAX": 0.5, "KA": 5.0}),  # nothing is fed back
     ("ST9C", {"ZA": 0.0}),
     ("ST4C", {"TA": 0.0}),
     ("ST4C", {"TG": 0.0}),
@@ -102,6 +125,13 @@ def limits(name, p):
     """Return the floor and the ceiling of efd by the diagram."""
     if name == "ST1C":
         return VT * p.VRMIN, VT * p.VRMAX - p.KC * IFD
+    if name == "ST2C":
+        return 0.0, p.EFDMAX
+    if name == "ST3C":
+        return bridge(p) * p.VMMIN, bridge(p) * p.VMMAX
+    if name == "ST8C":
+        vb1 = rectified(p.KP * VT, p.KC1 * IFD)
+        return vb1 * p.VRMIN, vb1 * p.VRMAX
     if name == "ST5C":  # KC IFD is taken before, the supply limits behind
         return max(p.VRMIN - p.KC * IFD, VT * p.VRMIN), min(p.VRMAX - p.KC * IFD, VT * p.VRMAX)
     if name == "ST7C":
@@ -115,10 +145,13 @@ def limits(name, p):
 
 LARGE = {
     "ST1C": {"VAMAX": 99.0, "VAMIN": -99.0},
+    "ST2C": {"EFDMAX": 2.5, "KF": 0.0, "VRMIN": -1.0},
+    "ST3C": {"VMMAX": 0.5},
     "ST4C": {"VRMAX": 9.0, "VRMIN": -9.0, "KIM": 20.0},
     "ST5C": {},
     "ST6C": {"KG": 0.1},
     "ST7C": {"VMAX": 9.0, "VMIN": -9.0},
+    "ST8C": {},
     "ST9C": {},
 }
 
@@ -157,13 +190,15 @@ OPEN = {"VIMAX": 9.0, "VIMIN": -9.0, "VMAX": 9.0, "VMIN": -9.0, "TR": 0.0, "KF":
 SWITCHED = ("TC1", "TB1", "TC2", "TB2")
 
 
-@pytest.mark.parametrize("name", DIAGRAMS)
+@pytest.mark.parametrize("name", [name for name in DIAGRAMS if name != "ST8C"])
 def test_a_gate_at_the_input_replaces_the_error(name):
     """The step of the reference that gives this error does the same; OEL has the last word."""
     values = lively_values(name)
     values |= {symbol: value for symbol, value in OPEN.items() if symbol in values}
     if name == "ST5C":
         values |= {f"T{gate}{time[1:]}": values[time] for gate in "UO" for time in SWITCHED}
+    if name == "ST2C":  # its gates are behind the PID
+        values |= {"KPR": 1.0, "KIR": 0.0, "KDR": 0.0}
     u, p, _ = standing(name, values)
     cases = [({"vuel": 0.08}, 0.08), ({"voel": -0.03}, -0.03)]
     cases += [({"vuel": 0.08, "voel": 0.02}, 0.02)]
@@ -216,6 +251,30 @@ def test_oel_takes_the_output_of_the_regulator_of_st9c():
     p = SimpleNamespace(**values)
     _, efd = alone("ST9C", values, held={"voel": 0.1}, vt=VT, time=0.1, step=1e-3)
     assert efd == pytest.approx(0.1 * p.KAS * bridge(p))
+
+
+def test_the_field_current_loop_of_st8c_feeds_the_current_back_and_has_the_gates():
+    """A step of the current is taken through KF / (1 + sTF), and a gate holds what is left."""
+    values = drawn_values("ST8C", 3) | {"KC1": 0.0}
+    p = SimpleNamespace(**values)
+    loop = pid(p.KPA, p.KIA) * lag(p.KA * p.KP * VT, p.TA)
+    times, efd = alone("ST8C", values, held={"ifd": IFD + 1e-6}, vt=VT, step=2.5e-4)
+    expected = -1e-6 * (lag(p.KF, p.TF) * loop).step(times)
+    assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
+    for gate, value in (("vuel", 1e-6), ("voel", -1e-6)):
+        times, efd = alone("ST8C", values, held={gate: value}, vt=VT, step=2.5e-4)
+        expected = value * loop.step(times)
+        assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
+
+
+def test_the_second_source_of_st8c_is_added_on_load():
+    values = lively_values("ST8C")
+    u, p, x = standing("ST8C", values, efd=2.0, vt=0.97, ifd=2.1, p=0.8, q=0.35)
+    current = abs(complex(0.8, -0.35) / 0.97)
+    vb2 = min(rectified(p.KI2 * current, p.KC2 * u.ifd), p.VB2MAX)
+    vb1 = rectified(p.KP * u.vt, p.KC1 * u.ifd)
+    assert x.VR * vb1 + vb2 == pytest.approx(2.0, rel=1e-12)
+    assert vb2 > 0.1
 
 
 def test_the_field_current_limit_of_st6c_holds_its_output_and_its_pid():

@@ -38,6 +38,7 @@ PID = {"KPR": "KP", "KIR": "KI", "KDR": "KD", "TDR": "TD"}
 BETWEEN = {"VEMAX": NONE, "VEMIN": 0.0}  # the floor of 2005, and no ceiling
 FROM_VT = {"SW1": 1.0, "KP": 1.0, "KI": 0.0, "XL": 0.0, "KC": 0.0, "VBMAX": NONE}
 FROM_VT |= {"VMMAX": NONE, "VMMIN": -NONE}  # the supply VT itself, no further limit
+GAIN = {"KPR": 1.0, "KIR": 0.0, "KDR": 0.0, "VPIDMAX": NONE, "VPIDMIN": -NONE}
 # the changes: lags that typical data leave out
 LAGS = {"TR": 0.02, "TB": 0.3, "TC": 0.1}
 FORMS = {
@@ -54,6 +55,8 @@ FORMS = {
     "AC7C": Form("AC7B", {"KC1": 0.0, "VBMAX": NONE}, changes={"KDR": 0.1, "KF3": 0.02}),
     "AC8C": Form("AC8B", SUPPLY, changes={"TR": 0.02, "TA": 0.05}),
     "ST1C": Form("ST1A", {}, changes={"TA": 0.02, "KF": 0.01}),
+    "ST2C": Form("ST2A", {**GAIN, "XL": 0.0, "THETAP": 0.0, "VBMAX": NONE}, changes={"KC": 0.3}),
+    "ST3C": Form("ST3A", {**GAIN, "SW1": 1.0}, changes={"TA": 0.02}),
     "ST4C": Form("ST4B", {**LOOP, "TG": 0.0, "VGMAX": NONE}, changes={"TA": 0.0, "KG": 0.5}),
     "ST5C": Form("ST5B", {}),
     "ST6C": Form("ST6B", {**FROM_VT, "TA": 0.0}, changes={"ILR": 99.0}),

@@ -1,0 +1,116 @@
+"""ST8C: static exciter with a field current loop (IEEE Std 421.5-2016, ST8C).
+
+                     VPIMAX        UEL OEL    VAMAX        VRMAX
+vref + vs ►(+)►[KPR + KIR/s]─►(+)►[gates]─►[KPA + KIA/s]─►[  KA  ]─►(x)─►(+)►efd
+ + vsum    -▲       VPIMIN    -▲              VAMIN       [1+sTA]    ▲    ▲
+            │                  │                           VRMIN    VB1  VB2
+vc1 ►[  1  ]┘       ifd ►[  KF  ]
+     [1+sTR]             [1+sTF]
+
+VB1 = VE1 FEX(KC1 IFD / VE1), at most VB1MAX. It comes from the terminals
+(SW1 = 1, position A of the drawing), VE1 = |KP∠THETAP VT + j (KI1 + KP∠THETAP
+XL) IT| with THETAP in degrees, or does not depend on them (SW1 = 2, B),
+VE1 = KP. VB2 = VE2 FEX(KC2 IFD / VE2), at most VB2MAX, with VE2 = KI2 IT, is
+added uncontrolled. The current IT, and so KI1, XL, THETAP and all of VB2, act
+on load only. An integral is frozen while its PI is at its limit; the limit of
+the lag is non-windup.
+
+The limiters act at the summing point (vsum) or at the gates of the field
+current regulator. Sources disagree on what this regulator sees: InterPSS
+subtracts IFD and KF IFD / (1 + sTF), PowerSimulationsDynamics the latter alone,
+which is followed: KF is the gain of the feedback. OEL is subtracted at the
+summing point by PowerWorld and InterPSS; here a limiter has the sign of what it
+adds. PowerSimulationsDynamics has VB1 for SW1 = 2 only, and no VB2. Typical
+data are not those of a sample.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    compound_source,
+    lag,
+    limited_lag,
+    pi,
+    pi_rest,
+    rectifier,
+    smaller,
+    where,
+)
+from exfit.models.sheet import FREE, record, sheet
+from exfit.models.static import SUPPLY_SWITCH
+
+ALIASES = ("ESST8C",)
+
+SHEET = (
+    *sheet(
+        ("TR", 0.012, "s", (0.0, 1.0), "voltage transducer lag"),
+        ("KPR", 20.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
+        ("KIR", 10.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+        ("VPIMAX", 4.5, "pu", (-9999.0, 9999.0), "ceiling of the field current reference"),
+        ("VPIMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the field current reference"),
+        ("KPA", 1.0, "pu", (0.0, 100000.0), "proportional gain of the current loop", FREE),
+        ("KIA", 10.0, "pu/s", (0.0, 100000.0), "integral gain of the current loop", FREE),
+        ("VAMAX", 1.2, "pu", (-9999.0, 9999.0), "ceiling of the current loop"),
+        ("VAMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the current loop"),
+        ("KA", 1.0, "pu", (0.01, 100000.0), "regulator gain"),
+        ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", FREE),
+        ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+        ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
+        ("KF", 1.0, "pu", (0.0, 100.0), "feedback gain of the field current"),
+        ("TF", 0.02, "s", (0.0, 10.0), "feedback lag of the field current", FREE),
+        ("KC1", 0.05, "pu", (0.0, 100.0), "rectifier loading factor"),
+        ("KP", 6.0, "pu", (0.01, 100.0), "potential source gain"),
+        ("KI1", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
+        ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
+        ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
+        ("VB1MAX", 8.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
+        ("KC2", 0.05, "pu", (0.0, 100.0), "loading factor of the second rectifier, on load"),
+        ("KI2", 0.5, "pu", (0.0, 100.0), "gain of the second source, on load"),
+        ("VB2MAX", 0.5, "pu", (0.01, 9999.0), "ceiling of the second source, on load"),
+    ),
+    *SUPPLY_SWITCH,
+)
+
+RECORDS = (
+    record(
+        "ST8C",
+        "TR KPR KIR VPIMAX VPIMIN KPA KIA VAMAX VAMIN KA TA VRMAX VRMIN KF TF KC1 KP KI1 XL "
+        "THETAP VB1MAX KC2 KI2 VB2MAX",
+        icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
+        ignored="OEL UEL SCL",
+    ),
+)
+
+STATES = "VC VI VA VR VF"
+
+
+def sources(u: Signal, p: Signal) -> tuple[Signal, Signal]:
+    """Return VB1 and VB2, what the sources give behind their rectifiers."""
+    terminals = compound_source(u.vt, u.p, u.q, p.KP, p.KI1, p.XL, p.THETAP)
+    ve1 = where(p.SW1 < 1.5, terminals, p.KP)
+    ve2 = compound_source(u.vt, u.p, u.q, 0.0, p.KI2)
+    vb1 = smaller(rectifier(ve1, p.KC1 * u.ifd), p.VB1MAX)
+    return vb1, smaller(rectifier(ve2, p.KC2 * u.ifd), p.VB2MAX)
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vb1, vb2 = sources(u, p)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    error = u.vref + u.vs + u.vsum - vc
+    wanted, d.VI = pi(error, s.VI, p.KPR, p.KIR, p.VPIMIN, p.VPIMAX)
+    vf, d.VF = lag(u.ifd, s.VF, p.KF, p.TF)
+    gated = clip(wanted - vf, u.vuel, u.voel)
+    va, d.VA = pi(gated, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)
+    vr, d.VR = limited_lag(va, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    return vr * vb1 + vb2
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    vb1, vb2 = sources(u, p)
+    x.VR, x.VF = (efd - vb2) / vb1, p.KF * u.ifd
+    difference, x.VA = pi_rest(x.VR / p.KA, p.KPA, p.KIA)
+    error, x.VI = pi_rest(difference + x.VF, p.KPR, p.KIR)
+    x.VC = u.vc1
+    return u.vc1 + error - u.vs
