@@ -7,7 +7,7 @@ import discrete_models
 import numpy as np
 import pytest
 from discrete_models import Data, Model, arx, instrumental, regressors, transferred
-from frequency_weights import Weighted, equal, least_spread, weighted
+from frequency_weights import Weighted, Whitened, equal, least_spread, weighted
 from related_work import SideBySide, descended, each, figures, lowest_cost, matched, subject
 from stochastic_approximation import recursive_gauss_newton, robbins_monro, spsa
 
@@ -94,6 +94,14 @@ def test_equal_weights_in_the_frequency_domain_are_least_squares_in_time():
     )
     assert errors @ errors == pytest.approx(in_time @ in_time, rel=1e-12)
     np.testing.assert_allclose(tilted.T @ errors, slopes.T @ in_time, rtol=1e-9)
+
+
+def test_errors_whitened_in_time_are_weighted_by_their_covariance():
+    share, errors = 0.9, np.random.default_rng(2).standard_normal(50)
+    white = Whitened(None, share).whitened(errors)
+    covariance = share ** np.abs(np.subtract.outer(np.arange(50), np.arange(50)))
+    expected = errors @ np.linalg.solve(covariance, errors) * (1.0 - share**2)
+    assert white @ white == pytest.approx(expected, rel=1e-9)
 
 
 def test_no_weights_have_less_spread_than_those_of_the_true_spectrum():

@@ -15,7 +15,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 
-from block_models import blocks, equation_error, output_error
+from block_models import blocks, equation_error, errors_of_all, output_error
 from related_work import asked, show_heads, show_rows, subject
 
 FITS = {"ARMA per block": equation_error, "output error per block": output_error}
@@ -27,3 +27,5 @@ if __name__ == "__main__":
         of = subject(name)
         methods = {title: blocks(of, fit) for title, fit in FITS.items()}
         show_rows(of, methods, scope, then_descent=True)
+        errors = " ".join(f"{error:.3f}" for error in errors_of_all(of))
+        print(f"least squares of all these records at once, {name}: spread {errors}")

@@ -27,4 +27,4 @@ METHODS = {
 }
 
 if __name__ == "__main__":
-    show(METHODS, then_descent=True)
+    show(METHODS)

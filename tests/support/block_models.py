@@ -8,6 +8,7 @@ Source: Oppenheim & Schafer 2010, section 7.2.2 (bilinear rule); IEEE 421.5-2005
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,9 +19,12 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from exfit.fitting.experiment import Channel
+
 FIELD_NOISE = 3e-4  # pu: that of ifd in the sample records
 REGULATOR_NOISE = 1e-4  # pu: that of vt
 NEAR_LIMIT = 0.05  # pu: where the regulator is taken to be at its limit
+FIELD = ("VA", "VE", "efd", "ifd")
 EVERY = (1, 2, 5)  # samples: the rates that are tried
 
 Signals = Mapping[str, np.ndarray]
@@ -121,10 +125,26 @@ def signals(of: Subject) -> dict[str, np.ndarray]:
     return {**s, "vfe": vfe, "vf": p["KF"] / p["TF"] * (vfe - s["VF"])}
 
 
+def errors_of_all(of: Subject) -> np.ndarray:
+    """Return the standard errors (N,) of least squares of the records of all blocks at once.
+
+    In those of least squares of vt alone, by linear theory, for white noise.
+    """
+    (experiment,) = of.residuals.experiments
+    exact_signals, sizes = signals(of), {"vt": REGULATOR_NOISE} | dict.fromkeys(FIELD, FIELD_NOISE)
+    channels = tuple(
+        Channel(name, exact_signals[name], weight=1.0 / size) for name, size in sizes.items()
+    )
+    whole = replace(of.residuals, experiments=[replace(experiment, channels=channels)])
+    of_vt = of.residuals.exact(of.truth) / REGULATOR_NOISE
+    variances = [np.diag(np.linalg.inv(J.T @ J)) for J in (whole.exact(of.truth), of_vt)]
+    return np.sqrt(variances[0] / variances[1])
+
+
 def blocks(of: Subject, fit: Fit) -> Method:
     """Return the method for a unit all of whose signals are recorded; starts do not matter."""
     exact_signals, hard = signals(of), HARD_CASES[of.hard]
-    noise = dict.fromkeys(("VA", "VE", "vfe", "efd", "ifd"), FIELD_NOISE) | {"vf": REGULATOR_NOISE}
+    noise = dict.fromkeys((*FIELD, "vfe"), FIELD_NOISE) | {"vf": REGULATOR_NOISE}
 
     def method(records: Sequence[Residuals], _: np.ndarray) -> list[Estimate]:
         rng, estimates = np.random.default_rng(SEED), {}

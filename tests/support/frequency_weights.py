@@ -3,7 +3,8 @@
 Equal weights are least squares in time (Parseval). Others are one over the amplitude of the noise
 at each frequency, estimated from the residuals of an earlier fit.
 
-Source: Whittle 1953; Ljung 1999, sections 7.8 and 14.4; Hannan 1970, chapter 7 (smoothed spectra).
+Source: Whittle 1953; Ljung 1999, sections 7.8 and 14.4; Hannan 1970, chapter 7 (smoothed spectra);
+Prais & Winsten 1954 (whitening in time).
 """
 
 from collections.abc import Callable, Sequence
@@ -65,10 +66,14 @@ def smoothed(residuals: np.ndarray) -> np.ndarray:
     return np.sqrt(np.mean(power) / power)
 
 
-def autoregressive(residuals: np.ndarray) -> np.ndarray:
+def repeated_share(residuals: np.ndarray) -> float:
+    """Return the share of each residual in the next one."""
+    return float(residuals[1:] @ residuals[:-1] / (residuals @ residuals))
+
+
+def by_share(residuals: np.ndarray) -> np.ndarray:
     """Return weights by an AR(1) of residuals: what whitens errors that repeat a share."""
-    share = residuals[1:] @ residuals[:-1] / (residuals @ residuals)
-    return whitening(share, len(residuals))
+    return whitening(repeated_share(residuals), len(residuals))
 
 
 def whitening(share: float, count: int) -> np.ndarray:
@@ -93,6 +98,37 @@ def weighted(weighting: Weighting) -> Callable[[Residuals, np.ndarray], Estimate
         return Estimate(stages[-1].point, sum(stage.simulations for stage in stages))
 
     return estimate
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """Residuals that repeat a share of the one before, each less that share: in time."""
+
+    own: Functions
+    share: float
+
+    def whitened(self, errors: np.ndarray) -> np.ndarray:
+        """Return white errors of errors (M, ...); the first one has none before it."""
+        first = np.sqrt(1.0 - self.share**2) * errors[:1]
+        return np.concatenate([first, errors[1:] - self.share * errors[:-1]])
+
+    def residuals(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return what is made small at each of points (N,)."""
+        return [self.whitened(errors) for errors in self.own.residuals(points)]
+
+    def jacobians(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return its derivatives at each of points (N,)."""
+        return [self.whitened(slopes) for slopes in self.own.jacobians(points)]
+
+
+def whitened_in_time(record: Residuals, start: np.ndarray) -> Estimate:
+    """Return least squares by way of the linear phase, then fits whitened by their residuals."""
+    stages = [matched(record, start)]
+    stages.append(local(record, stages[0].point))
+    for _ in range(ROUNDS):
+        functions = Whitened(SideBySide(record), repeated_share(record(stages[-1].point)))
+        stages.append(descent(functions, stages[-1].point, record.bounds))
+    return Estimate(stages[-1].point, sum(stage.simulations for stage in stages))
 
 
 def curve(highest: float) -> Callable[[Residuals, np.ndarray], Estimate]:
