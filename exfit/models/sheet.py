@@ -10,6 +10,8 @@ from exfit.util.magnitude import magnitude_fault
 
 Limits = tuple[float, float]
 
+MOST_LAGS = 8  # of a ramp tracking filter of a stabiliser, M N
+
 
 class SearchRange(NamedTuple):
     """How a fit of a bump test looks for a parameter: from ``low`` to ``high``, where units lie.
@@ -302,10 +304,21 @@ def saturation_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
         yield name, f"{se_high:g} at {high:g} pu is not above {se_low:g} at {low:g} pu"
 
 
+def stabiliser_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
+    """Yield (symbol, fault) for a ramp tracking filter or a switch that cannot be."""
+    lags = values.get("M", 1.0) * values.get("N", 1.0)
+    if "N" in values and lags > MOST_LAGS:
+        yield "N", f"M N = {lags:g} lags of the ramp tracking filter exceed {MOST_LAGS}"
+    on, off = values.get("PPSSON", 0.0), values.get("PPSSOFF", 0.0)
+    if off > on > 0.0:
+        yield "PPSSOFF", f"{off:g} is above PPSSON = {on:g}"
+
+
 def contradictions(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, fault) for what does not go together in any model's values."""
     yield from crossed_limits(values)
     yield from saturation_faults(values)
+    yield from stabiliser_faults(values)
 
 
 def exponential_faults(values: Mapping[str, float]) -> Iterable[tuple[str, str]]:

@@ -13,8 +13,12 @@ HEARD = ("speed", "p", "vt", "pa", "none")
 
 
 def listening(stabiliser: Stabilised, heard: Names) -> Names:
-    """Return what a stabiliser sees, ``vsi1`` and ``vsi2``; of the speed, what it deviates."""
-    return Names(**{f"vsi{k}": getattr(heard, of) for k, of in enumerate(stabiliser.inputs, 1)})
+    """Return what a stabiliser sees, ``vsi1`` and ``vsi2``; of the speed, what it deviates.
+
+    The power ``p`` is there too: some are switched by it, whatever they listen to.
+    """
+    inputs = {f"vsi{k}": getattr(heard, of) for k, of in enumerate(stabiliser.inputs, 1)}
+    return Names(p=heard.p, **inputs)
 
 
 def rests_with_output(stabiliser: Stabilised, values: Mapping[str, float]) -> bool:

@@ -16,7 +16,7 @@ from exfit.engine.system import Rest, System
 from exfit.models import MODELS, STABILISERS
 from exfit.models.blocks import SHORTEST
 from exfit.models.machines import MACHINES
-from exfit.models.sheet import crossed_limits, typical
+from exfit.models.sheet import contradictions, crossed_limits, typical
 from exfit.plants import STABILISER, Names, Stabilised, infinite_bus
 from exfit.plants.parts import motion, values_named
 from exfit.simulation.inputs import Inputs
@@ -27,15 +27,21 @@ SIGNALS = ("speed", "p", "vt")
 SIDES = ("vsi1", "vsi2")
 
 # washouts that T = 0 leaves out: there the limit is the long time constant
-LEFT_OUT = {"PSS2B": ("TW2", "TW4"), "PSS3B": ("TW3",)}
+ACCELERATING = ("TW2", "TW4")
+LEFT_OUT = {
+    **dict.fromkeys(("PSS2B", "PSS2C", "PSS7C"), ACCELERATING),
+    **dict.fromkeys(("PSS3B", "PSS3C"), ("TW3",)),
+}
 # what is zero beside a time constant that shrinks: the rest of its filter, which would resonate,
 # a numerator that the lag bypasses, or makes steep enough for a limit; in PSS4B the branch that
 # cancels most of the other
+FILTERS = {"A3": ("A1", "A2", "A4"), "A7": ("A5", "A6", "A8")}
+BRANCHES = {f"TL{k}": ("KL2" if k <= 6 else "KL1",) for k in range(1, 13)}
 BESIDE = {
     "PSS1A": {"A1": ("A2",)},
     "IEEEST": {"A1": ("A2",), "A3": ("A4", "A6")},
-    "PSS3B": {"A3": ("A1", "A2", "A4"), "A7": ("A5", "A6", "A8")},
-    "PSS4B": {f"TL{k}": ("KL2" if k <= 6 else "KL1",) for k in range(1, 13)},
+    **dict.fromkeys(("PSS3B", "PSS3C"), FILTERS),
+    **dict.fromkeys(("PSS4B", "PSS4C"), BRANCHES),
 }
 # numerators of a washout, where 0 stands for 1 instead of s times it
 WITHOUT_WASHOUT = {"IEEEST": "T5", "ST2CUT": "T3"}
@@ -46,14 +52,16 @@ def stabiliser(request):
     return STABILISERS[request.param]
 
 
-def inputs(*vsi):
-    return Names(**dict(zip(SIDES, vsi, strict=False)))
+def inputs(*vsi, p=1.0):
+    """Return what a stabiliser sees of a unit with a power: of those with a switch, it is on."""
+    return Names(p=p, **dict(zip(SIDES, vsi, strict=False)))
 
 
 def lively(model):
-    """Return typical data with no block bypassed."""
+    """Return typical data with no block bypassed, and a switch that acts."""
     values = typical(model.sheet)
-    return values | {row.symbol: values[row.symbol] or 0.04 for row in model.sheet}
+    values |= {row.symbol: values[row.symbol] or 0.04 for row in model.sheet}
+    return values | ({"PPSSON": 0.05, "PPSSOFF": 0.04} if "PPSSON" in values else {})
 
 
 def limits_of(values):
@@ -69,12 +77,13 @@ def resting(model, p, u):
     return x
 
 
-def motion_of(model, p, x, vsi):
+def motion_of(model, p, x, vsi, power=1.0):
     """Return the slopes of states (n) and the output."""
     d = Names()
     s = Names(**dict(zip(model.states, x, strict=True)))
-    vs = model.equations(s, inputs(*vsi), p, d)
-    return np.array([getattr(d, name) for name in model.states]), vs
+    vs = model.equations(s, inputs(*vsi, p=power), p, d)
+    slopes = [getattr(d, name) for name in model.states]
+    return np.array([getattr(slope, "slope", slope) for slope in slopes]), vs
 
 
 def frequency_response(model, values):
@@ -84,7 +93,8 @@ def frequency_response(model, values):
     of a ratio alone, however small they are.
     """
     p, h, count = Names(**values), 1e-9, len(model.inputs)
-    rest = np.zeros(len(model.states) + count)
+    x = resting(model, p, inputs(0.0, 0.0))
+    rest = np.array([*(getattr(x, name) for name in model.states), *[0.0] * count])
     columns = []
     for k in range(len(rest)):
         ends = []
@@ -124,13 +134,45 @@ def pss1a(s, p):
     return [p["KS"] * washed(s, p["T5"]) / (1.0 + s * p["T6"]) * filtered * shaped]
 
 
-def pss2b(s, p):
+def accelerating(s, p):
     speed = washed(s, p["TW1"]) * washed(s, p["TW2"]) / (1.0 + s * p["T6"])
     power = washed(s, p["TW3"]) * washed(s, p["TW4"]) * p["KS2"] / (1.0 + s * p["T7"])
-    ramp = (1.0 + s * p["T8"]) / (1.0 + s * p["T9"]) ** p["M"]
+    ramp = ((1.0 + s * p["T8"]) / (1.0 + s * p["T9"]) ** p["M"]) ** p.get("N", 1.0)
+    return np.array([ramp * speed, (ramp * p["KS3"] - 1.0) * power])
+
+
+def pss2b(s, p):
     shaped = p["KS1"] * lead(s, p["T1"], p["T2"]) * lead(s, p["T3"], p["T4"])
-    shaped *= lead(s, p["T10"], p["T11"])
-    return [ramp * speed * shaped, (ramp * p["KS3"] - 1.0) * power * shaped]
+    return accelerating(s, p) * shaped * lead(s, p["T10"], p["T11"])
+
+
+def pss2c(s, p):
+    return pss2b(s, p) * lead(s, p["T12"], p["T13"])
+
+
+def canonical(s, p):
+    """Return y / u: e is u over 1 and all that the integrators make of e."""
+    powers = np.cumprod(
+        [
+            1.0 / (s * p["TI1"]),
+            1.0 / (s * p["TI2"]),
+            p["KI3"] / (s * p["TI3"]),
+            p["KI4"] / (s * p["TI4"]),
+        ]
+    )
+    gains = np.array([p["K1"], p["K2"], p["K3"], p["K4"]])
+    return (p["K0"] + gains @ powers) / (1.0 + powers.sum())
+
+
+def pss7c(s, p):
+    return p["KS1"] * canonical(s, p) * accelerating(s, p)
+
+
+def pss6c(s, p):
+    shaped = washed(s, p["TD"]) * canonical(s, p) * p["KS"]
+    power = (p["KS1"] / (1.0 + s * p["T3"]) - 1.0) / (1.0 + s * p["T1"])
+    speed = p["KS2"] / (1.0 + s * p["T2"]) * s * p["MACC"] / (1.0 + s * p["T4"])
+    return [power * shaped, speed * shaped]
 
 
 def ieeest(s, p):
@@ -163,7 +205,7 @@ def pss3b(s, p):
     return [p[K] / (1.0 + p[T] * s) * washed(s, p[TW]) * shaped for K, T, TW in sides]
 
 
-def pss4b(s, p):
+def pss4b(s, p, letters="LIH"):
     def notch(BW, W):
         return (s * s + W * W) / (s * s + BW * s + W * W) if W > 0.0 else 1.0
 
@@ -180,7 +222,22 @@ def pss4b(s, p):
     low *= notch(p["BWLI1"], p["WLI1"]) * notch(p["BWLI2"], p["WLI2"])
     high = -1.0 / (1.0 + p["TH"] * s) * s * s / (1.0 + p["BH"] * s + p["AH"] * s * s)
     high *= notch(p["BWH1"], p["WH1"]) * notch(p["BWH2"], p["WH2"]) / (p["M"] * s)
-    return [low * (band("L") + band("I")), high * band("H")]
+    return [low * sum(band(letter) for letter in letters if letter != "H"), high * band("H")]
+
+
+def pss4c(s, p):
+    return pss4b(s, p, ("VL", "L", "I", "H"))
+
+
+def pss5c(s, p):
+    def band(letter):
+        f = p[f"F{letter}"]
+        slow, middle, fast = (1.0 + s / (p[k] * f) for k in ("K1", "K2", "K3"))
+        return p[f"K{letter}"] * (fast / middle - middle / slow)
+
+    low = (1.0 + 1.759e-3 * s) / (1.0 + 1.7823e-2 * s + 1.2739e-4 * s * s)
+    high = 80.0 * s * s / (s**3 + 82.0 * s**2 + 161.0 * s + 80.0)
+    return [low * (band("VL") + band("L") + band("I")) + high * band("H")]
 
 
 FUNCTIONS = {
@@ -188,8 +245,14 @@ FUNCTIONS = {
     "STAB2A": stab2a,
     "PSS1A": pss1a,
     "PSS2B": pss2b,
+    "PSS2C": pss2c,
     "PSS3B": pss3b,
+    "PSS3C": pss3b,
     "PSS4B": pss4b,
+    "PSS4C": pss4c,
+    "PSS5C": pss5c,
+    "PSS6C": pss6c,
+    "PSS7C": pss7c,
     "IEEEST": ieeest,
     "ST2CUT": st2cut,
 }
@@ -217,12 +280,20 @@ def test_the_response_is_the_product_of_the_blocks_for_drawn_values(stabiliser):
     for _ in range(20):
         values = lively(stabiliser)
         moved = {name: value * 3.0 ** rng.uniform(-1.0, 1.0) for name, value in values.items()}
-        assert_is_its_function(stabiliser, moved | ({"M": 4.0} if "M" in values else {}))
+        whole = {"M": 4.0, "N": 2.0} if "N" in values else {"M": 4.0}
+        assert_is_its_function(stabiliser, moved | (whole if "M" in values else {}))
 
 
 @pytest.mark.parametrize("lags", [1.0, 2.0, 3.0, 4.0, 5.0])
 def test_the_ramp_tracking_filter_has_as_many_lags_as_M(lags):
     assert_is_its_function(STABILISERS["PSS2B"], lively(STABILISERS["PSS2B"]) | {"M": lags})
+
+
+@pytest.mark.parametrize(("M", "N"), [(1, 1), (5, 1), (2, 4), (4, 2), (2, 3), (1, 4)])
+@pytest.mark.parametrize("name", ["PSS2C", "PSS7C"])
+def test_the_ramp_tracking_filter_is_as_many_blocks_as_N(name, M, N):
+    values = lively(STABILISERS[name]) | {"M": float(M), "N": float(N)}
+    assert_is_its_function(STABILISERS[name], values)
 
 
 @pytest.mark.parametrize("name", WITHOUT_WASHOUT)
@@ -292,9 +363,10 @@ def test_rest_is_rest_with_an_output_of_zero(stabiliser):
     for values in (typical(stabiliser.sheet), lively(stabiliser)):
         p = Names(**values)
         for vsi in ((0.0, 0.0), (0.01, 0.8), (-0.5, -3.0), (0.2, 9.0)):
-            x = resting(stabiliser, p, inputs(*vsi))
+            power = vsi[1]  # below the switch, between its powers, above
+            x = resting(stabiliser, p, inputs(*vsi, p=power))
             at = [getattr(x, name) for name in stabiliser.states]
-            slopes, vs = motion_of(stabiliser, p, at, vsi)
+            slopes, vs = motion_of(stabiliser, p, at, vsi, power)
             np.testing.assert_array_equal(slopes, 0.0)
             assert vs == 0.0
 
@@ -315,12 +387,13 @@ def test_the_output_stays_within_its_limits_and_reaches_both(stabiliser):
     assert (min(outputs), max(outputs)) == (low, high)
 
 
-def test_an_input_beyond_its_limit_acts_as_the_limit_does():
-    model = STABILISERS["PSS2B"]
+@pytest.mark.parametrize("name", ["PSS2B", "PSS2C", "PSS6C", "PSS7C"])
+def test_an_input_beyond_its_limit_acts_as_the_limit_does(name):
+    model = STABILISERS[name]
     p, x = Names(**lively(model)), np.full(len(model.states), 0.01)
     for beyond, limit in (
-        ((0.3, 0.0), (p.VSI1MAX, 0.0)),
-        ((-0.3, 0.0), (p.VSI1MIN, 0.0)),
+        ((2.3, 0.0), (p.VSI1MAX, 0.0)),
+        ((-2.3, 0.0), (p.VSI1MIN, 0.0)),
         ((0.0, 4.0), (0.0, p.VSI2MAX)),
         ((0.0, -4.0), (0.0, p.VSI2MIN)),
     ):
@@ -333,14 +406,17 @@ def test_no_parameter_is_inert(stabiliser):
     rng = np.random.default_rng(2)
     values = lively(stabiliser)
     probes = [
-        (size * rng.normal(size=len(stabiliser.states)), size * rng.normal(size=2))
+        (size * rng.normal(size=len(stabiliser.states)), size * rng.normal(size=2), size)
         for size in (1e-4, 0.03, 3.0)
         for _ in range(20)
     ]
+    if "ON" in stabiliser.states:  # the last state: on its way, or there
+        for k, (x, _, _) in enumerate(probes):
+            x[-1] = 0.3 if k % 2 else 1.0
 
     def felt(changed):
         p = Names(**changed)
-        return [np.append(*motion_of(stabiliser, p, x, vsi)) for x, vsi in probes]
+        return [np.append(*motion_of(stabiliser, p, *probe)) for probe in probes]
 
     before = felt(values)
     for row in stabiliser.sheet:
@@ -356,7 +432,7 @@ def as_system(model):
 
     def course(p, r, x, u):
         d = Names()
-        seen = inputs(*(u[name] for name in SIDES))
+        seen = inputs(*(u[name] for name in SIDES), p=1.0 + u["vsi2"])
         sheet = Names(**{row.symbol: p[row.symbol] for row in model.sheet})
         vs = model.equations(values_named(x, model.states), seen, sheet, d)
         return motion(d, model.states, {"vs": vs, **x})
@@ -430,11 +506,40 @@ def chain_of_pss3b(p):
     return series(p["KS1"], ([1.0], [p["T1"], 1.0]), *washouts, *filters)
 
 
+def canonical_ratio(p):
+    """Return y / u of the canonical form as two polynomials."""
+    s = np.array([1.0, 0.0])
+    steps = [p["TI1"] * s, p["TI2"] * s, p["TI3"] / p["KI3"] * s, p["TI4"] / p["KI4"] * s]
+    behind = [np.array([1.0])]  # what is left of the product behind each integrator
+    for step in reversed(steps):
+        behind.append(np.polymul(step, behind[-1]))
+    gains = (p["K4"], p["K3"], p["K2"], p["K1"], p["K0"])
+    above = below = np.array([0.0])
+    for gain, product in zip(gains, behind, strict=True):
+        above, below = np.polyadd(above, gain * product), np.polyadd(below, product)
+    return above, below
+
+
+def chain_of_pss6c(p):
+    """Of the power, whose own share of the sum is (KS1 - 1 - sT3) / (1 + sT3)."""
+    blocks = ([1.0], [p["T1"], 1.0]), ([-p["T3"], p["KS1"] - 1.0], [p["T3"], 1.0])
+    return series(p["KS"], *blocks, ([p["TD"], 0.0], [p["TD"], 1.0]), canonical_ratio(p))
+
+
+def chain_of_pss7c(p):
+    washouts = [([p[T], 0.0], [p[T], 1.0]) for T in ("TW1", "TW2")]
+    ramp = [([p["T8"], 1.0], np.array([p["T9"], 1.0]))] + [([1.0], [p["T9"], 1.0])] * 4
+    return series(p["KS1"], *washouts, ([1.0], [p["T6"], 1.0]), *ramp, canonical_ratio(p))
+
+
 CHAINS = {
     "IEEEST": chain_of_ieeest,
     "ST2CUT": chain_of_st2cut,
     "STAB2A": chain_of_stab2a,
     "PSS3B": chain_of_pss3b,
+    "PSS3C": chain_of_pss3b,
+    "PSS6C": chain_of_pss6c,
+    "PSS7C": chain_of_pss7c,
 }
 
 
@@ -552,6 +657,105 @@ def test_the_bands_of_another_typing_and_method_reach_their_limits_together(limi
     assert np.abs(got[:, 0, 0] - expected).max() < 3e-5 * np.abs(expected).max()
 
 
+# --- the edition of 2016 --------------------------------------------------------------------------
+
+# the form of 2005, values that make the new one equal to it, and what then makes that one so
+FORMS = {
+    "PSS2C": ("PSS2B", {"N": 1.0, "T12": 0.3, "T13": 0.3, "PPSSON": 0.0}),
+    "PSS3C": ("PSS3B", {"PPSSON": 0.0}),
+    "PSS4C": ("PSS4B", {"KVL": 0.0}),
+}
+
+
+def outputs_over_a_swing(model, values, swing=lambda t: 0.02 * np.sin(4.0 * t)):
+    """Return vs every 2 ms of 4 s; the power swings too, and stays above 0.5."""
+    time = 2e-3 * np.arange(2001)
+    u = np.column_stack([swing(time), 0.3 * np.cos(9.0 * time) - 0.2])
+    system = as_system(model)
+    code, p = Kernel(system, system.outputs), vector(system, values)[:, None]
+    (got,) = code.run(p, code.start(p), [Span(u, 2e-3, 2)])
+    return time, got[:, 0, 0]
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_stabiliser_of_2016_is_that_of_2005_while_what_is_new_does_nothing(name):
+    old, held = FORMS[name]
+    values = lively(STABILISERS[old])
+    new = lively(STABILISERS[name]) | values | held
+    _, expected = outputs_over_a_swing(STABILISERS[old], values)
+    _, got = outputs_over_a_swing(STABILISERS[name], new)
+    low, high = limits_of(values)
+    assert (expected.min(), expected.max()) == (low, high)
+    assert np.abs(got - expected).max() < 1e-9  # rounding
+
+
+def test_the_stabiliser_of_speed_alone_is_that_of_four_bands_of_which_the_power_follows_it():
+    """Behind the swing equation s M dw = -P; K1 to K3 and the gains are those of the branches."""
+    short, long = STABILISERS["PSS5C"], STABILISERS["PSS4C"]
+    values = typical(short.sheet)
+    same = typical(long.sheet) | {"DLI": 0.001759, "VSTMAX": 0.15, "VSTMIN": -0.15}
+    for letter in ("VL", "L", "I", "H"):
+        f = values[f"F{letter}"]
+        slow, middle, fast = (1.0 / (values[k] * f) for k in ("K1", "K2", "K3"))
+        same |= {f"T{letter}1": fast, f"T{letter}2": middle}
+        same |= {f"T{letter}7": middle, f"T{letter}8": slow}
+        same |= {
+            f"K{letter}1": 66.0,
+            f"K{letter}2": 66.0,
+            f"K{letter}": values[f"K{letter}"] / 66.0,
+        }
+    expected = frequency_response(long, same)
+    of_power = -same["M"] * 2j * np.pi * FREQUENCIES
+    together = expected[:, 0] + expected[:, 1] * of_power
+    got = frequency_response(short, values)[:, 0]
+    assert np.abs(got - together).max() < 1e-9 * np.abs(got).max()  # rounding
+
+
+SWITCHED = ("PSS2C", "PSS3C", "PSS6C", "PSS7C")
+
+
+@pytest.mark.parametrize("name", SWITCHED)
+def test_the_power_switches_a_stabiliser_off_and_on_and_between_both_it_stays(name):
+    """Down through the upper power, the lower one, and up again; vs is what it is without one."""
+    model = STABILISERS[name]
+    values = typical(model.sheet) | {"PPSSON": 0.4, "PPSSOFF": 0.2}
+    time = 1e-3 * np.arange(4001)
+    power = np.interp(time, [0.0, 0.5, 1.5, 2.5, 3.5, 4.0], [0.9, 0.9, 0.1, 0.1, 0.9, 0.9])
+    u = np.column_stack([0.001 * np.sin(7.0 * time), power - 1.0])
+    system = as_system(model)
+    code = Kernel(system, system.outputs)
+
+    def response(changes):
+        p = vector(system, values | changes)[:, None]
+        (got,) = code.run(p, code.start(p), [Span(u, 1e-3, 1)])
+        return got[:, 0, 0]
+
+    got, without = response({}), response({"PPSSON": 0.0})
+    falls, rises = 0.5 + 0.7 / 0.8, 2.5 + 0.3 / 0.8  # where the power passes them
+    off = (time > falls + 0.0065) & (time < rises + 0.0045)  # half of SWITCHING, and a step
+    on = (time < falls + 0.0045) | (time > rises + 0.0065)
+    assert np.abs(without[off]).max() > 1e-4
+    assert (got[off] == 0.0).all()
+    np.testing.assert_array_equal(got[on], without[on])
+
+
+@pytest.mark.parametrize("name", SWITCHED)
+def test_a_start_is_on_from_the_upper_power_up(name):
+    model = STABILISERS[name]
+    p = Names(**typical(model.sheet) | {"PPSSON": 0.4, "PPSSOFF": 0.2})
+    starts = [resting(model, p, inputs(0.0, 0.0, p=power)).ON for power in (0.1, 0.3, 0.4, 0.7)]
+    assert starts == [0.0, 0.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize("changes", [{"M": 5.0, "N": 2.0}, {"PPSSON": 0.2, "PPSSOFF": 0.3}])
+def test_a_filter_too_long_and_powers_of_the_switch_in_the_wrong_order_are_faults(changes):
+    values = typical(STABILISERS["PSS2C"].sheet)
+    assert [*contradictions(values)] == []
+    ((symbol, text),) = contradictions(values | changes)
+    assert symbol in changes
+    assert "exceed 8" in text or "above PPSSON = 0.2" in text
+
+
 @pytest.mark.parametrize(("name", "symbol"), [("PSS3B", "A5"), ("IEEEST", "A5"), ("PSS3B", "A7")])
 def test_a_coefficient_of_a_numerator_alone_asks_for_no_sub_steps(name, symbol):
     """A lag does; what is above it has no motion of its own."""
@@ -593,7 +797,7 @@ def test_a_record_lists_every_parameter_once(stabiliser):
         symbols = [row.symbol for row in stabiliser.sheet]
         integers = [name for name, _ in record.icons if name in symbols]
         listed = [*record.cons, *integers, *dict(record.held)]
-        assert sorted(listed) == sorted([*symbols, *dict(record.absent)])
+        assert sorted(listed) == sorted([*symbols, *dict(record.absent), *record.ignored])
 
 
 def test_the_inputs_are_signals_of_a_plant(stabiliser):

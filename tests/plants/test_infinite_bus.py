@@ -323,8 +323,14 @@ GAINS = {
     "IEEEST": ("KS",),
     "PSS1A": ("KS",),
     "PSS2B": ("KS1",),
+    "PSS2C": ("KS1",),
     "PSS3B": ("KS1", "KS2"),
+    "PSS3C": ("KS1", "KS2"),
     "PSS4B": ("KL", "KI", "KH"),
+    "PSS4C": ("KVL", "KL", "KI", "KH"),
+    "PSS5C": ("KVL", "KL", "KI", "KH"),
+    "PSS6C": ("KS",),
+    "PSS7C": ("KS1",),
     "ST2CUT": ("K1", "K2"),
     "STAB1": ("K_T",),
     "STAB2A": ("K5",),
@@ -409,10 +415,10 @@ def test_exact_derivatives_reach_through_a_stabiliser(stabiliser):
     made, values = stabilised(stabiliser)
     gains = [STABILISER + name for name in GAINS[stabiliser.name]]
     values |= {name: 0.2 * values[name] for name in gains}
-    if stabiliser.name == "PSS3B":
+    if stabiliser.name in ("PSS3B", "PSS3C"):
         values[STABILISER + "A5"] = 0.0015  # 0.001 is the step: half of its neighbours take two
-    # the bands of PSS4B are small differences of large branches
-    part = 3e-5 if stabiliser.name == "PSS4B" else 1e-4
+    # the bands of PSS4B and PSS4C are small differences of large branches
+    part = 3e-5 if stabiliser.name in ("PSS4B", "PSS4C") else 1e-4
     assert damping_of_the_swing(made, values) > 0.0
     inputs = Inputs(0.0, 2.0, (InputStep(0.2, 0.0005),))
     simulator = Simulator(made, inputs, np.linspace(0.0, 2.0, 41), 1e-3)

@@ -20,8 +20,9 @@ record has no such rows: it is read as PSS2B with these values.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, high_pass, lag, lead_lag, where
+from exfit.models.blocks import clip, lead_lag
 from exfit.models.sheet import record, sheet
+from exfit.models.stabiliser_parts import accelerating, accelerating_rest
 
 INPUTS = ("speed", "p")
 ALIASES = ("PSS2A",)
@@ -96,25 +97,14 @@ PSLF_RECORDS = (
     ),
 )
 
+LAGS = 5  # of the ramp tracking filter: the highest M
 STATES = "W1 W2 V6 W3 W4 V7 R1 R2 R3 R4 R5 V1 V3 V10"
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return vs."""
-    vsi1 = clip(u.vsi1, p.VSI1MIN, p.VSI1MAX)
-    w1, d.W1 = high_pass(vsi1, s.W1, p.TW1)
-    w2, d.W2 = high_pass(w1, s.W2, p.TW2)
-    v6, d.V6 = lag(w2, s.V6, 1.0, p.T6)
-    vsi2 = clip(u.vsi2, p.VSI2MIN, p.VSI2MAX)
-    w3, d.W3 = high_pass(vsi2, s.W3, p.TW3)
-    w4, d.W4 = high_pass(w3, s.W4, p.TW4)
-    v7, d.V7 = lag(w4, s.V7, p.KS2, p.T7)
-    ramp, d.R1 = lead_lag(v6 + p.KS3 * v7, s.R1, p.T8, p.T9)
-    ramp, d.R2 = lag(ramp, s.R2, 1.0, where(p.M >= 2.0, p.T9, 0.0))
-    ramp, d.R3 = lag(ramp, s.R3, 1.0, where(p.M >= 3.0, p.T9, 0.0))
-    ramp, d.R4 = lag(ramp, s.R4, 1.0, where(p.M >= 4.0, p.T9, 0.0))
-    ramp, d.R5 = lag(ramp, s.R5, 1.0, where(p.M >= 5.0, p.T9, 0.0))
-    v1, d.V1 = lead_lag(p.KS1 * (ramp - v7), s.V1, p.T1, p.T2)
+    v = accelerating(s, u, p, d, LAGS, 1.0)
+    v1, d.V1 = lead_lag(p.KS1 * v, s.V1, p.T1, p.T2)
     v3, d.V3 = lead_lag(v1, s.V3, p.T3, p.T4)
     v10, d.V10 = lead_lag(v3, s.V10, p.T10, p.T11)
     return clip(v10, p.VSTMIN, p.VSTMAX)
@@ -122,6 +112,5 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
 
 def rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
     """Write the states into x that still inputs lead to; vs is then 0."""
-    x.W1, x.W2, x.V6 = clip(u.vsi1, p.VSI1MIN, p.VSI1MAX), 0.0, 0.0
-    x.W3, x.W4, x.V7 = clip(u.vsi2, p.VSI2MIN, p.VSI2MAX), 0.0, 0.0
-    x.R1 = x.R2 = x.R3 = x.R4 = x.R5 = x.V1 = x.V3 = x.V10 = 0.0
+    accelerating_rest(u, p, x, LAGS)
+    x.V1 = x.V3 = x.V10 = 0.0

@@ -144,6 +144,13 @@ SLOWEST = 1e-6  # rad/s
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return vs."""
+    low, high = transduced(s, u, p, d)
+    bands = band("L", low, s, p, d) + band("I", low, s, p, d) + band("H", high, s, p, d)
+    return clip(bands, p.VSTMIN, p.VSTMAX)
+
+
+def transduced(s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
+    """Return what the bands of low and intermediate frequency get, and that of high frequency."""
     low, d.XLI, d.YLI = second_order_lead(u.vsi1, s.XLI, s.YLI, p.DLI, p.CLI, p.BLI, p.ALI)
     low, d.XLI1, d.YLI1 = notch(low, s.XLI1, s.YLI1, p.BWLI1, p.WLI1)
     low, d.XLI2, d.YLI2 = notch(low, s.XLI2, s.YLI2, p.BWLI2, p.WLI2)
@@ -152,8 +159,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     d.XH = steep
     high, d.XH1, d.YH1 = notch(steep / p.M, s.XH1, s.YH1, p.BWH1, p.WH1)
     high, d.XH2, d.YH2 = notch(high, s.XH2, s.YH2, p.BWH2, p.WH2)
-    bands = band("L", low, s, p, d) + band("I", low, s, p, d) + band("H", high, s, p, d)
-    return clip(bands, p.VSTMIN, p.VSTMAX)
+    return low, high
 
 
 def notch(u: Signal, x: Signal, v: Signal, BW: Signal, W: Signal) -> tuple[Signal, Signal, Signal]:
@@ -195,8 +201,13 @@ def rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
     x.PH = x.XH = -u.vsi2
     x.YLI = x.YLI1 = x.YLI2 = x.YH = x.XH1 = x.YH1 = x.XH2 = x.YH2 = 0.0
     for letter, low in (("L", u.vsi1), ("I", u.vsi1), ("H", 0.0)):
-        upper, lower = getattr(p, f"K{letter}1") * low, getattr(p, f"K{letter}2") * low
-        coefficients = getattr(p, f"K{letter}11"), getattr(p, f"K{letter}17")
-        for k, (gained, constant) in enumerate(zip((upper, lower), coefficients, strict=True)):
-            for n in range(3):
-                setattr(x, f"{letter}{3 * k + n + 1}", gained if n == 0 else constant * gained)
+        band_rest(letter, low, p, x)
+
+
+def band_rest(letter: str, low: Signal, p: Signal, x: Signal) -> None:
+    """Write the states of a band into x that a still input leads to."""
+    upper, lower = getattr(p, f"K{letter}1") * low, getattr(p, f"K{letter}2") * low
+    coefficients = getattr(p, f"K{letter}11"), getattr(p, f"K{letter}17")
+    for k, (gained, constant) in enumerate(zip((upper, lower), coefficients, strict=True)):
+        for n in range(3):
+            setattr(x, f"{letter}{3 * k + n + 1}", gained if n == 0 else constant * gained)

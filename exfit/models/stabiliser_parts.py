@@ -1,0 +1,108 @@
+"""What stabilisers share: a signal of the accelerating power, a canonical form, the switch."""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, high_pass, lag, lead_lag, limited, where
+from exfit.models.sheet import sheet
+
+SWITCHING = 0.01  # s, in which the state of the switch goes from one end to the other
+
+ACCELERATING = sheet(
+    ("TW1", 10.0, "s", (0.01, 1000.0), "first washout of the first input"),
+    ("TW2", 10.0, "s", (0.0, 1000.0), "second washout of the first input"),
+    ("T6", 0.0, "s", (0.0, 100.0), "transducer lag of the first input"),
+    ("TW3", 10.0, "s", (0.01, 1000.0), "first washout of the second input"),
+    ("TW4", 0.0, "s", (0.0, 1000.0), "second washout of the second input"),
+    ("T7", 10.0, "s", (0.0, 1000.0), "transducer lag of the second input"),
+    ("KS2", 0.99, "pu", (-1000.0, 1000.0), "gain of the second input"),
+    ("KS3", 1.0, "pu", (-1000.0, 1000.0), "share of the second input that is filtered"),
+    ("T8", 0.5, "s", (0.0, 100.0), "lead of the ramp tracking filter"),
+    ("T9", 0.1, "s", (0.001, 100.0), "lag of the ramp tracking filter"),
+    ("M", 5.0, "1", (1.0, 5.0), "number of lags of a block of the ramp tracking filter"),
+    ("N", 1.0, "1", (1.0, 4.0), "number of blocks of the ramp tracking filter"),
+)
+
+CANONICAL = sheet(
+    ("K0", 1.0, "pu", (-1000.0, 1000.0), "gain of the input of the first integrator"),
+    ("K1", 1.0, "pu", (-1000.0, 1000.0), "gain of the output of the first integrator"),
+    ("K2", 1.0, "pu", (-1000.0, 1000.0), "gain of the output of the second integrator"),
+    ("K3", 1.0, "pu", (-1000.0, 1000.0), "gain of the output of the third integrator"),
+    ("K4", 0.0, "pu", (-1000.0, 1000.0), "gain of the output of the fourth integrator"),
+    ("KI3", 1.0, "pu", (-1000.0, 1000.0), "gain of the third integrator"),
+    ("KI4", 0.0, "pu", (-1000.0, 1000.0), "gain of the fourth integrator"),
+    ("TI1", 0.1, "s", (0.001, 1000.0), "time constant of the first integrator"),
+    ("TI2", 0.1, "s", (0.001, 1000.0), "time constant of the second integrator"),
+    ("TI3", 1.0, "s", (0.001, 1000.0), "time constant of the third integrator"),
+    ("TI4", 1.0, "s", (0.001, 1000.0), "time constant of the fourth integrator"),
+)
+
+INPUT_LIMITS = sheet(
+    ("VSI1MAX", 2.0, "pu", (-9999.0, 9999.0), "ceiling of the first input"),
+    ("VSI1MIN", -2.0, "pu", (-9999.0, 9999.0), "floor of the first input"),
+    ("VSI2MAX", 2.0, "pu", (-9999.0, 9999.0), "ceiling of the second input"),
+    ("VSI2MIN", -2.0, "pu", (-9999.0, 9999.0), "floor of the second input"),
+)
+
+SWITCH = sheet(
+    ("PPSSON", 0.0, "pu", (-10.0, 10.0), "power at which it is switched on, or 0"),
+    ("PPSSOFF", 0.0, "pu", (-10.0, 10.0), "power at which it is switched off"),
+)
+
+
+def limited_inputs(u: Signal, p: Signal) -> tuple[Signal, Signal]:
+    """Return both inputs within their limits."""
+    return clip(u.vsi1, p.VSI1MIN, p.VSI1MAX), clip(u.vsi2, p.VSI2MIN, p.VSI2MAX)
+
+
+def accelerating(s: Signal, u: Signal, p: Signal, d: Signal, lags: int, N: Signal) -> Signal:
+    """Return what speed and power say of the integral of the accelerating power.
+
+    Its ramp tracking filter has room for so many ``lags``, N blocks (1 + sT8) / (1 + sT9)^M.
+    """
+    vsi1, vsi2 = limited_inputs(u, p)
+    w1, d.W1 = high_pass(vsi1, s.W1, p.TW1)
+    w2, d.W2 = high_pass(w1, s.W2, p.TW2)
+    v6, d.V6 = lag(w2, s.V6, 1.0, p.T6)
+    w3, d.W3 = high_pass(vsi2, s.W3, p.TW3)
+    w4, d.W4 = high_pass(w3, s.W4, p.TW4)
+    v7, d.V7 = lag(w4, s.V7, p.KS2, p.T7)
+    ramp = v6 + p.KS3 * v7
+    for k in range(1, lags + 1):
+        lead, slow = where(k <= N, p.T8, 0.0), where(k <= p.M * N, p.T9, 0.0)
+        ramp, slope = lead_lag(ramp, getattr(s, f"R{k}"), lead, slow)
+        setattr(d, f"R{k}", slope)
+    return ramp - v7
+
+
+def accelerating_rest(u: Signal, p: Signal, x: Signal, lags: int) -> None:
+    """Write the states of ``accelerating`` into x that still inputs lead to; it is then 0."""
+    x.W1, x.W3 = limited_inputs(u, p)
+    x.W2 = x.V6 = x.W4 = x.V7 = 0.0
+    for k in range(1, lags + 1):
+        setattr(x, f"R{k}", 0.0)
+
+
+def canonical(u: Signal, s: Signal, p: Signal, d: Signal) -> Signal:
+    """Return a weighted sum of a signal, less what four integrators in a row give, and of these."""
+    e = u - (s.X1 + s.X2 + s.X3 + s.X4)
+    d.X1 = e / p.TI1
+    d.X2 = s.X1 / p.TI2
+    d.X3 = p.KI3 * s.X2 / p.TI3
+    d.X4 = p.KI4 * s.X3 / p.TI4
+    return p.K0 * e + p.K1 * s.X1 + p.K2 * s.X2 + p.K3 * s.X3 + p.K4 * s.X4
+
+
+def switched(vs: Signal, s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Return vs, or 0 from where the power falls to PPSSOFF to where it rises to PPSSON.
+
+    The state goes towards the end that the power asks for, and between both powers to the nearer
+    one, in ``SWITCHING``; half way it switches. With PPSSON = 0 nothing does.
+    """
+    here = where(s.ON > 0.5, 1.0, -1.0)
+    towards = where(u.p >= p.PPSSON, 1.0, where(u.p <= p.PPSSOFF, -1.0, here))
+    d.ON = limited(towards / SWITCHING, s.ON, 0.0, 1.0)
+    return where((p.PPSSON <= 0.0) | (s.ON > 0.5), vs, 0.0)
+
+
+def switch_rest(u: Signal, p: Signal, x: Signal) -> None:
+    """Write the state of the switch into x: on where the power is PPSSON at least."""
+    x.ON = where(u.p >= p.PPSSON, 1.0, 0.0)

@@ -1,0 +1,94 @@
+"""PSS6C: dual input stabiliser, power and speed (IEEE Std 421.5-2016).
+
+      VSI1MAX
+vsi1 ─►[clip]─►[   1   ]─┬─►[  KS1  ]─►(+)─►[ sTD   ]─► v
+       VSI1MIN [1 + sT1] │  [1 + sT3]  ▲-▲  [1 + sTD]
+                         └─────────────┘ │
+      VSI2MAX                            │
+vsi2 ─►[clip]─►[  KS2  ]─►[ sMACC ]──────┘
+       VSI2MIN [1 + sT2]  [1 + sT4]
+                                    VSTMAX
+v ─►(+)─ e ─►[form]─ y ──────►[KS]─►[clip]─►[switch]─► vs
+    -▲         │                    VSTMIN
+     └── f ◄───┘
+
+The canonical form has four integrators in a row: sTI1 x1 = e, sTI2 x2 = x1,
+sTI3 x3 = KI3 x2, sTI4 x4 = KI4 x3; f = x1 + x2 + x3 + x4 is fed back, and
+y = K0 e + K1 x1 + K2 x2 + K3 x3 + K4 x4.
+
+The first input is the electrical power, the second the speed. The signs are
+Dynawo's, and those with which the sample data damp: MACC and KS1 positive make
+of power and speed the accelerating power. PowerWorld and PSS/E 36, as InterPSS
+has compared them, take the sum with the other sign, and PSS/E has another form
+(each integrator gets e and all outputs before it): there is no record of it
+here.
+
+The switch makes vs 0 from where the power p of the machine falls to PPSSOFF to
+where it rises to PPSSON; it goes over 5 ms after the power has passed. It is on
+at the start where p is PPSSON or more (as in InterPSS; Dynawo: more than
+PPSSOFF). PPSSON = 0 leaves it out. The switching makes vs jump: derivatives of
+a response do not include the shift of the jumps. T1, T2 or T3 = 0 bypasses its
+block. Typical data are the standard's, as GridKit has them.
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import clip, high_pass, lag, washout
+from exfit.models.sheet import sheet, with_typical
+from exfit.models.stabiliser_parts import (
+    CANONICAL,
+    INPUT_LIMITS,
+    SWITCH,
+    canonical,
+    limited_inputs,
+    switch_rest,
+    switched,
+)
+
+INPUTS = ("p", "speed")
+
+SHEET = (
+    *sheet(
+        ("KS1", 1.0, "pu", (-1000.0, 1000.0), "gain of the first input"),
+        ("T1", 0.01, "s", (0.0, 100.0), "transducer lag of the first input"),
+        ("T3", 0.4405, "s", (0.0, 100.0), "lag of the first input"),
+        ("KS2", 1.0, "pu", (-1000.0, 1000.0), "gain of the second input"),
+        ("MACC", 20.6838, "s", (-1000.0, 1000.0), "lead of the second input"),
+        ("T2", 0.01, "s", (0.0, 100.0), "transducer lag of the second input"),
+        ("T4", 0.4405, "s", (0.001, 100.0), "lag of the second input"),
+        ("TD", 1.7809, "s", (0.01, 1000.0), "washout of the sum"),
+        ("KS", 1.0, "pu", (-10000.0, 10000.0), "stabiliser gain"),
+        ("VSTMAX", 0.05, "pu", (-9999.0, 9999.0), "ceiling of the output"),
+        ("VSTMIN", -0.05, "pu", (-9999.0, 9999.0), "floor of the output"),
+    ),
+    *with_typical(
+        CANONICAL,
+        **{"K0": 1.3322, "K1": 0.2903, "K2": 0.7371, "K3": 0.0813},
+        **{"TI1": 0.06, "TI2": 0.5794, "TI3": 3.5414},
+    ),
+    *INPUT_LIMITS,
+    *with_typical(SWITCH, PPSSON=0.21, PPSSOFF=0.19),
+)
+
+STATES = "V1 V3 V2 W4 WD X1 X2 X3 X4 ON"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return vs."""
+    vsi1, vsi2 = limited_inputs(u, p)
+    v1, d.V1 = lag(vsi1, s.V1, 1.0, p.T1)
+    v3, d.V3 = lag(v1, s.V3, p.KS1, p.T3)
+    v2, d.V2 = lag(vsi2, s.V2, p.KS2, p.T2)
+    w4, d.W4 = washout(v2, s.W4, p.MACC, p.T4)
+    v, d.WD = high_pass(v3 - v1 + w4, s.WD, p.TD)
+    y = canonical(v, s, p, d)
+    return switched(clip(p.KS * y, p.VSTMIN, p.VSTMAX), s, u, p, d)
+
+
+def rest(vs: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x that still inputs lead to; vs is then 0."""
+    x.V1, vsi2 = limited_inputs(u, p)
+    x.V3 = p.KS1 * x.V1
+    x.V2 = x.W4 = p.KS2 * vsi2
+    x.WD = x.V3 - x.V1
+    x.X1 = x.X2 = x.X3 = x.X4 = 0.0
+    switch_rest(u, p, x)
