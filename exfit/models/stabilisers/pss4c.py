@@ -3,7 +3,7 @@
                                                                    VSTMAX
 vsi1 ─►[1 + sDLI + s²CLI]─►[NLI1]─►[NLI2]─┬─►[VL ]─►(+)──────►(+)─►[clip]─► vs
        [1 + sBLI + s²ALI]                 │          ▲         ▲   VSTMIN
-                                          ├─►[ L ]──►(+)       │
+                                          ├─►[ L ]─►(+)        │
                                           │          ▲         │
                                           └─►[ I ]───┘         │
                                                                │

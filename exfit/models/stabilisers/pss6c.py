@@ -1,11 +1,11 @@
 """PSS6C: dual input stabiliser, power and speed (IEEE Std 421.5-2016).
 
       VSI1MAX
-vsi1 ─►[clip]─►[   1   ]─┬─►[  KS1  ]─►(+)─►[ sTD   ]─► v
-       VSI1MIN [1 + sT1] │  [1 + sT3]  ▲-▲  [1 + sTD]
-                         └─────────────┘ │
-      VSI2MAX                            │
-vsi2 ─►[clip]─►[  KS2  ]─►[ sMACC ]──────┘
+vsi1 ─►[clip]─►[   1   ]─┬─►[  KS1  ]─►(+)─►(+)─►[ sTD   ]─► v
+       VSI1MIN [1 + sT1] │  [1 + sT3]  -▲    ▲   [1 + sTD]
+                         └──────────────┘    │
+      VSI2MAX                                │
+vsi2 ─►[clip]─►[  KS2  ]─►[ sMACC ]──────────┘
        VSI2MIN [1 + sT2]  [1 + sT4]
                                     VSTMAX
 v ─►(+)─ e ─►[form]─ y ──────►[KS]─►[clip]─►[switch]─► vs
@@ -17,11 +17,11 @@ sTI3 x3 = KI3 x2, sTI4 x4 = KI4 x3; f = x1 + x2 + x3 + x4 is fed back, and
 y = K0 e + K1 x1 + K2 x2 + K3 x3 + K4 x4.
 
 The first input is the electrical power, the second the speed. The signs are
-Dynawo's, and those with which the sample data damp: MACC and KS1 positive make
-of power and speed the accelerating power. PowerWorld and PSS/E 36, as InterPSS
-has compared them, take the sum with the other sign, and PSS/E has another form
-(each integrator gets e and all outputs before it): there is no record of it
-here.
+Dynawo's: MACC and KS1 make of power and speed the accelerating power, and the
+sample data damp a swing, which they do not with the other sign. InterPSS, which
+has compared it with PSS/E 36, takes the whole sum with the other sign, and
+PSS/E has another form (each integrator gets e and all outputs before it): its
+record would be read as what it is not, and so there is none here.
 
 The switch makes vs 0 from where the power p of the machine falls to PPSSOFF to
 where it rises to PPSSON; it goes over 5 ms after the power has passed. It is on

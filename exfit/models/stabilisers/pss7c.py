@@ -28,7 +28,8 @@ where it rises to PPSSON; it goes over 5 ms after the power has passed. It is on
 at the start where p is PPSSON or more. PPSSON = 0 leaves it out (as in PSS/E).
 The switching makes vs jump: derivatives of a response do not include the shift
 of the jumps. Not modelled: XCOMP and TCOMP, which make a compensated frequency
-of an input of PSS/E. Typical data are the standard's, as GridKit has them.
+of an input of PSS/E. Typical data are the standard's, as GridKit has them, but
+for KS2, which is that of H = 5.05 s as in PSS2C (there 0.7052).
 """
 
 from exfit.engine.trace import Signal
@@ -49,7 +50,7 @@ from exfit.models.stabiliser_parts import (
 INPUTS = ("speed", "p")
 
 SHEET = (
-    *with_typical(ACCELERATING, KS2=0.7052),
+    *ACCELERATING,
     *sheet(
         ("KS1", 50.0, "pu", (-10000.0, 10000.0), "stabiliser gain"),
         ("VSTMAX", 0.05, "pu", (-9999.0, 9999.0), "ceiling of the output"),
