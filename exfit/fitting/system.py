@@ -22,6 +22,8 @@ from exfit.plants import (
     SaturationForm,
     Stabilised,
     initial,
+    input_at,
+    inputs_for_limiters,
     playback,
 )
 from exfit.simulation.kernels import parameters_used
@@ -46,6 +48,8 @@ def _system_of(case: Case, recording: Recording | None) -> System:
     kind, parts = case.kind, case.parts
     if kind.has_exciter and parts.exciter is None:
         raise CaseError([f"{case.path}: model: missing"])
+    if parts.exciter is not None:
+        _refuse_missing_gates(case, parts.exciter)
     equipment = Equipment(
         exciter=parts.exciter,
         machine=parts.machine,
@@ -128,6 +132,18 @@ def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationFo
             if signal not in file.channels:
                 text = f"channels.{signal}: missing; it drives {model.name}"
                 raise CaseError([f"{case.path}: {place}: {text}"])
+
+
+def _refuse_missing_gates(case: Case, exciter: Model) -> None:
+    """Raise CaseError where an exciter that replaces the case's has no input for a limiter."""
+    missing = [
+        f"{case.path}: limiters: {exciter.name} has no input {input_at(limiter)} for "
+        f"{limiter.model.name}"
+        for limiter in case.parts.limiters
+        if input_at(limiter) not in inputs_for_limiters(exciter)
+    ]
+    if missing:
+        raise CaseError(missing)
 
 
 def _record_files(case: Case) -> dict[str, RecordFile]:

@@ -63,7 +63,10 @@ class PartDescription:
     @property
     def heading(self) -> str:
         """Its kind and name, as a heading of a table has them."""
-        return "Network" if self.kind == "network" else f"{self.kind.capitalize()} {self.name}"
+        if self.kind == "network":
+            return "Network"
+        kind = "limiter" if self.prefix in LIMITER_PREFIXES else self.kind
+        return f"{kind.capitalize()} {self.name}"
 
 
 @dataclass(frozen=True)

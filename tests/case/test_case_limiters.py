@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from exfit.case.load import load_case
+from exfit.case.other_model import with_exciter
 from exfit.case.peek import free_of, parameters_of
 from exfit.errors import CaseError, ExfitError
 from exfit.exchange.export import export
 from exfit.fitting.system import system_of
+from exfit.models import MODELS
 from exfit.output.run_folder import write_fit
 from exfit.results.io import load_result
 from exfit.workflows import fit, simulate
@@ -117,6 +119,13 @@ def test_an_OEL_acts_on_open_circuit_and_a_UEL_does_not(tmp_path):
 def test_a_limiter_that_acts_at_the_start_is_refused_with_how_far_it_is_beyond(tmp_path):
     with pytest.raises(ExfitError, match=r"oel\.OEL2C acts at the start already, at -6\.5"):
         simulate(load_case(written(tmp_path, ("IINST: 1.9", "IINST: 1.4"))), {})
+
+
+def test_another_exciter_in_a_ranking_needs_the_gate_too(tmp_path):
+    case = load_case(written(tmp_path))
+    system_of(with_exciter(case, "ST7B", MODELS["ST7B"]))
+    with pytest.raises(CaseError, match="limiters: SEXS has no input voel for OEL2C"):
+        system_of(with_exciter(case, "SEXS", MODELS["SEXS"]))
 
 
 def test_a_tie_joins_limiter_and_exciter(tmp_path):

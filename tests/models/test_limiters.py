@@ -25,11 +25,12 @@ from exfit.plants import (
     Attached,
     Names,
     infinite_bus,
+    inputs_for_limiters,
 )
 from exfit.plants.parts import motion, values_named
 from exfit.simulation.inputs import Inputs, InputStep
 from exfit.simulation.limit_hits import limits_hit
-from exfit.simulation.limits import acting_at_rest
+from exfit.simulation.limits import acting_at_rest, equation_limits, limiter_outputs
 from exfit.simulation.simulator import Simulator
 
 SIGNALS = ("ifd", "vt", "p", "q")
@@ -402,6 +403,25 @@ def test_a_limiter_that_acts_at_the_start_is_refused_with_what_it_lacks():
     text = acting_at_rest(plant, beyond)
     assert text.startswith("oel.OEL2C acts at the start already, at ")
     assert "where its gate has 1.65" in text
+
+
+# what an exciter has for limiters, each with the place that uses it
+AT_INPUT = {"vuel": "takeover", "voel": "takeover", "vsum": "summing"}
+AT_INPUT |= {"vuel_out": "takeover-output", "voel_out": "takeover-output"}
+
+
+def test_a_limiter_is_found_at_each_gate_and_sum_of_an_exciter(exciter):
+    """A gate that was taken for a sum would act at any output, and be refused at the start."""
+    model = MODELS[exciter]
+    for name in inputs_for_limiters(model):
+        attached = Attached(LIMITERS["UEL1" if "uel" in name else "OEL2C"], AT_INPUT[name])
+        plant = infinite_bus(model, MACHINES["GENROU"], QUADRATIC, limiters=(attached,))
+        limits = [limit for limit in equation_limits(plant) if limit.limit == attached.signal]
+        assert limits, name
+        (output,) = limiter_outputs(plant).values()
+        for limit in limits:
+            at_sum = limit.value is output
+            assert at_sum == (name == "vsum"), name
 
 
 # --- sheets and records ---------------------------------------------------------------------------
