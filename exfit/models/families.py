@@ -16,6 +16,7 @@ OF_THE_STANDARD = re.compile(r"((?:DC|AC|ST)\d+)([ABC])")
 EDITIONS = {"A": 2005, "B": 2005, "C": 2016}  # A and B: what the edition of 2005 contains
 SIMPLIFIED: dict[str, Family] = {
     "BBSEX1": "ST",
+    "ESURRY": "AC",
     "EXPIC1": "ST",
     "IEEET1": "DC",
     "IEEET2": "AC",

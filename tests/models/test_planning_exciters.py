@@ -134,6 +134,14 @@ def bbsex1(s, p):
     return p.K * lead_lag(s, p.T3, p.T4) * lead_lag(s, p.T2, p.T1) * error(s, p)
 
 
+def esurry(s, p):
+    regulator = p.K10 * lead_lag(s, p.TA, p.TB) * lead_lag(s, p.TC, p.TD)
+    back = 1.0 + (p.K16 + s * p.KF * lag(s, p.TF)) * lag(s, p.T1)
+    at = Rotating(vars(p), EFD, IFD)
+    ve = (regulator * error(s, p) - p.KD * back * DIRECT["ifd"]) / (s * p.TE + at.c * back)
+    return at.a * ve - at.b * DIRECT["ifd"]
+
+
 def urst5t(s, p):
     regulator = p.KR * lead_lag(s, p.TC1, p.TB1) * lead_lag(s, p.TC2, p.TB2)
     return regulator * lag(s, p.T1) * error(s, p) - p.KC * DIRECT["ifd"]
@@ -171,6 +179,8 @@ LINEAR = [
     ("EXAC3", exac3, {"TR": 0.02, "TB": 0.5, "TC": 0.3}),
     ("EXAC3", exac3, {"EFDN": 2.5}),  # up to the bend of its feedback
     ("BBSEX1", bbsex1, {}),
+    ("ESURRY", esurry, {"KC": 0.2, "KD": 0.4}),
+    ("ESURRY", esurry, {"T1": 0.0, "TB": 0.0, "TA": 0.0}),
     ("URST5T", urst5t, {"KC": 0.1}),
     ("BBSEX1", bbsex1, {"TR": 0.0, "T2": 0.0, "T3": 0.0}),
 ]
@@ -233,6 +243,7 @@ CEILINGS = [
     ("EXST3", {"EFDMAX": 4.0}, lambda p: 4.0),
     ("EXAC1A", {}, lambda p: of_field_current(p.VRMAX, p)),
     ("EXAC3", {"VAMAX": 0.4, "TE": 0.5}, lambda p: self_supplied(p.VAMAX, p)),
+    ("ESURRY", {"KD": 0.4, "TE": 0.9, "TD": 2.0}, lambda p: of_field_current(p.VRMAX, p)),
     ("URST5T", {"KC": 0.1}, lambda p: p.VRMAX - p.KC * IFD),  # VT is above 1
     ("BBSEX1", {"VRMAX": 3.0}, lambda p: 3.0),
     ("BBSEX1", {"EFDMAX": 3.0}, lambda p: 3.0 * VT),
@@ -253,9 +264,10 @@ def test_a_large_step_drives_efd_to_its_ceiling_never_beyond_and_back(name, chan
     assert efd[-1] < 0.5 * EFD
 
 
-def test_the_low_voltage_limiter_of_EXAC3_holds_efd_above_nothing():
-    p = parameters("EXAC3", {"TE": 0.5, "VAMAX": 9.0, "VLV": 0.9})
-    _, efd = alone("EXAC3", vars(p), vref=-0.5, time=30.0, step=5e-3, **START)
+@pytest.mark.parametrize("name", ["EXAC3"])
+def test_a_low_voltage_limiter_holds_efd_above_nothing(name):
+    p = parameters(name, {"TE": 0.5, "VAMAX": 9.0, "VLV": 0.9})
+    _, efd = alone(name, vars(p), vref=-0.5, time=30.0, step=5e-3, **START)
 
     def missing(efd):
         ve = efd + p.KC * IFD / np.sqrt(3.0) if 0.4 * efd > p.KC * IFD else np.nan

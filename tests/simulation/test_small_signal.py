@@ -243,7 +243,7 @@ def test_unstable_poles_are_those_of_a_run_that_grows(model):
     gain = next(
         (
             symbol
-            for symbol in ("KA", "K", "KPR", "KPA", "KV", "KVP", "KR", "k")
+            for symbol in ("KA", "K", "KPR", "KPA", "KV", "KVP", "K10", "KR", "k")
             if symbol in typical_values(model)
         ),
         None,

@@ -171,11 +171,12 @@ def frequency_response(name, p, inputs, frequencies, start, h=1e-5):
     model = MODELS[name]
     u, _, x = standing(name, vars(p), **start)
     n = len(model.states)
+    kept = {setpoint: vars(x)[setpoint] for setpoint in model.setpoints}
     rest = np.array([*(vars(x)[state] for state in model.states), *(vars(u)[i] for i in inputs)])
 
     def motion(at):
         d = Names()
-        states = Names(**dict(zip(model.states, at[:n], strict=True)))
+        states = Names(**dict(zip(model.states, at[:n], strict=True)), **kept)
         given = exciter_inputs(**vars(u) | dict(zip(inputs, at[n:], strict=True)))
         efd = model.equations(states, given, p, d)
         slopes = [getattr(vars(d)[state], "slope", vars(d)[state]) for state in model.states]

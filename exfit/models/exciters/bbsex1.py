@@ -38,10 +38,10 @@ SHEET = sheet(
 RECORDS = (
     record(
         "BBSEX1",
-        "TR K T1 T2 T3 T4 VRMAX VRMIN EFDMAX EFDMIN",
-        icons={"SWITCH": 0},
+        "TR K T1 T2 T3 T4 VRMAX VRMIN EFDMAX EFDMIN SWITCH",
+        absent={"SWITCH": 0.0},
         spelled={"TR": "TF"},
-        doubt="its order is that of public lists of parameters, not confirmed by a file",
+        doubt="two other programs read SWITCH at the end, where it is not confirmed by a file",
     ),
 )
 

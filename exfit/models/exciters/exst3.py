@@ -55,7 +55,6 @@ RECORDS = (
     record(
         "EXST3",
         "TR VIMAX VIMIN KJ TC TB KA TA VRMAX VRMIN KG KP KI EFDMAX KC XL VGMAX THETAP",
-        doubt="its order is that of two other programs, not confirmed by a file",
     ),
 )
 

@@ -11,7 +11,8 @@ vc1 ►[  1  ]┘ └──────────[  sKF  ]◄─────�
 
 VB = VE FEX(KC IFD / VE) with VE = |KP VT + j KI IT|, and 1 where KP = KI = 0 as
 in PSS/E. The limits of the regulator and of efd are non-windup. The current IT,
-and so KI, acts on load only. Not modelled: UEL and OEL at the summing point.
+and so KI, acts on load only. Not modelled: UEL and OEL at the summing point,
+where PSS/E's EXST2A has them and no gate.
 """
 
 from exfit.engine.trace import Signal
@@ -48,11 +49,7 @@ SHEET = sheet(
 
 RECORDS = (
     record("ESST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),
-    record(
-        "EXST2A",
-        "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX",
-        doubt="its order is taken to be that of ESST2A, not confirmed by a file",
-    ),
+    record("EXST2A", "TR KA TA VRMAX VRMIN KE TE KF TF KP KI KC EFDMAX"),
 )
 
 PSLF_RECORDS = (

@@ -23,13 +23,7 @@ from exfit.models.sheet import record
 
 __all__ = ["RECORDS", "SHEET", "STATES", "equations", "rest"]
 
-RECORDS = (
-    record(
-        "URST5T",
-        "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC",
-        doubt="its order is that of another open program, not confirmed by a file",
-    ),
-)
+RECORDS = (record("URST5T", "TR TC1 TB1 TC2 TB2 KR VRMAX VRMIN T1 KC"),)
 
 
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:

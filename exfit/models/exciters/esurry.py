@@ -1,0 +1,96 @@
+"""ESURRY: alternator exciter with feedback of its field current (PSS/E ESURRY).
+
+                                                VRMAX       VE >= 0
+vref + vs ►(+)►[1+sTA]►[1+sTC]►[K10]►(+)►(+)─►[clip]─►(+)►[  1  ]┬ VE ►(x)►efd
+          -▲   [1+sTB] [1+sTD]       ▲   -▲    VRMIN  -▲  [ sTE ]│      ▲
+           │                         │    │            │         │     FEX
+vc1►[  1  ]┘                       IREF   │            └── VFE ◄─┘      ▲
+    [1+sTR]                               │                │    KC IFD / VE
+                                          │                ▼
+                        [K16 + sKF/(1+sTF)]◄────────────[  1  ]
+                                                        [1+sT1]
+
+VFE = KE VE + VX(VE) + KD IFD. IREF is K16 VFE of the start (setpoint IREF0),
+so that the feedback K16 begins at nothing. The limit of VE is non-windup; the
+clamp has no state. TB = 0 bypasses TA with it, TD = 0 TC.
+
+OpenIPSL's and InterPSS's models, written after PSS/E's, agree; WECC's EXAC1M is
+another name. Typical data are those of a record. Not modelled: UEL other than
+at the summing point (PSS/E adds it to IREF).
+"""
+
+from exfit.engine.trace import Signal
+from exfit.models.blocks import (
+    clip,
+    field_demand,
+    lag,
+    lead_lag,
+    limited_integrator,
+    rectifier,
+    rectifier_supply,
+    washout,
+)
+from exfit.models.sheet import (
+    EXCITER_LAG,
+    FREE,
+    LAG_OF_KF,
+    LOADING,
+    SearchRange,
+    record,
+    sheet,
+)
+
+ALIASES = ("EXAC1M",)
+
+SHEET = sheet(
+    ("TR", 0.016668, "s", (0.0, 1.0), "voltage transducer lag"),
+    ("TA", 0.8, "s", (0.0, 100.0), "first regulator lead", SearchRange(unlike="TB")),
+    ("TB", 0.1, "s", (0.0, 100.0), "first regulator lag", SearchRange(unlike="TA")),
+    ("TC", 0.6, "s", (0.0, 100.0), "second regulator lead", SearchRange(unlike="TD")),
+    ("TD", 19.0, "s", (0.0, 100.0), "second regulator lag", SearchRange(unlike="TC")),
+    ("K10", 400.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
+    ("T1", 1.0, "s", (0.0, 100.0), "lag of the exciter's field current"),
+    ("K16", 1.0, "pu", (0.0, 1000.0), "feedback gain of the lagged field current"),
+    ("KF", 20.0, "pu", (0.0, 1000.0), "stabilising feedback gain", FREE),
+    ("TF", 1.6, "s", (0.01, 100.0), "stabilising feedback time constant", LAG_OF_KF),
+    ("VRMAX", 14.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
+    ("VRMIN", -12.6, "pu", (-9999.0, 9999.0), "regulator floor"),
+    ("TE", 2.0, "s", (0.01, 100.0), "exciter time constant", EXCITER_LAG),
+    ("E1", 3.01, "pu", (0.01, 100.0), "first voltage of the saturation curve"),
+    ("SE1", 0.01, "pu", (0.0, 100.0), "saturation at E1"),
+    ("E2", 5.01, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
+    ("SE2", 0.2, "pu", (0.0, 100.0), "saturation at E2"),
+    ("KC", 0.001, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
+    ("KD", 0.0, "pu", (0.0, 100.0), "demagnetising factor"),
+    ("KE", 0.8, "pu", (0.0, 10.0), "exciter constant"),
+)
+
+RECORDS = (
+    record("ESURRY", "TR TA TB TC TD K10 T1 K16 KF TF VRMAX VRMIN TE E1 SE1 E2 SE2 KC KD KE"),
+)
+
+STATES = "VC VL1 VL2 VF VS VE"
+SETPOINTS = "IREF0"
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
+    """Write the slopes of the states into d and return efd."""
+    vfe = field_demand(s.VE, u.ifd, p)
+    vf, d.VF = lag(vfe, s.VF, 1.0, p.T1)
+    vs, d.VS = washout(vf, s.VS, p.KF, p.TF)
+    vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
+    vl1, d.VL1 = lead_lag(u.vref + u.vs + u.vsum - vc, s.VL1, p.TA, p.TB)
+    vl2, d.VL2 = lead_lag(vl1, s.VL2, p.TC, p.TD)
+    vr = clip(p.K10 * vl2 + s.IREF0 - p.K16 * vf - vs, p.VRMIN, p.VRMAX)
+    ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
+    return rectifier(ve, p.KC * u.ifd)
+
+
+def rest(efd: Signal, u: Signal, p: Signal, x: Signal) -> Signal:
+    """Write the states that hold efd into x and return vref."""
+    ve = rectifier_supply(efd, p.KC * u.ifd)
+    vfe = field_demand(ve, u.ifd, p)
+    error = vfe / p.K10
+    x.VC, x.VL1, x.VL2, x.VF, x.VS, x.VE = u.vc1, error, error, vfe, vfe, ve
+    x.IREF0 = p.K16 * vfe
+    return u.vc1 + error - u.vs
