@@ -8,6 +8,7 @@ from exfit.exchange.fields import DynamicsFault, Field, located, refuse
 from exfit.exchange.file_format import Head
 from exfit.exchange.formats import format_of
 from exfit.exchange.records import Definition, definition_of, definitions, read_values
+from exfit.models import LIMITERS
 from exfit.util.text import near, show
 
 NEEDED = ("machine", "exciter")
@@ -254,7 +255,9 @@ def _looks_like(head: Head) -> str:
 
 
 def _left_out(head: Head) -> str:
-    kind = OTHERS.get(head.name.upper())
-    return (
-        f"{kind} {head.name} is left out" if kind else f"{head.name} is left out: not a known model"
-    )
+    name = head.name.upper()
+    kind = OTHERS.get(name)
+    if kind is None:
+        return f"{head.name} is left out: not a known model"
+    how = ": give it under limiters" if name in LIMITERS else ""
+    return f"{kind} {head.name} is left out{how}"

@@ -349,6 +349,7 @@ def test_what_other_units_and_devices_hold_is_no_fault():
     [
         ("1 IEEEG2 1 0 0 /", "governor IEEEG2 is left out"),
         ("1 'MAXEX2' 1 0 0 /", "excitation limiter MAXEX2 is left out"),
+        ("1 'OEL2C' 1 0 0 /", "excitation limiter OEL2C is left out: give it under limiters"),
         ("1 'XYZ' 1 0 0 /", "XYZ is left out: not a known model"),
         ("1 'USRMDL' 1 'MYGOV' 5 0 0 /", "USRMDL MYGOV is left out: not a known model"),
     ],
