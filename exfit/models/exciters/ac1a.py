@@ -8,7 +8,8 @@ vc1 ►[  1  ]┘   │  [  sKF  ]                   │            │        �
      [1+sTR]    └──[1 + sTF]◄──────────────────┴─── VFE ◄───┘   KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD. The limits of the lag are non-windup; the clamp
-behind it is not: VA may exceed VRMAX. Not modelled: UEL and OEL gates.
+behind it is not: VA may exceed VRMAX. The gates of UEL and OEL, not drawn, are
+between the two.
 """
 
 from exfit.engine.trace import Signal
@@ -16,11 +17,13 @@ from exfit.models.blocks import (
     clip,
     field_demand,
     lag,
+    larger,
     lead_lag,
     limited_integrator,
     limited_lag,
     rectifier,
     rectifier_supply,
+    smaller,
     washout,
 )
 from exfit.models.sheet import (
@@ -86,7 +89,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vf, d.VF = washout(vfe, s.VF, p.KF, p.TF)
     vl, d.VL = lead_lag(u.vref + u.vs - vc - vf, s.VL, p.TC, p.TB)
     va, d.VA = limited_lag(vl, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
-    vr = clip(va, p.VRMIN, p.VRMAX)
+    vr = clip(smaller(larger(va, u.vuel), u.voel), p.VRMIN, p.VRMAX)
     ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, low=0.0)
     return rectifier(ve, p.KC * u.ifd)
 

@@ -18,7 +18,7 @@ VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX,
 (VFEMAX - KD IFD) / (KE + SE(VE)): the limit of the exciter's field current. The
 limits of the lag and of VE are non-windup; the clamp to VRMAX, VRMIN is not. KH
 closes a loop that shortens the exciter's time constant, so at rest
-VA = VFE / KB + KH VFE. The UEL and OEL gates do not act.
+VA = VFE / KB + KH VFE.
 """
 
 from exfit.engine.trace import Signal

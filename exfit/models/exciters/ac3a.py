@@ -11,12 +11,11 @@ vc1►[  1  ]┘            ┌─────┘                               
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. VN has
 the slope KF up to EFDN and KN beyond it. The exciter supplies its regulator, so
-the gain of both grows with efd. The limits of the lag and of VE are non-windup;
-the UEL gate does not act.
+the gain of both grows with efd. The limits of the lag and of VE are non-windup.
 
 VF is subtracted behind the lead-lag, as in the models written after PSS/E's
 ESAC3A. Not modelled: the low voltage limiter (KLV, VLV) of the model of 1981,
-which IEEE Std 421.5 and ESAC3A replaced by VEMIN; an OEL, which is added to vs.
+which IEEE Std 421.5 and ESAC3A replaced by VEMIN. An OEL is added to vs.
 VEMIN is 0.1 here; with 0, as in some copies of the sample data, VE stays at 0
 once it is there, since the regulator then has no supply.
 """
@@ -108,7 +107,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     efd = rectifier(clip(s.VE, p.VEMIN, vemax), p.KC * u.ifd)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(feedback(efd, p), s.VF, 1.0, p.TF)
-    vl, d.VL = lead_lag(u.vref + u.vs - vc, s.VL, p.TC, p.TB)
+    vl, d.VL = lead_lag(u.vref + u.vs + u.vsum - vc, s.VL, p.TC, p.TB)
     va, d.VA = limited_lag(larger(vl, u.vuel) - vf, s.VA, p.KA, p.TA, p.VAMIN, p.VAMAX)
     _, d.VE = limited_integrator(p.KR * efd * va - vfe, s.VE, p.TE, p.VEMIN, vemax)
     return efd

@@ -8,9 +8,9 @@ vc1 ►[  1  ]┘
      [1+sTR]
 
 The limits of the lag are non-windup, and only the upper one falls with the
-field current; the UEL gate does not act. The alternator's own regulator is left
-out, as in the standard, and so is an OEL, which is added to vs. PSS/E's older
-EXAC4 differs in its limits and is a separate model.
+field current. An OEL is added to vs. The alternator's own regulator is left
+out, as in the standard. PSS/E's older EXAC4 differs in its limits and is a
+separate model.
 """
 
 from exfit.engine.trace import Signal
@@ -48,7 +48,7 @@ STATES = "VC VL VR"
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vi = clip(u.vref + u.vs - vc, p.VIMIN, p.VIMAX)
+    vi = clip(u.vref + u.vs + u.vsum - vc, p.VIMIN, p.VIMAX)
     vl, d.VL = lead_lag(vi, s.VL, p.TC, p.TB)
     ceiling = p.VRMAX - p.KC * u.ifd
     efd, d.VR = limited_lag(larger(vl, u.vuel), s.VR, p.KA, p.TA, p.VRMIN, ceiling)

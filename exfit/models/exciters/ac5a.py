@@ -14,8 +14,8 @@ The feedback is taken from VR, as the models written after PSS/E's ESAC5A do:
 efd of a brushless machine cannot be measured, and 1/(1 + sTF2) stands for the
 exciter. TF2 = 0 bypasses TF3 with it. TA > 0: the loop needs a lag.
 
-Not modelled: UEL and OEL, which are added to vs; PSS/E's own choice of KE or
-VRMAX where a record says 0. Copies of the sample data differ in TF2, TF3: 0.8
+UEL and OEL are added to vs. Not modelled: PSS/E's own choice of KE or VRMAX
+where a record says 0. Copies of the sample data differ in TF2, TF3: 0.8
 and 0 here, 1 and 1 (which cancel) elsewhere.
 """
 
@@ -71,7 +71,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vl, d.VL = lead_lag(s.VR, s.VL, p.TF3, p.TF2)
     vf, d.VF = washout(vl, s.VF, p.KF, p.TF1)
-    vr, d.VR = limited_lag(u.vref + u.vs - vc - vf, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
+    vr, d.VR = limited_lag(u.vref + u.vs + u.vsum - vc - vf, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     efd, d.VE = exciter(vr, s.VE, p.KE, p, low=0.0)
     return efd
 

@@ -16,8 +16,8 @@ VFE = KE VE + VX(VE) + KD IFD. The field current limiter acts above VFELIM; at
 rest VA = VFE + KH (VFE - VFELIM) there. The limit of the second lead-lag is
 non-windup as in annex E: at the limit its state follows the limited output with
 the lag TC. The limit of VE is non-windup; the clamps of VR and of the limiter
-are not. TB = 0 bypasses TC with it, TA = 0 TK, TH = 0 TJ. Not modelled: UEL and
-OEL, which are added to vs.
+are not. TB = 0 bypasses TC with it, TA = 0 TK, TH = 0 TJ. UEL and OEL are added
+to vs.
 """
 
 from exfit.engine.trace import Signal
@@ -100,7 +100,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     vfe = field_demand(s.VE, u.ifd, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    vk, d.VK = lead_lag(p.KA * (u.vref + u.vs - vc), s.VK, p.TK, p.TA)
+    vk, d.VK = lead_lag(p.KA * (u.vref + u.vs + u.vsum - vc), s.VK, p.TK, p.TA)
     va, d.VA = limited_lead_lag(vk, s.VA, p.TC, p.TB, p.VAMIN, p.VAMAX)
     vf, d.VH = lead_lag(limiter(vfe, p), s.VH, p.TJ, p.TH)
     vr = clip(va - vf, u.vt * p.VRMIN, u.vt * p.VRMAX)

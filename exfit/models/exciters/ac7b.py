@@ -17,8 +17,8 @@ VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
 limits of VE are non-windup; the integrals of the PID and of the PI are frozen
 while they would drive their output further beyond its limit. KP VT is the
 supply of the amplifier, with VT the terminal voltage itself. The exciter
-integrates, 1/sTE: the 1/(1+sTE) in the figure of 2005 is a misprint. Not
-modelled: the UEL input of the first summing point.
+integrates, 1/sTE: the 1/(1+sTE) in the figure of 2005 is a misprint. An UEL is
+added at the first summing point.
 """
 
 from exfit.engine.trace import Signal
@@ -103,7 +103,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vemax = field_ceiling(s.VE, vfe, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     vf, d.VF = washout(vfe, s.VF, p.KF3, p.TF)
-    error = u.vref + u.vs - vc - vf
+    error = u.vref + u.vs + u.vsum - vc - vf
     vr, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VRMIN, p.VRMAX)
     inner = vr - p.KF1 * rectifier(s.VE, p.KC * u.ifd) - p.KF2 * vfe
     va, d.VA = pi(inner, s.VA, p.KPA, p.KIA, p.VAMIN, p.VAMAX)

@@ -9,8 +9,8 @@ vc1 ►[  1  ]┘                                 │           │        ▲
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
 limits of the lag and of VE are non-windup; the integral is frozen while the PID
-is at its limit. Not modelled: the UEL and OEL gates. PSS/E's ESAC8B is another
-model.
+is at its limit. UEL and OEL are added at the summing point. PSS/E's ESAC8B is
+another model.
 """
 
 from exfit.engine.trace import Signal
@@ -97,7 +97,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     vfe = field_demand(s.VE, u.ifd, p)
     vemax = field_ceiling(s.VE, vfe, p)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
-    error = u.vref + u.vs - vc
+    error = u.vref + u.vs + u.vsum - vc
     vpid, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPR, p.KIR, p.KDR, p.TDR, p.VPIDMIN, p.VPIDMAX)
     vr, d.VR = limited_lag(vpid, s.VR, p.KA, p.TA, p.VRMIN, p.VRMAX)
     ve, d.VE = limited_integrator(vr - vfe, s.VE, p.TE, p.VEMIN, vemax)
