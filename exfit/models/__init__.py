@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
 from pkgutil import iter_modules
 from types import ModuleType
@@ -67,12 +68,25 @@ def find(name: str, folder: Path, sha256: str = "") -> Model:
     for listed in sorted(MODELS, key=lambda listed: not wanted.endswith(listed)):
         if wanted in MODELS[listed].aliases:
             return MODELS[listed]
+    names = [listed for entry in MODELS.values() for listed in (entry.name, *entry.aliases)]
+    raise ModelError(
+        f"{name} is not in the catalogue, which exfit models lists{_hint(wanted, names)}"
+    )
+
+
+def _hint(name: str, names: list[str]) -> str:
+    """Return the names that a wrong one may mean: of those as near, what begins as it does."""
     import difflib
 
-    names = [listed for entry in MODELS.values() for listed in (entry.name, *entry.aliases)]
-    near = difflib.get_close_matches(wanted, names, n=1)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    raise ModelError(f"{name} is not in the catalogue ({', '.join(names)}){hint}")
+    close = difflib.get_close_matches(name, names, n=len(names))
+    close.sort(key=lambda other: (-_letters_shared(name, other), other))
+    return f"; did you mean {' or '.join(close[:2])}?" if close else ""
+
+
+def _letters_shared(name: str, other: str) -> int:
+    """Return with how many equal letters two names begin."""
+    pairs = zip(name, other, strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def from_file(path: Path, sha256: str = "") -> Model:

@@ -449,7 +449,7 @@ FORM = {
 }
 
 MEANING = {
-    "unknown model": ("AC1A", "AC1B", "model", ["AC1B", "AC1A, ESAC1A, AC2A"]),
+    "unknown model": ("AC1A", "AC1B", "model", ["AC1B", "did you mean AC1A or AC1C?"]),
     "missing model file": (
         "model: AC1A",
         "model: mine.py",
