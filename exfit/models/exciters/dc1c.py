@@ -1,12 +1,12 @@
 """DC1C: commutator exciter, continuous regulator (IEEE Std 421.5-2016).
 
-                          VUEL  VOEL     VRMAX          VEMAX
-vref + vs ─►(+)─►[1 + sTC]─►HV───►LV───►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
-+ vsum     -▲ ▲- [1 + sTB]              [1+sTA]   -▲   [ sTE ] │
-            │ │                          VRMIN     │    VEMIN  │
-vc1 ►[  1  ]┘ │                                    └── VFE ◄───┤
-     [1+sTR]  └─────────────[  sKF  ]◄─────────────────────────┘
-                            [1 + sTF]
+                                 VUEL  VOEL    VRMAX           VEMAX
+vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]─►(+)─►[  1  ]─┬─► efd
+                  -▲ ▲- [1 + sTB]             [1+sTA]   -▲   [ sTE ] │
+                   │ │                         VRMIN     │    VEMIN  │
+       vc1 ►[  1  ]┘ │                                   └── VFE ◄───┤
+            [1+sTR]  └────────────[  sKF  ]◄─────────────────────────┘
+                                  [1 + sTF]
 
 VFE = KE EFD + VX(EFD). DC1A with the places of the limiters of 2016: vsum is
 what they add to the voltage error, VUEL and VOEL are takeover gates. The limits

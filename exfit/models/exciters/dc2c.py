@@ -1,12 +1,12 @@
 """DC2C: commutator exciter, bus-fed regulator (IEEE Std 421.5-2016).
 
-                          VUEL  VOEL    VT VRMAX        VEMAX
-vref + vs ─►(+)─►[1 + sTC]─►HV───►LV───►[  KA  ]─►(+)─►[  1  ]─┬─────► efd
-+ vsum     -▲ ▲- [1 + sTB]              [1+sTA]   -▲   [ sTE ] │
-            │ │                         VT VRMIN   │    VEMIN  │
-vc1 ►[  1  ]┘ │                                    └── VFE ◄───┤
-     [1+sTR]  └─────────────[  sKF  ]◄─────────────────────────┘
-                            [1 + sTF]
+                                 VUEL  VOEL   VT VRMAX         VEMAX
+vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]─►(+)─►[  1  ]─┬─► efd
+                  -▲ ▲- [1 + sTB]             [1+sTA]   -▲   [ sTE ] │
+                   │ │                        VT VRMIN   │    VEMIN  │
+       vc1 ►[  1  ]┘ │                                   └── VFE ◄───┤
+            [1+sTR]  └────────────[  sKF  ]◄─────────────────────────┘
+                                  [1 + sTF]
 
 VFE = KE EFD + VX(EFD). As DC1C, but the regulator's limits are proportional to
 the terminal voltage VT. It is DC2A with the places of the limiters of 2016:

@@ -1,20 +1,20 @@
 """DC4C: commutator exciter, PID regulator, own supply (IEEE Std 421.5-2016).
 
-                  VRMAX/KA             VUEL  VOEL
-vref + vs ─►(+)─►[KPR + KIR/s      ]───►HV───►LV────┐
-+ vsum     -▲ ▲- [+ sKDR/(1 + sTDR)]                │
-vc1 ►[  1  ]┘ │   VRMIN/KA                          │
-     [1+sTR]  │                                     │
-              │         VRMAX                       │
-              │   ┌─[   KA   ]◄─────────────────────┘
-              │   │ [1 + sTA ]
-              │   │     VRMIN
-              │   └►(x)─►(+)─►[  1  ]─┬─────────────► efd
-              │      ▲   -▲   [ sTE ] │
-              │      VB   │    VEMIN  │
-              │           └── VFE ◄───┤
-              └──────[   sKF  ]◄──────┘
-                     [1 + sTF ]
+                         VRMAX/KA             VUEL  VOEL
+vref + vs + vsum ─►(+)─►[KPR + KIR/s      ]───►HV───►LV────┐
+                  -▲ ▲- [+ sKDR/(1 + sTDR)]                │
+       vc1 ►[  1  ]┘ │   VRMIN/KA                          │
+            [1+sTR]  │                                     │
+                     │         VRMAX                       │
+                     │   ┌─[   KA   ]◄─────────────────────┘
+                     │   │ [1 + sTA ]
+                     │   │     VRMIN
+                     │   └►(x)─►(+)─►[  1  ]─┬─────────────► efd
+                     │      ▲   -▲   [ sTE ] │
+                     │      VB   │    VEMIN  │
+                     │           └── VFE ◄───┤
+                     └──────[   sKF  ]◄──────┘
+                            [1 + sTF ]
 
 VFE = KE EFD + VX(EFD). VB = VE FEX(KC1 VFE / VE), at most VBMAX, is what the
 regulator is fed with: SW1 = 1 (position A) from the terminals, VE = |KP VT +

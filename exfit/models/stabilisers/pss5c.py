@@ -1,17 +1,17 @@
 """PSS5C: multi-band stabiliser of speed alone (IEEE Std 421.5-2016).
 
-                                   VVLMAX
-vsi1 ─┬─►[ 1 + sD   ]─┬─►[VL]─►[KVL]─►[clip]─►(+)
-      │  [1+sB+s²A  ] │            VVLMIN      ▲
-      │               │            VLMAX       │
-      │               ├─►[L ]─►[KL ]─►[clip]──►(+)
-      │               │            VLMIN       ▲
-      │               │            VIMAX       │      VSTMAX
-      │               └─►[I ]─►[KI ]─►[clip]──►(+)───►[clip]─► vs
-      │                            VIMIN       ▲      VSTMIN
-      │                            VHMAX       │
-      └─►[    80 s²    ]─►[H ]─►[KH ]─►[clip]──┘
-         [(s+80)(s+1)² ]           VHMIN
+                                      VVLMAX
+vsi1 ─┬─►[  1 + sD   ]─┬──►[VL]─►[KVL]─►[clip]─►(+)
+      │  [1 + sB+s²A ] │                VVLMIN   │
+      │                │                VLMAX    ▼
+      │                ├──►[L ]─►[KL ]─►[clip]─►(+)
+      │                │                VLMIN    │
+      │                │                VIMAX    ▼      VSTMAX
+      │                └──►[I ]─►[KI ]─►[clip]─►(+)────►[clip]─► vs
+      │                                 VIMIN    ▲      VSTMIN
+      │                                 VHMAX    │
+      └─►[    80 s²    ]──►[H ]─►[KH ]─►[clip]───┘
+         [(s+80)(s+1)² ]                VHMIN
 
 VL, L, I and H are the bands of very low, low, intermediate and high frequency.
 The low band, with its central frequency FL (Hz), is
