@@ -18,6 +18,7 @@ from exfit.analysis.iteration_responses import (
 )
 from exfit.case import load
 from exfit.case.case import Case
+from exfit.case.program_files import refuse_changed_program
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment, plain_simulator
 from exfit.fitting.forms.external import (
@@ -136,11 +137,15 @@ def read_record(
 
 
 def loaded(case: CaseOrPath, values: ValuesOrResult | None = None) -> Case:
-    """Return a case, read from its file where it is a path, whose own model is that of a fit."""
-    if isinstance(case, Case):
-        return case
-    sha256 = values.inputs.get("model", "") if isinstance(values, FitResult) else ""
-    return load.load_case(Path(case), sha256)
+    """Return a case, read from its file where it is a path, whose own model is that of a fit.
+
+    So is the program that simulates it.
+    """
+    hashes = values.inputs if isinstance(values, FitResult) else {}
+    if not isinstance(case, Case):
+        case = load.load_case(Path(case), hashes.get("model", ""))
+    refuse_changed_program(case, hashes.get("program", ""))
+    return case
 
 
 @dataclass(frozen=True)

@@ -344,7 +344,7 @@ def _named(plant: Data, data: Data) -> Model:
     words += [str(plant[key]) for key in ("file", "type") if key in plant]
     section = _mapping(data.get("parameters"))
     names = (name for key in ("fixed", "free") for name in _mapping(section.get(key)))
-    name = Path([*files, *words][0]).stem
+    name = Path([*files, *words][0]).stem.upper()
     return model_of_names(name, dict.fromkeys(names))
 
 

@@ -181,27 +181,30 @@ class Given:
         if path is None and not self.changes:
             return load(case)
         from exfit.fitting.overrides import (
-            fitted_model_hash,
+            fitted_code,
             read_parameters,
             sources_in,
             with_given_values,
         )
 
-        loaded = load(case, fitted_model_hash(path) if path else "")
+        loaded = load(case, *(fitted_code(path) if path else ()))
         if path:
             values = read_parameters(loaded, path)
             loaded = with_given_values(loaded, values, path, sources_in(path))
         return with_given_values(loaded, assignments(self.changes, "--set"), "--set")
 
 
-def load(case: Path, model_sha256: str = "") -> "Case":
+def load(case: Path, model_sha256: str = "", program_sha256: str = "") -> "Case":
     """Return the case of a file; raises CaseError with all faults of it.
 
-    A user's own model is run only if its file has the hash given, where one is.
+    A user's own model, or a program, is run only if its file has the hash given, where one is.
     """
     from exfit.case.load import load_case
+    from exfit.case.program_files import refuse_changed_program
 
-    return load_case(case, model_sha256)
+    loaded = load_case(case, model_sha256)
+    refuse_changed_program(loaded, program_sha256)
+    return loaded
 
 
 def refuse_existing(output: Path, force: bool) -> None:

@@ -48,10 +48,10 @@ def simulate(
     parameter of the machine is named as in --set machine.Tpd0=6.
     """
     from exfit import workflows
-    from exfit.fitting.overrides import changed_values, fitted_model_hash, read_parameters
+    from exfit.fitting.overrides import changed_values, fitted_code, read_parameters
     from exfit.output import run_folder
 
-    loaded = load(case, fitted_model_hash(parameters) if parameters else "")
+    loaded = load(case, *(fitted_code(parameters) if parameters else ()))
     folder = output.folder_of(loaded, "simulate")
     values = read_parameters(loaded, parameters) if parameters else {}
     values |= changed_values(loaded, assignments(changes, "--set"), "--set")
@@ -151,11 +151,11 @@ def _with_source(path: Path, parameters: Path | None) -> tuple["Case", Path | No
 
     Raises CaseError where it was not fitted.
     """
-    from exfit.fitting.overrides import fitted_model_hash
+    from exfit.fitting.overrides import fitted_code
     from exfit.output import run_folder
 
     source = parameters or run_folder.last_fit(path)
-    case = load(path, "" if source is None else fitted_model_hash(source))
+    case = load(path, *(() if source is None else fitted_code(source)))
     if not case.free():
         return case, parameters
     if source is None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from math import isclose
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from exfit.case.bounds import search_bounds
 from exfit.case.case import Case
@@ -95,14 +95,21 @@ def contradictions(case: Case, values: Mapping[str, float]) -> Iterator[str]:
         yield from (f"{part.prefix}{symbol}: {text}" for symbol, text in part.check(own))
 
 
-def fitted_model_hash(path: Path) -> str:
-    """Return the SHA-256 of the user's own model that a file of parameters is of, or nothing.
+class CodeHashes(NamedTuple):
+    """The SHA-256 of the user's own model and of the program that a fit was made with, or ""."""
 
-    It is read before a case is loaded, which runs the model. Raises CaseError for a file that
-    holds no parameters: it would lack the hash too.
+    model: str = ""
+    program: str = ""
+
+
+def fitted_code(path: Path) -> CodeHashes:
+    """Return the hashes of the code that a file of parameters is of.
+
+    They are read before a case is loaded, which runs the model. Raises CaseError for a file that
+    holds no parameters: it would lack the hashes too.
     """
     content, _ = _content(path)
-    return str(content.get("model_sha256", ""))
+    return CodeHashes(*(str(content.get(key, "")) for key in ("model_sha256", "program_sha256")))
 
 
 def _content(path: Path) -> tuple[dict[str, Any], list[str]]:

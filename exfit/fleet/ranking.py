@@ -93,6 +93,9 @@ def planned_models(
     own = case.parts.exciter
     if own is None or own.name == ALONE:
         raise CaseError([f"{case.path}: plant {case.plant.type} has no exciter to rank"])
+    if case.external is not None:
+        text = f"{case.external.type}: not allowed with rank: the program has one exciter"
+        raise CaseError([f"{case.path}: plant.type: {text}"])
     cases: dict[str, Case] = {}
     for given in _names(own.name, [models] if isinstance(models, str) else [*models]):
         model = own if given == own.name else find(given, case.folder)

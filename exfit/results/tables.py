@@ -144,7 +144,7 @@ def parameter_file(result: FitResult) -> str:
     lines = [
         f"# {result.model} fitted to {', '.join(matches)}; {state}",
         f"model: {result.model}",
-        *([f"model_sha256: {result.inputs['model']}"] if "model" in result.inputs else []),
+        *_code_hashes(result),
         "parameters:",
     ]
     for name, value in result.own_values.items():
@@ -157,6 +157,12 @@ def parameter_file(result: FitResult) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _code_hashes(result: FitResult) -> list[str]:
+    """Return the lines with the hashes of code that was run: of a user's model, of a program."""
+    labels = (label for label in ("model", "program") if label in result.inputs)
+    return [f"{label}_sha256: {result.inputs[label]}" for label in labels]
+
+
 def phase_end_file(result: FitResult, end: PhaseEnd) -> str:
     """Return the values at the end of a phase as YAML, to be read as those of `parameter_file`."""
     matches = (f"{match.record}: rmse {match.rmse:.4g} pu" for match in end.comparisons)
@@ -165,7 +171,7 @@ def phase_end_file(result: FitResult, end: PhaseEnd) -> str:
         f"# {result.model}, {', '.join(matches)}; end of {end.phase}, iteration {end.iteration}, "
         f"where {end.next_phase} went on",
         f"model: {result.model}",
-        *([f"model_sha256: {result.inputs['model']}"] if "model" in result.inputs else []),
+        *_code_hashes(result),
         "parameters:",
         *(f"  {name}: {yaml_number(end.values[name])}" for name in own),
         *_sources(result, own),

@@ -7,13 +7,12 @@ from typing import TypeVar
 from exfit.analysis.descriptions.played_description import played_in
 from exfit.case.case import Case
 from exfit.case.parts import Part
-from exfit.case.peek import scripts_of
+from exfit.case.program_files import program_files
 from exfit.case.schema import (
     AngleTable,
     BumpTest,
     ChannelSection,
     FindableStep,
-    FmuPlant,
     PhasesSection,
     Recording,
     Reference,
@@ -78,12 +77,7 @@ def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]
 
 def _scripts(case: Case) -> dict[str, Path]:
     """Return the files beside a case of what simulates it in place of exfit, by their labels."""
-    if case.external is None:
-        return {}
-    if isinstance(case.external, FmuPlant):
-        return {"program": case.folder / case.external.file}
-    scripts = scripts_of(case.external.command, case.folder)
-    return {f"program{number or ''}": case.folder / word for number, word in enumerate(scripts)}
+    return {f"program{number or ''}": file for number, file in enumerate(program_files(case))}
 
 
 def _records(case: Case, setups: Sequence[ExperimentSetup]) -> Iterator[tuple[str, Record]]:

@@ -12,6 +12,7 @@ import exfit
 from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.forms.twin_descent import ProgramFunctions
+from exfit.results.tables import parameter_file
 from exfit.workflows import check, identify, profile
 
 PROGRAM = Path(__file__).parents[2] / "support" / "outside_program.py"
@@ -110,9 +111,19 @@ def test_the_hash_of_the_script_is_among_those_of_a_result(record, tmp_path):
     plant = external(record).external
     command = [sys.executable, shutil.copy(PROGRAM, tmp_path / "mine.py").name]
     own = {**PLANT, "type": "external", "twin": "open-circuit", "names": dict(plant.names)}
-    result = exfit.fit(case(record, {**own, "command": command}, tmp_path))
+    of_script = case(record, {**own, "command": command}, tmp_path)
+    result = exfit.fit(of_script)
     assert result.inputs["program"] == sha256(PROGRAM.read_bytes()).hexdigest()
     assert result.files["program"] == "mine.py"
+    assert f"program_sha256: {result.inputs['program']}" in parameter_file(result)
+    # as with a model in Python, values of a fit are taken with the fitted program alone
+    exfit.simulate(of_script, result)
+    (tmp_path / "mine.py").write_text("raise SystemExit('this was run')")
+    for again in (exfit.simulate, exfit.validate):
+        with pytest.raises(
+            CaseError, match=r"mine.py: not run: the file has changed since the fit"
+        ):
+            again(of_script, result)
 
 
 def test_a_simulation_is_the_programs_own(record):
