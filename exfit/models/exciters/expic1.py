@@ -39,7 +39,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.compound import supply
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
@@ -73,6 +73,15 @@ RECORDS = (
         "EXPIC1",
         "TR KA TA1 VR1 VR2 TA2 TA3 TA4 VRMAX VRMIN KF TF1 TF2 EFDMAX EFDMIN KE TE E1 SE1 E2 SE2 "
         "KP KI KC",
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "expic1",
+        "TR KA TA1 VR1 VR2 TA2 TA3 TA4 VRMAX VRMIN KF TF1 TF2 EFDMAX EFDMIN KE TE E1 SE1 E2 SE2 "
+        "KP KI KC",
+        doubt=OF_A_LIST,
     ),
 )
 

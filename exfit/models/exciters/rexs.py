@@ -55,6 +55,7 @@ from exfit.models.sheet import (
     FREE,
     LAG_OF_KF,
     LOADING,
+    OF_A_LIST,
     REGULATOR_LAG,
     record,
     sheet,
@@ -102,6 +103,17 @@ RECORDS = (
         "TR KVP KVI VIMAX TA TB1 TC1 TB2 TC2 VRMAX VRMIN KF TF TF1 TF2 FBF KIP KII TP VFMAX VFMIN "
         "KH KE TE KC KD E1 SE1 E2 SE2 FLIMF",
         spelled={"FLIMF": "F1IMF"},
+    ),
+)
+
+PSLF_RECORDS = (
+    record(
+        "rexs",
+        "TR KVP KVI VIMAX TA TB1 TC1 TB2 TC2 VRMAX VRMIN KF TF TF1 TF2 FBF KIP KII TP VFMAX VFMIN "
+        "KH KE TE KC KD E1 SE1 E2 SE2 RCOMP XCOMP NVPHZ KVPHZ FLIMF XC VCMAX KEFD LIMFLG",
+        absent={"KVPHZ": 0.0, "XC": 0.0, "KEFD": 0.0, "LIMFLG": 0.0},
+        ignored="RCOMP XCOMP NVPHZ VCMAX",
+        doubt=OF_A_LIST,
     ),
 )
 
