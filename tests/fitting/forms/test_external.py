@@ -250,6 +250,18 @@ def test_faults_of_the_section_are_named(changes, place, record):
         external(record, **changes)
 
 
+def test_what_only_shows_the_twin_does_not_start_the_program(record, tmp_path):
+    code = f"open({str(tmp_path / 'started')!r}, 'w'); raise SystemExit"
+    of_marker = external(record, command=[sys.executable, "-c", code])
+    identify(of_marker)
+    with pytest.raises(CaseError, match="not allowed with rank: the program has one exciter"):
+        exfit.rank(of_marker, ["SEXS"])
+    assert not (tmp_path / "started").exists()
+    with pytest.raises(SimulationError):
+        check(of_marker)
+    assert (tmp_path / "started").exists()
+
+
 def test_a_global_search_is_refused(record):
     with pytest.raises(CaseError, match="search: global: not allowed with plant external"):
         exfit.fit(external(record), search="global")
