@@ -1,16 +1,17 @@
 """AC7C: alternator exciter, inner field loop, supply (IEEE Std 421.5-2016).
 
-              UEL OEL     VRMAX        UEL OEL          VAMAX
-vref + vs ►(+)►HV─►LV►[KPR + KIR/s   ]►HV─►LV►(+)─►[KPA + KIA/s]─ VA ─►(x)─► VFD
- + vsum   -▲ ▲-       [+ sKDR/(1+sTDR)]      -▲                         ▲
-           │ │            VRMIN               │         VAMIN          VS
-           │ │                                KF1 efd + KF2 VFE
-           │ │  [  sKF3 ]                      VE <= VEMAX
-           │ └──[1 + sTF]◄──┐ VFD ─►[HV]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
-           │                │        ▲    -▲   [ sTE ] │        ▲
-vc1►[  1  ]┘                │     -KL VFE  │    VEMIN  │       FEX
-    [1+sTR]                 └──────────────┴─── VFE ◄──┘        ▲
-                                                           KC IFD / VE
+          vsum  UEL OEL   VRMAX        UEL OEL        VAMAX
+            ▼
+vref + vs ►(+)►[gates]►[KPR + KIR/s   ]►[gates]►(+)►[KPA + KIA/s]─ VA ►(x)► VFD
+           -▲▲-        [+ sKDR/(1+sTDR)]         -▲                     ▲
+            ││            VRMIN                   │   VAMIN             VS
+            ││                             KF1 efd + KF2 VFE
+            ││ [  sKF3 ]                       VE <= VEMAX
+            │└─[1 + sTF]◄──┐ VFD ─►[HV]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
+            │              │        ▲    -▲   [ sTE ] │        ▲
+vc1►[  1  ]─┘              │     -KL VFE  │    VEMIN  │       FEX
+    [1+sTR]                └──────────────┴─── VFE ◄──┘        ▲
+                                                          KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
 supply VS of the amplifier is VB (SW2 = 1, position A of the drawing) or KR efd

@@ -1,11 +1,12 @@
 """AC8C: alternator exciter, PID and supply of its own (IEEE Std 421.5-2016).
 
-              UEL OEL  VPIDMAX        UEL OEL  VRMAX           VE <= VEMAX
-vref + vs ►(+)►HV─►LV►[KPR + KIR/s   ]►HV►LV►[  KA  ]►(x)─►(+)►[  1  ]─┬►(x)►efd
- + vsum   -▲          [+ sKDR/(1+sTDR)]      [1+sTA]   ▲   -▲  [ sTE ] │  ▲
-           │           VPIDMIN                VRMIN    │    │    VEMIN │ FEX
-vc1►[  1  ]┘                                           VB   └── VFE ◄──┘  ▲
-    [1+sTR]                                                      KC IFD / VE
+         vsum        VPIDMAX                   VRMAX         VE <= VEMAX
+           ▼ UEL OEL                UEL OEL
+vref + vs►(+)►[gates]►[KPR + KIR/s  ]►[gates]►[  KA  ]►(x)─►(+)►[  1  ]┬►(x)►efd
+          -▲          [+sKDR/(1+sTDR)]        [1+sTA]   ▲   -▲  [ sTE ]│  ▲
+           │           VPIDMIN                 VRMIN    │    │    VEMIN│ FEX
+vc1►[  1  ]┘                                            VB   └── VFE ◄─┘  ▲
+    [1+sTR]                                                          KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX.
 VB = VE1 FEX(KC1 VFE / VE1), at most VBMAX, is the supply of the power stage. It
