@@ -68,8 +68,14 @@ def _slope(node: Node, inner: Sequence[Slope | None]) -> Slope | None:
 
 
 def _clipped(args: Sequence[Node], inner: Sequence[Slope | None]) -> Slope | None:
-    """Return the derivative of a clip; a state put back on its limit moves with the limit."""
+    """Return the derivative of a clip; a state put back on its limit moves with the limit.
+
+    Where both limits move, as two gates do, the lower one may pass the upper one, which then holds.
+    """
     x, low, high = args
+    if low.varies and high.varies:
+        above = x.graph.compare("<=", high, x) | x.graph.compare("<=", high, low)
+        return _chosen(above, inner[2], _chosen(x.graph.compare("<=", x, low), inner[1], inner[0]))
     inside = _chosen(x.graph.compare("<=", high, x), inner[2], inner[0])
     return _chosen(x.graph.compare("<=", x, low), inner[1], inside)
 

@@ -76,6 +76,16 @@ def test_what_lies_on_a_limit_moves_with_it(value, moves_with):
         assert moved == (1.0 if node.args[0] == moves_with else 0.0)
 
 
+@pytest.mark.parametrize("value", [0.3, 1.5, 4.0])
+def test_where_the_lower_of_two_gates_passes_the_upper_one_that_one_holds(value):
+    graph = Graph()
+    x, low, high = nodes = [graph.symbol(name, varies=True) for name in ("x", "low", "high")]
+    held, at = clip(x, low, high), {x: value, low: 2.0, high: 1.0}
+    assert evaluate([held], at)[held] == 1.0
+    slopes = [tangents([held], {node: graph.constant(1.0)})[0] for node in nodes]
+    assert [evaluate([slope], at)[slope] for slope in slopes] == [0.0, 0.0, 1.0]
+
+
 @pytest.mark.parametrize(
     "function",
     [

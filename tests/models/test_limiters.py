@@ -28,7 +28,7 @@ from exfit.plants import (
     inputs_for_limiters,
 )
 from exfit.plants.parts import motion, values_named
-from exfit.simulation.inputs import Inputs, InputStep
+from exfit.simulation.inputs import Inputs, InputStep, each
 from exfit.simulation.limit_hits import limits_hit
 from exfit.simulation.limits import acting_at_rest, equation_limits, limiter_outputs
 from exfit.simulation.simulator import Simulator
@@ -394,6 +394,22 @@ def test_both_limiters_are_reached_held_and_left_on_load_as_typed_again():
         before, after = np.searchsorted(times, step - 0.005), np.searchsorted(times, step + 0.3)
         assert got["efd"][before] == pytest.approx(got[name][before], abs=1e-12)
         assert abs(got["efd"][after] - got[name][after]) > 0.1
+
+
+@pytest.mark.long
+def test_derivatives_are_those_of_the_response_while_the_limiters_act():
+    plant, values = limited_unit()
+    free = ("oel.IINST", "oel.KPOEL", "oel.TROEL", "uel.KUR", "uel.KUL", "uel.TU2", "KA")
+    simulator = Simulator(plant, Inputs(0.0, END, STEPS), np.linspace(0.0, END, 241), 5e-4)
+    _, slopes = simulator.tangents(values, ("vt",), each(free))
+    for k, name in enumerate(free):
+        sides = [values | {name: values[name] * (1.0 + side)} for side in (1e-5, -1e-5)]
+        up, down = (simulator.response(side, ("vt",)).signals["vt"] for side in sides)
+        difference = (up - down) / (2e-5 * values[name])
+        # the instant at which a limiter takes over moves within a step
+        most = 1e-3 * np.abs(difference).max()
+        assert most > 0.0, name
+        assert np.abs(slopes[:, 0, k] - difference).max() < most, name
 
 
 def test_a_limiter_that_acts_at_the_start_is_refused_with_what_it_lacks():
