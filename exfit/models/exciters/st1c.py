@@ -33,7 +33,7 @@ ALIASES = ("ESST1C",)
 SHEET = (
     *st1a.SHEET,
     *sheet(
-        ("VOS", 1.0, "1", (1.0, 2.0), "place of the stabiliser, on load: 1 error, 2 regulator"),
+        ("VOS", 1.0, "1", (1.0, 2.0), "place of the stabiliser, on load: 1 error, 2 VA"),
     ),
 )
 

@@ -28,7 +28,7 @@ Typical data are those of ST6B, with a supply from the terminals and a lag.
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import clip, lag, larger, limited_lag, pi_rest, pid, smaller
+from exfit.models.blocks import clip, lag, larger, limited_lag, pi_rest, pid, smaller, where
 from exfit.models.exciters import st6b
 from exfit.models.sheet import FREE, record, sheet
 from exfit.models.static import SUPPLY, supply
@@ -38,7 +38,7 @@ ALIASES = ("ESST6C",)
 SHEET = (
     *st6b.SHEET,
     *sheet(
-        ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", FREE),
+        ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", FREE),
         ("VMMAX", 4.5, "pu", (-9999.0, 9999.0), "ceiling of the lag before the rectifier"),
         ("VMMIN", -3.6, "pu", (-9999.0, 9999.0), "floor of the lag before the rectifier"),
     ),
@@ -61,10 +61,11 @@ STATES = "VC VI VD VM VG"
 def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return efd."""
     current = larger(p.KLR * (p.KCI * p.ILR - u.ifd), p.VRMIN)
-    ceiling = smaller(p.VAMAX, current)
     vc, d.VC = lag(u.vc1, s.VC, 1.0, p.TR)
     error = clip(u.vref + u.vsum - vc, u.vuel, u.voel) + u.vs
-    va, d.VI, d.VD = pid(error, s.VI, s.VD, p.KPA, p.KIA, p.KDA, p.TDA, p.VAMIN, ceiling)
+    va, slope, d.VD = pid(error, s.VI, s.VD, p.KPA, p.KIA, p.KDA, p.TDA, p.VAMIN, p.VAMAX)
+    d.VI = where((va >= current) & (slope > 0.0), 0.0, slope)
+    va = smaller(va, current)
     vr = clip(p.KFF * va + p.KM * (va - s.VG), p.VRMIN, p.VRMAX)
     least = smaller(clip(vr, u.vuel_out, u.voel_out), current)
     vm, d.VM = limited_lag(least, s.VM, 1.0, p.TA, p.VMMIN, p.VMMAX)

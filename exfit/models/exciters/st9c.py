@@ -36,8 +36,8 @@ ALIASES = ("ESST9C",)
 SHEET = (
     *sheet(
         ("TR", 0.02, "s", (0.0, 1.0), "voltage transducer lag"),
-        ("TCD", 0.06, "s", (0.0, 10.0), "time constant of the derivative", FREE),
-        ("TBD", 0.03, "s", (0.0, 10.0), "lag of the derivative", FREE),
+        ("TCD", 0.06, "s", (0.0, 10.0), "time constant of the derivative"),
+        ("TBD", 0.03, "s", (0.0, 10.0), "lag of the derivative"),
         ("ZA", 0.036, "pu", (0.0, 9999.0), "dead band of the derivative"),
         ("KA", 12.0, "pu", (0.01, 100000.0), "regulator gain", FREE),
         ("KU", 100.0, "1", (0.0, 1e6), "gain of the change to TAUEL while UEL has the gate"),
