@@ -7,6 +7,7 @@ switch on its grid: a parameter that acts through the instant alone has no deriv
 from exfit.engine.trace import Signal, clip, exp, larger, log, where
 from exfit.models.blocks import Limited, limited, zero
 
+POWERS = ("p", "q")  # what a limiter sees of the stator current, beside the voltage
 LEAST_CURRENT = 1e-6  # pu; a power of less is that of this
 BEYOND = 1.0  # s by which a timer passes what it is compared with
 

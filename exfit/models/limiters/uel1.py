@@ -20,12 +20,12 @@ Typical data are the standard's sample data (PSCAD, IEC 61970-302) but for KUF.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lead_lag, pi, smaller
-from exfit.models.limiter_blocks import waiting_integral
+from exfit.models.limiter_blocks import POWERS, waiting_integral
 from exfit.models.phasors import modulus
 from exfit.models.sheet import record, sheet
 
 PLACES = ("takeover", "takeover-output", "summing")
-INPUTS = ("vt", "p", "q")
+INPUTS = ("vt", *POWERS)
 
 SHEET = sheet(
     ("KUR", 1.95, "pu", (0.0001, 100.0), "radius"),

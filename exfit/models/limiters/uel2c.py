@@ -25,12 +25,12 @@ from itertools import pairwise
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, inf, lag, limited_lag, limited_lead_lag, pi, where
-from exfit.models.limiter_blocks import power, waiting_integral
+from exfit.models.limiter_blocks import POWERS, power, waiting_integral
 from exfit.models.phasors import modulus
 from exfit.models.sheet import record, sheet
 
 PLACES = ("summing", "takeover", "takeover-output")
-INPUTS = ("vt", "p", "q")
+INPUTS = ("vt", *POWERS)
 
 POINTS = ((0.0, -0.31), (0.3, -0.31), (0.6, -0.28), (0.9, -0.21), (1.02, 0.0), *((0.0, 0.0),) * 6)
 LEAST_GAIN = 0.1  # of kadj
