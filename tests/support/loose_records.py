@@ -30,15 +30,19 @@ def sound(definition, random):
     held = {name: row for name, row in rows.items() if name in definition.names}
     whole = dict(definition.record.icons)
     unseen = typical(definition.model.sheet) | dict(definition.record.held)
-    values = unseen | {name: within(row, random) for name, row in held.items()}
-    values |= {name: float(round(values[name])) for name in held if name in whole}
+
+    def drawn_values(names):
+        values = {name: within(held[name], random) for name in names}
+        return {name: float(round(v)) if name in whole else v for name, v in values.items()}
+
+    values = unseen | drawn_values(held)
     for _ in range(TRIES):
         wrong = [*contradictions(definition.model, values)]
         if not wrong:
             return values
         symbol, text = wrong[random.integers(len(wrong))]
         drawn = SWAPPED if symbol in SWAPPED else [symbol, *re.findall(r"\w+", text)]
-        values |= {name: within(held[name], random) for name in drawn if name in held}
+        values |= drawn_values(name for name in drawn if name in held)
     return unseen
 
 
