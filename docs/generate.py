@@ -58,7 +58,7 @@ test: {{vt0: 1.0, duration: 20.0, vref: [{{at: 1.0, step: {step}}}]}}
 """
 # by limiter: an exciter, data by which it acts, a step of the reference, the signal that is drawn
 LIMITER_EXAMPLES: Mapping[str, tuple[str, str, float, str]] = {
-    "OEL2C": ("ST1A", "ITFPU: 1.9, ILIM: 1.9, IINST: 4.0, KPOEL: 20.0, K2: 2.0", 0.1, "ifd"),
+    "OEL2C": ("ST1A", "ITFPU: 1.9, ILIM: 1.9, IINST: 4.0, KPOEL: 20.0, K2: 20.0", 0.1, "ifd"),
     "OEL3C": ("AC8C", "ITFPU: 1.9, VOELMAX1: 0.1", 0.1, "ifd"),
     "OEL5C": (
         "AC8C",

@@ -41,7 +41,7 @@ LIVELY = {
         **{"ITFPU": 2.0, "ILIM": 1.9, "IINST": 3.0, "K2": 1.5, "KPOEL": 4.0, "KIOEL": 2.0},
         **{"KDOEL": 0.1, "TB1OEL": 0.2, "TC2OEL": 0.3, "TOFF": 0.5, "FIXEDRD": -0.6},
         **{"KRD": -20.0, "KRU": 20.0, "VOELMAX3": 9.0, "VOELMAX2": 8.0, "VOELMAX1": 7.0},
-        **{"KFB": 0.05, "FIXEDRU": 0.1},
+        **{"KFB": 0.05, "FIXEDRU": 0.1, "TFCL": 1.0, "TMAX": 1.0},
     },
     "OEL3C": {"ITFPU": 2.0, "TOEL": 0.8, "VOELMAX1": 0.3, "K1": 1.5, "KSCALE": 1.05},
     "OEL5C": {
