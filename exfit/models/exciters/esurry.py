@@ -1,22 +1,21 @@
 """ESURRY: alternator exciter with feedback of its field current (PSS/E ESURRY).
 
-                                                VRMAX       VE >= 0
-vref + vs ►(+)►[1+sTA]►[1+sTC]►[K10]►(+)►(+)─►[clip]─►(+)►[  1  ]┬ VE ►(x)►efd
-          -▲   [1+sTB] [1+sTD]       ▲   -▲    VRMIN  -▲  [ sTE ]│      ▲
-           │                         │    │            │         │     FEX
-vc1►[  1  ]┘                       IREF   │            └── VFE ◄─┘      ▲
-    [1+sTR]                               │                │    KC IFD / VE
-                                          │                ▼
-                        [K16 + sKF/(1+sTF)]◄────────────[  1  ]
-                                                        [1+sT1]
+                                            VRMAX        VE >= 0
+vref + vs ►(+)►[1+sTA]►[1+sTC]►[K10]─►(+)──►[clip]─►(+)─►[  1  ]─┬─ VE ►(x)►efd
+           -▲  [1+sTB] [1+sTD]        ▲ ▲-  VRMIN   -▲   [ sTE ] │       ▲
+            │                   IREF ─┘ │            │           │      FEX
+vc1►[  1  ]┘                            │            └─── VFE ◄──┘       ▲
+    [1+sTR]                             │                           KC IFD / VE
+                                        └─[K16 + sKF/(1+sTF)]◄─[  1  ]◄─ VFE
+                                                               [1+sT1]
 
 VFE = KE VE + VX(VE) + KD IFD. IREF is K16 VFE of the start (setpoint IREF0),
 so that the feedback K16 begins at nothing. The limit of VE is non-windup; the
 clamp has no state. TB = 0 bypasses TA with it, TD = 0 TC.
 
 OpenIPSL's and InterPSS's models, written after PSS/E's, agree; WECC's EXAC1M is
-another name. Typical data are those of a record. Not modelled: UEL other than
-at the summing point (PSS/E adds it to IREF).
+another name. Typical data are those of a record but for KC. Not modelled: UEL
+other than at the summing point (PSS/E adds it to IREF).
 """
 
 from exfit.engine.trace import Signal
@@ -60,7 +59,7 @@ SHEET = sheet(
     ("SE1", 0.01, "pu", (0.0, 100.0), "saturation at E1"),
     ("E2", 5.01, "pu", (0.01, 100.0), "second voltage of the saturation curve"),
     ("SE2", 0.2, "pu", (0.0, 100.0), "saturation at E2"),
-    ("KC", 0.001, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
+    ("KC", 0.1, "pu", (0.0, 100.0), "rectifier loading factor", LOADING),
     ("KD", 0.0, "pu", (0.0, 100.0), "demagnetising factor"),
     ("KE", 0.8, "pu", (0.0, 10.0), "exciter constant"),
 )
