@@ -20,7 +20,7 @@ FIELD_LIMITS = (
 )
 # the source of the regulator's power stage: terminal voltage alone, and a ceiling 1.5 times that
 SUPPLY = sheet(
-    ("SW1", 1.0, "1", (1.0, 2.0), "supply of the power stage: 1 terminals, 2 independent"),
+    ("SW1", 1.0, "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
     ("KP", 1.0, "pu", (0.01, 100.0), "potential source gain"),
     ("KI", 0.0, "pu", (0.0, 100.0), "current source gain, on load"),
     ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
