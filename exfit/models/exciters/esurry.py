@@ -4,8 +4,8 @@
 vref + vs ►(+)►[1+sTA]►[1+sTC]►[K10]─►(+)──►[clip]─►(+)─►[  1  ]─┬─ VE ►(x)►efd
            -▲  [1+sTB] [1+sTD]        ▲ ▲-  VRMIN   -▲   [ sTE ] │       ▲
             │                   IREF ─┘ │            │           │      FEX
-vc1►[  1  ]┘                            │            └─── VFE ◄──┘       ▲
-    [1+sTR]                             │                           KC IFD / VE
+vc1 ►[  1  ]┘                           │            └─── VFE ◄──┘       ▲
+     [1+sTR]                            │                           KC IFD / VE
                                         └─[K16 + sKF/(1+sTF)]◄─[  1  ]◄─ VFE
                                                                [1+sT1]
 
