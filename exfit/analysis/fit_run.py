@@ -18,6 +18,7 @@ from exfit.analysis.descriptions.case_description import (
     text_of,
     values_by_part,
 )
+from exfit.analysis.descriptions.other_program import other_program_of
 from exfit.analysis.given_values import given_values
 from exfit.analysis.iteration_responses import (
     LiveResponse,
@@ -152,4 +153,5 @@ def fit_result(request: FitRequest, program: ExternalProgram | None) -> FitResul
         case_text=case_text,
         as_found=analysis.as_found,
         criteria=criteria_of(case),
+        other_program=other_program_of(case, program, [*setups, *unseen]),
     )

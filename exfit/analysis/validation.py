@@ -15,6 +15,7 @@ from exfit.analysis.causes.run_quality import (
     unstable_rest_notes,
     voltage_notes,
 )
+from exfit.analysis.descriptions.other_program import other_program_of
 from exfit.analysis.given_values import ValuesOrResult, changes_of
 from exfit.analysis.other_values import model_as_found
 from exfit.analysis.solution import aligned, validation_of
@@ -32,6 +33,7 @@ from exfit.records.channel_inspection import SPIKE_LIMIT
 from exfit.records.record import Record
 from exfit.results.compare_with_record import compare_with_record
 from exfit.results.comparisons import Comparison, ValidatedStep
+from exfit.results.description import OtherProgram
 from exfit.util.file_names import folded
 
 Values = Mapping[str, float]
@@ -62,6 +64,7 @@ class Validation(NamedTuple):
     case: Case
     values: Values
     tests: tuple[ComparedTest, ...]
+    other_program: OtherProgram | None = None
 
     @property
     def fitted(self) -> bool:
@@ -92,7 +95,9 @@ def validate(
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
     with program_of(case) as program:
-        return _compared(*_with_values(case, values), record, given, program)
+        compared = _compared(*_with_values(case, values), record, given, program)
+        setups = [test.setup for test in compared.tests]
+        return compared._replace(other_program=other_program_of(case, program, setups))
 
 
 def _compared(

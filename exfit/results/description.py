@@ -129,6 +129,21 @@ class SmallSignalView:
 
 
 @dataclass(frozen=True)
+class OtherProgram:
+    """What simulated the records in place of exfit: its command, or the file of an FMU.
+
+    ``twin`` is the plant of exfit beside it, None where there is none; ``differences`` are the
+    largest ones of both at the values, per unit, by record and signal.
+    """
+
+    command: str
+    twin: str | None
+    runs: int
+    failed: int = 0
+    differences: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class HitLimits:
     """The limits that the response of a test was on."""
 

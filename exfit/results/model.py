@@ -18,6 +18,7 @@ from exfit.results.comparisons import Comparison
 from exfit.results.description import (
     Behaviour,
     GivenInPlace,
+    OtherProgram,
     PartDescription,
     RecordedTest,
     source_in_words,
@@ -193,7 +194,8 @@ class FitResult:
     ``knowledge`` is what they say of the parameters, None where that is not known; ``about`` is
     what identifies the unit and the test. ``inputs`` is the SHA-256 of every file by its label,
     ``files`` its name. ``given_values`` are those in place of the case's. ``as_found`` is
-    the model before the test, ``criteria`` are those by which a report judges; ``windows`` is T'd0
+    the model before the test, ``criteria`` are those by which a report judges;
+    ``other_program`` is what simulated the records where exfit did not; ``windows`` is T'd0
     over windows of its records, None unless it is fitted to several steps by playback. ``verdict``,
     ``behaviour`` and ``as_found`` are None in results of an earlier version.
     """
@@ -256,6 +258,7 @@ class FitResult:
     case_text: str = field(default="", metadata=IN_FILE)
     as_found: AsFound | None = field(default=None, metadata=IN_FILE)
     criteria: Criteria = field(default_factory=Criteria, metadata=IN_FILE)
+    other_program: OtherProgram | None = field(default=None, metadata=IN_FILE)
 
     @property
     def name(self) -> str:

@@ -8,6 +8,7 @@ from exfit.results.comparisons import Comparison
 from exfit.results.description import (
     Behaviour,
     GivenInPlace,
+    OtherProgram,
     PartDescription,
     RecordedTest,
     source_in_words,
@@ -49,6 +50,7 @@ class ValidationResult:
     case_text: str = field(default="", metadata=IN_FILE)
     as_found: AsFound | None = field(default=None, metadata=IN_FILE)
     criteria: Criteria = field(default_factory=Criteria, metadata=IN_FILE)
+    other_program: OtherProgram | None = field(default=None, metadata=IN_FILE)
 
     @property
     def name(self) -> str:

@@ -33,7 +33,7 @@ def validation_result(
 
     ``sources`` says where those values come from that were given beside the case.
     """
-    case, values, tests = validation
+    case, values, tests, other_program = validation
     setups = [test.setup for test in tests]
     own = [(test.setup, test.values) for test in tests]
     return ValidationResult(
@@ -50,17 +50,18 @@ def validation_result(
         inputs=input_hashes(case, setups),
         parts=tuple(parts_of(case)),
         tests=tuple(_tests(validation)),
-        behaviour=behaviour_of(own),
+        behaviour=None if case.has_no_equations else behaviour_of(own),
         files=input_names(case, setups),
         case_text=text_of(case),
         as_found=None if case.as_found is None else as_found_of(case, own),
         criteria=criteria_of(case),
+        other_program=other_program,
     )
 
 
 def _sources(validation: Validation, sources: Mapping[str, str]) -> dict[str, str]:
     """Return where every value comes from: what differs from the case is by who gave it."""
-    case, values, _ = validation
+    case, values = validation.case, validation.values
     of_case, free = case.values(), case.free() if validation.fitted else ()
     changed = [name for name in of_case if name not in free and values[name] != of_case[name]]
     given = {name: word for name, word in sources.items() if name in of_case}

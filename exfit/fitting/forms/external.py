@@ -206,7 +206,7 @@ def differences_of_program(
         tests = settled(simulated_by(program, case, setups), values)
         if case.has_no_equations:
             return {setup.name: _differences_from_record(setup, values) for setup in tests}
-        return _differences(tests)
+        return differences_from_twin(tests)
 
 
 def _differences_from_record(setup: ExperimentSetup, values: Values) -> dict[str, float]:
@@ -218,7 +218,10 @@ def _differences_from_record(setup: ExperimentSetup, values: Values) -> dict[str
     }
 
 
-def _differences(setups: Sequence[ExperimentSetup]) -> dict[str, dict[str, float]]:
+def differences_from_twin(
+    setups: Sequence[ExperimentSetup],
+) -> dict[str, dict[str, float]]:
+    """Return by how much a program differs from its twin where tests were settled."""
     return {
         setup.name: {
             signal: float(np.max(np.abs(difference)))
@@ -254,6 +257,6 @@ def program_notes(
         f"derivatives by the twin {section.twin}; the search is local; {followed} are by the twin, "
         "corrected by its difference to the program at the result"
     )
-    for name, differences in _differences(setups).items():
+    for name, differences in differences_from_twin(setups).items():
         listed = ", ".join(f"{signal} {largest:.2g} pu" for signal, largest in differences.items())
         yield f"{name}: largest difference of program and twin: {listed}"

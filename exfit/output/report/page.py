@@ -4,7 +4,7 @@ import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
 from math import isfinite
@@ -18,10 +18,11 @@ from exfit.output.report.charts import drawing
 from exfit.output.report.sections import AGAINST, OF_VALIDATION, SECTIONS, ReportSection
 from exfit.output.report.sections.against import against
 from exfit.output.report.sections.matches import MatchView, OverlayChart, live_data
+from exfit.output.report.sections.other_program import NO_TWIN, has_no_equations
 from exfit.output.report.verdict import Headline, headline, headline_of_validation
 from exfit.results.feature_digits import feature_cells
 from exfit.results.model import FitResult
-from exfit.results.validation_result import ValidationResult
+from exfit.results.validation_result import Reported, ValidationResult
 from exfit.util.text import percentage, rounded
 
 if TYPE_CHECKING:
@@ -35,6 +36,10 @@ LIBRARY = ("bokeh.min.js", "bokeh-api.min.js")
 LONG = 12  # lines of a history that a reader sees without asking for more
 MOST_PRINTED = 8  # columns of parameters beside which a history is read on paper
 GENERATOR = '<meta name="generator" content="exfit '
+NO_BEHAVIOUR = (
+    "The result does not hold this: the fit was interrupted, or an earlier version of exfit "
+    "wrote it."
+)
 HEAD = 2000  # characters at the beginning of a page, among which it says what made it
 
 
@@ -43,7 +48,7 @@ class Page:
     """What a page shows: its title, what it comes to, its sections with their content.
 
     ``folder`` is where the results lie, for the commands on the page; ``fitted`` is whether values
-    were fitted.
+    were fitted; ``simulated_by`` is what shows how they behave, ``no_behaviour`` why nothing does.
     """
 
     title: str
@@ -51,6 +56,8 @@ class Page:
     sections: Sequence[tuple[ReportSection, Any]]
     folder: Path
     fitted: bool = True
+    simulated_by: str = "exfit"
+    no_behaviour: str = NO_BEHAVIOUR
 
 
 def html(result: FitResult, folder: Path, other: FitResult | None = None) -> str:
@@ -66,7 +73,8 @@ def fit_page(result: FitResult, folder: Path, other: FitResult | None = None) ->
     sections = [(section, section.content(result)) for section in SECTIONS]
     if other is not None:
         sections.insert(len(sections) - 1, (AGAINST, against(result, other)))
-    return Page(f"{result.model}: {result.name}", headline(result), sections, folder)
+    page = Page(f"{result.model}: {result.name}", headline(result), sections, folder)
+    return _with_other_program(page, result)
 
 
 def validation_page(result: ValidationResult, folder: Path) -> Page:
@@ -74,7 +82,17 @@ def validation_page(result: ValidationResult, folder: Path) -> Page:
     every = ((section, section.content(result)) for section in OF_VALIDATION)
     sections = [(section, content) for section, content in every if content]
     title = f"{result.model}: {result.name}"
-    return Page(title, headline_of_validation(result), sections, folder, fitted=False)
+    page = Page(title, headline_of_validation(result), sections, folder, fitted=False)
+    return _with_other_program(page, result)
+
+
+def _with_other_program(page: Page, result: Reported) -> Page:
+    """Return a page that names the twin as what shows how values behave, or its lack."""
+    if result.other_program is None:
+        return page
+    if has_no_equations(result):
+        return replace(page, simulated_by="", no_behaviour=f"{NO_TWIN}.".capitalize())
+    return replace(page, simulated_by="the twin in exfit")
 
 
 def page_html(page: Page, interactive: bool = True) -> str:
@@ -92,6 +110,8 @@ def page_html(page: Page, interactive: bool = True) -> str:
             numbers={part.key: k for k, (part, _) in enumerate(page.sections, start=1)},
             folder=str(page.folder),
             fitted=page.fitted,
+            simulated_by=page.simulated_by,
+            no_behaviour=page.no_behaviour,
             data=list(live_data(overlays)),
             css=CHART_STYLE.read_text(encoding="utf-8") + style.read_text(encoding="utf-8"),
             scripts=scripts,

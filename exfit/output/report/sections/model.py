@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import exp, log
 
 from exfit.output.drawings import block_diagram, diagram_and_remarks
+from exfit.output.report.sections.other_program import has_no_equations, other_program
 from exfit.results.description import PartDescription
 from exfit.results.validation_result import Reported
 
@@ -17,10 +18,15 @@ EXPONENTIAL: Mapping[str, tuple[str, Callable[[float, float], float]]] = {
 
 @dataclass(frozen=True)
 class ModelView:
-    """The models that were fitted; ``saturation`` is a sentence, empty where there is none."""
+    """The models that were fitted; ``saturation`` is a sentence, empty where there is none.
+
+    ``other_program`` are sentences on what simulated in place of exfit.
+    """
 
     parts: tuple["PartView", ...]
     saturation: str
+    other_program: tuple[str, ...] = ()
+    has_equations: bool = True
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,12 @@ class PartView:
 def model(result: Reported) -> ModelView:
     """Return the models that were fitted; a network is none."""
     parts = (part for part in result.parts if part.kind != "network")
-    return ModelView(tuple(map(_view, parts)), saturation(result))
+    return ModelView(
+        tuple(map(_view, parts)),
+        saturation(result),
+        other_program(result),
+        not has_no_equations(result),
+    )
 
 
 def _view(part: PartDescription) -> PartView:

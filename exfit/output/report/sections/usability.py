@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import NamedTuple
 
+from exfit.output.report.sections.other_program import NO_TWIN, has_no_equations
 from exfit.results.description import Behaviour
 from exfit.results.validation_result import Reported
 
@@ -25,7 +26,7 @@ def usability(result: Reported) -> tuple[UsabilityCheck, ...]:
     """Return the checks of usability (cf. NERC MOD-026-1 R6), each with its result."""
     behaviour = result.behaviour
     if behaviour is None:
-        return no_usability(NOT_HELD)
+        return no_usability(NO_TWIN if has_no_equations(result) else NOT_HELD)
     return (_initialises(behaviour), _no_disturbance(behaviour), _damping(behaviour))
 
 
