@@ -1,5 +1,6 @@
 """The models of the catalogue."""
 
+import re
 from collections.abc import Iterable, Mapping
 
 from rich.console import Console
@@ -10,6 +11,8 @@ from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Sheet
 from exfit.output.terminal.terminal import paragraph, plain_table, remarks, show_table
 
+EDITION = re.compile(r"421\.5-(\d{4})")
+
 
 def catalogue(
     console: Console,
@@ -18,9 +21,9 @@ def catalogue(
     added: Mapping[str, Iterable[Model]],
 ) -> None:
     """Show the names of all models; those ``added`` to exciter and machine by what they are."""
-    table = plain_table("exciter", "also", "")
+    table = plain_table("exciter", "also", "of", "")
     for exciter in models:
-        table.add_row(exciter.name, ", ".join(exciter.aliases), exciter.title.partition(" (")[0])
+        table.add_row(exciter.name, ", ".join(exciter.aliases), *_edition_and_words(exciter))
     show_table(console, table)
     console.print()
     table = plain_table("machine", "")
@@ -29,10 +32,18 @@ def catalogue(
     show_table(console, table)
     for kind, of_kind in added.items():
         console.print()
-        table = plain_table(kind, "")
-        for model in of_kind:
-            table.add_row(model.name, model.title.partition(" (")[0])
+        rows = [(model.name, *_edition_and_words(model)) for model in of_kind]
+        table = plain_table(kind, "of" if any(edition for _, edition, _ in rows) else "", "")
+        for row in rows:
+            table.add_row(*row)
         show_table(console, table)
+
+
+def _edition_and_words(model: Model) -> tuple[str, str]:
+    """Return the year of the standard's edition that a title names, "" for none, and its words."""
+    words, _, source = model.title.partition(" (")
+    edition = EDITION.search(source)
+    return edition[1] if edition else "", words
 
 
 def model(console: Console, described: Model | Machine) -> None:
