@@ -26,6 +26,7 @@ from exfit.fitting.forms.external import (
     program_of,
     refuse_without_equations,
     simulated_by,
+    simulation_by_twin_notes,
 )
 from exfit.fitting.recordings import read_section
 from exfit.fitting.search import checked_strategy, search_options
@@ -189,7 +190,8 @@ def _simulated(
         at = setup.experiment.parameters(setup.with_start_values(values))
         simulator = setup.experiment.with_inputs(setup.with_start_values(values))
         simulated = simulation_notes(case, simulator, at, response)
-        return SimulationResult(response, comparison, (*simulated, *notes))
+        by_twin = simulation_by_twin_notes(case, simulator, response.signals)
+        return SimulationResult(response, comparison, (*simulated, *notes, *by_twin))
     simulator, levels = plain_simulator(case, values)
     at = {**values, **levels}
     simulator = with_enough_substeps(simulator, at, case.path)
@@ -197,7 +199,8 @@ def _simulated(
         simulator = external_simulator(program, case, simulator)
     response = simulator.response(at)
     notes = simulation_notes(case, simulator, at, response)
-    return SimulationResult(response, None, tuple(notes))
+    by_twin = simulation_by_twin_notes(case, simulator, response.signals)
+    return SimulationResult(response, None, (*notes, *by_twin))
 
 
 def validate(
@@ -229,7 +232,9 @@ def validate(
     """
     from exfit.analysis import validation
 
-    return validation.validate(loaded(case, values), values, record, step, at).comparisons
+    case = loaded(case, values)
+    with program_of(case) as program:
+        return validation.validate(case, values, record, step, at, program).comparisons
 
 
 def validation_result(
@@ -250,8 +255,10 @@ def validation_result(
 
     if isinstance(values, FitResult):
         sources = values.sources
-    compared = validation.validate(loaded(case, values), values, record, step, at)
-    return validation_result(compared, versions(), sources or {})
+    case = loaded(case, values)
+    with program_of(case) as program:  # it runs the model as found, too
+        compared = validation.validate(case, values, record, step, at, program)
+        return validation_result(compared, versions(), sources or {})
 
 
 def profile(

@@ -13,6 +13,7 @@ from exfit.case.case import Case
 from exfit.case.schema import AsFoundSection
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.build import build_experiment
+from exfit.fitting.forms.external import run_by_program
 from exfit.fitting.residuals import Residuals
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
@@ -111,6 +112,9 @@ def _case_before(case: Case, section: AsFoundSection) -> Case:
     model = find(section.model.removesuffix(".py"), Path())
     if case.parts.exciter is not None and model.name == case.parts.exciter.name:
         return case
+    if case.external is not None:
+        text = f"the program simulates {case.subject} only"
+        raise CaseError([f"{case.path}: as_found.model: {model.name}: {text}"])
     from exfit.case.other_model import with_exciter  # what `new` needs, a fit mostly does not
 
     return with_exciter(case, model.name, model)
@@ -126,6 +130,7 @@ def _comparisons(
         of_record = {name: value for name, value in fitted.items() if name not in case.rows()}
         at = {**of_record, **values}
         own = setup if before is case else build_experiment(before, recording, at)
+        run_by_program(own, at)
         comparisons.append(compare_with_record(own.with_enough_substeps(at), setup.name, at))
     return comparisons
 

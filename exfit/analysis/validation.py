@@ -25,7 +25,7 @@ from exfit.dsp.quality import noise_of, spikes
 from exfit.errors import CaseError
 from exfit.external.program import ExternalProgram
 from exfit.fitting.build import build_experiment
-from exfit.fitting.forms.external import as_by_program, program_of
+from exfit.fitting.forms.external import as_by_program
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.system import values_of
 from exfit.fitting.unplanned_test import GivenSteps, UnplannedTest, with_steps_of_record
@@ -83,21 +83,21 @@ def validate(
     record: Record | Path | str | None,
     step: float | Sequence[float],
     at: float | Sequence[float],
+    program: ExternalProgram | None = None,
 ) -> Validation:
     """Return the comparisons with the fitted records, then with those that no fit saw.
 
     No fit saw any record where nothing in the case is free, nor without ``values``: they are those
-    of the model as found then. A ``record`` by hand, whose steps may be given, takes the place of
-    the others. Raises ExfitError where input cannot be used, or where there is nothing to validate
-    on.
+    of the model as found then. A ``program`` simulates if one is given. A ``record`` by hand, whose
+    steps may be given, takes the place of the others. Raises ExfitError where input cannot be used,
+    or where there is nothing to validate on.
     """
     given = GivenSteps(_numbers(step), _numbers(at))
     if record is None and any(given):
         raise CaseError([f"{case.path}: step and at are those of a record that is given with them"])
-    with program_of(case) as program:
-        compared = _compared(*_with_values(case, values), record, given, program)
-        setups = [test.setup for test in compared.tests]
-        return compared._replace(other_program=other_program_of(case, program, setups))
+    compared = _compared(*_with_values(case, values), record, given, program)
+    setups = [test.setup for test in compared.tests]
+    return compared._replace(other_program=other_program_of(case, program, setups))
 
 
 def _compared(

@@ -104,8 +104,16 @@ def identify(case: Case, noise: Mapping[str, float]) -> Design:
         uncertainty_after(own),
         tuple(plans),
         _noise_by_signal(case, own, levels),
-        tuple(search_range_notes(case)),
+        (*_twin_notes(case), *search_range_notes(case)),
     )
+
+
+def _twin_notes(case: Case) -> Iterator[str]:
+    if case.external is not None:
+        yield (
+            f"these are the standard errors of the twin {case.external.twin}: "
+            f"{case.external.simulator} is not run"
+        )
 
 
 def _uncertainty_after(

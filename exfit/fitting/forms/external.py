@@ -182,6 +182,34 @@ def start_tried(case: Case, residuals: Residuals, program: ExternalProgram) -> N
             raise SimulationError(f"{case.path}: {fault} (at the start values, twice)") from fault
 
 
+def run_by_program(setup: ExperimentSetup, values: Values) -> None:
+    """Have a program run a settled test at other values too, so that it responds with that run.
+
+    Nothing where exfit simulates it. Raises SimulationError where the program has no run there.
+    """
+    at = setup.with_start_values(values)
+    simulator = setup.experiment.with_inputs(at)
+    if not isinstance(simulator, ProgramSimulator):
+        return
+    (run,) = simulator.program.runs([simulator.request(setup.experiment.parameters(at))])
+    if run.failure:
+        raise SimulationError(f"{setup.case}: record {setup.name}: {run.failure}")
+
+
+def simulation_by_twin_notes(
+    case: Case, simulator: Simulator, shown: Iterable[str]
+) -> Iterator[str]:
+    """Yield which of the shown signals the twin of a program gives, without a correction."""
+    section = case.external
+    if section is None or section.twin is None or not isinstance(simulator, ProgramSimulator):
+        return
+    if {*shown} - {*simulator.signals}:
+        yield (
+            f"{section.simulator} gives {', '.join(simulator.signals)}; all other signals are by "
+            f"the twin {section.twin}, not corrected"
+        )
+
+
 def as_by_program(
     program: ExternalProgram | None, case: Case, setup: ExperimentSetup, values: Values
 ) -> ExperimentSetup:

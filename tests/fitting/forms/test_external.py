@@ -13,7 +13,7 @@ from exfit.case.case import Case
 from exfit.errors import CaseError, SimulationError
 from exfit.fitting.forms.twin_descent import ProgramFunctions
 from exfit.results.tables import parameter_file
-from exfit.workflows import check, identify, profile
+from exfit.workflows import check, identify, profile, validation_result
 
 PROGRAM = Path(__file__).parents[2] / "support" / "outside_program.py"
 PLANT = {"machine": "ONE_AXIS", "parameters": {"Tpd0": 6.0, "S10": 0.0, "S12": 0.0}}
@@ -265,3 +265,55 @@ def test_what_only_shows_the_twin_does_not_start_the_program(record, tmp_path):
 def test_a_global_search_is_refused(record):
     with pytest.raises(CaseError, match="search: global: not allowed with plant external"):
         exfit.fit(external(record), search="global")
+
+
+AS_FOUND = {"source": "base.dyr", "parameters": {"K": 120.0, "TE": 0.1, "TB": 5.0}}
+
+
+def as_found_case(record, **as_found):
+    """Return a case whose twin differs, with a model as found."""
+    other = {"machine": "GENSAL", "parameters": {**PLANT["parameters"], "Tppd0": 0.2}}
+    plain = external(record, **other)
+    section = type(plain).from_dict(
+        {
+            "model": "SEXS",
+            "plant": {**PLANT, "type": "external", "twin": "open-circuit", **other,
+                      "command": [sys.executable, str(PROGRAM)], "names": {"K": "K_A"}},
+            "test": BUMP,
+            "record": {"file": "none.csv", "time": "t", "channels": {"vt": "vt"}},
+            "parameters": {"fixed": {k: v for k, v in TRUTH.items() if k not in FREE},
+                           "free": FREE},
+            "as_found": as_found,
+        },
+        record,
+    )  # fmt: skip
+    return plain, section
+
+
+def test_the_model_as_found_is_run_by_the_program(record):
+    plain, stated = as_found_case(record, **AS_FOUND)
+    by_program = exfit.simulate(plain, AS_FOUND["parameters"]).response.signals["vt"]
+    result = exfit.fit(stated)
+    (match,) = result.as_found.comparisons
+    assert np.array_equal(match.overlays["vt"].simulated, by_program)
+    validated = validation_result(stated, None)
+    assert np.array_equal(validated.matches[0].overlays["vt"].simulated, by_program)
+    assert validated.other_program.runs == 1
+    fitted = {name: TRUTH[name] for name in FREE}
+    (match, _) = validation_result(stated, fitted, record).as_found.comparisons
+    assert np.array_equal(match.overlays["vt"].simulated, by_program)
+
+
+def test_another_exciter_as_found_is_not_compared(record):
+    _, stated = as_found_case(record, source="base.dyr", model="AC4A")
+    with pytest.raises(CaseError, match=r"as_found.model: AC4A: the program simulates SEXS only"):
+        validation_result(stated, None)
+    assert "the program simulates SEXS only" in exfit.fit(stated).as_found.why
+
+
+def test_what_the_twin_alone_shows_is_named(record):
+    shown = exfit.simulate(external(record))
+    (note,) = [note for note in shown.notes if "not corrected" in note]
+    assert note.endswith("gives vt; all other signals are by the twin open-circuit, not corrected")
+    assert identify(external(record)).notes[0].startswith("these are the standard errors of the tw")
+    assert not any("twin" in note for note in exfit.simulate(without_twin(record)).notes)
