@@ -36,8 +36,9 @@ class RunCounts(NamedTuple):
 class ExternalProgram:
     """A command that simulates: ``parallel`` processes of it, each with a ``time_limit`` (s).
 
-    ``place`` is where the case names it. No run is asked for twice: its outcome is remembered, a
-    failure too.
+    ``place`` is where the case names it. A run that fails is made once again: of what fails now and
+    then a second run has signals, of what cannot be simulated it has none either. No run is asked
+    for beyond that: its outcome is remembered, a failure too.
     """
 
     def __init__(
@@ -76,12 +77,10 @@ class ExternalProgram:
             if key not in self._outcomes
         }
         self._values |= {_key(request["values"]) for request in missing.values()}
-        if len(missing) == 1 or len(self._processes) == 1:
-            for key, request in missing.items():
-                self._outcomes[key] = self._run(request)
-        elif missing:
-            outcomes = self._side_by_side([*missing.values()])
-            self._outcomes |= zip(missing, outcomes, strict=True)
+        self._run_all(missing)
+        failed = {key: missing[key] for key in missing if self._outcomes[key].failure}
+        self._earlier_failures += len(failed)
+        self._run_all(failed)
         return [self._outcomes[key] for key in keys]
 
     def remembered(self, request: Mapping[str, Any]) -> ExternalRun | None:
@@ -91,16 +90,19 @@ class ExternalProgram:
         outcome = self._outcomes.get(_key(request))
         return None if outcome is None or outcome.failure else outcome
 
-    def forget_failures(self) -> None:
-        """Have runs that failed be asked for again."""
-        kept = {key: outcome for key, outcome in self._outcomes.items() if not outcome.failure}
-        self._earlier_failures += len(self._outcomes) - len(kept)
-        self._outcomes = kept
-
     def end(self) -> None:
         """End all processes."""
         for process in self._processes:
             process.end()
+
+    def _run_all(self, requests: Mapping[str, Mapping[str, Any]]) -> None:
+        """Remember the outcomes of requests by their keys."""
+        if len(requests) <= 1 or len(self._processes) == 1:
+            for key, request in requests.items():
+                self._outcomes[key] = self._run(request)
+        else:
+            outcomes = self._side_by_side([*requests.values()])
+            self._outcomes |= zip(requests, outcomes, strict=True)
 
     def _side_by_side(self, requests: Sequence[Mapping[str, Any]]) -> list[ExternalRun]:
         executor = ThreadPoolExecutor(min(len(requests), len(self._processes)))

@@ -66,7 +66,7 @@ def fitted(
         setups = simulated_by(program, case, setups)
     problem = problem_of(residuals_of(case, setups, start))
     if program is not None:
-        start_tried(case, problem.residuals, program)
+        start_tried(case, problem.residuals)
     refuse_unfit(case, problem)
     return setups, problem
 

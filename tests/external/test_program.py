@@ -42,3 +42,22 @@ def test_no_run_is_asked_for_twice(tmp_path):
         assert [run.signals["vt"][1] for run in again] == [3.0, 2.0, 1.0, 1.0]
         assert program.counts == (3, 0, 0)
     assert (tmp_path / "runs").read_text() == "..."
+
+
+FAILING = """
+import json, sys
+for number, line in enumerate(sys.stdin, 1):
+    asked = json.loads(line)
+    fails = asked['values']['K'] == 1.0 or number == 2
+    signals = {'signals': {'vt': asked['times']}}
+    print(json.dumps({'id': asked['id'], **({'error': 'none'} if fails else signals)}), flush=True)
+"""
+
+
+def test_a_run_that_fails_is_made_once_again(tmp_path):
+    requests = [{**REQUEST, "values": {"K": k}} for k in (3.0, 2.0, 1.0)]
+    with running(ExternalProgram([sys.executable, "-c", FAILING], tmp_path, 1, 20.0)) as program:
+        for _ in range(2):
+            runs = program.runs(requests)
+            assert [run.failure for run in runs] == ["", "", "it reports: none"]
+            assert program.counts == (5, 3, 0)

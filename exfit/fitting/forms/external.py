@@ -166,14 +166,10 @@ def has_twin(residuals: Residuals) -> bool:
     )
 
 
-def start_tried(case: Case, residuals: Residuals, program: ExternalProgram) -> None:
-    """Run the start of a search, a second time where it failed.
-
-    Raises SimulationError with the reason where it failed again.
-    """
+def start_tried(case: Case, residuals: Residuals) -> None:
+    """Run the start of a search; raises SimulationError with the reason where it has no run."""
     if np.isfinite(residuals(residuals.start)).all():
         return
-    program.forget_failures()
     values = residuals.values(residuals.start)
     for experiment in residuals.experiments:
         try:
