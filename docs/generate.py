@@ -265,6 +265,7 @@ def _model_page(model: Any, caption: str, folder: Path) -> Path:
         f"{title[:1].upper()}{title[1:]}.",
         _diagram(model),
         *map(_escaped, remarks),
+        *([f"{model.name} {_escaped(model.doubt)}."] if model.doubt else []),
         f"## Data sheet\n\n{_sheet(model.sheet)}",
         f"States: {', '.join(model.states)}.",
         f"## Response\n\n![response of {model.name}]({model.name}.png)\n\n{caption}",

@@ -283,6 +283,25 @@ def test_every_model_is_named(name):
     assert catalogue <= set(re.findall(r"\w+", PAGES[name]))
 
 
+def test_the_table_of_sources_says_of_each_model_of_2016_what_its_file_does():
+    text = PAGES["docs/models/index.md"]
+    (listed,) = re.findall(r"^\| DC commutator.*?\n(?=\n)", text, re.DOTALL | re.MULTILINE)
+    of_2016 = " ".join(row.split("|")[3] for row in listed.splitlines()).split()
+    older = {"DC3A", "PSS1A"}  # which the edition of 2016 did not change
+    _, _, table = text.partition("| model | diagrams |")
+    rows = [row.split("|")[1:3] for row in table.partition("\n\n")[0].splitlines()[2:]]
+    shelves = {**MODELS, **STABILISERS, **LIMITERS}
+    doubts = {name.strip(): shelves[name.strip()].doubt for name, _ in rows}
+    assert set(doubts) == {*of_2016} - older
+    assert len(rows) == len(doubts)
+    for name, diagrams in rows:
+        doubt = doubts[name.strip()]
+        one = doubt.startswith("rests on one public diagram")
+        expected = "one" if one else "two that differ" if doubt else "two"
+        assert diagrams.strip() == expected, name
+    assert all(model.doubt == "" for name, model in shelves.items() if name not in doubts)
+
+
 @pytest.mark.long
 def test_a_fit_writes_the_files_of_the_table_and_no_others(tmp_path):
     result = workflows.fit(load_case(ROOT / "configs" / "first_order.yaml"))

@@ -173,6 +173,15 @@ def typical_notes(case: Case, values: Mapping[str, float]) -> Iterator[str]:
         yield f"{name} does not act: the breaker is open"
 
 
+def diagram_notes(case: Case) -> Iterator[str]:
+    """Yield what is not settled about the diagrams of the models of a case."""
+    parts = case.parts
+    limiters = (limiter.model for limiter in parts.limiters)
+    for model in (parts.exciter, parts.stabiliser, parts.governor, *limiters):
+        if model is not None and model.doubt:
+            yield f"{model.name} {model.doubt}"
+
+
 def idle_models(case: Case) -> list[str]:
     """Return the models of a case that do nothing without load, where no test has one."""
     if case.on_load or case.kind.plays_back:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from exfit.analysis.causes.before_fit import case_warnings, record_warnings
 from exfit.analysis.causes.events_before_fit import event_warnings
 from exfit.analysis.causes.run_quality import unstable_rest_notes
-from exfit.analysis.diagnostics import search_range_notes, typical_notes
+from exfit.analysis.diagnostics import diagram_notes, search_range_notes, typical_notes
 from exfit.case.case import Case
 from exfit.errors import ExfitError
 from exfit.fitting.build import build_experiments, planned
@@ -102,6 +102,7 @@ def check(case: Case) -> Check:
         drift=drift,
         notes=(
             *typical_notes(case, case.values()),
+            *diagram_notes(case),
             *search_range_notes(case),
             *own_value_notes(case),
             *dict.fromkeys(_rest_notes(experiments, values)),

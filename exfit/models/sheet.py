@@ -201,7 +201,7 @@ class Model:
     keeps: ``rest`` writes them beside the states, ``equations`` reads them there. ``records`` are
     its PSS/E records, its own one first, ``pslf_records`` those of PSLF; ``inputs`` the signals
     that a stabiliser or a limiter listens to, ``places`` where a limiter may act on an exciter, the
-    usual one first.
+    usual one first; ``doubt`` what is not settled about its diagram, to be read behind its name.
 
     A governor's output is the turbine's power Pm, its reference ``pref``; it sees ``dw``, the speed
     less 1, and ``p``, the electrical power, all per unit on the machine's base.
@@ -220,6 +220,7 @@ class Model:
     rest: Callable[..., Any]
     pslf_records: tuple[DynamicsRecord, ...] = ()
     places: tuple[str, ...] = ()
+    doubt: str = ""
 
 
 def model(name: str, parts: Mapping[str, Any]) -> Model:
@@ -247,6 +248,7 @@ def model(name: str, parts: Mapping[str, Any]) -> Model:
         rest=parts["rest"],
         pslf_records=tuple(parts.get("PSLF_RECORDS", ())),
         places=tuple(parts.get("PLACES", ())),
+        doubt=str(parts.get("DOUBT", "")),
     )
 
 

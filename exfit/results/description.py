@@ -50,7 +50,8 @@ class NetworkParameter(NamedTuple):
 class PartDescription:
     """A part of what was fitted: its kind, its model, how its parameters' names begin.
 
-    ``sheet`` is by symbol; ``drawing`` is empty where there is none.
+    ``sheet`` is by symbol; ``drawing`` is empty where there is none, ``doubt`` where its diagram is
+    settled.
     """
 
     kind: str
@@ -59,6 +60,7 @@ class PartDescription:
     title: str = ""
     drawing: str = ""
     sheet: Mapping[str, SheetRow] | None = None
+    doubt: str = ""
 
     @property
     def heading(self) -> str:

@@ -11,6 +11,7 @@ from exfit.case.load import load_case, parse_case
 from exfit.fitting.build import build_experiments
 from exfit.fitting.problem import residuals_of
 from exfit.fitting.residuals import Residuals
+from exfit.models import MODELS
 
 WITHOUT_RECORD = """\
 model: AC1A
@@ -99,6 +100,13 @@ def test_it_names_what_is_bypassed_and_what_is_taken_as_typical(tmp_path):
     assert "TR" not in exciter
     assert "KA" not in exciter
     assert "Tpd0" in machine
+
+
+def test_it_names_a_model_whose_diagram_is_in_doubt(tmp_path):
+    text = WITHOUT_RECORD.partition("  free:")[0].replace("AC1A", "AC5C")
+    found = check(parse_case(text, tmp_path / "bump.yaml"))
+    assert f"AC5C {MODELS['AC5C'].doubt}" in found.notes
+    assert MODELS["AC5C"].doubt.startswith("rests on one public diagram")
 
 
 def test_it_reports_the_sub_steps_of_a_fast_case(tmp_path):

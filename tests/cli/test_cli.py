@@ -23,7 +23,7 @@ from rich.console import Console
 from tiers import few_of
 
 from exfit import cli, workflows
-from exfit.models import MODELS
+from exfit.models import LIMITERS, MODELS, STABILISERS
 from exfit.models.machines import MACHINES
 from exfit.output import plots, terminal
 from exfit.output.figure_files import FigureFiles
@@ -1010,6 +1010,14 @@ def test_the_parameters_that_a_new_case_frees_are_listed_below_a_data_sheet(run,
     lines = run("models", name).out.splitlines()
     last = [f"free in the case of `exfit new`: {', '.join(free)}"] if free else []
     assert [line for line in lines if line.startswith("free")] == last
+
+
+@pytest.mark.parametrize("name", ["AC1A", "AC5C", "OEL2C", "PSS4C"])
+def test_what_is_not_settled_about_a_diagram_is_noted_below_its_data_sheet(run, name):
+    described = {**MODELS, **LIMITERS, **STABILISERS}[name]
+    _, _, note = run("models", name).out.partition("note: ")
+    assert note.split() == (f"{name} {described.doubt}".split() if described.doubt else [])
+    assert bool(described.doubt) == (name != "AC1A")
 
 
 def test_an_unknown_model_is_reported_with_the_known_ones(run, workplace):

@@ -342,6 +342,15 @@ def test_a_machine_alone_has_no_drawing_and_no_loop(pages):
     assert "there is no loop" in page.text
 
 
+def test_what_is_not_settled_about_a_diagram_stands_below_it(own):
+    saved = json.loads((own / "result.json").read_text(encoding="utf-8"))
+    assert saved["parts"][0]["doubt"] == ""
+    assert "Note: FIRST_ORDER" not in Page(page_of(own)).text
+    part = saved["parts"][0] | {"doubt": "rests on one public diagram"}
+    change(own, parts=[part, *saved["parts"][1:]])
+    assert "Note: FIRST_ORDER rests on one public diagram." in Page(page_of(own)).text
+
+
 def test_a_pole_of_the_first_order_system_is_what_was_fitted(fits, pages):
     """k / (s + a) has its pole at -a, and falls by 3 dB at a / 2 pi."""
     a = saved_of(fits("first order"))["parameters"]["a"]["value"]

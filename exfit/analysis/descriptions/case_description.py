@@ -139,6 +139,7 @@ def parts_of(case: Case) -> Iterator[PartDescription]:
             title=model.title if model else "",
             drawing=model.drawing if model else "",
             sheet={row.symbol: SheetRow(row.unit, row.meaning) for row in part.sheet},
+            doubt=model.doubt if model else "",
         )
 
 

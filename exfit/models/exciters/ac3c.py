@@ -17,8 +17,8 @@ VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. VN is
 efd through a gain KF up to EFDN and KN beyond it. The exciter supplies its
 regulator, so the gain of both grows with efd. The limits of the lag and of VE
 are non-windup; the integral is frozen while the PID is at its limit. With a
-PID of 1 (KPR = 1, KIR = KDR = 0) it is AC3A, whose sample data it has but for
-those of the PID.
+PID of 1 (KPR = 1, KIR = KDR = 0) it is AC3A, whose sample data it has. The PID
+is not that of a sample: GridKit, with the standard's sample data, has it at 1.
 
 The limiters act at the summing point (vsum) or at the gates. The sources are
 the drawing of 2005, the program InterPSS, which adds the PID and the gates, and
@@ -46,6 +46,7 @@ from exfit.models.blocks import (
 from exfit.models.exciters import ac3a
 from exfit.models.sheet import FREE, OF_ONE_PROGRAM, SearchRange, record, sheet
 
+DOUBT = "rests on one public diagram for its PID and gates, that of InterPSS"
 ALIASES = ("ESAC3C",)
 
 SHEET = (

@@ -36,6 +36,7 @@ from exfit.models.blocks import (
 from exfit.models.exciters import ac1a, ac5a
 from exfit.models.sheet import OF_ONE_PROGRAM, record, renamed
 
+DOUBT = "rests on one public diagram for its rectifier, that of InterPSS"
 ALIASES = ("ESAC5C",)
 
 SHEET = (

@@ -11,7 +11,8 @@ The limits VRMAX, VRMIN are non-windup, as IEEE Std 421.5-2005, annex E, draws
 those of a lead-lag: what they leave goes back through a lag T2, times
 (T1 / T2 - 1) / K. Two open models written after PSS/E's BBSEX1 agree. The
 limits of efd follow the terminal voltage itself. CIM's ExcBBC, whose data are
-the typical ones, is this with a fall of VT by XE.
+the typical ones, is this with a fall of VT by XE and without TR, which is not
+that of a sample.
 
 In a PSS/E record TR is TF, and SWITCH = 0: the stabiliser acts on the error.
 Not modelled: SWITCH = 1, a stabiliser added behind VRMAX; UEL and OEL other

@@ -52,6 +52,10 @@ from exfit.models.sheet import (
     sheet,
 )
 
+DOUBT = (
+    "rests on one public diagram, that of InterPSS, whose tests compare it with PowerWorld "
+    "but for saturation and KC1"
+)
 SHEET = (
     *sheet(
         ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),

@@ -23,8 +23,9 @@ The limiters act at the summing point (vsum) or at the gates behind VIMAX.
 InterPSS writes this; the parameters and limits that PowerWorld lists agree, but
 for the derivative, which the standard does not have and the record of PSS/E
 has. A later test of InterPSS says that PSS/E reads TA and does without it: here
-it acts, as in ST3A. Typical data are those of ST3A; those of the PID are not
-those of a sample.
+it acts, as in ST3A. Typical data are those of ST3A, which are the first set of
+the standard's sample data in GridKit; the PID is not that of a sample: GridKit
+lists none.
 """
 
 from exfit.engine.trace import Signal
@@ -33,6 +34,7 @@ from exfit.models.exciters import st3a
 from exfit.models.sheet import OF_ONE_PROGRAM, not_searched, record
 from exfit.models.static import PID, SUPPLY_SWITCH, supply
 
+DOUBT = "rests on one public diagram, that of InterPSS, whose tests compare it with PowerWorld"
 ALIASES = ("ESST3C",)
 
 SHEET = (*not_searched(st3a.SHEET, "KA"), *PID, *SUPPLY_SWITCH)

@@ -20,7 +20,8 @@ limiter acts it is ST5B.
 The limiters act at the summing point (vsum) or at the gates. Dynawo and
 InterPSS draw this; on the order and the limits of the lead-lags they disagree
 as they do on ST5B, which says what is followed. Typical data are those of ST5B;
-the times of the limiters' pairs are those that CIM gives as typical for it.
+the times of the limiters' pairs are the standard's sample data, as GridKit has
+them.
 """
 
 from exfit.engine.trace import Signal

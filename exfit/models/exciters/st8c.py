@@ -21,7 +21,9 @@ subtracts IFD and KF IFD / (1 + sTF), PowerSimulationsDynamics the latter alone,
 which is followed: KF is the gain of the feedback. OEL is subtracted at the
 summing point by PowerWorld and InterPSS; here a limiter has the sign of what it
 adds. PowerSimulationsDynamics has VB1 for SW1 = 2 only, and no VB2. Typical
-data are not those of a sample.
+data are not those of a sample: that of the standard, as GridKit has it, has no
+KIA and no second source (KPR 6.6, KIR 30, KPA 2.38, KA 4.295, TA 0.0017, KC1
+0.062, KP 1, TR and TF 0.0226).
 """
 
 from exfit.engine.trace import Signal
@@ -39,6 +41,10 @@ from exfit.models.blocks import (
 from exfit.models.sheet import FREE, record, sheet
 from exfit.models.static import SUPPLY_SWITCH
 
+DOUBT = (
+    "has the feedback KF alone of the field current; one of its two public diagrams "
+    "subtracts IFD as well"
+)
 ALIASES = ("ESST8C",)
 
 SHEET = (

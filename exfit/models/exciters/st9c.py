@@ -22,8 +22,9 @@ share KU times what UEL adds, at most all of it.
 The limiters act at the summing point (vsum) or at the gates HV and LV. Dynawo
 and InterPSS draw this; Dynawo has no KU and changes to TAUEL at once, as KU
 without bounds does. Both subtract a stator current limiter at the summing
-point, which here is added, as others are. The typical data of the derivative
-are those that InterPSS tests with; the others are not those of a sample.
+point, which here is added, as others are. Typical data are the standard's
+sample data, as GridKit has them, but for TR, KU, TAUEL, TAS, KC and VBMAX,
+which are 0, 10000, 2, 0.0018, 0 and 1.2 there: most leave out what they act on.
 """
 
 from exfit.engine.trace import Signal
@@ -44,8 +45,8 @@ SHEET = (
         ("TA", 2.0, "s", (0.01, 100.0), "time constant of the integral", FREE),
         ("TAUEL", 3.0, "s", (0.01, 100.0), "that of the integral while UEL has the gate"),
         ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),
-        ("VRMIN", -0.87, "pu", (-9999.0, 9999.0), "regulator floor"),
-        ("KAS", 6.0, "pu", (0.01, 1000.0), "gain of the power converter"),
+        ("VRMIN", -0.866, "pu", (-9999.0, 9999.0), "regulator floor"),
+        ("KAS", 6.1, "pu", (0.01, 1000.0), "gain of the power converter"),
         ("TAS", 0.01, "s", (0.0, 10.0), "firing circuit time constant", FREE),
     ),
     *SUPPLY,

@@ -27,14 +27,16 @@ active with none: activated when t reaches TFCL or iact has been above iref for
 TEN (TEN = 0: always), inactive again when iref is IINST and has been above iact
 by ITHOFF for TOFF. At the summing point VOELMAX1 is 0.
 
-Dynawo has FIXEDRU and FIXEDRD the other way round, so that its timer never runs
-back with the sample data, and no memory of being active: without either
-condition its bias is 0. Followed are the names of the parameters ("fixed delay
-time", "fixed cooling-down time", "reset delay time": PSCAD, PowerWorld,
-GridKit). Lists call TC1OEL and TC2OEL lags and TB1OEL and TB2OEL leads; the
-letters, and Dynawo, say the reverse, as drawn. Not modelled: the field voltage
-or the exciter's field current as input. Typical data are the first set of the
-standard's sample data (GridKit, PSCAD).
+Dynawo and InterPSS have FIXEDRU and FIXEDRD the other way round, so that the
+timer never runs back with the sample data; InterPSS's tests, which compare it
+with PSS/E, count with FIXEDRU = 1 below the pick-up. Followed are the names of
+the parameters ("fixed delay time", "fixed cooling-down time", "reset delay
+time": PSCAD, PowerWorld, GridKit); data made for PSS/E may need the two values
+exchanged. Dynawo has no memory of being active, which InterPSS has: without
+either condition its bias is 0. Lists call TC1OEL and TC2OEL lags and TB1OEL and
+TB2OEL leads; the letters, Dynawo and InterPSS say the reverse, as drawn. Not
+modelled: the field voltage or the exciter's field current as input. Typical
+data are the first set of the standard's sample data (GridKit, PSCAD).
 """
 
 from exfit.engine.trace import Signal
@@ -42,6 +44,7 @@ from exfit.models.blocks import Limited, clip, lag, limited, limited_lead_lag, p
 from exfit.models.limiter_blocks import BEYOND, latch, leaky_rest, power, timer, waiting_integral
 from exfit.models.sheet import record, sheet
 
+DOUBT = "has FIXEDRU and FIXEDRD as their names say; its two public diagrams exchange them"
 PLACES = ("takeover", "takeover-output", "summing")
 INPUTS = ("ifd",)
 

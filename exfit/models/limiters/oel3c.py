@@ -22,6 +22,7 @@ from exfit.models.blocks import clip, lag, limited_integrator, where
 from exfit.models.limiter_blocks import power
 from exfit.models.sheet import record, sheet
 
+DOUBT = "rests on one public diagram, that of Dynawo, which CoLib describes"
 PLACES = ("summing",)
 INPUTS = ("ifd",)
 

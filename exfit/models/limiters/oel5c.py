@@ -26,6 +26,7 @@ from exfit.models.blocks import clip, lag, lead_lag, limited, pi, where
 from exfit.models.limiter_blocks import latch, leaky_rest, power, timer, waiting_integral
 from exfit.models.sheet import sheet
 
+DOUBT = "rests on one public diagram, that of Dynawo, which CoLib describes"
 PLACES = ("takeover", "takeover-output")
 INPUTS = ("ifd",)
 

@@ -14,8 +14,9 @@ or TU4 = 0 bypasses its block. For the summing point VUIMIN and VULMIN are 0.
 Not modelled: KUF, by which the stabilising signal VF of the excitation system
 is subtracted, as exciters do not give it out; so a record has to have KUF = 0,
 though the sample data have 3.3. It damps: without it the gain KUL of 100 makes
-a unit oscillate at the limit. Dynawo gives the output the limits of the PI.
-Typical data are the standard's sample data (PSCAD, IEC 61970-302) but for KUF.
+a unit oscillate at the limit. Dynawo and InterPSS agree, but that Dynawo gives
+the output the limits of the PI. Typical data are the standard's sample data
+(PSCAD, IEC 61970-302) but for KUF.
 """
 
 from exfit.engine.trace import Signal

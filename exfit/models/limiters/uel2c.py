@@ -18,7 +18,9 @@ with the last point whose P is above that before. kadj is KFIX with SW1 = 1
 (position A); with SW1 = 2 it is a / sqrt(a² + p²) of a = vt²/XQ + q through the
 lag TADJ, between 0.1 and 1. Not modelled: the stabilising signal VF (KUF) and,
 for ST7C, the reference fed back (KFB, TUL). The limits of the two last blocks
-are non-windup. Typical data are the standard's sample data (PSCAD, GridKit).
+are non-windup. Dynawo and InterPSS agree but for kadj, by which InterPSS
+divides and which it does not limit; here it reduces the gain, as its name says.
+Typical data are the standard's sample data (PSCAD, GridKit).
 """
 
 from itertools import pairwise

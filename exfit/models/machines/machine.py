@@ -62,6 +62,7 @@ class Machine:
     records: tuple[DynamicsRecord, ...] = ()
     saturation: Literal["quadratic", "exponential"] = "quadratic"
     pslf_records: tuple[DynamicsRecord, ...] = ()
+    doubt: str = ""
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ from exfit.models.blocks import clip
 from exfit.models.sheet import Parameter, record, with_typical
 from exfit.models.stabilisers import pss4b
 
+DOUBT = "rests on one public diagram, that of InterPSS"
 INPUTS = pss4b.INPUTS
 SAMPLE = {
     **{"KVL": 0.5, "TVL1": 12.1, "TVL2": 14.5, "TVL7": 14.5, "TVL8": 17.4},

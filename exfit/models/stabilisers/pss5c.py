@@ -35,6 +35,7 @@ from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, lead_lag, second_order, second_order_lead
 from exfit.models.sheet import record, sheet
 
+DOUBT = "rests on one public diagram, that of InterPSS, whose tests compare it with PowerWorld"
 INPUTS = ("speed",)
 
 SHEET = sheet(

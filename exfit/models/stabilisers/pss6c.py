@@ -44,6 +44,7 @@ from exfit.models.stabiliser_parts import (
     switched,
 )
 
+DOUBT = "has the sign of Dynawo's diagram; InterPSS's has the other"
 INPUTS = ("p", "speed")
 
 SHEET = (

@@ -47,6 +47,10 @@ from exfit.models.stabiliser_parts import (
     switched,
 )
 
+DOUBT = (
+    "rests on one public diagram, that of InterPSS, which reports a comparison with PSS/E "
+    "and PowerWorld"
+)
 INPUTS = ("speed", "p")
 
 SHEET = (

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from exfit.models.machines import Machine
 from exfit.models.sheet import Model, Sheet
-from exfit.output.terminal.terminal import paragraph, plain_table, remarks, show_table
+from exfit.output.terminal.terminal import notes, paragraph, plain_table, remarks, show_table
 
 EDITION = re.compile(r"421\.5-(\d{4})")
 
@@ -58,6 +58,8 @@ def model(console: Console, described: Model | Machine) -> None:
     free = [row.symbol for row in described.sheet if row.free]
     if free:
         paragraph(console, f"free in the case of `exfit new`: {', '.join(free)}")
+    if described.doubt:
+        notes(console, [f"{described.name} {described.doubt}"])
 
 
 def data_sheet(rows: Sheet) -> Table:
