@@ -100,7 +100,8 @@ RECORDS = (
         "C2 K2 VINVMAX VINVMIN FIXEDRU FIXEDRD TFCL TMAX TMIN KFB KRD KRU KZRU",
         icons={"OELINPUT": 0},
         held={"SW1": 0.0},
-        doubt="its order is that of PowerWorld's list, not confirmed by a file",
+        doubt="its order is that of PowerWorld's list, not confirmed by a file; another program "
+        "reads SW1 as a second integer and a rated field current at the end",
     ),
 )
 
