@@ -26,7 +26,7 @@ SUPPLY = sheet(
     ("XL", 0.0, "pu", (0.0, 10.0), "reactance of the potential source, on load"),
     ("THETAP", 0.0, "deg", (-360.0, 360.0), "angle of the potential source, on load"),
     ("KC1", 0.05, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
-    ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the supply"),
+    ("VBMAX", 1.5, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
 )
 
 

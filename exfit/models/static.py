@@ -5,7 +5,7 @@ from exfit.models.blocks import compound_source, rectifier, smaller, where
 from exfit.models.sheet import FREE, SearchRange, sheet
 
 SUPPLY_SWITCH = sheet(
-    ("SW1", 1.0, "1", (1.0, 2.0), "supply of the rectifier: 1 terminals, 2 independent"),
+    ("SW1", 1.0, "1", (1.0, 2.0), "supply: 1 terminals, 2 independent"),
 )
 # a source of the terminals' voltage alone, and a ceiling 1.5 times that
 SUPPLY = (

@@ -55,7 +55,7 @@ SHEET = (
     *(row for row in SUPPLY if row.symbol not in ("KP", "KC1", "VBMAX")),
     *sheet(
         ("KC1", 0.2, "pu", (0.0, 100.0), "loading factor of the supply's rectifier"),
-        ("VBMAX", 7.0, "pu", (0.01, 9999.0), "ceiling of the supply"),
+        ("VBMAX", 7.0, "pu", (0.01, 9999.0), "ceiling of the source voltage"),
         ("SW2", 1.0, "1", (1.0, 2.0), "supply of the amplifier: 1 VB, 2 field voltage"),
         ("KR", 4.0, "pu", (0.01, 1000.0), "gain of the regulator's supply"),
     ),

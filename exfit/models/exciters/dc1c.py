@@ -1,6 +1,6 @@
 """DC1C: commutator exciter, continuous regulator (IEEE Std 421.5-2016).
 
-                                 VUEL  VOEL    VRMAX           VEMAX
+                                 UEL   OEL     VRMAX           VEMAX
 vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]─►(+)─►[  1  ]─┬─► efd
                   -▲ ▲- [1 + sTB]             [1+sTA]   -▲   [ sTE ] │
                    │ │                         VRMIN     │    VEMIN  │
@@ -8,16 +8,16 @@ vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]
             [1+sTR]  └────────────[  sKF  ]◄─────────────────────────┘
                                   [1 + sTF]
 
-VFE = KE EFD + VX(EFD). DC1A with the places of the limiters of 2016: vsum is
-what they add to the voltage error, VUEL and VOEL are takeover gates. The limits
-are non-windup. EFD is limited as in PSS/E, with VEMAX and VEMIN; Dynawo has the
-floor alone, and the sample data neither. Of the signs at the sum Dynawo adds
-OEL and SCL, PowerWorld subtracts them: here vsum is what is added.
-KE = 0 is self-excited: KE is computed at the start so that VR starts at
-VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0). VRMAX = 0 is computed too:
-VRMAX = (KE + SE(E)) E at the higher of E1, E2 (SE(E) E where KE < 0), VRMIN =
--VRMAX. The values in use are the setpoints KE0, VRMAX0, VRMIN0. Typical data
-are the standard's, as GridKit has them.
+VFE = KE EFD + VX(EFD). DC1A with the places of the limiters of 2016: they act
+at the summing point (vsum) or at the gates. The limits are non-windup. EFD is
+limited as in PSS/E, with VEMAX and VEMIN; Dynawo has the floor alone, and the
+sample data neither. Of the signs at the sum Dynawo adds OEL and SCL, PowerWorld
+subtracts them: here vsum is what is added. KE = 0 is self-excited: KE is
+computed at the start so that VR starts at VRMAX / 10, as in PSS/E (IEEE 421.5:
+at VR = 0). VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of
+E1, E2 (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the
+setpoints KE0, VRMAX0, VRMIN0. Typical data are the standard's, as GridKit has
+them.
 """
 
 from exfit.engine.trace import Signal

@@ -1,6 +1,6 @@
 """DC2C: commutator exciter, bus-fed regulator (IEEE Std 421.5-2016).
 
-                                 VUEL  VOEL   VT VRMAX         VEMAX
+                                 UEL   OEL    VT VRMAX         VEMAX
 vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]─►(+)─►[  1  ]─┬─► efd
                   -▲ ▲- [1 + sTB]             [1+sTA]   -▲   [ sTE ] │
                    │ │                        VT VRMIN   │    VEMIN  │
@@ -10,13 +10,13 @@ vref + vs + vsum ─►(+)─►[1 + sTC]─►HV───►LV──►[  KA  ]
 
 VFE = KE EFD + VX(EFD). As DC1C, but the regulator's limits are proportional to
 the terminal voltage VT. It is DC2A with the places of the limiters of 2016:
-vsum is what they add to the voltage error, VUEL and VOEL are takeover gates.
-The limits are non-windup. EFD is limited as in PSS/E, with VEMAX and VEMIN.
-KE = 0 is self-excited: KE is computed at the start so that VR starts at
-VRMAX / 10, as in PSS/E (IEEE 421.5: at VR = 0). VRMAX = 0 is computed too:
-VRMAX = (KE + SE(E)) E at the higher of E1, E2 (SE(E) E where KE < 0), VRMIN =
--VRMAX. The values in use are the setpoints KE0, VRMAX0, VRMIN0. Typical data
-are the standard's, as GridKit has them.
+they act at the summing point (vsum) or at the gates. The limits are non-windup.
+EFD is limited as in PSS/E, with VEMAX and VEMIN. KE = 0 is self-excited: KE is
+computed at the start so that VR starts at VRMAX / 10, as in PSS/E (IEEE 421.5:
+at VR = 0). VRMAX = 0 is computed too: VRMAX = (KE + SE(E)) E at the higher of
+E1, E2 (SE(E) E where KE < 0), VRMIN = -VRMAX. The values in use are the
+setpoints KE0, VRMAX0, VRMIN0. Typical data are the standard's, as GridKit has
+them.
 """
 
 from exfit.engine.trace import Signal

@@ -1,6 +1,6 @@
 """DC4C: commutator exciter, PID regulator, own supply (IEEE Std 421.5-2016).
 
-                         VRMAX/KA             VUEL  VOEL
+                         VRMAX/KA             UEL   OEL
 vref + vs + vsum ─►(+)─►[KPR + KIR/s      ]───►HV───►LV────┐
                   -▲ ▲- [+ sKDR/(1 + sTDR)]                │
        vc1 ►[  1  ]┘ │   VRMIN/KA                          │
@@ -16,11 +16,12 @@ vref + vs + vsum ─►(+)─►[KPR + KIR/s      ]───►HV───►LV�
                      └──────[   sKF  ]◄──────┘
                             [1 + sTF ]
 
-VFE = KE EFD + VX(EFD). VB = VE FEX(KC1 VFE / VE), at most VBMAX, is what the
-regulator is fed with: SW1 = 1 (position A) from the terminals, VE = |KP VT +
-j (KI + KP XL) IT| with KP at THETAP degrees; SW1 = 2 (B) from a source of its
-own, VE = KP. vsum is what limiters add to the voltage error, VUEL and VOEL are
-takeover gates. The limits of the lag and of EFD are non-windup; the integral is
+VFE = KE EFD + VX(EFD). VB = VE FEX(KC1 VFE / VE), at most VBMAX, is the supply
+of the regulator. It comes from the terminals (SW1 = 1, position A of the
+drawing), VE = |KP∠THETAP VT + j (KI + KP∠THETAP XL) IT| with THETAP in degrees,
+or does not depend on them (SW1 = 2, B), VE = KP. The current IT, and so KI, XL
+and THETAP, act on load only. The limiters act at the summing point (vsum) or at
+the gates. The limits of the lag and of EFD are non-windup; the integral is
 frozen while the PID is at its limit. DC4B multiplies with VT before the lag TA:
 with TA = 0 and VB = VT they are one model. KE and VRMAX are used as given, also
 0. The drawing is PowerWorld's and InterPSS's; VFE as the current of the

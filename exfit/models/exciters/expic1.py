@@ -43,7 +43,7 @@ from exfit.models.sheet import FREE, OF_A_LIST, record, sheet
 
 SHEET = sheet(
     ("TR", 0.0, "s", (0.0, 1.0), "voltage transducer lag"),
-    ("KA", 3.15, "1/s", (0.001, 100000.0), "gain of the PI", FREE),
+    ("KA", 3.15, "pu/s", (0.001, 100000.0), "integral gain of the PI", FREE),
     ("TA1", 1.0, "s", (0.0, 100.0), "lead of the PI", FREE),
     ("VR1", 1.0, "pu", (-9999.0, 9999.0), "ceiling of the PI"),
     ("VR2", -0.87, "pu", (-9999.0, 9999.0), "floor of the PI"),

@@ -1,4 +1,4 @@
-"""EXST1: static exciter ST1 of IEEE Std 421.5-1981, as PSS/E has it.
+"""EXST1: potential-source controlled rectifier (IEEE type ST1 of 1981).
 
                   VIMAX                         VT VRMAX - KC IFD
 vref + vs ──►(+)─►[clip]─►[1 + sTC]─►[  KA  ]─┬─►[clip]─► efd

@@ -66,7 +66,7 @@ ALIASES = ("REXSYS",)
 SHEET = sheet(
     ("TR", 0.01, "s", (0.0, 1.0), "voltage transducer lag"),
     ("KVP", 30.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-    ("KVI", 25.0, "1/s", (0.0, 100000.0), "integral gain", FREE),
+    ("KVI", 25.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
     ("VIMAX", 0.5, "pu", (0.0, 9999.0), "limit of the voltage error, of both signs"),
     ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", REGULATOR_LAG),
     ("TB1", 0.0, "s", (0.0, 100.0), "regulator lag"),
@@ -81,7 +81,7 @@ SHEET = sheet(
     ("TF2", 0.0, "s", (0.0, 100.0), "stabilising feedback lag"),
     ("FBF", 1.0, "1", (0.0, 2.0), "fed back: 0 VR, 1 VFE, 2 efd"),
     ("KIP", 5.0, "pu", (0.0, 1000.0), "proportional gain of the field current regulator"),
-    ("KII", 5.0, "1/s", (0.0, 1000.0), "integral gain of the field current regulator"),
+    ("KII", 5.0, "pu/s", (0.0, 1000.0), "integral gain of the field current regulator"),
     ("TP", 0.02, "s", (0.0, 10.0), "time constant of the field current regulator"),
     ("VFMAX", 15.4, "pu", (-9999.0, 9999.0), "ceiling of the exciter's field voltage"),
     ("VFMIN", -12.3, "pu", (-9999.0, 9999.0), "floor of the exciter's field voltage"),

@@ -1,4 +1,4 @@
-"""ST1C: potential-source controlled rectifier (IEEE Std 421.5-2016, ST1C).
+"""ST1C: potential-source controlled rectifier (IEEE Std 421.5-2016).
 
                          VIMAX    UEL OEL                             VAMAX
 vref + vs + vsum ──►(+)─►[clip]─►[gates]─►[1 + sTC]─►[1 + sTC1]─►[  KA  ]─┐ VA

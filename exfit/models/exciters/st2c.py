@@ -1,4 +1,4 @@
-"""ST2C: compound-source rectifier exciter with a PID (IEEE Std 421.5-2016, ST2C).
+"""ST2C: compound-source rectifier exciter with a PID (IEEE Std 421.5-2016).
 
                        VPIDMAX       UEL OEL    VRMAX             EFDMAX
 vref + vs ─►(+)─►[KPR + KIR/s   ]─►[gates]─►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─►efd

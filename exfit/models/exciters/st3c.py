@@ -1,4 +1,4 @@
-"""ST3C: controlled rectifier with a field voltage loop (IEEE Std 421.5-2016, ST3C).
+"""ST3C: controlled rectifier with a field voltage loop (IEEE Std 421.5-2016).
 
                VIMAX   UEL OEL     VPIDMAX                     VRMAX
 vref + vs ►(+)─►[clip]─►[gates]─►[KPR + KIR/s   ]─►[1 + sTC]─►[  KA  ]─┐ VR

@@ -1,4 +1,4 @@
-"""ST4C: PI regulator with a field voltage loop (IEEE Std 421.5-2016, ST4C).
+"""ST4C: PI regulator with a field voltage loop (IEEE Std 421.5-2016).
 
               UEL OEL   VRMAX           VMMAX        UEL OEL   VAMAX
 vref + vs ►(+)►[gates]►[KPR + KIR/s]─►(+)►[KPM + KIM/s]►[gates]►[  1  ]►(x)┬►efd
@@ -45,7 +45,10 @@ from exfit.models.static import SUPPLY_SWITCH, supply
 ALIASES = ("ESST4C",)
 
 SHEET = (
-    *with_typical(st4b.SHEET, VRMAX=2.0, VRMIN=-1.74),
+    *(
+        row._replace(meaning="firing circuit time constant") if row.symbol == "TA" else row
+        for row in with_typical(st4b.SHEET, VRMAX=2.0, VRMIN=-1.74)
+    ),
     *sheet(
         ("VAMAX", 0.95, "pu", (-9999.0, 9999.0), "ceiling of the lag before the rectifier"),
         ("VAMIN", -0.82, "pu", (-9999.0, 9999.0), "floor of the lag before the rectifier"),

@@ -1,4 +1,4 @@
-"""ST5C: static exciter with two lead-lags in series (IEEE Std 421.5-2016, ST5C).
+"""ST5C: static exciter with two lead-lags in series (IEEE Std 421.5-2016).
 
               UEL OEL       VRMAX/KR    VRMAX/KR           VRMAX
 vref + vsum ►(+)─►[gates]─►(+)─►[1 + sTC1]─►[1 + sTC2]─►[KR]─►[clip]─┐ VR

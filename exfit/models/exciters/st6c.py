@@ -1,4 +1,4 @@
-"""ST6C: static exciter, PID with a field voltage loop (IEEE Std 421.5-2016, ST6C).
+"""ST6C: static exciter, PID with a field voltage loop (IEEE Std 421.5-2016).
 
                 UEL OEL      VAMAX, ILIM                      VRMAX  UEL OEL
 vref + vsum ►(+)►[gates]─►(+)─►[KPA + KIA/s   ]─┬─►[KFF]─►(+)─►[clip]─►[gates]─┐
@@ -38,7 +38,7 @@ ALIASES = ("ESST6C",)
 SHEET = (
     *st6b.SHEET,
     *sheet(
-        ("TA", 0.02, "s", (0.0, 10.0), "regulator time constant", FREE),
+        ("TA", 0.02, "s", (0.0, 10.0), "firing circuit time constant", FREE),
         ("VMMAX", 4.5, "pu", (-9999.0, 9999.0), "ceiling of the lag before the rectifier"),
         ("VMMIN", -3.6, "pu", (-9999.0, 9999.0), "floor of the lag before the rectifier"),
     ),

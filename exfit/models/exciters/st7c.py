@@ -1,4 +1,4 @@
-"""ST7C: static exciter, PI by a feedback of its output (IEEE Std 421.5-2016, ST7C).
+"""ST7C: static exciter, PI by a feedback of its output (IEEE Std 421.5-2016).
 
                                 vs
              UEL OEL    VMAX    ▼

@@ -1,4 +1,4 @@
-"""ST8C: static exciter with a field current loop (IEEE Std 421.5-2016, ST8C).
+"""ST8C: static exciter with a field current loop (IEEE Std 421.5-2016).
 
                      VPIMAX        UEL OEL    VAMAX        VRMAX
 vref + vs ►(+)►[KPR + KIR/s]─►(+)►[gates]─►[KPA + KIA/s]─►[  KA  ]─►(x)─►(+)►efd
@@ -50,14 +50,14 @@ ALIASES = ("ESST8C",)
 SHEET = (
     *sheet(
         ("TR", 0.012, "s", (0.0, 1.0), "voltage transducer lag"),
-        ("KPR", 20.0, "pu", (0.0, 100000.0), "proportional gain", FREE),
-        ("KIR", 10.0, "pu/s", (0.0, 100000.0), "integral gain", FREE),
+        ("KPR", 20.0, "pu", (0.0, 100000.0), "proportional gain of the regulator", FREE),
+        ("KIR", 10.0, "pu/s", (0.0, 100000.0), "integral gain of the regulator", FREE),
         ("VPIMAX", 4.5, "pu", (-9999.0, 9999.0), "ceiling of the field current reference"),
         ("VPIMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the field current reference"),
-        ("KPA", 1.0, "pu", (0.0, 100000.0), "proportional gain of the current loop", FREE),
-        ("KIA", 10.0, "pu/s", (0.0, 100000.0), "integral gain of the current loop", FREE),
-        ("VAMAX", 1.2, "pu", (-9999.0, 9999.0), "ceiling of the current loop"),
-        ("VAMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the current loop"),
+        ("KPA", 1.0, "pu", (0.0, 100000.0), "proportional gain of the field current loop", FREE),
+        ("KIA", 10.0, "pu/s", (0.0, 100000.0), "integral gain of the field current loop", FREE),
+        ("VAMAX", 1.2, "pu", (-9999.0, 9999.0), "ceiling of the field current loop"),
+        ("VAMIN", -1.0, "pu", (-9999.0, 9999.0), "floor of the field current loop"),
         ("KA", 1.0, "pu", (0.01, 100000.0), "regulator gain"),
         ("TA", 0.01, "s", (0.0, 10.0), "regulator time constant", FREE),
         ("VRMAX", 1.0, "pu", (-9999.0, 9999.0), "regulator ceiling"),

@@ -1,4 +1,4 @@
-"""ST9C: static exciter with a PI that tracks its limits (IEEE Std 421.5-2016, ST9C).
+"""ST9C: static exciter with a PI that tracks its limits (IEEE Std 421.5-2016).
 
                              UEL         VRMAX   OEL
 vref + vs + vsum ─►(+)─►[KA]─►[HV]─►(+)─►[clip]─►[LV]─┬─►[ KAS  ]─►(x)─► efd

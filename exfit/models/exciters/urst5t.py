@@ -1,6 +1,6 @@
 """URST5T: static exciter with two lead-lags in series (PSS/E URST5T).
 
-              VUEL VOEL       VRMAX/KR    VRMAX/KR        VRMAX
+              UEL OEL         VRMAX/KR    VRMAX/KR        VRMAX
 vref ─►(+)───►[gates]──►(+)─►[1 + sTC1]─►[1 + sTC2]─►[KR]─►[clip]─┐ VR
        -▲                ▲   [1 + sTB1]  [1 + sTB2]       VRMIN   │
         │                │    VRMIN/KR    VRMIN/KR                │
