@@ -17,8 +17,9 @@ the lag is non-windup.
 
 The limiters act at the summing point (vsum) or at the gates of the field
 current regulator. Sources disagree on what this regulator sees: InterPSS
-subtracts IFD and KF IFD / (1 + sTF), PowerSimulationsDynamics the latter alone,
-which is followed: KF is the gain of the feedback. OEL is subtracted at the
+subtracts IFD and KF IFD / (1 + sTF), and reports a comparison with PSS/E,
+PowerSimulationsDynamics the latter alone, which is followed: KF is the gain of
+the feedback. OEL is subtracted at the
 summing point by PowerWorld and InterPSS; here a limiter has the sign of what it
 adds. PowerSimulationsDynamics has VB1 for SW1 = 2 only, and no VB2. Typical
 data are not those of a sample: that of the standard, as GridKit has it, has no
