@@ -109,8 +109,13 @@ def _files(content: Any) -> Iterator[str]:
 
 
 def scripts_of(command: Sequence[str], folder: Path) -> list[str]:
-    """Return the words of a command that are files beside the case, such as a script."""
-    return [word for word in command if not Path(word).is_absolute() and (folder / word).is_file()]
+    """Return the words of a command that are files, such as a script.
+
+    A program by its absolute path is none: it is a Python, or an installed tool.
+    """
+    program, arguments = command[:1], command[1:]
+    own = [word for word in program if not Path(word).is_absolute()]
+    return [word for word in (*own, *arguments) if (folder / word).is_file()]
 
 
 def _parts(file: Path) -> Iterator[Path]:

@@ -12,7 +12,7 @@ HASH_DIGITS = 12  # of a SHA-256, in a message
 
 
 def program_files(case: Case) -> list[Path]:
-    """Return the files beside a case of what simulates it in place of exfit: scripts, or an FMU."""
+    """Return the files of what simulates a case in place of exfit: scripts, or an FMU."""
     if case.external is None:
         return []
     if isinstance(case.external, FmuPlant):

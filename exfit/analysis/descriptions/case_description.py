@@ -76,7 +76,7 @@ def input_names(case: Case, setups: Sequence[ExperimentSetup]) -> dict[str, str]
 
 
 def _scripts(case: Case) -> dict[str, Path]:
-    """Return the files beside a case of what simulates it in place of exfit, by their labels."""
+    """Return the files of what simulates a case in place of exfit, by their labels."""
     return {f"program{number or ''}": file for number, file in enumerate(program_files(case))}
 
 
