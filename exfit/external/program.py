@@ -76,7 +76,7 @@ class ExternalProgram:
             for key, request in zip(keys, requests, strict=True)
             if key not in self._outcomes
         }
-        self._values |= {_key(request["values"]) for request in missing.values()}
+        self._values |= {_key_of(request["values"]) for request in missing.values()}
         self._run_all(missing)
         failed = {key: missing[key] for key in missing if self._outcomes[key].failure}
         self._earlier_failures += len(failed)
@@ -85,7 +85,7 @@ class ExternalProgram:
 
     def remembered(self, request: Mapping[str, Any]) -> ExternalRun | None:
         """Return the run of a request that was made before and has not failed, None else."""
-        if _key(request["values"]) not in self._values:  # a search asks for many
+        if _key_of(request["values"]) not in self._values:  # a search asks for many
             return None
         outcome = self._outcomes.get(_key(request))
         return None if outcome is None or outcome.failure else outcome
@@ -126,9 +126,14 @@ class ExternalProgram:
         return run_of(answer, request["signals"], len(request["times"]))
 
 
-def _key(content: Mapping[str, Any]) -> str:
-    """Return what distinguishes a request, or its values, from others."""
-    return json.dumps(content, sort_keys=True)
+def _key(request: Mapping[str, Any]) -> str:
+    """Return what distinguishes a request from others."""
+    return json.dumps({**request, "values": _key_of(request["values"])}, sort_keys=True)
+
+
+def _key_of(values: Mapping[str, float]) -> str:
+    """Return what distinguishes values from others: more than rounding."""
+    return json.dumps({name: f"{value:.12g}" for name, value in values.items()}, sort_keys=True)
 
 
 @contextmanager
