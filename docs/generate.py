@@ -29,7 +29,7 @@ TYPES = {
     "boolean": "true or false",
 }
 WIDTH, HEIGHT, DPI = 7.2, 2.2, 110  # of a figure and of each of its panels, inches
-LABELS = {name: f"{name} (pu)" for name in ("vt", "efd", "ifd", "p", "q")}
+LABELS = {name: f"{name} (pu)" for name in ("vt", "efd", "ifd", "p", "q", "it")}
 
 Schema = Mapping[str, Any]
 
@@ -65,6 +65,13 @@ LIMITER_EXAMPLES: Mapping[str, tuple[str, str, float, str]] = {
         "KSCALE1: 0.52, IFDLIM: 0.3, VOELMAX1: 0.5, KPOEL: 0.3, KIOEL: 1.0",
         0.1,
         "ifd",
+    ),
+    "SCL1C": ("AC8C", "ISCLLIM: 0.73, KIOEX: 0.5", 0.1, "it"),
+    "SCL2C": (
+        "ST1A",
+        "ITFPU: 0.75, ILIM: 0.75, K2: 100.0, KPOEL: 6.0, KIOEL: 3.0, TAOEL: 0.5",
+        0.1,
+        "it",
     ),
     "UEL1": ("ST1A", "KUR: 1.6, KUL: 7.0", -0.15, "q"),
     "UEL2C": ("AC8C", "", -0.15, "q"),

@@ -24,7 +24,7 @@ OTHERS: Mapping[str, str] = {
         "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PSS2C PSS5C PSS6C PSS7C PTIST1 PTIST3
             STAB3 STAB4 STABNI STBSVC""",
         "excitation limiter": """MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL2C OEL3C OEL4C OEL5C
-            UEL1 UEL2 UEL2C""",
+            SCL1C SCL2C UEL1 UEL2 UEL2C""",
         "compensator": "COMP COMPCC IEEEVC REMCMP",
     }.items()
     for name in names.split()

@@ -22,7 +22,7 @@ from exfit.plants import (
     SaturationForm,
     Stabilised,
     initial,
-    input_at,
+    inputs_at,
     inputs_for_limiters,
     playback,
 )
@@ -137,10 +137,10 @@ def _refuse_missing_drivers(case: Case, exciter: Model, saturation: SaturationFo
 def _refuse_missing_gates(case: Case, exciter: Model) -> None:
     """Raise CaseError where an exciter that replaces the case's has no input for a limiter."""
     missing = [
-        f"{case.path}: limiters: {exciter.name} has no input {input_at(limiter)} for "
-        f"{limiter.model.name}"
+        f"{case.path}: limiters: {exciter.name} has no input {name} for {limiter.model.name}"
         for limiter in case.parts.limiters
-        if input_at(limiter) not in inputs_for_limiters(exciter)
+        for name in inputs_at(limiter).values()
+        if name not in inputs_for_limiters(exciter)
     ]
     if missing:
         raise CaseError(missing)

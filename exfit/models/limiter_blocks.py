@@ -4,8 +4,8 @@ A timer and a latch are states that are put back after each step of a simulation
 switch on its grid: a parameter that acts through the instant alone has no derivative.
 """
 
-from exfit.engine.trace import Signal, clip, exp, larger, log, where
-from exfit.models.blocks import Limited, limited, zero
+from exfit.engine.trace import Signal, clip, exp, larger, log, sqrt, where
+from exfit.models.blocks import Limited, limited, limited_lead_lag, pid, zero
 
 POWERS = ("p", "q")  # what a limiter sees of the stator current, beside the voltage
 LEAST_CURRENT = 1e-6  # pu; a power of less is that of this
@@ -15,6 +15,11 @@ BEYOND = 1.0  # s by which a timer passes what it is compared with
 def power(x: Signal, exponent: Signal) -> Signal:
     """Return x to a power, of a current or voltage, which is not negative."""
     return exp(exponent * log(larger(x, LEAST_CURRENT)))
+
+
+def stator_current(u: Signal) -> Signal:
+    """Return the magnitude of the stator current, which is never quite zero."""
+    return sqrt(larger(u.p * u.p + u.q * u.q, LEAST_CURRENT * LEAST_CURRENT)) / u.vt
 
 
 def timer(runs: Signal, x: Signal, most: Signal) -> Limited:
@@ -37,3 +42,49 @@ def leaky_rest(u: Signal, leak: Signal, low: Signal, high: Signal) -> Signal:
     none = zero(leak)
     still = clip(u / where(none, 1.0, leak), low, high)
     return where(none, where(u > 0.0, high, low), still)
+
+
+def counting(current: Signal, p: Signal) -> Signal:
+    """Return how fast a timer of inverse time counts, without its feedback."""
+    ratio = current / p.ITFPU
+    inverse = clip(p.K2 * (power(ratio, p.C2) - 1.0), p.VINVMIN, p.VINVMAX)
+    return inverse + where(ratio > 1.0, p.FIXEDRU, p.FIXEDRD)
+
+
+def rate_of_reference(current: Signal, up_when: Signal, down_when: Signal, p: Signal) -> Signal:
+    """Return how fast the reference moves: down when the time is over, up when it is released."""
+    by_current = p.K1 * (power(current / p.ITFPU, p.C1) - 1.0)
+    up, down = (where(p.SW1 > 0.5, by_current, fixed) for fixed in (p.KRU, p.KRD))
+    return where(up_when, up, where(down_when, down, 0.0))
+
+
+def regulator(error: Signal, s: Signal, p: Signal, d: Signal, side: str, own: str = "") -> Signal:
+    """Write the slopes of a PID and its two lead-lags and return their output.
+
+    ``side``, OEL or UEL, is in the names of their parameters, ``own`` in those of their states.
+    """
+    KP, KI, KD, TD = (getattr(p, name + side) for name in ("KP", "KI", "KD", "TD"))
+    integral, steep = getattr(s, "INTEG" + own), getattr(s, "DERIV" + own)
+    v, d_integral, d_steep = pid(error, integral, steep, KP, KI, KD, TD, *_limits(p, side, 3))
+    setattr(d, "INTEG" + own, d_integral)
+    setattr(d, "DERIV" + own, d_steep)
+    for k in (2, 1):
+        lead, lag = getattr(p, f"TC{k}{side}"), getattr(p, f"TB{k}{side}")
+        v, slope = limited_lead_lag(v, getattr(s, f"V{k}{own}"), lead, lag, *_limits(p, side, k))
+        setattr(d, f"V{k}{own}", slope)
+    return v
+
+
+def regulator_rest(error: Signal, p: Signal, x: Signal, side: str, own: str = "") -> None:
+    """Write the states of a PID and its two lead-lags that wait at an error."""
+    integral = waiting_integral(error, getattr(p, "KI" + side), *_limits(p, side, 3))
+    setattr(x, "DERIV" + own, error)
+    setattr(x, "INTEG" + own, integral)
+    v = clip(getattr(p, "KP" + side) * error + integral, *_limits(p, side, 3))
+    for k in (2, 1):
+        v = clip(v, *_limits(p, side, k))
+        setattr(x, f"V{k}{own}", v)
+
+
+def _limits(p: Signal, side: str, k: int) -> tuple[Signal, Signal]:
+    return getattr(p, f"V{side}MIN{k}"), getattr(p, f"V{side}MAX{k}")

@@ -6,7 +6,7 @@ from exfit.plants.governing import rests_at
 from exfit.plants.grid_playback import RESTING, grid_playback
 from exfit.plants.infinite_bus import INFINITE_BUS, flow_sheet, infinite_bus
 from exfit.plants.kinds import EVENTS, KINDS
-from exfit.plants.limiting import PLACES, acts_without_load, input_at, inputs_for_limiters
+from exfit.plants.limiting import PLACES, acts_without_load, inputs_at, inputs_for_limiters
 from exfit.plants.machine_on_load import machine_on_load
 from exfit.plants.machine_playback import machine_playback
 from exfit.plants.open_circuit import OPEN_CIRCUIT, open_circuit
@@ -79,7 +79,7 @@ __all__ = [
     "grid_playback",
     "infinite_bus",
     "initial",
-    "input_at",
+    "inputs_at",
     "inputs_for_limiters",
     "kind_of_limiter",
     "machine_on_load",

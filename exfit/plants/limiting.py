@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 
 from exfit.engine.system import Signals
-from exfit.engine.trace import Graph, Node, Signal, in_order
+from exfit.engine.trace import Graph, Node, Signal, in_order, larger, smaller
 from exfit.models.blocks import Limited, quadratic
 from exfit.models.sheet import Model, Sheet
 from exfit.plants.parts import (
@@ -29,9 +29,13 @@ def acts_without_load(limiter: Attached) -> bool:
     return limiter.model.inputs == ("ifd",)
 
 
-def input_at(limiter: Attached) -> str:
-    """Return the input of an exciter on which a limiter acts."""
-    return "vsum" if limiter.place == SUMMING else f"v{limiter.kind}{GATES[limiter.place]}"
+def inputs_at(limiter: Attached) -> dict[str, str]:
+    """Return the inputs of an exciter on which the outputs of a limiter act, by their names."""
+    return {signal: _input_at(limiter.place, side) for side, signal in limiter.signals.items()}
+
+
+def _input_at(place: str, side: str) -> str:
+    return "vsum" if place == SUMMING else f"v{side}{GATES[place]}"
 
 
 def states_of(limiters: Iterable[Attached]) -> tuple[str, ...]:
@@ -41,7 +45,7 @@ def states_of(limiters: Iterable[Attached]) -> tuple[str, ...]:
 
 def signals_of(limiters: Iterable[Attached]) -> tuple[str, ...]:
     """Return the names of the outputs of limiters in the system."""
-    return tuple(limiter.signal for limiter in limiters)
+    return tuple(name for limiter in limiters for name in limiter.signals.values())
 
 
 def sheets_of(limiters: Iterable[Attached]) -> tuple[tuple[str, Sheet], ...]:
@@ -73,19 +77,32 @@ def limiting(
     limiters: Sequence[Attached], seen: Names, p: Signals, x: Signals, d: Names
 ) -> dict[str, Signal]:
     """Write the slopes of limiters into ``d`` and return their outputs by name in the system."""
-    return {
-        limiter.signal: output_of(limiter.prefix, limiter.model, seen, p, x, d)
-        for limiter in limiters
-    }
+    signals: dict[str, Signal] = {}
+    for limiter in limiters:
+        output = output_of(limiter.prefix, limiter.model, seen, p, x, d)
+        outputs = output if isinstance(output, tuple) else (output,)
+        signals |= zip(limiter.signals.values(), outputs, strict=True)
+    return signals
 
 
 def limited_inputs(limiters: Iterable[Attached], signals: Signals) -> dict[str, Signal]:
-    """Return what an exciter sees of limiters whose outputs are given."""
+    """Return what an exciter sees of limiters whose outputs are given.
+
+    At a gate of overexcitation the smaller of two acts, at one of underexcitation the larger.
+    """
     inputs: dict[str, Signal] = {}
     for limiter in limiters:
-        name, signal = input_at(limiter), signals[limiter.signal]
-        inputs[name] = inputs[name] + signal if name in inputs else signal
+        for output, name in inputs_at(limiter).items():
+            signal = signals[output]
+            inputs[name] = _both(name, inputs[name], signal) if name in inputs else signal
     return inputs
+
+
+def _both(name: str, a: Signal, b: Signal) -> Signal:
+    """Return what two limiters at one input of an exciter do together."""
+    if name == "vsum":
+        return a + b
+    return smaller(a, b) if name.startswith("voel") else larger(a, b)
 
 
 @cache

@@ -1,6 +1,6 @@
 """A kind of plant as data: what it needs, what acts on it, what it shows, and how it is built."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeVar
 
@@ -14,7 +14,8 @@ from exfit.signals import COMPARED
 Component = TypeVar("Component", Model, Machine)
 OF_EXCITER = ("vref", "vs")
 REFERENCES = (*OF_EXCITER, "pref")  # inputs that are given as steps, ramps, tables or records
-LIMITER_KINDS = ("oel", "uel")  # what limiters limit, as their names begin
+LIMITER_KINDS = ("oel", "uel", "scl")  # what limiters limit, as their names begin
+STATOR_CURRENT = "scl"  # of the two sides of excitation, with an output for each
 Requirement = Literal["exciter", "machine", "network"]
 Swing = Literal["power", "torque"]  # what Pm is in the equation of the speed
 PowerAt = Literal["recorded-voltage", "terminals"]  # where the recorded powers are
@@ -35,7 +36,7 @@ class Attached(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """What it limits, as its name begins: oel, uel."""
+        """What it limits, as its name begins: oel, uel, scl."""
         return kind_of_limiter(self.model.name)
 
     @property
@@ -44,13 +45,16 @@ class Attached(NamedTuple):
         return f"{self.kind}."
 
     @property
-    def signal(self) -> str:
-        """The name of its output."""
-        return self.prefix + self.model.name
+    def signals(self) -> Mapping[str, str]:
+        """The names of its outputs by the side on which they act, oel or uel."""
+        name = self.prefix + self.model.name
+        if self.kind == STATOR_CURRENT:
+            return {side: f"{name}.{side}" for side in ("oel", "uel")}
+        return {self.kind: name}
 
 
 def kind_of_limiter(name: str) -> str:
-    """Return what a limiter of the catalogue limits, as its name begins: oel, uel."""
+    """Return what a limiter of the catalogue limits, as its name begins: oel, uel, scl."""
     return name[:3].lower()
 
 

@@ -1,11 +1,11 @@
 """The limits in a system's equations: what each holds, and the parameter that sets it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
 from exfit.engine.system import System, Trace, trace
-from exfit.engine.trace import Node, evaluate, in_order
+from exfit.engine.trace import Node, Signal, evaluate, in_order, larger, smaller
 from exfit.plants import LIMITER_KINDS
 
 Values = Mapping[str, float]
@@ -124,16 +124,31 @@ def _of_limiters(system: System) -> Iterator[EquationLimit]:
 
 def _gates_of(system: System, name: str, output: Node) -> Iterator[EquationLimit]:
     """Yield the gates at which a limiter takes over; the sum where it is added."""
-    of = traced(system)
     # an overexcitation limiter is a ceiling
-    sign = 1.0 if name.startswith("oel.") else -1.0
-    gates = (_gated(node, output) for node in in_order([*of.slopes, *of.outputs]))
-    values = [value for value in dict.fromkeys(gates) if value is not None]
+    ceiling = "oel" in name.split(".")
+    sign = 1.0 if ceiling else -1.0
+    values = _values_at_gates(system, output, smaller if ceiling else larger)
     for value in values:
         yield EquationLimit(name, "", sign, value, output, False)
     if not values:
         zero = output.graph.constant(0.0)
         yield EquationLimit(name, "", -sign, output, zero, False)
+
+
+def _values_at_gates(
+    system: System, output: Node, nearer: Callable[[Signal, Signal], Signal]
+) -> list[Node]:
+    """Return what a limiter takes over from: of another one at its gate and the regulator both."""
+    of, limiters = traced(system), set(limiter_outputs(system).values())
+    gates = {node: _gated(node, output) for node in in_order([*of.slopes, *of.outputs])}
+    values: dict[Node, None] = {}
+    for gate, value in gates.items():
+        if value in limiters:
+            others = _values_at_gates(system, gate, nearer)
+            values |= dict.fromkeys(output.graph.lift(nearer(value, other)) for other in others)
+        elif value is not None:
+            values[value] = None
+    return list(values)
 
 
 def _gated(node: Node, output: Node) -> Node | None:

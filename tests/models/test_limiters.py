@@ -54,6 +54,27 @@ LIVELY = {
         **{"TADJ": 0.2, "TU1": 0.05, "TU2": 0.1, "TU3": 0.2, "TU4": 0.15, "KFIX": 0.8},
         **{"VUIMIN": -0.5, "VUELMIN1": -0.5},
     },
+    "SCL1C": {
+        **{"ISCLLIM": 0.8, "TIT": 0.05, "TQSCL": 0.04, "K": 1.5, "IQMIN": 0.2, "TINV": 0.5},
+        **{"TDSCL": 0.3, "KPOEX": 0.2, "KPUEX": 0.6, "KIUEX": 3.0, "VSCLMIN": -0.1},
+    },
+    "SCL2C": {
+        **{"ITFPU": 0.8, "ILIM": 0.75, "IINST": 1.2, "IINSTUEL": 1.1, "K2": 1.5, "KPUEL": 4.0},
+        **{"KIUEL": 2.0, "KPOEL": 3.0, "KIOEL": 1.0, "KDUEL": 0.1, "KDOEL": 0.1, "TB1UEL": 0.2},
+        **{"TC2OEL": 0.3, "TC2UEL": 0.3, "TB1OEL": 0.2, "TOFF": 0.5, "FIXEDRD": -0.6},
+        **{"FIXEDRU": 0.1, "KFB": 0.05, "TSCL": 0.3, "TMAX": 0.3, "KRD": -20.0, "KRU": 20.0},
+        **{"TIPOEL": 0.02, "TIQOEL": 0.03, "TIPUEL": 0.04, "TIQUEL": 0.05, "KPREF": 0.1},
+        **{"KIPUEL": 0.9, "KIQUEL": 1.1, "KIPOEL": 0.9, "KIQOEL": 1.1, "IQMAXUEL": -0.1},
+        **{
+            "IQMINOEL": 0.2,
+            "VTMIN": 0.97,
+            "VTRESET": 0.95,
+            "VOELMAX1": 7.0,
+            "VUELMIN1": -7.0,
+            "VOELMIN3": -4.0,
+            "VUELMIN3": -4.0,
+        },
+    },
 }
 
 
@@ -73,22 +94,32 @@ def resting(model, p, u):
     return x
 
 
+def each_output(output):
+    """Return the outputs of a limiter, which of a stator current limiter are two."""
+    return output if isinstance(output, tuple) else (output,)
+
+
 def slopes_of(model, p, x, u):
-    """Return the slopes of the states and the output."""
+    """Return the slopes of the states and the outputs."""
     d = Names()
-    output = model.equations(x, u, p, d)
+    outputs = each_output(model.equations(x, u, p, d))
     assert vars(d).keys() == set(model.states)
     slopes = [getattr(d, name) for name in model.states]
-    return [s.slope if isinstance(s, Limited) else s for s in slopes], output
+    return [s.slope if isinstance(s, Limited) else s for s in slopes], outputs
 
 
 def test_it_rests_while_its_inputs_are_within_its_characteristic(limiter):
     for values in (typical(limiter.sheet), lively(limiter)):
         p, u = Names(**values), Names(**{name: np.float64(AT_REST[name]) for name in SIGNALS})
         x = resting(limiter, p, u)
-        slopes, output = slopes_of(limiter, p, x, u)
+        slopes, outputs = slopes_of(limiter, p, x, u)
         assert np.abs(np.array(slopes, dtype=float)).max() < 1e-12
-        assert np.isfinite(output)
+        assert np.all(np.isfinite(outputs))
+
+
+def sides_of(model):
+    """Return the sides on which the outputs of a limiter act."""
+    return tuple(Attached(model, model.places[0]).signals)
 
 
 def as_system(model):
@@ -107,14 +138,15 @@ def as_system(model):
     def course(p, r, x, u):
         d = Names()
         output = model.equations(values_named(x, model.states), seen(u), sheet_of(p), d)
-        return motion(d, model.states, {"output": output, **x})
+        outputs = dict(zip(sides_of(model), each_output(output), strict=True))
+        return motion(d, model.states, {**outputs, **x})
 
     return System(
         parameters=tuple(row.symbol for row in model.sheet),
         setpoints=(),
         states=model.states,
         inputs=SIGNALS,
-        outputs=("output", *model.states),
+        outputs=(*sides_of(model), *model.states),
         time_constants=tuple(row.symbol for row in model.sheet if row.is_time),
         rest=rest,
         motion=course,
@@ -211,7 +243,19 @@ def typed_uel2c(x, u, p):
     ], held
 
 
-SMOOTH = {"OEL3C": typed_oel3c, "UEL1": typed_uel1, "UEL2C": typed_uel2c}
+def typed_scl1c(x, u, p):
+    _, vt, P, Q = u
+    i, late, iq, _, oex, uex = x
+    it, error = abs(complex(P, Q)) / vt, i ** p["K"] - p["ISCLLIM"]
+    reactive = np.sign(iq) * abs(iq) ** p["K"]
+    limits = "VSCLMIN", "VSCLMAX"
+    o, d_o = pi(min(reactive - p["IQMIN"], error), oex, p, "KPOEX", "KIOEX", *limits)
+    v, d_v = pi(min(-reactive - p["IQMIN"], error), uex, p, "KPUEX", "KIUEX", *limits)
+    lags = [(it - i) / p["TIT"], (it - late) / p["TINV"], (Q / vt - iq) / p["TQSCL"]]
+    return [*lags, 0.0, d_o, d_v], np.array([-max(o, 0.0), max(v, 0.0)])
+
+
+SMOOTH = {"OEL3C": typed_oel3c, "UEL1": typed_uel1, "UEL2C": typed_uel2c, "SCL1C": typed_scl1c}
 
 
 def test_another_typing_and_method_reach_and_leave_the_limits_together(limiter):
@@ -233,10 +277,10 @@ def test_another_typing_and_method_reach_and_leave_the_limits_together(limiter):
     )
     expected = np.array(
         [typed(x, first + changes(t), values)[1] for t, x in zip(solved.t, solved.y.T, strict=True)]
-    )
+    ).reshape(len(solved.t), -1)
     assert np.ptp(expected) > 0.2
     # a limit is met within a step: the square of its length, times what the slope jumps by
-    assert np.abs(got[::20, 0] - expected).max() < 2e-6
+    assert np.abs(got[::20, : expected.shape[1]] - expected).max() < 2e-6
 
 
 # --- switching ------------------------------------------------------------------------------------
@@ -289,6 +333,46 @@ def test_OEL5C_acts_by_its_count_or_soon_and_lets_go_when_the_count_is_empty():
     first = np.argmax(soon)
     acts = np.argmax(alone[:, 0] != p["IBIAS"])
     assert time[acts] - time[first] == pytest.approx(p["TIFDLEV"], abs=2e-3)
+
+
+@pytest.mark.parametrize("limiter", ["SCL1C"], indirect=True)
+def test_mirrored_in_Q_one_side_of_SCL1C_does_what_the_other_did(limiter):
+    rng = np.random.default_rng(5)
+    for switches in ({"SW1": 1.0}, {"SW1": 2.0, "SW2": 0.0}, {"SW1": 2.0, "SW2": 1.0}):
+        p = lively(limiter) | {"KPUEX": 0.2, "KIUEX": 0.2} | switches
+        for _ in range(30):
+            x = {name: rng.uniform(0.0, 1.5) for name in limiter.states}
+            u = {"vt": 1.0, "p": 0.6, "q": rng.uniform(-1.0, 1.0)}
+            oel, uel = limiter.equations(Names(**x), Names(**u), Names(**p), Names())
+            x |= {"IQ": -x["IQ"], "OEX": x["UEX"], "UEX": x["OEX"]}
+            u |= {"q": -u["q"]}
+            mirrored = limiter.equations(Names(**x), Names(**u), Names(**p), Names())
+            assert mirrored == (-uel, -oel)
+
+
+@pytest.mark.parametrize("limiter", ["SCL2C"], indirect=True)
+def test_SCL2C_counts_acts_and_is_reset_and_leaves_Q_between_its_limits(limiter):
+    p = lively(limiter) | {"KFB": 0.0, "KPREF": 0.0}
+    time, got = run(limiter, p, seconds=10.0)
+    x = dict(zip(limiter.states, got[:, 2:].T, strict=True))
+    ratio = np.maximum(x["I"] / p["ITFPU"], 1e-6)
+    counting = p["K2"] * (ratio ** p["C2"] - 1.0)
+    rate = np.clip(counting, 0.0, 100.0) + np.where(ratio > 1.0, p["FIXEDRU"], p["FIXEDRD"])
+    t = np.zeros(len(time))
+    for k, (a, b) in enumerate(pairwise(rate)):
+        t[k + 1] = np.clip(t[k] + 5e-4 * (a + b) / 2.0, p["TMIN"], p["TMAX"])
+    # where the rate jumps, a step of it
+    assert np.abs(x["T"] - t).max() < 5e-4 * 2.0
+    for side in ("OEL", "UEL"):
+        on, off = at_instants(x["ACTIVE" + side] > 0.5)[[0, -1]]
+        assert abs(on - np.argmax(t >= p["TSCL"])) <= 3
+        assert x["BELOW" + side][off] > p["TOFF"]
+        assert x["IREF"][off] == p["IINST"]
+    # with Q far below, the underexcited side raises
+    assert got[x["IQUEL"] < -0.5, 1].max() > 0.5
+    # while the reactive current is above IQMAXUEL the error of the underexcited side lets go
+    assert got[0, 1] < 0.0
+    assert got[-1, 1] < 0.0
 
 
 # --- on load --------------------------------------------------------------------------------------
@@ -432,7 +516,9 @@ def test_a_limiter_is_found_at_each_gate_and_sum_of_an_exciter(exciter):
     for name in inputs_for_limiters(model):
         attached = Attached(LIMITERS["UEL1" if "uel" in name else "OEL2C"], AT_INPUT[name])
         plant = infinite_bus(model, MACHINES["GENROU"], QUADRATIC, limiters=(attached,))
-        limits = [limit for limit in equation_limits(plant) if limit.limit == attached.signal]
+        limits = [
+            limit for limit in equation_limits(plant) if limit.limit in attached.signals.values()
+        ]
         assert limits, name
         (output,) = limiter_outputs(plant).values()
         for limit in limits:
@@ -458,7 +544,10 @@ def test_a_drawing_is_narrow_and_shows_every_parameter(limiter):
     text = limiter.title + limiter.drawing
     assert max(map(len, limiter.drawing.splitlines())) <= 80
     for row in limiter.sheet:
-        ours = row.symbol in text or (row.symbol[0] in "PQ" and row.symbol[1:].isdigit())
+        sides = row.symbol, row.symbol.replace("UEL", "OEL")  # drawn once for both
+        ours = any(symbol in text for symbol in sides) or (
+            row.symbol[0] in "PQ" and row.symbol[1:].isdigit()
+        )
         assert ours, row.symbol
 
 
@@ -479,21 +568,27 @@ def test_it_says_what_it_sees_and_where_it_acts(limiter):
 def test_no_parameter_is_inert(limiter):
     values, away = (
         lively(limiter),
-        {"SW1": 1.0, "TEN": 2.0, "TOFF": 0.1, "ITHOFF": 9.0, "VURMAX": 1.0, "VUCMAX": 1.0},
+        {"SW1": 1.0, "TEN": 2.0, "TOFF": 0.1, "ITHOFF": 9.0, "VURMAX": 1.0, "VUCMAX": 1.0}
+        | {"VSCLDB": 99.0, "TENOEL": 2.0, "TENUEL": 2.0},
     )
-    fixed = {"UEL2C": {"SW1": 1.0}, "OEL2C": {"SW1": 1.0, "K1": -5.0, "C1": 1.0}}
+    fixed = {
+        "UEL2C": {"SW1": 1.0},
+        "SCL1C": {"SW1": 2.0, "SW2": 0.0},
+        **{name: {"SW1": 1.0, "K1": -5.0, "C1": 1.0} for name in ("OEL2C", "SCL2C")},
+    }
 
     def felt(changed):
         rng = np.random.default_rng(3)
         motions = []
         for size in (0.3, 3.0, 300.0):
-            for _ in range(25):
+            for k in range(25):
+                q = size if k % 2 else -size
                 x = Names(**{name: size * rng.normal() for name in limiter.states})
-                u = Names(ifd=size, vt=rng.uniform(0.8, 1.2), p=rng.uniform(-1.0, 1.3), q=-size)
+                u = Names(ifd=size, vt=rng.uniform(0.8, 1.2), p=rng.uniform(-1.0, 1.3), q=q)
                 d = Names()
-                output = limiter.equations(x, u, Names(**changed), d)
+                outputs = each_output(limiter.equations(x, u, Names(**changed), d))
                 slopes = [s if isinstance(s, Limited) else (s,) for s in vars(d).values()]
-                motions.append([output, *(float(part) for slope in slopes for part in slope)])
+                motions.append([*outputs, *(float(part) for slope in slopes for part in slope)])
         return np.array(motions)
 
     bases = [values, values | fixed.get(limiter.name, {})]

@@ -13,7 +13,7 @@ from exfit.plants import (
     PlantKind,
     Stabilised,
     acts_without_load,
-    input_at,
+    inputs_at,
     inputs_for_limiters,
     rests_at,
     rests_with_output,
@@ -108,13 +108,16 @@ def _place_faults(
         yield place.fault(f"{show_value(limiter.place)}: {name} acts at {places}")
         return
     inputs = frozenset() if exciter is None else inputs_for_limiters(exciter)
-    if exciter is None or input_at(limiter) in inputs:
+    missing = [name for name in inputs_at(limiter).values() if name not in inputs]
+    if exciter is None or not missing:
         return
     others = [
-        other for other in limiter.model.places if input_at(limiter._replace(place=other)) in inputs
+        other
+        for other in limiter.model.places
+        if inputs.issuperset(inputs_at(limiter._replace(place=other)).values())
     ]
     has = f"it has {', '.join(others)}" if others else "none of its inputs is for this limiter"
-    word = f"{limiter.place} ({input_at(limiter)})"
+    word = f"{limiter.place} ({', '.join(missing)})"
     yield place.fault(f"{exciter.name} has no input {word} for {name}: {has}")
 
 

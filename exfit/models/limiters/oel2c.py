@@ -40,8 +40,17 @@ data are the first set of the standard's sample data (GridKit, PSCAD).
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import Limited, clip, lag, limited, limited_lead_lag, pid, where
-from exfit.models.limiter_blocks import BEYOND, latch, leaky_rest, power, timer, waiting_integral
+from exfit.models.blocks import Limited, clip, lag, limited, where
+from exfit.models.limiter_blocks import (
+    BEYOND,
+    counting,
+    latch,
+    leaky_rest,
+    rate_of_reference,
+    regulator,
+    regulator_rest,
+    timer,
+)
 from exfit.models.sheet import record, sheet
 
 DOUBT = "has FIXEDRU and FIXEDRD as their names say; its two public diagrams exchange them"
@@ -115,32 +124,15 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     t = clip(s.T, p.TMIN, p.TMAX)
     d.T = limited(counting(current, p) - p.KFB * t, s.T, p.TMIN, p.TMAX)
     iref = clip(s.IREF, p.ILIM, p.IINST)
-    d.IREF = limited(rate_of_reference(current, t, p), s.IREF, p.ILIM, p.IINST)
+    left = p.TFCL - t
+    rate = rate_of_reference(current, left >= p.KZRU * p.TFCL, left <= 0.0, p)
+    d.IREF = limited(rate, s.IREF, p.ILIM, p.IINST)
     filtered, d.IF = lag(iref, s.IF, 1.0, p.TAOEL)
     d.OVER = timer(actual > iref, s.OVER, p.TEN)
     d.BELOW = timer(iref > actual + p.ITHOFF, s.BELOW, p.TOFF)
     d.ACTIVE = activity(s, t, iref, p)
     error = filtered - actual + where(s.ACTIVE > 0.5, 0.0, p.IRESET)
-    gains = p.KPOEL, p.KIOEL, p.KDOEL, p.TDOEL
-    v, d.INTEG, d.DERIV = pid(error, s.INTEG, s.DERIV, *gains, p.VOELMIN3, p.VOELMAX3)
-    v2, d.V2 = limited_lead_lag(v, s.V2, p.TC2OEL, p.TB2OEL, p.VOELMIN2, p.VOELMAX2)
-    v1, d.V1 = limited_lead_lag(v2, s.V1, p.TC1OEL, p.TB1OEL, p.VOELMIN1, p.VOELMAX1)
-    return v1
-
-
-def counting(current: Signal, p: Signal) -> Signal:
-    """Return how fast the timer counts, without its feedback."""
-    ratio = current / p.ITFPU
-    inverse = clip(p.K2 * (power(ratio, p.C2) - 1.0), p.VINVMIN, p.VINVMAX)
-    return inverse + where(ratio > 1.0, p.FIXEDRU, p.FIXEDRD)
-
-
-def rate_of_reference(current: Signal, t: Signal, p: Signal) -> Signal:
-    """Return how fast the reference moves: down when the time is over, up when it is released."""
-    by_current = p.K1 * (power(current / p.ITFPU, p.C1) - 1.0)
-    up, down = (where(p.SW1 > 0.5, by_current, fixed) for fixed in (p.KRU, p.KRD))
-    left = p.TFCL - t
-    return where(left >= p.KZRU * p.TFCL, up, where(left <= 0.0, down, 0.0))
+    return regulator(error, s, p, d, "OEL")
 
 
 def activity(s: Signal, t: Signal, iref: Signal, p: Signal) -> Limited:
@@ -155,8 +147,5 @@ def rest(voel: Signal, u: Signal, p: Signal, x: Signal) -> None:
     x.IREF = x.IF = p.IINST
     x.OVER, x.BELOW = 0.0, p.TOFF + BEYOND
     x.ACTIVE = where(p.TEN > 0.0, 0.0, 1.0)
-    x.DERIV = p.IINST - p.KACT * x.I + where(p.TEN > 0.0, p.IRESET, 0.0)
-    x.INTEG = waiting_integral(x.DERIV, p.KIOEL, p.VOELMIN3, p.VOELMAX3)
-    x.V2 = clip(p.KPOEL * x.DERIV + x.INTEG, p.VOELMIN3, p.VOELMAX3)
-    x.V2 = clip(x.V2, p.VOELMIN2, p.VOELMAX2)
-    x.V1 = clip(x.V2, p.VOELMIN1, p.VOELMAX1)
+    bias = where(p.TEN > 0.0, p.IRESET, 0.0)
+    regulator_rest(p.IINST - p.KACT * x.I + bias, p, x, "OEL")

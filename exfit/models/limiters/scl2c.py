@@ -1,0 +1,232 @@
+"""SCL2C: stator current limiter with selectable pick-up and limiting (IEEE Std 421.5-2016).
+
+it ─►[    1     ]─► i        vt ─►[    1     ]─► v
+     [1 + sTITSCL]                [1 + sTVTSCL]
+                         VINVMAX           TMAX
+(i/ITFPU)^C2 - 1 ─►[K2]─►[clip]─►(+)─►[   1   ]─► t
+                         VINVMIN  ▲   [s + KFB]
+                                fixed      TMIN
+         IINST
+rate ─►[ 1 ]─► iref ─►(iref^2 - ipref^2)^½ ─►[    1     ]─► ref
+       [ s ]                                 [1 + sTAOEL]
+         ILIM
+p/vt ─►[   KIPOEL  ]─► ip  ┐
+       [1 + sTIPOEL]       ├─►(ip^2 + iq^2)^½ ─► iact
+q/vt ─►[   KIQOEL  ]─► iq  ┘
+       [1 + sTIQOEL]
+                                          VOELMAX3
+max(ref + bias - iact, ──►[ KPOEL + KIOEL/s        ]─► y
+    IQMINOEL - iq,        [ + sKDOEL/(1 + sTDOEL)  ]
+    VTMIN - v)                            VOELMIN3
+       VOELMAX2       VOELMAX1
+y ─►[1 + sTC2OEL]─►[1 + sTC1OEL]─► voel
+    [1 + sTB2OEL]  [1 + sTB1OEL]
+       VOELMIN2       VOELMIN1
+
+vuel is of the same blocks with UEL in their names, its reference the smaller of
+ref and IINSTUEL, its error min(iact - ref - bias, IQMAXUEL - iq). ipref is the
+active current behind KPREF and the lag TIPOEL.
+
+fixed is FIXEDRU while i is above ITFPU, FIXEDRD below; t counts to TSCL. The
+current iref is IINST, and goes to ILIM by KRD once t reaches TSCL or v is below
+VTRESET, back by KRU once t is below TSCL (1 - KZRU); with SW1 = 1 both rates
+are K1 ((i/ITFPU)^C1 - 1) instead. A side is inactive with the bias IRESET and
+active with none: activated when t reaches TSCL or iact has been above its
+reference for TENOEL or TENUEL (0: always), inactive again when iref is back and
+the reference has been above iact by ITHOFF for TOFF. The OEL side is not
+activated while v is below VTMIN, and is inactive below VTRESET. At the summing
+point VOELMAX1 and VUELMIN1 are 0.
+
+The equations are Dynawo's, the parameters those of GridKit's and PowerWorld's
+lists (there under SCL1C). Followed as in OEL2C: the names FIXEDRU and FIXEDRD,
+and the memory of being active, which Dynawo has not. Where ipref is above iref
+Dynawo's reference jumps to iref; here it is continuous, 0. PSS/E's record is
+not known. Typical data: C1, C2, FIXEDRU, FIXEDRD and IINST are CoLib's, the
+limit is that of SCL1C, the others are taken from OEL2C: check them.
+"""
+
+from exfit.engine.trace import Signal, sqrt
+from exfit.models.blocks import clip, lag, larger, limited, smaller, where
+from exfit.models.limiter_blocks import (
+    BEYOND,
+    LEAST_CURRENT,
+    POWERS,
+    counting,
+    latch,
+    leaky_rest,
+    rate_of_reference,
+    regulator,
+    regulator_rest,
+    stator_current,
+    timer,
+)
+from exfit.models.sheet import sheet
+
+PLACES = ("takeover", "takeover-output", "summing")
+INPUTS = ("vt", *POWERS)
+
+SHEET = sheet(
+    ("TB1OEL", 0.1, "s", (0.0, 100.0), "lag of the last block, overexcited"),
+    ("TC1OEL", 0.1, "s", (0.0, 100.0), "lead of the last block, overexcited"),
+    ("TB2OEL", 0.1, "s", (0.0, 100.0), "lag of the last but one, overexcited"),
+    ("TC2OEL", 0.1, "s", (0.0, 100.0), "lead of the last but one, overexcited"),
+    ("KPOEL", 0.5, "pu", (0.0, 100000.0), "proportional gain, overexcited"),
+    ("KIOEL", 0.0, "pu", (0.0, 100000.0), "integral gain, overexcited"),
+    ("KDOEL", 0.0, "pu", (0.0, 10000.0), "derivative gain, overexcited"),
+    ("TDOEL", 0.1, "s", (0.0, 100.0), "derivative lag, overexcited"),
+    ("VOELMAX3", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the PID, overexcited"),
+    ("VOELMIN3", -100.0, "pu", (-1000.0, 1000.0), "floor of the PID, overexcited"),
+    ("VOELMAX2", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the last but one, overexcited"),
+    ("VOELMIN2", -100.0, "pu", (-1000.0, 1000.0), "floor of the last but one, overexcited"),
+    ("VOELMAX1", 10.0, "pu", (-1000.0, 1000.0), "ceiling of the output, overexcited"),
+    ("VOELMIN1", -10.0, "pu", (-1000.0, 1000.0), "floor of the output, overexcited"),
+    ("TB1UEL", 0.1, "s", (0.0, 100.0), "lag of the last block, underexcited"),
+    ("TC1UEL", 0.1, "s", (0.0, 100.0), "lead of the last block, underexcited"),
+    ("TB2UEL", 0.1, "s", (0.0, 100.0), "lag of the last but one, underexcited"),
+    ("TC2UEL", 0.1, "s", (0.0, 100.0), "lead of the last but one, underexcited"),
+    ("KPUEL", 0.5, "pu", (0.0, 100000.0), "proportional gain, underexcited"),
+    ("KIUEL", 0.0, "pu", (0.0, 100000.0), "integral gain, underexcited"),
+    ("KDUEL", 0.0, "pu", (0.0, 10000.0), "derivative gain, underexcited"),
+    ("TDUEL", 0.1, "s", (0.0, 100.0), "derivative lag, underexcited"),
+    ("VUELMAX3", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the PID, underexcited"),
+    ("VUELMIN3", -100.0, "pu", (-1000.0, 1000.0), "floor of the PID, underexcited"),
+    ("VUELMAX2", 100.0, "pu", (-1000.0, 1000.0), "ceiling of the last but one, underexcited"),
+    ("VUELMIN2", -100.0, "pu", (-1000.0, 1000.0), "floor of the last but one, underexcited"),
+    ("VUELMAX1", 10.0, "pu", (-1000.0, 1000.0), "ceiling of the output, underexcited"),
+    ("VUELMIN1", -10.0, "pu", (-1000.0, 1000.0), "floor of the output, underexcited"),
+    ("IRESET", 100.0, "pu", (0.0, 10000.0), "bias while it is inactive"),
+    ("TENOEL", 0.2, "s", (0.0, 1000.0), "activation delay, overexcited"),
+    ("TENUEL", 0.2, "s", (0.0, 1000.0), "activation delay, underexcited"),
+    ("TOFF", 5.0, "s", (0.0, 1000.0), "reset delay"),
+    ("ITHOFF", 0.05, "pu", (-10.0, 100.0), "distance below the reference that resets"),
+    ("TIQOEL", 0.0, "s", (0.0, 100.0), "reactive current lag, overexcited"),
+    ("KIQOEL", 1.0, "1", (0.0, 1000.0), "scale of the reactive current, overexcited"),
+    ("TIPOEL", 0.0, "s", (0.0, 100.0), "active current lag, overexcited"),
+    ("KIPOEL", 1.0, "1", (0.0, 1000.0), "scale of the active current, overexcited"),
+    ("TIQUEL", 0.0, "s", (0.0, 100.0), "reactive current lag, underexcited"),
+    ("KIQUEL", 1.0, "1", (0.0, 1000.0), "scale of the reactive current, underexcited"),
+    ("TIPUEL", 0.0, "s", (0.0, 100.0), "active current lag, underexcited"),
+    ("KIPUEL", 1.0, "1", (0.0, 1000.0), "scale of the active current, underexcited"),
+    ("TITSCL", 0.005, "s", (0.0, 100.0), "stator current transducer lag"),
+    ("ITFPU", 1.05, "pu", (0.0001, 100.0), "stator current above which the timer counts"),
+    ("IINST", 5.0, "pu", (0.0001, 10000.0), "instantaneous limit"),
+    ("IINSTUEL", 5.0, "pu", (0.0001, 10000.0), "instantaneous limit, underexcited"),
+    ("ILIM", 1.05, "pu", (0.0001, 10000.0), "thermal limit"),
+    ("TAOEL", 0.04, "s", (0.0, 100.0), "lag of the reference"),
+    ("C1", 0.0, "1", (0.0, 100.0), "exponent of the rate with SW1 = 1"),
+    ("K1", 0.0, "pu/s", (-10000.0, 10000.0), "gain of the rate with SW1 = 1"),
+    ("C2", 2.0, "1", (0.0, 100.0), "exponent of the inverse time"),
+    ("K2", 0.0296, "1", (-10000.0, 10000.0), "gain of the inverse time"),
+    ("VINVMAX", 100.0, "1", (-1000.0, 1000.0), "ceiling of the inverse time"),
+    ("VINVMIN", 0.0, "1", (-1000.0, 1000.0), "floor of the inverse time"),
+    ("FIXEDRU", 0.0, "1", (-1000.0, 1000.0), "fixed count above the pick-up"),
+    ("FIXEDRD", -0.001, "1", (-1000.0, 1000.0), "fixed count below the pick-up"),
+    ("TSCL", 10.0, "s", (0.001, 10000.0), "reference of the timer"),
+    ("TMAX", 10.0, "s", (0.0, 10000.0), "ceiling of the timer"),
+    ("TMIN", 0.0, "s", (-10000.0, 1000.0), "floor of the timer"),
+    ("KFB", 0.0, "1/s", (0.0, 1000.0), "feedback of the timer"),
+    ("SW1", 0.0, "1", (0.0, 1.0), "rates of the reference: 0 fixed, 1 by the current"),
+    ("KRD", -1000.0, "pu/s", (-100000.0, 0.0), "rate of the reference down"),
+    ("KRU", 1000.0, "pu/s", (0.0, 100000.0), "rate of the reference up"),
+    ("KZRU", 0.99, "1", (0.0, 1.0), "share of the timer at which the reference rises"),
+    ("TVTSCL", 0.005, "s", (0.0, 100.0), "terminal voltage transducer lag"),
+    ("VTMIN", 0.9, "pu", (0.0, 10.0), "voltage that the overexcited side leaves"),
+    ("VTRESET", 0.8, "pu", (0.0, 10.0), "voltage below which that side is inactive"),
+    ("IQMINOEL", 0.0, "pu", (-100.0, 100.0), "reactive current that the overexcited side leaves"),
+    ("IQMAXUEL", 0.0, "pu", (-100.0, 100.0), "reactive current that the other side leaves"),
+    ("KPREF", 0.0, "1", (0.0, 1000.0), "scale of the active current in the reference"),
+)
+
+STATES = """I VT T IREF IPREF IF
+    IPOEL IQOEL OVEROEL BELOWOEL ACTIVEOEL INTEGOEL DERIVOEL V2OEL V1OEL
+    IPUEL IQUEL OVERUEL BELOWUEL ACTIVEUEL INTEGUEL DERIVUEL V2UEL V1UEL"""
+
+
+def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> tuple[Signal, Signal]:
+    """Write the slopes of the states into d and return voel and vuel."""
+    v, d.VT = lag(u.vt, s.VT, 1.0, p.TVTSCL)
+    full, iref, filtered = reference(s, u, p, d, v)
+    oel, iq_oel, d.IPOEL, d.IQOEL = scaled(s, u, p, "OEL")
+    uel, iq_uel, d.IPUEL, d.IQUEL = scaled(s, u, p, "UEL")
+    limit = smaller(filtered, p.IINSTUEL)
+    d.OVEROEL, d.BELOWOEL = timers(s.OVEROEL, s.BELOWOEL, oel, filtered, p.TENOEL, p)
+    d.OVERUEL, d.BELOWUEL = timers(s.OVERUEL, s.BELOWUEL, uel, limit, p.TENUEL, p)
+    acts = (v > p.VTMIN) & (full | (s.OVEROEL >= p.TENOEL))
+    waits = (iref >= p.IINST) & (s.BELOWOEL > p.TOFF)
+    d.ACTIVEOEL = latch(acts | (p.TENOEL <= 0.0), waits | (v < p.VTRESET))
+    waits = (iref >= smaller(p.IINST, p.IINSTUEL)) & (s.BELOWUEL > p.TOFF)
+    d.ACTIVEUEL = latch(full | (s.OVERUEL >= p.TENUEL), waits)
+    error = filtered - oel + where(s.ACTIVEOEL > 0.5, 0.0, p.IRESET)
+    error = larger(larger(error, p.IQMINOEL - iq_oel), p.VTMIN - v)
+    voel = regulator(error, s, p, d, "OEL", "OEL")
+    error = uel - limit - where(s.ACTIVEUEL > 0.5, 0.0, p.IRESET)
+    vuel = regulator(smaller(error, p.IQMAXUEL - iq_uel), s, p, d, "UEL", "UEL")
+    return voel, vuel
+
+
+def reference(
+    s: Signal, u: Signal, p: Signal, d: Signal, v: Signal
+) -> tuple[Signal, Signal, Signal]:
+    """Return whether the time is over, the reference of the current, and what the sides see."""
+    current, d.I = lag(stator_current(u), s.I, 1.0, p.TITSCL)
+    t = clip(s.T, p.TMIN, p.TMAX)
+    d.T = limited(counting(current, p) - p.KFB * t, s.T, p.TMIN, p.TMAX)
+    iref = clip(s.IREF, p.ILIM, p.IINST)
+    left = p.TSCL - t
+    down = (left <= 0.0) | (v < p.VTRESET)
+    rate = rate_of_reference(current, left >= p.KZRU * p.TSCL, down, p)
+    d.IREF = limited(rate, s.IREF, p.ILIM, p.IINST)
+    active, d.IPREF = lag(u.p / u.vt, s.IPREF, p.KPREF, p.TIPOEL)
+    filtered, d.IF = lag(beside(iref, active), s.IF, 1.0, p.TAOEL)
+    return left <= 0.0, iref, filtered
+
+
+def beside(iref: Signal, active: Signal) -> Signal:
+    """Return the current that a reference leaves beside an active one."""
+    return sqrt(larger(iref * iref - active * active, LEAST_CURRENT * LEAST_CURRENT))
+
+
+def scaled(s: Signal, u: Signal, p: Signal, side: str) -> tuple[Signal, Signal, Signal, Signal]:
+    """Return the current that one side sees, its reactive part, and the slopes of both parts."""
+    parts = ((x, f"I{x.upper()}{side}") for x in POWERS)
+    (ip, d_ip), (iq, d_iq) = (
+        lag(getattr(u, x) / u.vt, getattr(s, name), getattr(p, "K" + name), getattr(p, "T" + name))
+        for x, name in parts
+    )
+    return magnitude(ip, iq), iq, d_ip, d_iq
+
+
+def magnitude(ip: Signal, iq: Signal) -> Signal:
+    """Return the magnitude of a current, which is never quite zero."""
+    return sqrt(larger(ip * ip + iq * iq, LEAST_CURRENT * LEAST_CURRENT))
+
+
+def timers(
+    over: Signal, below: Signal, actual: Signal, limit: Signal, delay: Signal, p: Signal
+) -> tuple[Signal, Signal]:
+    """Return the slopes of the timers above and below a limit."""
+    return (
+        timer(actual > limit, over, delay),
+        timer(limit > actual + p.ITHOFF, below, p.TOFF),
+    )
+
+
+def rest(scl: Signal, u: Signal, p: Signal, x: Signal) -> None:
+    """Write the states into x at which it waits for its inputs to pass its limits."""
+    active, reactive = u.p / u.vt, u.q / u.vt
+    x.I, x.VT, x.IREF = stator_current(u), u.vt, p.IINST
+    x.T = leaky_rest(counting(x.I, p), p.KFB, p.TMIN, p.TMAX)
+    x.IPREF = p.KPREF * active
+    x.IF = beside(p.IINST, x.IPREF)
+    x.IPOEL, x.IQOEL = p.KIPOEL * active, p.KIQOEL * reactive
+    x.IPUEL, x.IQUEL = p.KIPUEL * active, p.KIQUEL * reactive
+    x.OVEROEL = x.OVERUEL = 0.0
+    x.BELOWOEL = x.BELOWUEL = p.TOFF + BEYOND
+    x.ACTIVEOEL = where(p.TENOEL > 0.0, 0.0, 1.0)
+    x.ACTIVEUEL = where(p.TENUEL > 0.0, 0.0, 1.0)
+    bias = p.IRESET * (1.0 - x.ACTIVEOEL)
+    error = larger(x.IF - magnitude(x.IPOEL, x.IQOEL) + bias, p.IQMINOEL - x.IQOEL)
+    regulator_rest(larger(error, p.VTMIN - u.vt), p, x, "OEL", "OEL")
+    bias = p.IRESET * (1.0 - x.ACTIVEUEL)
+    error = magnitude(x.IPUEL, x.IQUEL) - smaller(x.IF, p.IINSTUEL) - bias
+    regulator_rest(smaller(error, p.IQMAXUEL - x.IQUEL), p, x, "UEL", "UEL")
