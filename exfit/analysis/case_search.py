@@ -1,10 +1,17 @@
 """The search for the parameters of a case: weighted, judged, and continued where profiles lead."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 from exfit import estimate
-from exfit.analysis.intervals.determination import Determination, determination
+from exfit.analysis.intervals.determination import (
+    NEEDS_PROFILE,
+    Determination,
+    determination,
+    uncertainty_of_solution,
+    without_linear_intervals,
+)
 from exfit.analysis.intervals.samples_at_steps import without_contradicting_samples
 from exfit.analysis.judgement import doubt_of
 from exfit.case.case import Case
@@ -19,9 +26,10 @@ from exfit.fitting.driving_noise.weighing import (
 )
 from exfit.fitting.forms.external import settled, with_setups
 from exfit.fitting.global_search import SearchResult
+from exfit.fitting.nonlinearity import not_served_by_linear_theory
 from exfit.fitting.nuisances.found_lines import with_found_lines
 from exfit.fitting.problem import FitProblem, problem_of, residuals_of
-from exfit.fitting.search import continued_from, search
+from exfit.fitting.search import continued_from, names_of_records, search
 from exfit.fitting.setup import ExperimentSetup
 from exfit.fitting.simulation_counter import SimulationCounter
 from exfit.util.strategies import WEIGHED_BY_NOISE
@@ -69,7 +77,7 @@ def search_outcome(
     if options.weights == "balanced":
         unseen = weighted_alike(unseen, problem.residuals)
     if task.case.external is not None:
-        determined = determined_by_twin(task.case, problem, found, setups, progress)
+        determined = determined_by_twin(task, problem, found, setups, progress)
         return SearchOutcome(problem, setups, unseen, found, determined)
     profiled = options.search != "local"
     determined = determination(problem, found, setups, profiled, progress)
@@ -82,7 +90,7 @@ def search_outcome(
 
 
 def determined_by_twin(
-    case: Case,
+    task: SearchTask,
     problem: FitProblem,
     found: SearchResult,
     setups: tuple[ExperimentSetup, ...],
@@ -91,13 +99,32 @@ def determined_by_twin(
     """Return how well the records determine the parameters of a program, by its corrected twin.
 
     Profiles take no run. Where they lead to a lower cost, which the program need not have, the
-    intervals are those of linear theory; so they are without a twin.
+    result is not at the minimum of the corrected twin. The intervals are those of linear theory
+    then, which is judged at that minimum; without a twin they are so as well.
     """
-    if not case.has_no_equations:
-        determined = determination(problem, found, setups, True, progress)
-        if determined.lower is None:
-            return determined
-    return determination(problem, found, setups, False, progress)
+    if task.case.has_no_equations:
+        return determination(problem, found, setups, False, progress)
+    determined = determination(problem, found, setups, True, progress)
+    if determined.lower is None:
+        return determined
+    counter, of_record = SimulationCounter(), names_of_records(setups)
+    try:
+        of_twin = continued_from(
+            determined.lower, found, problem, lambda _: None, counter, task.options
+        ).best
+        own, there = (
+            uncertainty_of_solution(problem, point, of_record)
+            for point in (found.best.x, of_twin.x)
+        )
+    except KeyboardInterrupt:
+        return Determination(None, interrupted=True)
+    if own is None or there is None:
+        return Determination(None)
+    if found.best.cost - of_twin.cost > max(own.rises.values(), default=0.0):  # another minimum
+        return determination(problem, found, setups, False, progress)
+    names = not_served_by_linear_theory(problem.residuals, of_twin.x, there, of_record)
+    own = replace(own, nonlinear=there.nonlinear)
+    return Determination(without_linear_intervals(own, names, NEEDS_PROFILE))
 
 
 def with_lines(

@@ -102,6 +102,12 @@ def test_a_twin_that_differs_leads_to_the_minimum_of_the_program(record, native)
     result = exfit.fit(external(record, **other, parallel=2))
     assert result.cost == pytest.approx(native.cost, rel=SAME_COST)
     assert result.parameters["TE"].value == pytest.approx(native.parameters["TE"].value, rel=0.01)
+    # the result is not the minimum of the corrected twin, which has the intervals nevertheless
+    for name, parameter in native.parameters.items():
+        low, high = result.parameters[name].interval
+        own_low, own_high = parameter.interval
+        assert high - low == pytest.approx(own_high - own_low, rel=0.3)
+        assert low < parameter.value < high
     # what is shown of start and iterations are runs of the program, which it remembers
     start = exfit.simulate(external(record, **other)).response.signals["vt"]
     assert np.array_equal(result.comparisons[0].overlays["vt"].start, start)
