@@ -1,6 +1,6 @@
 """Whether a record contradicts what its case holds fixed: a score test of each such value."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import erfc, exp, hypot, log, sqrt
 from typing import NamedTuple
@@ -39,7 +39,8 @@ class Held:
     """A value that a case holds fixed, or one that it takes from the record (``words`` empty).
 
     ``size`` is by how much it is changed for a derivative; without ``unit`` that is its own size.
-    ``rare`` is by how much (log-likelihood) it is less often wrong than other values.
+    ``rare`` is by how much (log-likelihood) it is less often wrong than other values. ``std_error``
+    is that of the value as the case gives it, of its size.
     """
 
     words: str = ""
@@ -47,6 +48,7 @@ class Held:
     size: float = 1.0
     unit: str = ""
     rare: float = 0.0
+    std_error: float = 0.0
 
     def better(self, change: float) -> str:
         """Return which change would match better."""
@@ -88,7 +90,8 @@ def contradictions(evidence: Evidence) -> list[Contradiction]:
 
     The residuals are projected on what a value does that the free parameters cannot do, in their
     own variances: chi-square of one degree of freedom, if the value is right. It may be exceeded
-    with 1 %, divided by the number of values (Bonferroni).
+    with 1 %, divided by the number of values (Bonferroni). A value that is given with a standard
+    error may be off by that as well.
 
     Where the errors are weighed by the noise of what drives the simulation, the bias that it has
     by each value is taken out, too; it is as uncertain as the variance of that noise.
@@ -139,7 +142,8 @@ def _score(
     if not square > (SAME**2) * float(direction @ direction):
         return None
     by_bias = BIAS_KNOWN_TO * float(own @ shift)
-    error = hypot(float(np.linalg.norm(spread * own)), by_bias) / square
+    by_noise = float(np.linalg.norm(spread * own))
+    error = hypot(by_noise / square, by_bias / square, held.std_error)
     change = -float(own @ linear.errors) / square
     if not held.unit and max(error, abs(change)) > LARGEST_CHANGE:
         return None
@@ -164,7 +168,7 @@ def _linearised(evidence: Evidence) -> tuple[LinearFit, list[tuple[Held, Array]]
     directions = [(held, held.size * each) for held, each in zip(of_test, others.T, strict=False)]
     for names in _together([*fixed]):
         direction = np.sum([fixed[name] * column[name] for name in names], axis=0)
-        directions.append((_held_value(fixed, names), direction))
+        directions.append((_held_value(evidence, names), direction))
     directions = [each for each in directions if np.isfinite(each[1]).all()]
     from_record = [direction for held, direction in directions if not held.words]
     known = np.column_stack([own[:, moving(evidence)], *from_record])
@@ -204,9 +208,16 @@ def _together(names: Sequence[str]) -> Iterator[tuple[str, ...]]:
     yield from ((name,) for name in names if name not in saturation)
 
 
-def _held_value(fixed: Mapping[str, float], names: Sequence[str]) -> Held:
+def _held_value(evidence: Evidence, names: Sequence[str]) -> Held:
+    """Return the test of fixed values; those of a curve err as the one that errs most."""
+    fixed, std_errors = evidence.residuals.fixed, evidence.case.std_errors()
     words = listed([f"{name} = {fixed[name]:.4g}" for name in names])
-    return Held(words, remedy_of(names), rare=0.0 if of_machine(names) else RARE)
+    return Held(
+        words,
+        remedy_of(names),
+        rare=0.0 if of_machine(names) else RARE,
+        std_error=max(std_errors.get(name, 0.0) / abs(fixed[name]) for name in names),
+    )
 
 
 def _of_test(evidence: Evidence, number: int) -> Iterator[tuple[Held, Opened]]:
