@@ -40,6 +40,7 @@ WITHOUT_EFFECT: Mapping[str, float] = {
     "integral gain": 0.0,
     "derivative gain": 0.0,
     "second stage gain": 1.0,
+    "loading factor of the supply's rectifier": 0.0,
     "feedback gain of the exciter's field current": 0.0,
     "stabilising feedback gain": 0.0,
     "stabilising feedback lag": 0.0,
@@ -70,6 +71,8 @@ GAIN, PROPORTIONAL = "regulator gain", "proportional gain"
 FACTORS = (PROPORTIONAL, "second stage gain")  # of the regulator, beside its gain
 LEAD, LAG = "regulator lead", "regulator lag"
 LEAD_AS_SHARE = "regulator lead, as a share of its lag"
+SUPPLY_SWITCH = "supply: 1 terminals, 2 independent"
+FED_BY_TERMINALS = ("potential source gain", "at rated voltage", "bridge voltage")
 
 
 class Counterpart(NamedTuple):

@@ -58,6 +58,15 @@ def test_a_model_within_another_is_found_exactly_and_without_a_search(source, ta
 
 
 @pytest.mark.long
+def test_a_model_without_a_supply_gets_one_that_does_not_depend_on_the_terminals():
+    """AC8B has no supply: that of AC8C is constant then, and has no rectifier that loads it."""
+    translation = translated("AC8B", "AC8C")
+    assert translation.exact
+    supply = {name: translation.parameters[name].value for name in ("SW1", "KP", "KC1")}
+    assert supply == {"SW1": 2.0, "KP": 1.0, "KC1": 0.0}
+
+
+@pytest.mark.long
 def test_every_exciter_is_itself_exactly(exciter):
     values = fit_of(FIT, exciter).fixed
     translation = translated(exciter, exciter)

@@ -14,6 +14,7 @@ from exfit.engine.trace import evaluate
 from exfit.models.counterparts import (
     CEILINGS,
     FACTORS,
+    FED_BY_TERMINALS,
     FLOORS,
     GAIN,
     LAG,
@@ -23,6 +24,7 @@ from exfit.models.counterparts import (
     OUTPUT_FLOOR,
     PROPORTIONAL,
     REMOVABLE,
+    SUPPLY_SWITCH,
     WITHOUT_EFFECT,
     Counterpart,
     by_quantity,
@@ -152,11 +154,18 @@ def _without_counterpart(row: Parameter, source: Placed) -> StartValue:
     name = quantity(row)
     if name == "floor of the exciter voltage" and source.at_least_zero():
         return StartValue(0.0, "computed")
+    if name == SUPPLY_SWITCH:
+        return StartValue(1.0 if _fed_by_terminals(source.model) else 2.0, "computed")
     if name in REMOVABLE:
         return StartValue(_far(row), "without effect")
     if name in WITHOUT_EFFECT and row.low <= WITHOUT_EFFECT[name] <= row.high:
         return StartValue(WITHOUT_EFFECT[name], "without effect")
     return StartValue(row.typical, "typical")
+
+
+def _fed_by_terminals(model: Model) -> bool:
+    """Return whether the field voltage that a model can give falls with that of the terminals."""
+    return any(words in row.meaning for row in model.sheet for words in FED_BY_TERMINALS)
 
 
 def _far(row: Parameter) -> float:
