@@ -55,8 +55,8 @@ LIVELY = {
         **{"VUIMIN": -0.5, "VUELMIN1": -0.5},
     },
     "SCL1C": {
-        **{"ISCLLIM": 0.8, "TIT": 0.05, "TQSCL": 0.04, "K": 1.5, "IQMIN": 0.2, "TINV": 0.5},
-        **{"TDSCL": 0.3, "KPOEX": 0.2, "KPUEX": 0.6, "KIUEX": 3.0, "VSCLMIN": -0.1},
+        **{"ISCLLIM": 0.9, "TIT": 0.05, "TQSCL": 0.04, "K": 1.5, "IQMIN": 0.2, "TINV": 0.5},
+        **{"TDSCL": 0.3, "KPOEX": 0.2, "KPUEX": 1.2, "KIUEX": 3.0, "VSCLMIN": -0.2, "VSCLMAX": 3.0},
     },
     "SCL2C": {
         **{"ITFPU": 0.8, "ILIM": 0.75, "IINST": 1.2, "IINSTUEL": 1.1, "K2": 1.5, "KPUEL": 4.0},
