@@ -17,7 +17,7 @@ from exfit.util.text import show_value, to_json
 from exfit.util.typed import FormError, Reader, plain
 
 WHOLE_FIT, WHOLE_PROGRAMME, VALIDATION = "result.json", "programme.json", "validation.json"
-VERSION = 8  # of the file; a file without a version is of the first
+VERSION = 9  # of the file; a file without a version is of the first
 
 
 def result_text(result: FitResult) -> str:
