@@ -35,6 +35,7 @@ from exfit.models.blocks import lag, larger, pi, smaller, where
 from exfit.models.limiter_blocks import POWERS, power, stator_current, timer, waiting_integral
 from exfit.models.sheet import sheet
 
+DOUBT = "rests on one public diagram, that of Dynawo"
 PLACES = ("summing",)
 INPUTS = ("vt", *POWERS)
 

@@ -41,8 +41,9 @@ The equations are Dynawo's, the parameters those of GridKit's and PowerWorld's
 lists (there under SCL1C). Followed as in OEL2C: the names FIXEDRU and FIXEDRD,
 and the memory of being active, which Dynawo has not. Where ipref is above iref
 Dynawo's reference jumps to iref; here it is continuous, 0. PSS/E's record is
-not known. Typical data: C1, C2, FIXEDRU, FIXEDRD and IINST are CoLib's, the
-limit is that of SCL1C, the others are taken from OEL2C: check them.
+not known. Typical data are no sample: C1, C2, FIXEDRU, FIXEDRD and IINST are
+CoLib's, the limit is that of SCL1C, timer and regulators as in OEL2C, and all
+else is chosen so that it waits at rated current: take the plant's own.
 """
 
 from exfit.engine.trace import Signal, sqrt
@@ -62,6 +63,7 @@ from exfit.models.limiter_blocks import (
 )
 from exfit.models.sheet import sheet
 
+DOUBT = "rests on one public diagram, that of Dynawo"
 PLACES = ("takeover", "takeover-output", "summing")
 INPUTS = ("vt", *POWERS)
 
