@@ -42,8 +42,11 @@ def main() -> None:
                 faulty, sound = verdict_on(event.faulty), verdict_on(event.sound)
                 likeliest = faulty.causes[0].sentence if faulty.causes else "no cause"
                 right = words in likeliest
-                first, accused = first + right, accused + bool(accusations(sound))
+                named = accusations(sound)
+                first, accused = first + right, accused + bool(named)
                 print(f"{kind:16} {seed}: {faulty.verdict}; {likeliest}", flush=True)
+                if named:
+                    print(f"{kind:16} {seed}, sound: {'; '.join(named)}", flush=True)
     events = len(seeds) * len(KINDS)
     print(f"{first} of {events} right causes first; {accused} sound cases accused")
 
