@@ -13,6 +13,7 @@ from exfit.util.text import near, show
 
 NEEDED = ("machine", "exciter")
 BASE_SHARE = "Trate_Mbase"  # the base of a governor over the machine's, where its model has it
+LIMITER = "excitation limiter"
 MOST_LISTED = 20  # units in a message
 OTHERS: Mapping[str, str] = {
     name: kind
@@ -23,8 +24,7 @@ OTHERS: Mapping[str, str] = {
             WEHGOV WESGOV WPIDHY WSHYDD WSHYGP WSIEG1""",
         "stabiliser": """BEPSST IEE2ST IVOST OSTB2T OSTB5T PSS2C PSS5C PSS6C PSS7C PTIST1 PTIST3
             STAB3 STAB4 STABNI STBSVC""",
-        "excitation limiter": """MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL2C OEL3C OEL4C OEL5C
-            SCL1C SCL2C UEL1 UEL2 UEL2C""",
+        LIMITER: "MAXEX1 MAXEX2 MNLEX1 MNLEX2 MNLEX3 OEL1B OEL4C UEL2",
         "compensator": "COMP COMPCC IEEEVC REMCMP",
     }.items()
     for name in names.split()
@@ -221,7 +221,7 @@ def _missing(
     if classical:
         yield from classical
         return
-    unknown = [head for head in left_out if head.name.upper() not in OTHERS]
+    unknown = [head for head in left_out if kind_left_out(head.name) is None]
     for kind in missing:
         names = names_of(kind, chosen[0].program)
         candidates = [head for head in unknown if len(missing) == 1 or _looks_like(head) == kind]
@@ -254,10 +254,14 @@ def _looks_like(head: Head) -> str:
     return "machine" if head.name.upper().startswith("GEN") else "exciter"
 
 
+def kind_left_out(name: str) -> str | None:
+    """Return what a record that is left out is by its name, None where that is not known."""
+    return LIMITER if name.upper() in LIMITERS else OTHERS.get(name.upper())
+
+
 def _left_out(head: Head) -> str:
-    name = head.name.upper()
-    kind = OTHERS.get(name)
+    kind = kind_left_out(head.name)
     if kind is None:
         return f"{head.name} is left out: not a known model"
-    how = ": give it under limiters" if name in LIMITERS else ""
-    return f"{kind} {head.name} is left out{how}"
+    how = ": give it under limiters" if head.name.upper() in LIMITERS else ""
+    return f"{kind} {head.name.upper()} is left out{how}"

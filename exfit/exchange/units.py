@@ -9,10 +9,10 @@ from exfit.exchange.file_format import Head
 from exfit.exchange.formats import format_of
 from exfit.exchange.unit import (
     NEEDED,
-    OTHERS,
     Unit,
     by_unit,
     classical_machines,
+    kind_left_out,
     missing_kinds,
     names_of,
     unit_of,
@@ -84,7 +84,7 @@ def _lacking(heads: Sequence[Head], missing: Sequence[str]) -> Iterator[Dynamics
         return
     names = [name for kind in NEEDED for name in names_of(kind, heads[0].program)]
     unknown = [
-        head for head in heads if head.definition is None and head.name.upper() not in OTHERS
+        head for head in heads if head.definition is None and kind_left_out(head.name) is None
     ]
     text = f"no {' and no '.join(missing)} of the catalogue: "
     text += ", ".join(head.name for head in heads)

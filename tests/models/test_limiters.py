@@ -29,7 +29,7 @@ from exfit.plants import (
 )
 from exfit.plants.parts import motion, values_named
 from exfit.simulation.inputs import Inputs, InputStep, each
-from exfit.simulation.limit_hits import limits_hit
+from exfit.simulation.limit_hits import limiter_actions, limits_hit
 from exfit.simulation.limits import acting_at_rest, equation_limits, limiter_outputs
 from exfit.simulation.simulator import Simulator
 
@@ -386,16 +386,20 @@ OEL |= {"VOELMAX1": 40.0, "TB1OEL": 0.1, "TC1OEL": 0.1, "TAOEL": 0.04}
 UEL = {"KUR": 1.7, "KUL": 20.0}
 
 
-def limited_unit():
-    """Return a unit on load with both limiters at the gates of a static exciter, and its values."""
+def limited_unit(data=None):
+    """Return a unit on load with limiters at the gates of a static exciter, and its values.
+
+    ``data`` are what each limiter has beside its typical data, by its name.
+    """
     machine = MACHINES["GENROU"]
-    attached = tuple(Attached(LIMITERS[name], "takeover") for name in ("OEL2C", "UEL1"))
+    data = {"OEL2C": OEL, "UEL1": UEL} if data is None else data
+    attached = tuple(Attached(LIMITERS[name], "takeover") for name in data)
     plant = infinite_bus(MODELS["ST1A"], machine, QUADRATIC, limiters=attached)
     values = values_on_load(machine, exciter="ST1A", network_Rc=0.0, network_Xc=0.0)
     values |= {"TR": 0.0, "TC": 0.0, "TB": 0.0, "KA": KA, "TA": TA, "KC": 0.0, "KF": 0.0}
     values |= {"KLR": 0.0, "VAMAX": 99.0, "VAMIN": -99.0, "VRMAX": 99.0, "VRMIN": -99.0}
     values |= {VT0: 1.0, NETWORK + "P": 0.6, NETWORK + "Q": 0.05, NETWORK + "X": 0.3}
-    for limiter, changed in zip(attached, (OEL, UEL), strict=True):
+    for limiter, changed in zip(attached, data.values(), strict=True):
         of_limiter = typical(limiter.model.sheet) | changed
         values |= {limiter.prefix + symbol: value for symbol, value in of_limiter.items()}
     return plant, values
@@ -503,6 +507,59 @@ def test_a_limiter_that_acts_at_the_start_is_refused_with_what_it_lacks():
     text = acting_at_rest(plant, beyond)
     assert text.startswith("oel.OEL2C acts at the start already, at ")
     assert "where its gate has 1.65" in text
+
+
+SCL = {"TENOEL": 0.0, "TENUEL": 0.0, "IINST": 0.75, "ILIM": 0.1, "ITFPU": 99.0, "KPOEL": 15.0}
+SCL |= {"VOELMAX1": 40.0, "VTMIN": 0.5, "VTRESET": 0.4, "IQMINOEL": -9.0}
+OF_OEL, OF_SCL = "oel.OEL2C", "scl.SCL2C.oel"
+
+
+def stepped_up(**currents):
+    """Return when limiters act after a step into overexcitation, and all signals.
+
+    ``currents`` are the limits of a limiter of the field current and of one of the stator's.
+    """
+    data = {"OEL2C": OEL, "SCL2C": SCL}
+    limiters = {name: data[name] | {"IINST": limit} for name, limit in currents.items()}
+    plant, values = limited_unit(limiters)
+    inputs = Inputs(0.0, 3.0, (InputStep(0.5, UP),))
+    simulator = Simulator(plant, inputs, np.linspace(0.0, 3.0, 301), 1e-3)
+    actions = limiter_actions(simulator, values)
+    return {action.name: action.spans for action in actions}, simulator.response(values).signals
+
+
+@pytest.mark.parametrize(
+    ("oel", "scl", "acting"),
+    # the one that waits is far from its limit, or would act if it were alone
+    [(1.85, 9.0, OF_OEL), (9.0, 0.75, OF_SCL), (1.85, 0.85, OF_OEL), (2.2, 0.75, OF_SCL)],
+)
+def test_of_two_limiters_at_one_gate_the_lower_one_acts_as_if_alone(oel, scl, acting):
+    spans, got = stepped_up(OEL2C=oel, SCL2C=scl)
+    alone = {"OEL2C": oel} if acting == OF_OEL else {"SCL2C": scl}
+    spans_alone, expected = stepped_up(**alone)
+    assert spans == spans_alone
+    assert spans.keys() == {acting}
+    assert spans[acting][-1][1] == 3.0
+    for name in ("vt", "efd", "ifd", "q"):
+        assert np.abs(got[name] - expected[name]).max() < 1e-9, name
+
+
+def test_two_limiters_at_one_gate_are_noted_from_when_each_is_the_lower():
+    spans, got = stepped_up(OEL2C=2.2, SCL2C=0.8)
+    ((begin, handed),), ((taken, end),) = spans[OF_SCL], spans[OF_OEL]
+    # held first by the stator current, since the field current follows efd later
+    assert 0.5 < begin < handed < taken < end == 3.0
+    assert taken - handed == pytest.approx(1e-3)
+    lower = np.minimum(got["VA"], np.minimum(got[OF_OEL], got[OF_SCL]))
+    assert np.abs(got["efd"] - lower).max() < 1e-12
+    time = np.linspace(0.0, 3.0, 301)
+    for name, since, until in ((OF_SCL, begin, handed), (OF_OEL, taken, end)):
+        during = (time > since) & (time < until)
+        assert np.array_equal(got[name][during], got["efd"][during])
+    # until then the other one changes nothing
+    first = stepped_up(SCL2C=0.8)[1]
+    assert np.abs(got["vt"] - first["vt"])[time < taken].max() < 1e-9
+    assert np.abs(got["vt"] - first["vt"])[-1] > 0.01
 
 
 # what an exciter has for limiters, each with the place that uses it
