@@ -1,11 +1,12 @@
 """AC1C: alternator exciter with rate feedback (IEEE Std 421.5-2016).
 
-                            VAMAX  UEL OEL EFEMAX     VE <= VEMAX
-vref + vs ►(+)─►[1 + sTC]─►[  KA  ]─►HV─►LV─►[clip]►(+)►[  1  ]─┬─ VE ─►(x)► efd
- + vsum   -▲ ▲- [1 + sTB]  [1+sTA]                  -▲  [ sTE ] │        ▲
-           │ │              VAMIN         EFEMIN     │    VEMIN │       FEX
-vc1►[  1  ]┘ │  [  sKF  ]                            │          │        ▲
-    [1+sTR]  └──[1 + sTF]◄───────────────────────────┴── VFE ◄──┘   KC IFD / VE
+          vsum              VAMAX    UEL OEL   EFEMAX   VE <= VEMAX
+            ▼
+vref + vs ►(+)─►[1 + sTC]─►[  KA  ]─►[gates]─►[clip]►(+)►[  1  ]─┬ VE ─►(x)► efd
+          -▲ ▲- [1 + sTB]  [1+sTA]                   -▲  [ sTE ] │       ▲
+           │ │              VAMIN              EFEMIN │    VEMIN │      FEX
+vc1►[  1  ]┘ │  [  sKF  ]                             │          │       ▲
+    [1+sTR]  └──[1 + sTF]◄────────────────────────────┴── VFE ◄──┘  KC IFD / VE
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
 limits of the lag and of VE are non-windup; the clamp behind the gates is not.

@@ -1,18 +1,18 @@
 """AC2C: alternator exciter with high initial response (IEEE Std 421.5-2016).
 
-                           VAMAX             UEL OEL  EFEMAX
-vref + vs ►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[KB]─►HV─►LV─►[clip]─┐
- + vsum   -▲ ▲- [1 + sTB]  [1+sTA]  -▲                  EFEMIN │ EFE
-           │ │              VAMIN    │           VE <= VEMAX   ▼
-vc1►[  1  ]┘ │                       │   ┌─ VE ─┬─[  1  ]◄────(+)
-    [1+sTR]  │                       │   ▼      │ [ sTE ]     -▲
-             │                efd ◄──┼──(x)     │  VEMIN       │
-             │                       │   ▲      └──► VFE ──────┤
-             │                       │  FEX                    │
-             │                       │   ▲                     │
-             │                       │  KC IFD / VE            │
-             │  [  sKF  ]            └─[KH]◄───────────────────┤
-             └──[1 + sTF]◄─────────────────────────────────────┘
+          vsum              VAMAX              UEL OEL   EFEMAX
+            ▼
+vref + vs ►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[KB]─►[gates]─►[clip]─┐
+          -▲ ▲- [1 + sTB]  [1+sTA]  -▲                   EFEMIN │ EFE
+           │ │              VAMIN    └─[KH]◄──┐                 │
+vc1►[  1  ]┘ │                                │   VE <= VEMAX   ▼
+    [1+sTR]  │          efd ◄─(x)◄─ VE ──┬────┼─────[  1  ]◄───(+)
+             │                 ▲         │    │     [ sTE ]    -▲
+             │                FEX        │    │      VEMIN      │
+             │                 ▲         └────┼─────► VFE ──────┤
+             │            KC IFD / VE         │                 │
+             │  [  sKF  ]                     │                 │
+             └──[1 + sTF]◄────────────────────┴─────────────────┘
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
 limits of the lag and of VE are non-windup; the clamp behind the gates is not.

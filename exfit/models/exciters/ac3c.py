@@ -1,8 +1,9 @@
 """AC3C: alternator exciter, its own supply, with a PID (IEEE Std 421.5-2016).
 
-                 VPIDMAX                   UEL OEL        VAMAX
-vref + vs ►(+)─►[KPR + KIR/s   ]─►[1 + sTC]─►HV─►LV─►(+)─►[  KA  ]─┐
- + vsum   -▲    [+ sKDR/(1+sTDR)] [1 + sTB]         -▲    [1+sTA]  │ VA
+          vsum     VPIDMAX                   UEL OEL      VAMAX
+            ▼
+vref + vs ►(+)─►[KPR + KIR/s   ]─►[1 + sTC]─►[gates]►(+)─►[  KA  ]─┐
+          -▲    [+ sKDR/(1+sTDR)] [1 + sTB]         -▲    [1+sTA]  │ VA
            │     VPIDMIN                             │     VAMIN   ▼
 vc1►[  1  ]┘                                         │   KR efd ─►(x)
     [1+sTR]                                          │             │

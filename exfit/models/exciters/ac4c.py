@@ -1,9 +1,10 @@
 """AC4C: alternator with a controlled rectifier (IEEE Std 421.5-2016).
 
-                 VIMAX             UEL OEL  VRMAX - KC IFD
-vref + vs ─►(+)─►[clip]─►[1 + sTC]─►HV─►LV─►[  KA  ]─► efd
- + vsum    -▲    VIMIN   [1 + sTB]          [1+sTA]
-            │                               VRMIN
+           vsum  VIMAX            UEL OEL  VRMAX - KC IFD
+             ▼
+vref + vs ─►(+)─►[clip]─►[1 + sTC]─►[gates]─►[  KA  ]─► efd
+           -▲    VIMIN   [1 + sTB]           [1+sTA]
+            │                                VRMIN
 vc1 ►[  1  ]┘
      [1+sTR]
 

@@ -1,8 +1,9 @@
 """AC5C: simplified brushless exciter with a rectifier (IEEE Std 421.5-2016).
 
-                      VAMAX               UEL OEL      VE <= VEMAX
-vref + vs ►(+)─►(+)─►[  KA  ]─────┬─ VA ─►HV─►LV─►(+)─►[  1  ]─┬ VE ─►(x)─► efd
- + vsum   -▲    -▲   [1+sTA]      │               -▲   [ sTE ] │       ▲
+          vsum        VAMAX               UEL OEL      VE <= VEMAX
+            ▼
+vref + vs ►(+)─►(+)─►[  KA  ]─────┬─ VA ─►[gates]►(+)─►[  1  ]─┬ VE ─►(x)─► efd
+          -▲    -▲   [1+sTA]      │               -▲   [ sTE ] │       ▲
            │     │    VAMIN       │                │    VEMIN  │      FEX
 vc1►[  1  ]┘     │                │                └── VFE ◄───┘       ▲
     [1+sTR]      └─[  sKF   ]◄─[1 + sTF3]                        KC IFD / VE

@@ -1,16 +1,17 @@
 """AC6C: alternator exciter, field current limiter (IEEE Std 421.5-2016).
 
-                              VAMAX    UEL OEL   VT EFEMAX     VE <= VEMAX
-vref + vs ►(+)►[KA(1+sTK)]►[1 + sTC]►HV─►LV►(+)►[clip]►(+)►[  1  ]─┬─►(x)─► efd
- + vsum   -▲   [ 1 + sTA ] [1 + sTB]       -▲          -▲  [ sTE ] │   ▲
-           │                  VAMIN         │ VT EFEMIN │   VEMIN  │  FEX
-vc1►[  1  ]┘                                │           │          │   ▲
-    [1+sTR]                                 │           ├─ VFE ◄VE─┘   │
-                        ┌───────────────────┘           │        KC IFD / VE
-                        │  [1 + sTJ]     VHMAX          ▼
-                        └──[1 + sTH]◄────[ KH ]◄───────(+)
-                                           0           -▲
-                                                        └─── VFELIM
+          vsum                VAMAX   UEL OEL    VT EFEMAX     VE <= VEMAX
+            ▼
+vref + vs ►(+)►[KA(1+sTK)]►[1 + sTC]►[gates]►(+)►[clip]►(+)►[  1  ]─┬─►(x)► efd
+          -▲   [ 1 + sTA ] [1 + sTB]        -▲          -▲  [ sTE ] │   ▲
+           │                  VAMIN          │ VT EFEMIN │   VEMIN  │  FEX
+vc1►[  1  ]┘                                 │           │          │   ▲
+    [1+sTR]                                  │           ├─ VFE ◄VE─┘   │
+                        ┌────────────────────┘           │        KC IFD / VE
+                        │  [1 + sTJ]     VHMAX           ▼
+                        └──[1 + sTH]◄────[ KH ]◄────────(+)
+                                           0            -▲
+                                                         └─── VFELIM
 
 VFE = KE VE + VX(VE) + KD IFD, and VEMAX is the VE at which VFE = VFEMAX. The
 field current limiter acts above VFELIM; at rest VA = VFE + KH (VFE - VFELIM)

@@ -1,8 +1,9 @@
 """ST2C: compound-source rectifier exciter with a PID (IEEE Std 421.5-2016).
 
-                       VPIDMAX       UEL OEL    VRMAX             EFDMAX
+           vsum        VPIDMAX     UEL OEL    VRMAX             EFDMAX
+             ▼
 vref + vs ─►(+)─►[KPR + KIR/s   ]─►[gates]─►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─►efd
- + vsum    -▲ ▲- [+ sKDR/(1+sTDR)]          [1+sTA]    ▲   -▲   [ sTE ] │
+           -▲ ▲- [+ sKDR/(1+sTDR)]          [1+sTA]    ▲   -▲   [ sTE ] │
             │ │        VPIDMIN               VRMIN     VB   │      0    │
             │ │                                             └───[ KE ]◄─┤
             │ │                                                         │

@@ -1,8 +1,9 @@
 """ST3C: controlled rectifier with a field voltage loop (IEEE Std 421.5-2016).
 
-               VIMAX   UEL OEL     VPIDMAX                     VRMAX
+          vsum  VIMAX   UEL OEL      VPIDMAX                   VRMAX
+            ▼
 vref + vs ►(+)─►[clip]─►[gates]─►[KPR + KIR/s   ]─►[1 + sTC]─►[  KA  ]─┐ VR
- + vsum    -▲   VIMIN            [+ sKDR/(1+sTDR)] [1 + sTB]  [1+sTA]  │
+           -▲   VIMIN            [+ sKDR/(1+sTDR)] [1 + sTB]  [1+sTA]  │
             │                      VPIDMIN                     VRMIN   │
 vc1 ►[  1  ]┘                                          VMMAX           ▼
      [1+sTR]                      efd ◄─┬─(x)◄───────[  KM  ]◄────────(+)

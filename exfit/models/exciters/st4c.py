@@ -1,8 +1,9 @@
 """ST4C: PI regulator with a field voltage loop (IEEE Std 421.5-2016).
 
-              UEL OEL   VRMAX           VMMAX        UEL OEL   VAMAX
+          vsum UEL OEL     VRMAX             VMMAX      UEL OEL  VAMAX
+            ▼
 vref + vs ►(+)►[gates]►[KPR + KIR/s]─►(+)►[KPM + KIM/s]►[gates]►[  1  ]►(x)┬►efd
- + vsum    -▲           VRMIN         -▲   VMMIN                [1+sTA]  ▲ │
+           -▲              VRMIN      -▲     VMMIN              [1+sTA]  ▲ │
             │                          │                         VAMIN  VB │
 vc1 ►[  1  ]┘                          └─[smaller]◄──[  KG  ]◄─────────────┘
      [1+sTR]                                 ▲       [1+sTG]

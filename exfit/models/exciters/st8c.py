@@ -1,11 +1,12 @@
 """ST8C: static exciter with a field current loop (IEEE Std 421.5-2016).
 
-                     VPIMAX        UEL OEL    VAMAX        VRMAX
+          vsum      VPIMAX         UEL OEL    VAMAX        VRMAX
+            ▼
 vref + vs ►(+)►[KPR + KIR/s]─►(+)►[gates]─►[KPA + KIA/s]─►[  KA  ]─►(x)─►(+)►efd
- + vsum    -▲       VPIMIN    -▲              VAMIN       [1+sTA]    ▲    ▲
+           -▲       VPIMIN    -▲              VAMIN       [1+sTA]    ▲    ▲
             │                  │                           VRMIN    VB1  VB2
-vc1 ►[  1  ]┘       ifd ►[  KF  ]
-     [1+sTR]             [1+sTF]
+vc1 ►[  1  ]┘    ifd ►[  KF  ]─┘
+     [1+sTR]          [1+sTF]
 
 VB1 = VE1 FEX(KC1 IFD / VE1), at most VB1MAX. It comes from the terminals
 (SW1 = 1, position A of the drawing), VE1 = |KP∠THETAP VT + j (KI1 + KP∠THETAP

@@ -1,14 +1,13 @@
 """SCL1C: stator current limiter at the summing point (IEEE Std 421.5-2016).
 
-it ─►[   1   ]─► i ─►(i^K - ISCLLIM)─► error
-     [1 + sTIT]
-it ─►[   1    ]─► late
-     [1 + sTINV]
-q/vt ─►[    1    ]─► iq
-       [1 + sTQSCL]
+it ─►[   1   ]─► i      it ─►[   1    ]─► late
+     [1 + sTIT]              [1 + sTINV]
+i^K - ISCLLIM ─► error  q/vt ─►[    1    ]─► iq
+                               [1 + sTQSCL]
                       VSCLMAX
 oex ─►[KPOEX + KIOEX/s]─►[max 0]─►[-1]─► voel
                       VSCLMIN
+
                       VSCLMAX
 uex ─►[KPUEX + KIUEX/s]─►[max 0]─► vuel
                       VSCLMIN

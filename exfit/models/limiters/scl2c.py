@@ -6,26 +6,22 @@ it ─►[    1     ]─► i        vt ─►[    1     ]─► v
 (i/ITFPU)^C2 - 1 ─►[K2]─►[clip]─►(+)─►[   1   ]─► t
                          VINVMIN  ▲   [s + KFB]
                                 fixed      TMIN
-         IINST
-rate ─►[ 1 ]─► iref ─►(iref^2 - ipref^2)^½ ─►[    1     ]─► ref
-       [ s ]                                 [1 + sTAOEL]
-         ILIM
-p/vt ─►[   KIPOEL  ]─► ip  ┐
-       [1 + sTIPOEL]       ├─►(ip^2 + iq^2)^½ ─► iact
-q/vt ─►[   KIQOEL  ]─► iq  ┘
-       [1 + sTIQOEL]
-                                          VOELMAX3
-max(ref + bias - iact, ──►[ KPOEL + KIOEL/s        ]─► y
-    IQMINOEL - iq,        [ + sKDOEL/(1 + sTDOEL)  ]
-    VTMIN - v)                            VOELMIN3
-       VOELMAX2       VOELMAX1
-y ─►[1 + sTC2OEL]─►[1 + sTC1OEL]─► voel
-    [1 + sTB2OEL]  [1 + sTB1OEL]
-       VOELMIN2       VOELMIN1
+       IINST
+rate ─►[ 1 ]─► iref        √(iref² - ipref²) ─►[    1     ]─► ref
+       [ s ]                                   [1 + sTAOEL]
+       ILIM
+p/vt ─►[   KIPOEL  ]─► ip      q/vt ─►[   KIQOEL  ]─► iq
+       [1 + sTIPOEL]                  [1 + sTIQOEL]
 
-vuel is of the same blocks with UEL in their names, its reference the smaller of
-ref and IINSTUEL, its error min(iact - ref - bias, IQMAXUEL - iq). ipref is the
-active current behind KPREF and the lag TIPOEL.
+                VOELMAX3              VOELMAX2       VOELMAX1
+e ─►[KPOEL + KIOEL/s        ]─►[1 + sTC2OEL]─►[1 + sTC1OEL]─► voel
+    [ + sKDOEL/(1 + sTDOEL) ]  [1 + sTB2OEL]  [1 + sTB1OEL]
+                VOELMIN3              VOELMIN2       VOELMIN1
+
+iact = √(ip² + iq²), and the error e is the largest of ref + bias - iact,
+IQMINOEL - iq and VTMIN - v. vuel is of the same blocks with UEL in their names,
+its reference the smaller of ref and IINSTUEL, its error min(iact - ref - bias,
+IQMAXUEL - iq). ipref is the active current behind KPREF and the lag TIPOEL.
 
 fixed is FIXEDRU while i is above ITFPU, FIXEDRD below; t counts to TSCL. The
 current iref is IINST, and goes to ILIM by KRD once t reaches TSCL or v is below

@@ -18,7 +18,8 @@ WIDTHS: Mapping[str, float] = {
 CAPITAL, OTHER = 0.72, 0.54
 TOKEN = re.compile(r"s(?=[A-Z²(])|[A-Za-z][A-Za-z0-9]*|\^[A-Za-z0-9]+|²|<=|>=|\d+(?:\.\d+)?|\s+|.")
 SYMBOL = re.compile(
-    r"[A-Z]p+[dq]0?|[A-Z][A-Z0-9_]*|v(?:ref|s|t|c1|si\d|uel|oel)?|[ei]fd|X[dql]|[iv][dq]|i1q|[skav]"
+    r"[A-Z]p+[dq]0?|[A-Z][A-Z0-9_]*|v(?:ref|sum|s|t|c1|si\d|uel|oel)?|[ei]fd|X[dql]"
+    r"|[iv][dq]|it|i1q|[a-ik-z]"
 )
 WORDS = ("UEL", "OEL", "HV", "LV", "PI", "PID")
 SIGNS: Mapping[str, str] = {"<=": "≤", ">=": "≥", "-": "−"}
