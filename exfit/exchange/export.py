@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 from exfit import __version__
-from exfit.case.peek import section_of, stabiliser_inputs
+from exfit.case.peek import limiter_places, section_of, stabiliser_inputs
 from exfit.errors import ExfitError, FileError
 from exfit.exchange.file_format import WIDTH, FileFormat
 from exfit.exchange.psse.files import PSSE_FILES
@@ -24,6 +24,7 @@ from exfit.exchange.records import (
 from exfit.models import LIMITERS, MODELS
 from exfit.models.counterparts import OUT_OF_REACH
 from exfit.models.machines import MACHINES
+from exfit.models.sheet import DynamicsRecord
 from exfit.results.model import FitResult
 from exfit.results.side_by_side import explanation_of, outcome_of
 from exfit.results.translation import Translation
@@ -72,12 +73,13 @@ def export(
     program = files.program
     of_fit = [*_of_fit(result, program)]
     warnings = list[str]()
+    exciter = [*_exciter(result, program, name)]
     written = [
         *_machine(result, program, warnings),
-        *_exciter(result, program, name),
+        *exciter,
         *_added(result, "stabiliser", program, warnings),
         *_added(result, "governor", program, warnings),
-        *_limiters(result, program, warnings),
+        *_limiters(result, program, exciter, warnings),
     ]
     if not written:
         raise ExfitError(f"{result.model} has no {program} record")
@@ -151,8 +153,25 @@ def _exciter(result: FitResult, program: str, name: str | None) -> Iterator[Writ
             f"{_other_model(wanted, program) or near(wanted, candidates)}"
         )
     written = _written(result, candidates[wanted], "")
-    flag = {SPEED_FLAG: 1.0} if _times_speed(result) else {}
-    yield replace(written, values={**written.values, **flag})
+    flags = {SPEED_FLAG: 1.0} if _times_speed(result) else {}
+    flags |= _place_flags(result, written.definition.record)
+    yield replace(written, values={**written.values, **flags})
+
+
+def _place_flags(result: FitResult, record: DynamicsRecord) -> dict[str, float]:
+    """Return the flags that say in an exciter's record where limiters act, as far as known."""
+    given = limiter_places(result.case_text, result.case)
+    codes = {place: float(code) for code, place in record.places}
+    places = {
+        kind.upper(): given.get(name, LIMITERS[name].places[0])
+        for kind, name in result.limiter_models.items()
+        if name in LIMITERS and LIMITERS[name].records
+    }
+    return {
+        flag: codes[place]
+        for flag, place in places.items()
+        if flag in dict(record.icons) and place in codes
+    }
 
 
 def _times_speed(result: FitResult) -> bool:
@@ -198,15 +217,19 @@ def _added(result: FitResult, kind: str, program: str, warnings: list[str]) -> I
     yield replace(record, values={**record.values, **codes})
 
 
-def _limiters(result: FitResult, program: str, warnings: list[str]) -> Iterator[Written]:
+def _limiters(
+    result: FitResult, program: str, exciters: Iterable[Written], warnings: list[str]
+) -> Iterator[Written]:
     """Yield the records of the limiters; add what is lost to the warnings."""
+    placed = [flag for entry in exciters for flag in entry.values]
     for kind, name in result.limiter_models.items():
         records = LIMITERS[name].records if name in LIMITERS and program == PSSE else ()
         if not records:
             warnings.append(f"limiter {name} has no {program} record: it is left out")
             continue
         yield _written(result, Definition("limiter", LIMITERS[name], records[0]), f"{kind}.")
-        warnings.append(f"{name}: the exciter's record says nothing of its place: set its flag")
+        if kind.upper() not in placed:
+            warnings.append(f"{name}: the exciter's record says nothing of its place: set its flag")
 
 
 def _written(result: FitResult, definition: Definition, prefix: str) -> Written:

@@ -13,6 +13,7 @@ from exfit.util.text import show, show_value
 PSSE, PSLF = "PSS/E", "PSLF"
 SORTED = (("E1", "SE1"), ("E2", "SE2"))  # PSS/E files have the lower voltage first
 SPEED_FLAG = "SPDMLT"  # not 0: efd is multiplied by the speed
+FLAGS = ("OEL", "UEL")  # of the places where limiters act
 LIMITS = ("MAX", "MIN", "VCU", "VCL")  # how the names of limits end
 SIGNALS = {0: "none", 1: "speed", 3: "p", 4: "pa", 5: "vt"}  # by the input code of a stabiliser
 UNSATURATED = {"E1": 1.0, "SE1": 0.0, "E2": 2.0, "SE2": 0.0}  # for a record of four zeros
@@ -207,9 +208,10 @@ def _lacking(definition: Definition) -> Iterable[tuple[str, str]]:
 def _unmodelled(definition: Definition, given: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Yield (symbol, warning) for what the model has in one way only."""
     explained = {*definition.record.ignored, *(row.symbol for row in definition.model.sheet)}
+    places = dict(definition.record.places)
     for name, modelled in (*definition.record.icons, *definition.record.absent):
         value = given.get(name, modelled)
-        if name in definition.codes and value in SIGNALS:
+        if (name in definition.codes and value in SIGNALS) or (name in FLAGS and value in places):
             continue
         if name.endswith(LIMITS) and abs(value) >= OUT_OF_REACH:
             continue

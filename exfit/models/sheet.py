@@ -144,7 +144,8 @@ class DynamicsRecord:
     ``ignored`` are symbols (integers too) that act only where a limiter does, or otherwise not in
     the model's own equations: any value will do; ``doubt`` says what is not settled about the
     order; ``spelled`` are symbols with their names in the file, where these differ by more than
-    capitals; ``times_speed`` says that efd is multiplied by the speed there.
+    capitals; ``times_speed`` says that efd is multiplied by the speed there; ``places`` are where a
+    limiter acts by the value of its flag, OEL or UEL, which is one of the integers.
     """
 
     name: str
@@ -156,6 +157,7 @@ class DynamicsRecord:
     held: tuple[tuple[str, float], ...] = ()
     times_speed: bool = False
     spelled: tuple[tuple[str, str], ...] = ()
+    places: tuple[tuple[int, str], ...] = ()
 
 
 def record(
@@ -169,6 +171,7 @@ def record(
     held: Mapping[str, float] | None = None,
     times_speed: bool = False,
     spelled: Mapping[str, str] | None = None,
+    places: Mapping[int, str] | None = None,
 ) -> DynamicsRecord:
     """Return a record from its symbols in one text, ``"TR KA TA"``."""
     return DynamicsRecord(
@@ -181,6 +184,7 @@ def record(
         tuple((held or {}).items()),
         times_speed,
         tuple((spelled or {}).items()),
+        tuple((places or {}).items()),
     )
 
 
@@ -189,6 +193,9 @@ OF_A_LIST = "its order is that of a public list of parameters, not confirmed by 
 AS_IN_PSSE = "its order is taken to be that of PSS/E, not confirmed by a file"
 # what is not settled about orders of PSS/E
 OF_ONE_PROGRAM = "its order is that of another open program, not confirmed by a file"
+# what flags of limiters mean (InterPSS); 0 says that the input is not used
+ONE_GATE = {1: "summing", 2: "takeover"}
+TWO_GATES = {**ONE_GATE, 3: "takeover-output"}
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from exfit.analysis.verdict import rule
 from exfit.case.load import load_case
 from exfit.exchange.records import definition_of
 from exfit.exchange.unit import read_unit
-from exfit.models import MODELS
-from exfit.models.sheet import record
+from exfit.models import LIMITERS, MODELS
+from exfit.models.sheet import record, typical
 from exfit.output.run_folder import write_fit
 from exfit.plants import MACHINE
 from exfit.workflows import fit
@@ -347,6 +347,58 @@ def test_typical_values_that_matter_are_named(run, fitted):
     assert "// what was fitted depends on typical values: KE." in out.splitlines()
     named(fitted, typical_values={"KE": {**moves, "shifts": {"K": 1.0}}})
     assert "typical_values: what they move are not the parameters" in run("export", fitted)[2]
+
+
+def with_limiter(folder, model, name, place=None, **changes):
+    """Put a limiter of the catalogue into a result whose exciter is another, of typical data."""
+    limiter = LIMITERS[name]
+    values = typical(limiter.sheet)
+    text = "" if place is None else f"limiters: [{{model: {name}, place: {place}}}]\n"
+    at = {"limiter_models": {"oel": name}, "limiters": {"oel": values}}
+    exciter = {"model": model, "fixed": typical(MODELS[model].sheet), "parameters": {}}
+    named(folder, **at, **exciter, history=[], inputs={}, case_text=text, **changes)
+    return values
+
+
+def test_fitted_values_of_a_limiter_are_named_with_those_that_are_typical(run, fitted):
+    sources = {"oel.ITFPU": "fitted", "oel.TF": "typical", "oel.K1": "typical"}
+    with_limiter(fitted, "AC1A", "OEL3C", sources=sources)
+    named(fitted, parameters={"oel.ITFPU": of_value(1.3)})
+    code, out, err = run("export", fitted)
+    assert code == 0
+    record = out.splitlines()[-1].split()
+    assert record[:5] == ["1", "'OEL3C'", "1", "0", "1.3"]
+    assert "OEL3C: typical, not of this unit, check: TF, K1\n" in err
+    assert "OEL3C: its order is that of PowerWorld's list" in err
+    assert "// OEL3C: fitted: ITFPU." in out.splitlines()
+    # ESAC1A has no flag of it
+    assert "OEL3C: the exciter's record says nothing of its place: set its flag" in err
+
+
+@pytest.mark.parametrize(
+    ("model", "place", "flags"),
+    [
+        ("AC1C", "summing", ["1", "1"]),
+        ("AC1C", None, ["2", "1"]),  # at its usual place
+        ("AC7C", "takeover-output", ["3", "1"]),
+        ("DC4B", "takeover", ["2", "2"]),
+        ("ST7B", "takeover", ["3", "0"]),
+    ],
+)
+def test_the_place_of_a_limiter_is_the_flag_of_its_exciter(run, fitted, model, place, flags):
+    with_limiter(fitted, model, "OEL2C", place)
+    code, out, err = run("export", fitted)
+    assert code == 0
+    (record,) = (line.split() for line in out.splitlines() if f"'{model}'" in line)
+    assert record[3:5] == flags
+    assert "set its flag" not in err
+    of_exciter = [text for _, text in read_unit(out, "out.dyr").warnings if text.startswith(model)]
+    assert not [text for text in of_exciter if "is not modelled" in text]
+
+
+def test_a_place_whose_flag_no_source_gives_is_warned_of(run, fitted):
+    with_limiter(fitted, "ST6C", "OEL2C", "takeover")
+    assert "OEL2C: the exciter's record says nothing of its place" in run("export", fitted)[2]
 
 
 @pytest.mark.parametrize("name", [None, "ONE_AXIS"])

@@ -1,6 +1,6 @@
 """What every limiter of the catalogue keeps to, and each against its equations typed again."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -25,6 +25,7 @@ from exfit.plants import (
     Attached,
     Names,
     infinite_bus,
+    inputs_at,
     inputs_for_limiters,
 )
 from exfit.plants.parts import motion, values_named
@@ -581,6 +582,20 @@ def test_a_limiter_is_found_at_each_gate_and_sum_of_an_exciter(exciter):
         for limit in limits:
             at_sum = limit.value is output
             assert at_sum == (name == "vsum"), name
+
+
+def test_the_flags_of_an_exciter_s_record_are_of_its_gates_and_sums(exciter):
+    """A flag without its input would place a limiter where the model does not see it."""
+    model = MODELS[exciter]
+    for record in model.records:
+        flags = {"OEL", "UEL"} & dict(record.icons).keys()
+        assert flags or not record.places
+        places = [place for _, place in record.places]
+        assert len({*places}) == len(places)
+        for kind, place in product(flags, places):
+            limiter = LIMITERS[f"{kind}2C"]
+            needed = {*inputs_at(Attached(limiter, place)).values()}
+            assert needed <= inputs_for_limiters(model), place
 
 
 # --- sheets and records ---------------------------------------------------------------------------

@@ -30,7 +30,7 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac1a
-from exfit.models.sheet import OF_ONE_PROGRAM, record, renamed
+from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record, renamed
 
 ALIASES = ("ESAC1C",)
 
@@ -42,6 +42,7 @@ RECORDS = (
         "TR TB TC KA TA VAMAX VAMIN TE KF TF KC KD KE E1 SE1 E2 SE2 EFEMAX EFEMIN VFEMAX VEMIN",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
+        places=ONE_GATE,
         doubt=OF_ONE_PROGRAM,
     ),
 )

@@ -45,7 +45,7 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac3a
-from exfit.models.sheet import FREE, OF_ONE_PROGRAM, SearchRange, record, sheet
+from exfit.models.sheet import FREE, OF_ONE_PROGRAM, ONE_GATE, SearchRange, record, sheet
 
 DOUBT = "rests on one public diagram for its PID and gates, that of InterPSS"
 ALIASES = ("ESAC3C",)
@@ -69,6 +69,7 @@ RECORDS = (
         "KPR KIR KDR TDR VPIDMAX VPIDMIN",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
+        places=ONE_GATE,
         doubt=OF_ONE_PROGRAM,
     ),
 )

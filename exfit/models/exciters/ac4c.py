@@ -20,7 +20,7 @@ where the limit of the lag winds up.
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, lead_lag, limited_lag, smaller
 from exfit.models.exciters import ac4a
-from exfit.models.sheet import OF_ONE_PROGRAM, record
+from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record
 
 ALIASES = ("ESAC4C",)
 
@@ -32,6 +32,7 @@ RECORDS = (
         "TR VIMAX VIMIN TC TB KA TA VRMAX VRMIN KC",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
+        places=ONE_GATE,
         doubt=OF_ONE_PROGRAM,
     ),
 )

@@ -35,7 +35,7 @@ from exfit.models.blocks import (
     washout,
 )
 from exfit.models.exciters import ac1a, ac5a
-from exfit.models.sheet import OF_ONE_PROGRAM, record, renamed
+from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record, renamed
 
 DOUBT = "rests on one public diagram for its rectifier, that of InterPSS"
 ALIASES = ("ESAC5C",)
@@ -52,6 +52,7 @@ RECORDS = (
         "TR KA TA VAMAX VAMIN KE TE KF TF1 TF2 TF3 E1 SE1 E2 SE2 KC KD VFEMAX VEMIN",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
+        places=ONE_GATE,
         doubt=OF_ONE_PROGRAM,
     ),
 )

@@ -31,7 +31,7 @@ from exfit.engine.trace import Signal
 from exfit.models.alternators import FIELD_LIMITS, alternator
 from exfit.models.blocks import clip, field_demand, lag, larger, lead_lag, limited_lead_lag, smaller
 from exfit.models.exciters import ac6a
-from exfit.models.sheet import OF_ONE_PROGRAM, record, renamed
+from exfit.models.sheet import OF_ONE_PROGRAM, ONE_GATE, record, renamed
 
 ALIASES = ("ESAC6C",)
 
@@ -44,6 +44,7 @@ RECORDS = (
         "E2 SE2 VFEMAX VEMIN",
         icons={"OEL": 1, "UEL": 1},
         ignored="OEL UEL",
+        places=ONE_GATE,
         doubt=OF_ONE_PROGRAM,
     ),
 )

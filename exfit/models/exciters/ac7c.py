@@ -46,7 +46,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import ac7b
-from exfit.models.sheet import OF_ONE_PROGRAM, record, sheet
+from exfit.models.sheet import OF_ONE_PROGRAM, TWO_GATES, record, sheet
 
 ALIASES = ("ESAC7C",)
 
@@ -68,6 +68,7 @@ RECORDS = (
         "VFEMAX VEMIN E1 SE1 E2 SE2 KI XL THETAP KC1 VBMAX KR",
         icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1, "SW2": 1},
         ignored="OEL UEL",
+        places=TWO_GATES,
         doubt=OF_ONE_PROGRAM,
     ),
 )

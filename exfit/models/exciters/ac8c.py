@@ -38,7 +38,7 @@ from exfit.models.blocks import (
     smaller,
 )
 from exfit.models.exciters import ac8b
-from exfit.models.sheet import OF_ONE_PROGRAM, record
+from exfit.models.sheet import OF_ONE_PROGRAM, TWO_GATES, record
 
 ALIASES = ("ESAC8C",)
 
@@ -51,6 +51,7 @@ RECORDS = (
         "E1 SE1 E2 SE2 KP KI XL THETAP KC1 VBMAX",
         icons={"OEL": 1, "UEL": 1, "VOS": 1, "SW1": 1},
         ignored="OEL UEL",
+        places=TWO_GATES,
         doubt=OF_ONE_PROGRAM,
     ),
 )

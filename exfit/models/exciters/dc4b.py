@@ -78,6 +78,7 @@ RECORDS = (
         "DC4B",
         "TR KP KI KD TD VRMAX VRMIN KA TA KE TE KF TF VEMIN E1 SE1 E2 SE2",
         icons={"OEL": 2, "UEL": 2},
+        places={2: "takeover"},
     ),
 )
 

@@ -70,6 +70,7 @@ RECORDS = (
         "ESST1A",
         "TR VIMAX VIMIN TC TB TC1 TB1 KA TA VAMAX VAMIN VRMAX VRMIN KC KF TF KLR ILR",
         icons={"UEL": 1, "VOS": 1},
+        places={3: "takeover"},
     ),
 )
 

@@ -40,7 +40,7 @@ from exfit.models.blocks import (
     where,
 )
 from exfit.models.exciters import st4b
-from exfit.models.sheet import FREE, record, sheet, with_typical
+from exfit.models.sheet import FREE, TWO_GATES, record, sheet, with_typical
 from exfit.models.static import SUPPLY_SWITCH, supply
 
 ALIASES = ("ESST4C",)
@@ -66,6 +66,7 @@ RECORDS = (
         "THETAP KC VBMAX",
         icons={"VOS": 1, "OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
         ignored="OEL UEL SCL",
+        places=TWO_GATES,
     ),
 )
 

@@ -53,6 +53,7 @@ RECORDS = (
         "ST7B",
         "TR TG TF VMAX VMIN KPA VRMAX VRMIN KH KL TC TB KIA TIA",
         icons={"OEL": 0, "UEL": 0},
+        places={3: "takeover"},
     ),
 )
 

@@ -40,7 +40,7 @@ from exfit.models.blocks import (
     smaller,
     where,
 )
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, ONE_GATE, record, sheet
 from exfit.models.static import SUPPLY_SWITCH
 
 DOUBT = (
@@ -86,6 +86,7 @@ RECORDS = (
         "THETAP VB1MAX KC2 KI2 VB2MAX",
         icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
         ignored="OEL UEL SCL",
+        places=ONE_GATE,
     ),
 )
 

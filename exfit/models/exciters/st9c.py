@@ -29,7 +29,7 @@ which are 0, 10000, 2, 0.0018, 0 and 1.2 there: most leave out what they act on.
 
 from exfit.engine.trace import Signal
 from exfit.models.blocks import clip, lag, larger, smaller, washout
-from exfit.models.sheet import FREE, record, sheet
+from exfit.models.sheet import FREE, ONE_GATE, record, sheet
 from exfit.models.static import SUPPLY, supply
 
 ALIASES = ("ESST9C",)
@@ -58,6 +58,7 @@ RECORDS = (
         "TR TCD TBD ZA KA KU TA TAUEL VRMAX VRMIN KAS TAS KP THETAP KI XL KC VBMAX",
         icons={"OEL": 1, "UEL": 1, "SCL": 1, "SW1": 1},
         ignored="OEL UEL SCL",
+        places=ONE_GATE,
     ),
 )
 
