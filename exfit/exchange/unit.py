@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from exfit.errors import DynamicsError
-from exfit.exchange.fields import DynamicsFault, Field, located, refuse
+from exfit.exchange.fields import DynamicsFault, Field, located, number, refuse
 from exfit.exchange.file_format import Head
 from exfit.exchange.formats import format_of
-from exfit.exchange.records import Definition, definition_of, definitions, read_values
+from exfit.exchange.records import FLAGS, Definition, definition_of, definitions, read_values
 from exfit.models import LIMITERS
 from exfit.util.text import near, show
 
@@ -95,12 +95,14 @@ def unit_of(heads: Sequence[Head]) -> tuple[Unit | None, list[DynamicsFault]]:
     """
     faults: list[DynamicsFault] = []
     left_out = [head for head in heads if head.definition is None]
-    warnings = [DynamicsFault(head.line, _left_out(head)) for head in left_out]
+    warnings = list[DynamicsFault]()
     parts = _parts(heads, faults, warnings)
     if "governor" in parts:
         parts["governor"] = _on_its_base(parts["governor"], heads, warnings)
     if faults or not parts.keys() >= {*NEEDED}:
         return None, faults
+    exciter = parts["exciter"]
+    warnings += [DynamicsFault(head.line, _left_out(head, exciter)) for head in left_out]
     unit = Unit(
         heads[0].bus,
         heads[0].id,
@@ -259,9 +261,23 @@ def kind_left_out(name: str) -> str | None:
     return LIMITER if name.upper() in LIMITERS else OTHERS.get(name.upper())
 
 
-def _left_out(head: Head) -> str:
+def _left_out(head: Head, exciter: UnitPart) -> str:
     kind = kind_left_out(head.name)
     if kind is None:
         return f"{head.name} is left out: not a known model"
-    how = ": give it under limiters" if head.name.upper() in LIMITERS else ""
-    return f"{kind} {head.name.upper()} is left out{how}"
+    name = head.name.upper()
+    how = f": give it under limiters{_place(name, exciter)}" if name in LIMITERS else ""
+    return f"{kind} {name} is left out{how}"
+
+
+def _place(limiter: str, exciter: UnitPart) -> str:
+    """Return where a limiter acts by the flag of its exciter's record, "" where it is not known."""
+    definition, flag = exciter.definition, limiter[:3]
+    values = dict(zip(definition.names, exciter.fields, strict=True))
+    if flag not in FLAGS or flag not in values:
+        return ""
+    code = int(number(values[flag]))
+    place = dict(definition.record.places).get(code)
+    if place not in LIMITERS[limiter].places:
+        return ""
+    return f", place: {place} ({definition.record.name} has {flag} = {code})"

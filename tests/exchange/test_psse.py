@@ -360,6 +360,31 @@ def test_what_is_left_out_is_reported_and_written_in_the_case(record, words):
     assert f"# Line 5: {words}." in case_text(unit, "unit.dyr").splitlines()
 
 
+@pytest.mark.parametrize(
+    ("exciter", "flags", "limiter", "place"),
+    [
+        ("AC1C", {"OEL": 2.0}, "OEL2C", ", place: takeover (AC1C has OEL = 2)"),
+        ("AC7C", {"OEL": 1.0, "UEL": 3.0}, "UEL2C", ", place: takeover-output (AC7C has UEL = 3)"),
+        # 4 is a gate behind the PI, 0 no place; OEL3C has no gate; ESAC1A and ST6C say nothing
+        ("AC7C", {"OEL": 4.0}, "OEL2C", ""),
+        ("AC1C", {"OEL": 0.0}, "OEL2C", ""),
+        ("AC1C", {"OEL": 2.0}, "OEL3C", ""),
+        ("ESAC1A", {}, "OEL2C", ""),
+        ("ST6C", {"OEL": 2.0}, "OEL2C", ""),
+    ],
+)
+def test_the_place_of_a_limiter_left_out_is_that_of_its_exciter_s_flag(
+    exciter, flags, limiter, place
+):
+    parts = ((GENROU, {}), (definition_of(exciter), flags))
+    records = [
+        record_text(part, typical(part.model.sheet) | changes, 7, "1") for part, changes in parts
+    ]
+    unit = read_unit("\n".join([*records, f"7 '{limiter}' 1 0 0 /"]), "unit.dyr")
+    (text,) = (warning.text for warning in unit.warnings if "limiter" in warning.text)
+    assert text == f"excitation limiter {limiter} is left out: give it under limiters{place}"
+
+
 def test_a_governor_that_cannot_be_simulated_is_left_out_with_the_reason():
     for text, reason in (
         ("1 TGOV1 1 0.05 0.5 1 0 3 10 /", "TGOV1: 6 values after the id"),
