@@ -176,6 +176,7 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[UnitPart,
         raise ExfitError(
             f"{result.model} is not a model of the catalogue: it has no {program} record"
         )
+    _refuse_limiters(result)
     for model, part, prefix in models:
         if model is None:
             continue
@@ -188,6 +189,14 @@ def _parts(result: FitResult, unit: Unit, file: str) -> Iterator[tuple[UnitPart,
         _refuse_other_values(result, part, prefix, file)
         _refuse_other_inputs(result, part, file)
         yield part, prefix
+
+
+def _refuse_limiters(result: FitResult) -> None:
+    """Raise ExfitError where values of limiters were fitted, whose records are not changed."""
+    prefixes = tuple(f"{kind}." for kind in result.limiter_models)
+    fitted = [name for name in result.parameters if name.startswith(prefixes)]
+    if fitted:
+        raise ExfitError(f"records of limiters are not changed: fitted: {', '.join(fitted)}")
 
 
 def _refuse_other_inputs(result: FitResult, part: UnitPart, file: str) -> None:

@@ -17,6 +17,7 @@ from exfit.exchange.fields import text_of
 from exfit.exchange.fitted_file import FittedUnit, fitted_file, number_text
 from exfit.exchange.records import PSLF, PSSE, contradictions, definition_of, definitions
 from exfit.exchange.units import read_units
+from exfit.results.model import FittedParameter
 from exfit.results.other_values import AsFound
 from exfit.util.sources import FITTED, TYPICAL
 
@@ -248,6 +249,20 @@ REFUSED = {
     "a user's model": ({"inputs": {"model": "0"}}, "AC1A is not a model of the catalogue"),
     "saturation": ({"saturation": "exponential"}, "fitted with saturation: exponential"),
 }
+
+
+def test_fitted_values_of_a_limiter_are_refused_and_those_of_its_unit_with_them(fit):
+    data = THREE.encode()
+    unit = unit_of(data, 9)
+    at_work = {"limiter_models": {"oel": "OEL3C"}, "limiters": {"oel": {"ITFPU": 1.1}}}
+    as_given = verified(fit, unit, {**values_of(unit), "KA": 300.0}, **at_work)
+    assert [change.parameter for change in exported(data, as_given).changes] == ["KA"]
+    free = replace(as_given, parameters={"oel.ITFPU": FittedParameter(1.1, 1.0, 0.1, 10.0)})
+    written = fitted_file(data, "f", [FittedUnit("case", free)])
+    assert written.data == data
+    (left,) = written.left
+    assert left.verified
+    assert left.reason == "records of limiters are not changed: fitted: oel.ITFPU"
 
 
 @pytest.mark.parametrize("case", REFUSED)
