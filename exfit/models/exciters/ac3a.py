@@ -1,6 +1,7 @@
 """AC3A: alternator exciter, its own supply (IEEE Std 421.5-2005, 6.3).
 
-                         UEL       VAMAX               VE <= VEMAX
+          vsum           UEL       VAMAX               VE <= VEMAX
+            ▼
 vref + vs ►(+)►[1 + sTC]─►HV─►(+)─►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─ VE ─►(x)─┬►efd
           -▲   [1 + sTB]     -▲    [1+sTA]    ▲  -▲    [ sTE ] │        ▲  │
            │                  │    VAMIN      │   │    VEMIN   │       FEX │

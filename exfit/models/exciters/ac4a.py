@@ -1,6 +1,7 @@
 """AC4A: alternator with a controlled rectifier (IEEE Std 421.5-2005, 6.4).
 
-                 VIMAX             UEL  VRMAX - KC IFD
+           vsum  VIMAX             UEL  VRMAX - KC IFD
+             ▼
 vref + vs ─►(+)─►[clip]─►[1 + sTC]─►HV─►[  KA  ]─► efd
            -▲    VIMIN   [1 + sTB]      [1+sTA]
             │                           VRMIN

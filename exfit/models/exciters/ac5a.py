@@ -1,6 +1,7 @@
 """AC5A: simplified brushless exciter (IEEE Std 421.5-2005, 6.5).
 
-                       VRMAX                            VE >= 0
+            vsum       VRMAX                            VE >= 0
+              ▼
 vref + vs ──►(+)─►(+)─►[  KA  ]────────────┬─ VR ─►(+)─►[  1  ]─┬─► VE = efd
            -▲    -▲    [1+sTA]             │       -▲   [ sTE ] │
             │     │    VRMIN               │        └─── VFE ◄──┘

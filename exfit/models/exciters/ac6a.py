@@ -1,6 +1,7 @@
 """AC6A: alternator exciter, field current limiter (IEEE Std 421.5-2005, 6.6).
 
-                              VAMAX          VT VRMAX      VE >= 0
+           vsum               VAMAX          VT VRMAX      VE >= 0
+             ▼
 vref + vs ─►(+)─►[KA(1+sTK)]─►[1 + sTC]─►(+)─►[clip]─►(+)─►[  1  ]─┬─►(x)─► efd
            -▲    [ 1 + sTA ]  [1 + sTB] -▲           -▲    [ sTE ] │   ▲
             │                 VAMIN      │   VT VRMIN │            │  FEX

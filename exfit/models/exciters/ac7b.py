@@ -1,6 +1,7 @@
 """AC7B: alternator exciter with an inner field loop (IEEE Std 421.5-2005, 6.7).
 
-                      VRMAX              VAMAX
+           vsum       VRMAX              VAMAX
+             ▼
 vref + vs ─►(+)─►[KPR + KIR/s    ]─►(+)─►[KPA + KIA/s]─ VA ─►(x)─►[ HV ]─► VFD
            -▲ ▲- [+ sKDR/(1+sTDR)]  -▲       VAMIN            ▲   [gate]
             │ │       VRMIN          │                        │     ▲

@@ -1,6 +1,7 @@
 """AC8B: alternator exciter with PID regulator (IEEE Std 421.5-2005, 6.8).
 
-                    VPIDMAX            VRMAX         VE <= VEMAX
+           vsum     VPIDMAX            VRMAX         VE <= VEMAX
+             ▼
 vref + vs ─►(+)─►[KPR + KIR/s   ]─►[  KA  ]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
            -▲    [+ sKDR/(1+sTDR)] [1+sTA]   -▲   [ sTE ] │        ▲
             │       VPIDMIN            VRMIN  │    VEMIN  │       FEX

@@ -1,6 +1,7 @@
 """BBSEX1: static exciter at the terminals, ABB's regulator (PSS/E BBSEX1).
 
-                            VRMAX         VT EFDMAX
+           vsum             VRMAX         VT EFDMAX
+             ▼
 vref + vs ─►(+)─►[1 + sT3]─►[K (1+sT2)]─►[clip]─► efd
            -▲    [1 + sT4]  [  1+sT1  ]  VT EFDMIN
             │               VRMIN

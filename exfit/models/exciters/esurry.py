@@ -1,6 +1,7 @@
 """ESURRY: alternator exciter with feedback of its field current (PSS/E ESURRY).
 
-                                            VRMAX        VE >= 0
+          vsum                              VRMAX        VE >= 0
+            ▼
 vref + vs ►(+)►[1+sTA]►[1+sTC]►[K10]─►(+)──►[clip]─►(+)─►[  1  ]─┬─ VE ►(x)►efd
            -▲  [1+sTB] [1+sTD]        ▲ ▲-  VRMIN   -▲   [ sTE ] │       ▲
             │                   IREF ─┘ │            │           │      FEX

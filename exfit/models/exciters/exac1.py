@@ -1,6 +1,7 @@
 """EXAC1: alternator exciter with rate feedback (IEEE type AC1 of 1981).
 
-                             VRMAX          VE >= 0
+            vsum             VRMAX          VE >= 0
+              ▼
 vref + vs ──►(+)─►[1 + sTC]─►[  KA  ]─►(+)─►[  1  ]─┬─ VE ─►(x)─► efd
            -▲   ▲-[1 + sTB]  [1+sTA]  -▲    [ sTE ] │        ▲
             │   │            VRMIN     │            │       FEX

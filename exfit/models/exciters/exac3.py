@@ -1,6 +1,7 @@
 """EXAC3: alternator exciter, its own supply (IEEE type AC3 of 1981).
 
-                           VAMAX                  VE >= 0
+          vsum             VAMAX                  VE >= 0
+            ▼
 vref + vs ►(+)►[1 + sTC]►HV►[  KA  ]─►(x)─►(+)─►[  1  ]─┬─ VE ─►(x)─┬► efd
           -▲ ▲-[1 + sTB] ▲  [1+sTA]    ▲   -▲   [ sTE ] │        ▲  │
            │ │           │  VAMIN      │    │           │       FEX │

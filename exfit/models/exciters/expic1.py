@@ -1,6 +1,7 @@
 """EXPIC1: proportional and integral regulator, compound source (PSS/E EXPIC1).
 
-                  VR1                              VRMAX      EFDMAX
+          vsum    VR1                              VRMAX      EFDMAX
+            ▼
 vref + vs ►(+)►[KA (1 + sTA1)]►[    1 + sTA3    ]►[clip]┬►(x)►[clip]► E0
           -▲ ▲-[      s      ] [(1+sTA2)(1+sTA4)] VRMIN │  ▲  EFDMIN
            │ │    VR2                                   │  VB

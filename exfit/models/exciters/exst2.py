@@ -1,6 +1,7 @@
 """EXST2: compound-source exciter, its supply added (IEEE type ST2 of 1981).
 
-                   VRMAX               EFDMAX
+           vsum    VRMAX               EFDMAX
+             ▼
 vref + vs ─►(+)─►[  KA  ]─►(+)─►(+)─►[  1  ]─┬─► efd
            -▲ ▲- [1+sTA]    ▲   -▲   [ sTE ] │
             │ │    VRMIN   VB    │      0    │

@@ -1,6 +1,7 @@
 """EXST3: controlled rectifier with a field voltage loop (IEEE type ST3 of 1981).
 
-              VIMAX                         VRMAX           EFDMAX
+         vsum VIMAX                         VRMAX           EFDMAX
+            ▼
 vref + vs ►(+)►[clip]►[ KJ ]►[1 + sTC]─►(+)─►[  KA  ]─►(x)─►[clip]─┬─► efd
            -▲  VIMIN         [1 + sTB]  -▲   [1+sTA]    ▲          │
             │                            │    VRMIN    VB          │

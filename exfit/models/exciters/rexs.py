@@ -1,6 +1,7 @@
 """REXS: general purpose rotating exciter (PSS/E REXSYS, PSLF rexs).
 
-              VIMAX                                   F VRMAX
+         vsum VIMAX                                   F VRMAX
+            ▼
 vref + vs ►(+)►[clip]►[KVP + KVI/s]►[1+sTC1]►[1+sTC2]►[  1  ]─► VR
           -▲ ▲--VIMAX               [1+sTB1] [1+sTB2] [1+sTA]
            │ │                                        F VRMIN

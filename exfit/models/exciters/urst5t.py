@@ -1,6 +1,7 @@
 """URST5T: static exciter with two lead-lags in series (PSS/E URST5T).
 
-              UEL OEL         VRMAX/KR    VRMAX/KR        VRMAX
+      vsum    UEL OEL         VRMAX/KR    VRMAX/KR        VRMAX
+        ▼
 vref ─►(+)───►[gates]──►(+)─►[1 + sTC1]─►[1 + sTC2]─►[KR]─►[clip]─┐ VR
        -▲                ▲   [1 + sTB1]  [1 + sTB2]       VRMIN   │
         │                │    VRMIN/KR    VRMIN/KR                │

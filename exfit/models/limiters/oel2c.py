@@ -6,10 +6,10 @@ ifd ─►[  KSCALE  ]─┬─► i
 (i/ITFPU)^C2 - 1 ─►[K2]─►[clip]─►(+)─►[   1   ]─► t
                          VINVMIN  ▲   [s + KFB]
                                 fixed      TMIN
-         IINST
-rate ─►[ 1 ]─► iref ─►[    1     ]─► if
-       [ s ]          [1 + sTAOEL]
-         ILIM
+       IINST
+rate ─►[ 1 ]─ iref ─►[    1     ]─► if
+       [ s ]         [1 + sTAOEL]
+       ILIM
                              VOELMAX3
 if + bias - iact ─►[    KPOEL + KIOEL/s   ]─► v
                    [+ sKDOEL/(1 + sTDOEL) ]
