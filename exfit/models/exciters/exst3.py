@@ -1,14 +1,14 @@
 """EXST3: controlled rectifier with a field voltage loop (IEEE type ST3 of 1981).
 
-         vsum VIMAX                         VRMAX           EFDMAX
+          vsum   VIMAX                        VRMAX           EFDMAX
             ▼
-vref + vs ►(+)►[clip]►[ KJ ]►[1 + sTC]─►(+)─►[  KA  ]─►(x)─►[clip]─┬─► efd
-           -▲  VIMIN         [1 + sTB]  -▲   [1+sTA]    ▲          │
-            │                            │    VRMIN    VB          │
-            │                            │                         │
-vc1 ►[  1  ]┘                            └─[smaller]◄────────[ KG ]┘
-     [1+sTR]                                  ▲
-                                            VGMAX
+vref + vs ►(+)──►[clip]►[ KJ ]►[1 + sTC]─►(+)─►[  KA  ]─►(x)─►[clip]─┬─► efd
+           -▲    VIMIN         [1 + sTB]  -▲   [1+sTA]    ▲          │
+            │                              │    VRMIN    VB          │
+            │                              │                         │
+vc1 ►[  1  ]┘                              └─[smaller]◄────────[ KG ]┘
+     [1+sTR]                                    ▲
+                                              VGMAX
 
 VB = VE FEX(KC IFD / VE) with VE = |KP∠THETAP VT + j (KI + KP∠THETAP XL) IT|,
 THETAP in degrees (OPAL-RT's model takes radians). The limits of the lag are

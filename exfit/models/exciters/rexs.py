@@ -1,12 +1,12 @@
 """REXS: general purpose rotating exciter (PSS/E REXSYS, PSLF rexs).
 
-         vsum VIMAX                                   F VRMAX
+          vsum   VIMAX                                  F VRMAX
             ▼
-vref + vs ►(+)►[clip]►[KVP + KVI/s]►[1+sTC1]►[1+sTC2]►[  1  ]─► VR
-          -▲ ▲--VIMAX               [1+sTB1] [1+sTB2] [1+sTA]
-           │ │                                        F VRMIN
-           │ └─[1 + sTF1]◄─[  sKF  ]◄─ VR, VFE or efd for FBF = 0, 1 or 2
-vc1►[  1  ]┘   [1 + sTF2]  [1 + sTF]
+vref + vs ►(+)──►[clip]►[KVP + KVI/s]►[1+sTC1]►[1+sTC2]►[  1  ]─► VR
+          -▲ ▲-  -VIMAX               [1+sTB1] [1+sTB2] [1+sTA]
+           │ │                                          F VRMIN
+           │ └───[1 + sTF1]◄─[  sKF  ]◄─ VR, VFE or efd for FBF = 0, 1 or 2
+vc1►[  1  ]┘     [1 + sTF2]  [1 + sTF]
     [1+sTR]
 
            F VFMAX        F VFMAX      VE >= 0
