@@ -277,6 +277,7 @@ def test_a_gate_before_the_pid_takes_the_error_over(name):
     np.testing.assert_allclose(after(name, p, 0.0, {"vuel": 0.01}, 0.5), expected, rtol=1e-12)
 
 
+@pytest.mark.long
 def test_the_second_gates_of_ac7c_take_the_reference_of_the_inner_loop_over():
     """At rest KF1 efd is what the gate gives: the inner loop has an integral."""
     p = parameters("AC7C", KF2=0.0)
@@ -284,6 +285,7 @@ def test_the_second_gates_of_ac7c_take_the_reference_of_the_inner_loop_over():
         assert after("AC7C", p, vref, {gate: x})[-1] == pytest.approx(x / p.KF1, rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_gates_of_ac3c_and_ac4c_take_the_input_of_the_regulator_over():
     for share, gate, vref in ((1.1, "voel", 0.5), (0.9, "vuel", -0.5)):
         p = parameters("AC4C")

@@ -211,6 +211,7 @@ def test_a_gate_at_the_input_replaces_the_error(name):
         assert np.ptp(gated) > 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("limiter", "gate"), [("vuel", "U"), ("voel", "O")])
 def test_st5c_changes_its_lead_lags_while_a_limiter_has_the_gate(limiter, gate):
     values = lively_values("ST5C")
@@ -223,6 +224,7 @@ def test_st5c_changes_its_lead_lags_while_a_limiter_has_the_gate(limiter, gate):
     assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
 
 
+@pytest.mark.long
 def test_st9c_changes_the_time_of_its_integral_while_uel_has_the_gate():
     """To the share KU times what UEL adds."""
     for KU, share in ((1e5, 1.0), (10.0, 0.5), (0.0, 0.0)):
@@ -246,6 +248,7 @@ def test_a_gate_at_the_output_is_the_output(name):
         assert efd == pytest.approx(vb * output)
 
 
+@pytest.mark.long
 def test_oel_takes_the_output_of_the_regulator_of_st9c():
     values = lively_values("ST9C") | {"TAS": 0.0}
     p = SimpleNamespace(**values)
@@ -253,6 +256,7 @@ def test_oel_takes_the_output_of_the_regulator_of_st9c():
     assert efd == pytest.approx(0.1 * p.KAS * bridge(p))
 
 
+@pytest.mark.long
 def test_the_field_current_loop_of_st8c_feeds_the_current_back_and_has_the_gates():
     """A step of the current is taken through KF / (1 + sTF), and a gate holds what is left."""
     values = drawn_values("ST8C", 3) | {"KC1": 0.0}
@@ -267,6 +271,7 @@ def test_the_field_current_loop_of_st8c_feeds_the_current_back_and_has_the_gates
         assert np.abs(efd - EFD - expected).max() < 1e-6 * np.abs(expected).max() + 1e-12
 
 
+@pytest.mark.long
 def test_the_second_source_of_st8c_is_added_on_load():
     values = lively_values("ST8C")
     u, p, x = standing("ST8C", values, efd=2.0, vt=0.97, ifd=2.1, p=0.8, q=0.35)
@@ -277,6 +282,7 @@ def test_the_second_source_of_st8c_is_added_on_load():
     assert vb2 > 0.1
 
 
+@pytest.mark.long
 def test_the_field_current_limit_of_st6c_holds_its_output_and_its_pid():
     """17.33 (KCI ILR - IFD) of the standard's data; the PID does not wind up beyond it."""
     values = lively_values("ST6C") | {"TG": 0.02, "KG": 0.0, "TA": 0.0, "VMMAX": 99.0, "KFF": 0.5}
@@ -294,6 +300,7 @@ def test_the_field_current_limit_of_st6c_holds_its_output_and_its_pid():
     assert returned[-1] < up[-1]
 
 
+@pytest.mark.long
 def test_the_stabiliser_of_st1c_is_added_where_vos_says():
     """At the error it is a step of the reference; behind it it is added to VA."""
     values = lively_values("ST1C")
@@ -304,6 +311,7 @@ def test_the_stabiliser_of_st1c_is_added_where_vos_says():
     assert behind[0] - EFD == pytest.approx(0.01, abs=1e-12)
 
 
+@pytest.mark.long
 def test_the_field_voltage_loop_of_st4c_closes_on_itself():
     """The PI sees the very field voltage that it gives, whatever limit or gate cuts it."""
     rng = np.random.default_rng(11)
