@@ -25,6 +25,7 @@ from exfit.fitting.build import build_experiments
 from exfit.fitting.overrides import changed_values, read_parameters, with_given_values
 from exfit.fitting.parameters import FreeParameter
 from exfit.models import MODELS
+from exfit.models.families import without_doubles
 from exfit.output import terminal
 from exfit.output.report import html
 from exfit.records.record import Record
@@ -210,8 +211,10 @@ def test_bounds_that_are_never_met_do_not_matter(strategy):
     assert np.allclose(*ends, rtol=1e-5)  # the record is noiseless: both end at k = 4, a = 2
 
 
-# each model meets a start on one side, by one method, its neighbours the others
-IN_TURN = [*zip(MODELS, cycle(product((0.5, 1.6), ("dgn", "lm"))), strict=False)]
+# each model meets a start on one side, by one method, its neighbours the others; a form of 2016 has
+# the gains and times of that of 2005
+DISTINCT = without_doubles("AC1A", MODELS)
+IN_TURN = [*zip(DISTINCT, cycle(product((0.5, 1.6), ("dgn", "lm"))), strict=False)]
 
 
 @pytest.mark.long
