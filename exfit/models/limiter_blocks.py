@@ -17,14 +17,29 @@ def power(x: Signal, exponent: Signal) -> Signal:
     return exp(exponent * log(larger(x, LEAST_CURRENT)))
 
 
+def magnitude(ip: Signal, iq: Signal) -> Signal:
+    """Return the magnitude of a current, which is never quite zero."""
+    return sqrt(larger(ip * ip + iq * iq, LEAST_CURRENT * LEAST_CURRENT))
+
+
 def stator_current(u: Signal) -> Signal:
     """Return the magnitude of the stator current, which is never quite zero."""
-    return sqrt(larger(u.p * u.p + u.q * u.q, LEAST_CURRENT * LEAST_CURRENT)) / u.vt
+    return magnitude(u.p, u.q) / u.vt
 
 
 def timer(runs: Signal, x: Signal, most: Signal) -> Limited:
     """Return the slope of a timer: it counts seconds, up to ``most``, and is 0 unless it runs."""
     return limited(where(runs, 1.0, 0.0), x, 0.0, where(runs, most + BEYOND, 0.0))
+
+
+def timers(
+    over: Signal, below: Signal, actual: Signal, limit: Signal, delay: Signal, p: Signal
+) -> tuple[Signal, Signal]:
+    """Return the slopes of the timers above and below a limit."""
+    return (
+        timer(actual > limit, over, delay),
+        timer(limit > actual + p.ITHOFF, below, p.TOFF),
+    )
 
 
 def latch(sets: Signal, resets: Signal) -> Limited:

@@ -108,6 +108,20 @@ class ProgramSimulator(TwinSimulator):
             "signals": list(self.signals),
         }
 
+    def put_remembered(
+        self,
+        samples: Array,
+        sets: Sequence[Values],
+        outputs: tuple[str, ...],
+        tests: Sequence[Simulator] | None,
+    ) -> None:
+        """Put the runs that the program remembers in the place of samples (K, M, ny) of K sets."""
+        simulators = [self] * len(sets) if tests is None else tests
+        for k, (simulator, values) in enumerate(zip(simulators, sets, strict=True)):
+            run = self.program.remembered(_request(simulator, values))
+            if run is not None:
+                _put(samples[k], run, outputs)
+
 
 class ExternalSimulator(ProgramSimulator):
     """Simulates its signals in another program; exact derivatives are those of the twin."""
@@ -260,9 +274,7 @@ class LinearSimulator(ProgramSimulator):
             place = self._coordinates.place(values, simulator)
             linear = self._samples + self._slopes @ self._coordinates.along(place - here)
             _put(samples[k], _Linear(dict(zip(self.signals, linear.T, strict=True))), outputs)
-            run = self.program.remembered(_request(simulator, values))
-            if run is not None:
-                _put(samples[k], run, outputs)
+        self.put_remembered(samples, sets, outputs, tests)
         return samples, parts
 
     def tangents_of_many(
@@ -332,11 +344,7 @@ class CorrectedSimulator(ProgramSimulator):
         """Return outputs (K, M, ny) of K sets, corrected."""
         samples, parts = super().samples_of_many(sets, outputs, tests)
         samples = samples + self._added(outputs)
-        for k, values in enumerate(sets):
-            simulator = self if tests is None else tests[k]
-            run = self.program.remembered(_request(simulator, values))
-            if run is not None:
-                _put(samples[k], run, outputs)
+        self.put_remembered(samples, sets, outputs, tests)
         return samples, parts
 
     def tangents_of_many(

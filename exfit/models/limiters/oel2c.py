@@ -49,7 +49,7 @@ from exfit.models.limiter_blocks import (
     rate_of_reference,
     regulator,
     regulator_rest,
-    timer,
+    timers,
 )
 from exfit.models.sheet import record, sheet
 
@@ -128,8 +128,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     rate = rate_of_reference(current, left >= p.KZRU * p.TFCL, left <= 0.0, p)
     d.IREF = limited(rate, s.IREF, p.ILIM, p.IINST)
     filtered, d.IF = lag(iref, s.IF, 1.0, p.TAOEL)
-    d.OVER = timer(actual > iref, s.OVER, p.TEN)
-    d.BELOW = timer(iref > actual + p.ITHOFF, s.BELOW, p.TOFF)
+    d.OVER, d.BELOW = timers(s.OVER, s.BELOW, actual, iref, p.TEN, p)
     d.ACTIVE = activity(s, t, iref, p)
     error = filtered - actual + where(s.ACTIVE > 0.5, 0.0, p.IRESET)
     return regulator(error, s, p, d, "OEL")

@@ -51,11 +51,12 @@ from exfit.models.limiter_blocks import (
     counting,
     latch,
     leaky_rest,
+    magnitude,
     rate_of_reference,
     regulator,
     regulator_rest,
     stator_current,
-    timer,
+    timers,
 )
 from exfit.models.sheet import sheet
 
@@ -192,21 +193,6 @@ def scaled(s: Signal, u: Signal, p: Signal, side: str) -> tuple[Signal, Signal, 
         for x, name in parts
     )
     return magnitude(ip, iq), iq, d_ip, d_iq
-
-
-def magnitude(ip: Signal, iq: Signal) -> Signal:
-    """Return the magnitude of a current, which is never quite zero."""
-    return sqrt(larger(ip * ip + iq * iq, LEAST_CURRENT * LEAST_CURRENT))
-
-
-def timers(
-    over: Signal, below: Signal, actual: Signal, limit: Signal, delay: Signal, p: Signal
-) -> tuple[Signal, Signal]:
-    """Return the slopes of the timers above and below a limit."""
-    return (
-        timer(actual > limit, over, delay),
-        timer(limit > actual + p.ITHOFF, below, p.TOFF),
-    )
 
 
 def rest(scl: Signal, u: Signal, p: Signal, x: Signal) -> None:
