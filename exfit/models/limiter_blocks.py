@@ -73,6 +73,22 @@ def rate_of_reference(current: Signal, up_when: Signal, down_when: Signal, p: Si
     return where(up_when, up, where(down_when, down, 0.0))
 
 
+def timed_reference(
+    current: Signal, s: Signal, p: Signal, d: Signal, time: Signal, at_once: Signal = False
+) -> tuple[Signal, Signal]:
+    """Write the slopes of a timer T and of a reference IREF and return T and the reference.
+
+    The reference goes down once T reaches ``time``, or ``at_once``.
+    """
+    t = clip(s.T, p.TMIN, p.TMAX)
+    d.T = limited(counting(current, p) - p.KFB * t, s.T, p.TMIN, p.TMAX)
+    iref = clip(s.IREF, p.ILIM, p.IINST)
+    left = time - t
+    rate = rate_of_reference(current, left >= p.KZRU * time, (left <= 0.0) | at_once, p)
+    d.IREF = limited(rate, s.IREF, p.ILIM, p.IINST)
+    return t, iref
+
+
 def regulator(error: Signal, s: Signal, p: Signal, d: Signal, side: str, own: str = "") -> Signal:
     """Write the slopes of a PID and its two lead-lags and return their output.
 

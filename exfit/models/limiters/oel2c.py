@@ -40,15 +40,15 @@ data are the first set of the standard's sample data (GridKit, PSCAD).
 """
 
 from exfit.engine.trace import Signal
-from exfit.models.blocks import Limited, clip, lag, limited, where
+from exfit.models.blocks import Limited, lag, where
 from exfit.models.limiter_blocks import (
     BEYOND,
     counting,
     latch,
     leaky_rest,
-    rate_of_reference,
     regulator,
     regulator_rest,
+    timed_reference,
     timers,
 )
 from exfit.models.sheet import record, sheet
@@ -121,12 +121,7 @@ def equations(s: Signal, u: Signal, p: Signal, d: Signal) -> Signal:
     """Write the slopes of the states into d and return voel."""
     current, d.I = lag(u.ifd, s.I, p.KSCALE, p.TROEL)
     actual = p.KACT * current
-    t = clip(s.T, p.TMIN, p.TMAX)
-    d.T = limited(counting(current, p) - p.KFB * t, s.T, p.TMIN, p.TMAX)
-    iref = clip(s.IREF, p.ILIM, p.IINST)
-    left = p.TFCL - t
-    rate = rate_of_reference(current, left >= p.KZRU * p.TFCL, left <= 0.0, p)
-    d.IREF = limited(rate, s.IREF, p.ILIM, p.IINST)
+    t, iref = timed_reference(current, s, p, d, p.TFCL)
     filtered, d.IF = lag(iref, s.IF, 1.0, p.TAOEL)
     d.OVER, d.BELOW = timers(s.OVER, s.BELOW, actual, iref, p.TEN, p)
     d.ACTIVE = activity(s, t, iref, p)

@@ -43,7 +43,7 @@ else is chosen so that it waits at rated current: take the plant's own.
 """
 
 from exfit.engine.trace import Signal, sqrt
-from exfit.models.blocks import clip, lag, larger, limited, smaller, where
+from exfit.models.blocks import lag, larger, smaller, where
 from exfit.models.limiter_blocks import (
     BEYOND,
     LEAST_CURRENT,
@@ -52,10 +52,10 @@ from exfit.models.limiter_blocks import (
     latch,
     leaky_rest,
     magnitude,
-    rate_of_reference,
     regulator,
     regulator_rest,
     stator_current,
+    timed_reference,
     timers,
 )
 from exfit.models.sheet import sheet
@@ -168,16 +168,10 @@ def reference(
 ) -> tuple[Signal, Signal, Signal]:
     """Return whether the time is over, the reference of the current, and what the sides see."""
     current, d.I = lag(stator_current(u), s.I, 1.0, p.TITSCL)
-    t = clip(s.T, p.TMIN, p.TMAX)
-    d.T = limited(counting(current, p) - p.KFB * t, s.T, p.TMIN, p.TMAX)
-    iref = clip(s.IREF, p.ILIM, p.IINST)
-    left = p.TSCL - t
-    down = (left <= 0.0) | (v < p.VTRESET)
-    rate = rate_of_reference(current, left >= p.KZRU * p.TSCL, down, p)
-    d.IREF = limited(rate, s.IREF, p.ILIM, p.IINST)
+    t, iref = timed_reference(current, s, p, d, p.TSCL, v < p.VTRESET)
     active, d.IPREF = lag(u.p / u.vt, s.IPREF, p.KPREF, p.TIPOEL)
     filtered, d.IF = lag(beside(iref, active), s.IF, 1.0, p.TAOEL)
-    return left <= 0.0, iref, filtered
+    return t >= p.TSCL, iref, filtered
 
 
 def beside(iref: Signal, active: Signal) -> Signal:
